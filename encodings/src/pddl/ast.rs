@@ -1,0 +1,383 @@
+//! The syntax tree of PDDL: what the parser makes of a file, before names are resolved.
+//!
+//! The tree keeps the source position of everything that a message may have to point at. Names keep
+//! the spelling of the file and compare without regard to case, as PDDL wants it [1].
+//!
+//! [1] M. Fox, D. Long: PDDL2.1, an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
+
+use std::fmt;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use num_rational::BigRational;
+
+/// A region of one source text, in bytes from its beginning; `end` is exclusive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Span {
+    /// First byte.
+    pub start: u32,
+    /// One past the last byte.
+    pub end: u32,
+}
+
+/// A PDDL name as written; equality, order and hash ignore ASCII case.
+#[derive(Clone)]
+pub struct Name(Arc<str>);
+
+impl Name {
+    /// The name with the given spelling.
+    pub fn new(written: &str) -> Self {
+        Self(written.into())
+    }
+
+    /// The spelling in the source.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    fn folded(&self) -> impl Iterator<Item = u8> + '_ {
+        self.0.bytes().map(|byte| byte.to_ascii_lowercase())
+    }
+}
+
+impl PartialEq for Name {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.eq_ignore_ascii_case(&other.0)
+    }
+}
+
+impl Eq for Name {}
+
+impl Hash for Name {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.folded().for_each(|byte| state.write_u8(byte));
+        state.write_u8(0xff);
+    }
+}
+
+impl PartialOrd for Name {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Name {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.folded().cmp(other.folded())
+    }
+}
+
+impl fmt::Debug for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}", &self.0)
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// A name at a place.
+#[derive(Debug, Clone)]
+pub struct Identifier {
+    /// The name.
+    pub name: Name,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// The type of a typed-list entry: one name, or `either` of several; empty means `object`.
+#[derive(Debug, Clone, Default)]
+pub struct TypeExpression {
+    /// The alternatives.
+    pub alternatives: Vec<Identifier>,
+}
+
+/// An entry of a typed list. Variables are stored without their question mark.
+#[derive(Debug, Clone)]
+pub struct TypedName {
+    /// The variable, object or type that is introduced.
+    pub identifier: Identifier,
+    /// Its type.
+    pub r#type: TypeExpression,
+}
+
+/// A domain file.
+#[derive(Debug, Clone)]
+pub struct Domain {
+    /// `(domain NAME)`.
+    pub name: Identifier,
+    /// The requirement flags, without their colon.
+    pub requirements: Vec<Identifier>,
+    /// `:types`.
+    pub types: Vec<TypedName>,
+    /// `:constants`.
+    pub constants: Vec<TypedName>,
+    /// `:predicates`.
+    pub predicates: Vec<Declaration>,
+    /// `:functions`, all of them numeric.
+    pub functions: Vec<Declaration>,
+    /// `:derived` axioms, in the order of the file.
+    pub derived: Vec<Derived>,
+    /// `:action` and `:durative-action`, in the order of the file.
+    pub actions: Vec<Action>,
+}
+
+/// The declaration of a predicate or of a numeric function.
+#[derive(Debug, Clone)]
+pub struct Declaration {
+    /// Its name.
+    pub identifier: Identifier,
+    /// Its parameters.
+    pub parameters: Vec<TypedName>,
+}
+
+/// `(:derived (HEAD PARAMETERS) CONDITION)`.
+#[derive(Debug, Clone)]
+pub struct Derived {
+    /// The derived predicate with the variables that the body may use.
+    pub head: Declaration,
+    /// When it holds.
+    pub condition: Condition,
+    /// The whole axiom.
+    pub span: Span,
+}
+
+/// An action schema.
+#[derive(Debug, Clone)]
+pub struct Action {
+    /// Its name; two schemas may share one.
+    pub identifier: Identifier,
+    /// Its parameters.
+    pub parameters: Vec<TypedName>,
+    /// What it needs and does.
+    pub body: ActionBody,
+    /// The whole schema.
+    pub span: Span,
+}
+
+/// What an action needs and does.
+#[derive(Debug, Clone)]
+pub enum ActionBody {
+    /// `:action`.
+    Instantaneous {
+        /// `:precondition`; an empty conjunction where the file has none.
+        precondition: Condition,
+        /// `:effect`.
+        effect: Effect,
+    },
+    /// `:durative-action`.
+    Durative {
+        /// `:duration`: all of these bound `?duration`.
+        duration: Vec<DurationConstraint>,
+        /// `:condition`, flattened: a conjunction of conditions, each at its time.
+        conditions: Vec<(ConditionTime, Condition)>,
+        /// `:effect`, flattened: all effects, each at its time.
+        effects: Vec<(EffectTime, Effect)>,
+    },
+}
+
+/// `([at start|at end] (OPERATOR ?duration EXPRESSION))`.
+#[derive(Debug, Clone)]
+pub struct DurationConstraint {
+    /// When the expression is evaluated; `AtStart` unless the file says otherwise.
+    pub time: EffectTime,
+    /// How `?duration` compares with the expression.
+    pub operator: Comparison,
+    /// The bound, in the domain's time unit.
+    pub expression: Expression,
+    /// The whole constraint.
+    pub span: Span,
+}
+
+/// When a condition of a durative action must hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ConditionTime {
+    /// In the state in which the action starts.
+    AtStart,
+    /// In the open interval between start and end.
+    OverAll,
+    /// In the state in which the action ends.
+    AtEnd,
+}
+
+/// When an effect of a durative action takes place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum EffectTime {
+    /// At the start of the action.
+    AtStart,
+    /// At its end.
+    AtEnd,
+}
+
+/// A variable or a constant.
+#[derive(Debug, Clone)]
+pub enum Term {
+    /// `?x`, stored as `x`.
+    Variable(Identifier),
+    /// An object or a domain constant.
+    Constant(Identifier),
+}
+
+/// A predicate or a numeric function applied to terms.
+#[derive(Debug, Clone)]
+pub struct Atom {
+    /// The predicate or the function.
+    pub predicate: Identifier,
+    /// Its arguments.
+    pub arguments: Vec<Term>,
+    /// The whole atom, with its parentheses if it has any.
+    pub span: Span,
+}
+
+/// A goal description.
+#[derive(Debug, Clone)]
+pub enum Condition {
+    /// `(and …)`; the empty conjunction is true.
+    And(Vec<Condition>),
+    /// `(or …)`; the empty disjunction is false.
+    Or(Vec<Condition>),
+    /// `(not …)`.
+    Not(Box<Condition>),
+    /// `(imply A B)`.
+    Imply(Box<Condition>, Box<Condition>),
+    /// `(exists (…) …)`.
+    Exists(Vec<TypedName>, Box<Condition>),
+    /// `(forall (…) …)`.
+    ForAll(Vec<TypedName>, Box<Condition>),
+    /// An atom.
+    Atom(Atom),
+    /// `(= t1 t2)` between terms.
+    Equal(Term, Term, Span),
+    /// A comparison of numbers.
+    Compare(Comparison, Expression, Expression, Span),
+}
+
+/// How two numbers compare.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Comparison {
+    /// `<`
+    Less,
+    /// `<=`
+    LessOrEqual,
+    /// `=`
+    Equal,
+    /// `>=`
+    GreaterOrEqual,
+    /// `>`
+    Greater,
+}
+
+/// A numeric expression.
+#[derive(Debug, Clone)]
+pub enum Expression {
+    /// A number, exactly as written.
+    Number(BigRational, Span),
+    /// A numeric function.
+    Fluent(Atom),
+    /// `?duration`, inside durative actions.
+    Duration(Span),
+    /// `total-time`, inside the metric.
+    TotalTime(Span),
+    /// `(+ …)`, `(* …)` with one or more operands; `(- a)` and `(- a b)`; `(/ a b)`.
+    Operation(Arithmetic, Vec<Expression>, Span),
+}
+
+/// An arithmetic operation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Arithmetic {
+    /// Sum.
+    Add,
+    /// Difference, or negation of one operand.
+    Subtract,
+    /// Product.
+    Multiply,
+    /// Quotient.
+    Divide,
+}
+
+/// An effect.
+#[derive(Debug, Clone)]
+pub enum Effect {
+    /// `(and …)`.
+    And(Vec<Effect>),
+    /// An atom becomes true.
+    Add(Atom),
+    /// An atom becomes false.
+    Delete(Atom),
+    /// `(forall (…) …)`.
+    ForAll(Vec<TypedName>, Box<Effect>),
+    /// `(when CONDITION EFFECT)`; in a durative action both at the time of the entry they stand in.
+    When(Condition, Box<Effect>),
+    /// A numeric effect.
+    Assign(Assignment, Atom, Expression, Span),
+}
+
+/// What a numeric effect does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Assignment {
+    /// `assign`
+    Assign,
+    /// `increase`
+    Increase,
+    /// `decrease`
+    Decrease,
+    /// `scale-up`
+    ScaleUp,
+    /// `scale-down`
+    ScaleDown,
+}
+
+/// A problem file.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// `(problem NAME)`.
+    pub name: Identifier,
+    /// `(:domain NAME)`.
+    pub domain: Identifier,
+    /// The requirement flags, without their colon.
+    pub requirements: Vec<Identifier>,
+    /// `:objects`.
+    pub objects: Vec<TypedName>,
+    /// `:init`.
+    pub init: Vec<InitialElement>,
+    /// `:goal`.
+    pub goal: Condition,
+    /// `:metric`.
+    pub metric: Option<Metric>,
+}
+
+/// One entry of `:init`.
+#[derive(Debug, Clone)]
+pub enum InitialElement {
+    /// An atom that holds.
+    Fact(Atom),
+    /// `(not ATOM)`: says again what the closed world says already.
+    NegatedFact(Atom),
+    /// `(= FUNCTION NUMBER)`.
+    Value(Atom, BigRational, Span),
+    /// `(at TIME LITERAL)`: a timed initial literal; the flag is false for a negated one.
+    Timed(BigRational, Atom, bool, Span),
+}
+
+/// `(:metric DIRECTION EXPRESSION)`.
+#[derive(Debug, Clone)]
+pub struct Metric {
+    /// Whether less or more is better.
+    pub direction: Direction,
+    /// What is measured in the final state.
+    pub expression: Expression,
+    /// The whole metric.
+    pub span: Span,
+}
+
+/// Whether less or more is better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// Less is better.
+    Minimize,
+    /// More is better.
+    Maximize,
+}

@@ -1,0 +1,3 @@
+//! PDDL text to syntax tree and back.
+
+pub mod ast;

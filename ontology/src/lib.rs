@@ -1,0 +1,1 @@
+//! What the robot is: OWL 2 knowledge bases, read and lowered to rules and facts.

@@ -1,0 +1,1 @@
+//! What follows: SWRL and Datalog rules over interned facts, maintained incrementally.

@@ -1,0 +1,1 @@
+//! Metaplan: a robot's task plan and its software architecture, adapted together.
