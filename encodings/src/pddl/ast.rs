@@ -160,6 +160,7 @@ pub struct Action {
 
 /// What an action needs and does.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "a domain has few actions, and patterns stay flat")]
 pub enum ActionBody {
     /// `:action`.
     Instantaneous {

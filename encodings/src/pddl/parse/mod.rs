@@ -1,0 +1,190 @@
+//! Trees of lists to the syntax tree, reporting every problem and going on behind each.
+//!
+//! A part that cannot be read is left out, so the tree that comes back together with errors is incomplete.
+
+mod condition;
+mod domain;
+mod durative;
+mod effect;
+mod expression;
+mod init;
+mod problem;
+mod typed;
+
+use rustc_hash::FxHashMap;
+
+use super::ast::{Domain, Identifier, Name, Problem, Span};
+use super::diagnostic::{Diagnostic, Sink};
+use super::number::{Literal, literal};
+use super::sexp::{self, Item};
+use super::source::Source;
+
+/// Reads a domain. With errors the tree lacks what could not be read; it is absent where the text has no
+/// `(define (domain …) …)`.
+pub fn parse_domain(source: &Source) -> (Option<Domain>, Vec<Diagnostic>) {
+    let parsed = domain(source);
+    (parsed.tree, parsed.diagnostics)
+}
+
+/// Reads a problem, as [`parse_domain`] does a domain.
+pub fn parse_problem(source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
+    let parsed = problem(source);
+    (parsed.tree, parsed.diagnostics)
+}
+
+/// What came out of a text.
+#[derive(Debug)]
+pub(super) struct Parsed<T> {
+    pub(super) tree: Option<T>,
+    pub(super) diagnostics: Vec<Diagnostic>,
+    /// Whether the declarations were read without errors, so that a name not found in them is an error of its own.
+    pub(super) declarations_intact: bool,
+}
+
+pub(super) fn domain(source: &Source) -> Parsed<Domain> {
+    parse(source, Parser::domain)
+}
+
+pub(super) fn problem(source: &Source) -> Parsed<Problem> {
+    parse(source, Parser::problem)
+}
+
+fn parse<'s, T>(source: &'s Source, build: impl FnOnce(&mut Parser<'s>, Item<'_>) -> Option<T>) -> Parsed<T> {
+    let mut sink = Sink::new(source);
+    let tree = sexp::read(source.text(), &mut sink);
+    let well_formed = !sink.has_errors();
+    let mut parser = Parser {
+        sink,
+        names: FxHashMap::default(),
+        declarations_intact: well_formed,
+        has_unknown_section: false,
+    };
+    let tree = tree.and_then(|tree| {
+        let define = parser.define(tree.top())?;
+        build(&mut parser, define)
+    });
+    Parsed { tree, declarations_intact: parser.declarations_intact, diagnostics: parser.sink.finish() }
+}
+
+/// What the parts of the parser share.
+struct Parser<'s> {
+    sink: Sink<'s>,
+    /// One allocation for each spelling.
+    names: FxHashMap<Box<str>, Name>,
+    declarations_intact: bool,
+    /// Whether a section was reported as unknown, so that a missing one may be just that.
+    has_unknown_section: bool,
+}
+
+impl Parser<'_> {
+    /// The `(define …)` of a text.
+    fn define<'t>(&mut self, top: sexp::Items<'t>) -> Option<Item<'t>> {
+        let mut define = None;
+        for item in top {
+            match define {
+                None if item.is_headed("define") => define = Some(item),
+                _ => {
+                    let what = if item.is_list() { "this list" } else { "this word" };
+                    self.sink
+                        .error("P104", at_start(item), format!("{what} stands outside of the definition"))
+                        .help("a file has one `(define …)` and nothing else");
+                }
+            }
+        }
+        if define.is_none() && !self.sink.has_errors() {
+            self.sink
+                .error("P100", Span::default(), "the file is empty")
+                .help("a domain begins with `(define (domain …)`, a problem with `(define (problem …)`");
+        }
+        define
+    }
+
+    fn name(&mut self, written: &str) -> Name {
+        if let Some(name) = self.names.get(written) {
+            return name.clone();
+        }
+        let name = Name::new(written);
+        self.names.insert(written.into(), name.clone());
+        name
+    }
+
+    fn identifier(&mut self, written: &str, span: Span) -> Identifier {
+        Identifier { name: self.name(written), span }
+    }
+
+    /// A name; `what` says of what, for the message.
+    fn name_item(&mut self, item: Item<'_>, what: &str) -> Option<Identifier> {
+        match item.symbol() {
+            Some(symbol) if !symbol.starts_with(['?', ':']) => Some(self.identifier(symbol, item.span())),
+            Some(symbol) => {
+                self.sink.error("P106", item.span(), format!("`{symbol}` is not {what}"));
+                None
+            }
+            None => {
+                self.sink.error("P106", at_start(item), format!("this is a list, expected {what}"));
+                None
+            }
+        }
+    }
+
+    /// A syntax error at the beginning of an item: what was found there is not what is expected.
+    fn expected(&mut self, item: Item<'_>, what: &str) -> &mut Diagnostic {
+        let found = match item.symbol() {
+            Some(symbol) => format!("`{symbol}`"),
+            None => match item.head() {
+                Some(head) => format!("`({head} …)`"),
+                None => "a list".to_owned(),
+            },
+        };
+        self.sink.error("P106", at_start(item), format!("expected {what}, found {found}"))
+    }
+
+    /// A construct that is known and not planned with.
+    fn refuse(&mut self, item: Item<'_>, what: &str) -> &mut Diagnostic {
+        self.sink.error("P113", at_start(item), format!("{what} are not supported"))
+    }
+
+    /// Exactly `N` operands of a list, or an error that shows the form that is right.
+    fn operands<'t, const N: usize>(&mut self, list: Item<'t>, form: &str) -> Option<[Item<'t>; N]> {
+        let operands: Vec<_> = list.rest().collect();
+        let count = operands.len();
+        let operands = operands.try_into().ok();
+        if operands.is_none() {
+            let head = list.head().unwrap_or_default();
+            let plural = if N == 1 { "" } else { "s" };
+            self.sink
+                .error("P108", list_start(list), format!("`{head}` takes {N} operand{plural}, found {count}"))
+                .help(format!("write `{form}`"));
+        }
+        operands
+    }
+
+    /// The number that a symbol is.
+    fn number(&mut self, item: Item<'_>) -> Option<num_rational::BigRational> {
+        match item.symbol().map(literal) {
+            Some(Literal::Number(value)) => Some(value),
+            Some(Literal::TooLong) => {
+                self.sink.error("P105", item.span(), "this number is too long");
+                None
+            }
+            _ => {
+                self.expected(item, "a number");
+                None
+            }
+        }
+    }
+}
+
+/// Where the eye should go for an item: a symbol whole, of a list its parenthesis and its head.
+fn at_start(item: Item<'_>) -> Span {
+    if item.is_list() { list_start(item) } else { item.span() }
+}
+
+fn list_start(list: Item<'_>) -> Span {
+    let span = list.span();
+    let end = match list.items().next() {
+        Some(first) if !first.is_list() => first.span().end,
+        _ => span.start + 1,
+    };
+    Span { start: span.start, end }
+}

@@ -1,0 +1,274 @@
+//! Text to a tree of parenthesised lists, with recovery from parentheses that do not match.
+//!
+//! The tree is one flat vector in the order of the text: a list is followed by its items and knows where
+//! they end. Reading is iterative and nothing is freed recursively, so no text can overflow the stack.
+
+use super::ast::Span;
+use super::diagnostic::Sink;
+
+/// The deepest nesting that is read. Everything behind the reader may recurse this far.
+const DEPTH_LIMIT: usize = 500;
+
+/// The keywords that open a section of a file. Where one stands deeper than a section can, the section
+/// before it was not closed.
+pub(super) const SECTIONS: [&str; 20] = [
+    ":requirements",
+    ":types",
+    ":constants",
+    ":predicates",
+    ":functions",
+    ":derived",
+    ":action",
+    ":durative-action",
+    ":domain",
+    ":objects",
+    ":init",
+    ":goal",
+    ":metric",
+    ":constraints",
+    ":process",
+    ":event",
+    ":axiom",
+    ":task",
+    ":method",
+    ":length",
+];
+
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    span: Span,
+    /// The index of the first node after this one and all its items.
+    next: u32,
+    is_list: bool,
+}
+
+/// The lists and symbols of a text.
+#[derive(Debug)]
+pub(super) struct Tree<'s> {
+    text: &'s str,
+    nodes: Vec<Node>,
+}
+
+/// A list or a symbol of a tree.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Item<'t> {
+    tree: &'t Tree<'t>,
+    index: u32,
+}
+
+impl<'t> Item<'t> {
+    fn node(self) -> Node {
+        self.tree.nodes[self.index as usize]
+    }
+
+    /// Where it stands, a list with its parentheses.
+    pub(super) fn span(self) -> Span {
+        self.node().span
+    }
+
+    pub(super) fn is_list(self) -> bool {
+        self.node().is_list
+    }
+
+    /// The text of a symbol; nothing for a list.
+    pub(super) fn symbol(self) -> Option<&'t str> {
+        let Node { span, is_list, .. } = self.node();
+        (!is_list).then(|| &self.tree.text[span.start as usize..span.end as usize])
+    }
+
+    /// The items of a list; none for a symbol.
+    pub(super) fn items(self) -> Items<'t> {
+        Items { tree: self.tree, next: self.index + 1, end: self.node().next }
+    }
+
+    /// The first item of a list, if it is a symbol.
+    pub(super) fn head(self) -> Option<&'t str> {
+        self.items().next().and_then(Item::symbol)
+    }
+
+    /// Whether this is a list whose first item is `keyword` in any case.
+    pub(super) fn is_headed(self, keyword: &str) -> bool {
+        self.head().is_some_and(|head| head.eq_ignore_ascii_case(keyword))
+    }
+
+    /// The items of a list behind its first.
+    pub(super) fn rest(self) -> Items<'t> {
+        let mut items = self.items();
+        items.next();
+        items
+    }
+}
+
+/// Walks over the items of a list.
+#[derive(Debug, Clone)]
+pub(super) struct Items<'t> {
+    tree: &'t Tree<'t>,
+    next: u32,
+    end: u32,
+}
+
+impl<'t> Iterator for Items<'t> {
+    type Item = Item<'t>;
+
+    fn next(&mut self) -> Option<Item<'t>> {
+        if self.next >= self.end {
+            return None;
+        }
+        let item = Item { tree: self.tree, index: self.next };
+        self.next = item.node().next;
+        Some(item)
+    }
+}
+
+impl<'s> Tree<'s> {
+    /// The lists and symbols that stand in no list.
+    pub(super) fn top(&'s self) -> Items<'s> {
+        Items { tree: self, next: 0, end: self.nodes.len() as u32 }
+    }
+}
+
+/// Reads a text, or reports why it cannot be read at all.
+pub(super) fn read<'s>(text: &'s str, sink: &mut Sink<'_>) -> Option<Tree<'s>> {
+    if u32::try_from(text.len()).is_err() {
+        sink.error("P100", Span::default(), "the file is larger than 4 GB");
+        return None;
+    }
+    let mut reader =
+        Reader { nodes: Vec::with_capacity(text.len() / 6), open: Vec::new(), sink, last_close: 0 };
+    let mut at = 0;
+    while let Some((start, end)) = next_token(text, at) {
+        let span = Span { start: start as u32, end: end as u32 };
+        match text.as_bytes()[start] {
+            b'(' => reader.open(span)?,
+            b')' => reader.close(span),
+            _ => reader.symbol(span, &text[start..end]),
+        }
+        at = end;
+    }
+    reader.end(text.len() as u32);
+    let nodes = reader.nodes;
+    Some(Tree { text, nodes })
+}
+
+/// The next parenthesis or symbol from byte `at` on.
+fn next_token(text: &str, mut at: usize) -> Option<(usize, usize)> {
+    let bytes = text.as_bytes();
+    loop {
+        match *bytes.get(at)? {
+            b';' => at += bytes[at..].iter().position(|byte| matches!(byte, b'\n' | b'\r'))?,
+            b' ' | b'\t' | b'\n' | b'\r' | 0x0b | 0x0c => at += 1,
+            b'(' | b')' => return Some((at, at + 1)),
+            byte if byte.is_ascii() => break,
+            _ => match text[at..].chars().next() {
+                Some(character) if is_space(character) => at += character.len_utf8(),
+                _ => break,
+            },
+        }
+    }
+    let ends = |(_, character): &(usize, char)| matches!(character, '(' | ')' | ';') || is_space(*character);
+    let length = text[at..].char_indices().find(ends).map_or(text.len() - at, |(length, _)| length);
+    Some((at, at + length))
+}
+
+/// White space in the wide sense: text copied from documents brings no-break spaces and byte order marks.
+fn is_space(character: char) -> bool {
+    character.is_whitespace() || character == '\u{feff}'
+}
+
+/// The state of [`read`].
+struct Reader<'r, 's> {
+    nodes: Vec<Node>,
+    /// The lists that are open, outermost first.
+    open: Vec<u32>,
+    sink: &'r mut Sink<'s>,
+    /// The end of the last parenthesis that was closed.
+    last_close: u32,
+}
+
+impl Reader<'_, '_> {
+    fn open(&mut self, span: Span) -> Option<()> {
+        if self.open.len() >= DEPTH_LIMIT {
+            let message = format!("parentheses are nested more than {DEPTH_LIMIT} deep");
+            self.sink.error("P103", span, message);
+            return None;
+        }
+        self.open.push(self.nodes.len() as u32);
+        self.nodes.push(Node { span, next: 0, is_list: true });
+        Some(())
+    }
+
+    fn symbol(&mut self, span: Span, text: &str) {
+        // Only the first item of a list opens a section, and only right below `(define`.
+        let is_first = self.open.last().is_some_and(|list| *list as usize + 1 == self.nodes.len());
+        if is_first && text.starts_with(':') && SECTIONS.iter().any(|name| name.eq_ignore_ascii_case(text)) {
+            match self.open.len() {
+                1 => self.reopen_define(span, text),
+                2 => {}
+                _ => self.close_section_before(span, text),
+            }
+        }
+        self.nodes.push(Node { span, next: self.nodes.len() as u32 + 1, is_list: false });
+    }
+
+    /// A section at top level: the `(define` before it was closed too early, so it goes on.
+    fn reopen_define(&mut self, span: Span, text: &str) {
+        // Only a definition that came first and is closed again can go on.
+        if self.open[0] == 0 || !self.nodes[0].is_list {
+            return;
+        }
+        let extra = Span { start: self.last_close - 1, end: self.last_close };
+        let source = self.sink.source();
+        self.sink
+            .error("P102", extra, "this `)` closes the whole definition, but sections follow")
+            .related(source, span, format!("`{text}` stands outside"))
+            .help("remove one `)` here or before");
+        self.open.insert(0, 0);
+    }
+
+    /// A section inside another one: what is open of that is closed here.
+    fn close_section_before(&mut self, span: Span, text: &str) {
+        let Some(list) = self.open.pop() else { return };
+        let unclosed = self.nodes[self.open[1] as usize].span;
+        let source = self.sink.source();
+        self.sink
+            .error("P101", unclosed, "this parenthesis is not closed before the next section begins")
+            .related(source, span, format!("`{text}` begins here"))
+            .help("add the missing `)` at the end of this section");
+        let end = self.nodes[list as usize].span.start;
+        for inner in self.open.drain(1..) {
+            let node = &mut self.nodes[inner as usize];
+            (node.next, node.span.end) = (list, end);
+        }
+        self.open.push(list);
+    }
+
+    fn close(&mut self, span: Span) {
+        self.last_close = span.end;
+        let Some(list) = self.open.pop() else {
+            self.sink.error("P102", span, "this `)` closes nothing").help("remove it");
+            return;
+        };
+        let next = self.nodes.len() as u32;
+        let node = &mut self.nodes[list as usize];
+        (node.next, node.span.end) = (next, span.end);
+    }
+
+    fn end(&mut self, end: u32) {
+        if let Some(innermost) = self.open.last() {
+            let span = Span {
+                end: self.nodes[*innermost as usize].span.start + 1,
+                ..self.nodes[*innermost as usize].span
+            };
+            let message = match self.open.len() {
+                1 => "this parenthesis is never closed".to_owned(),
+                count => format!("{count} parentheses are never closed, the last of them is this one"),
+            };
+            self.sink.error("P101", span, message).help("add the missing `)`");
+        }
+        let next = self.nodes.len() as u32;
+        for list in self.open.drain(..) {
+            let node = &mut self.nodes[list as usize];
+            (node.next, node.span.end) = (next, end);
+        }
+    }
+}

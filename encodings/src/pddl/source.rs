@@ -1,0 +1,97 @@
+//! A source text with its name, and where in it a byte stands.
+
+use super::ast::Span;
+
+/// A text to parse: a file, or what stands for one.
+#[derive(Debug, Clone)]
+pub struct Source {
+    name: String,
+    text: String,
+    line_starts: Vec<u32>,
+}
+
+/// A place for people: both numbers start at 1, the column counts characters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Position {
+    /// The line.
+    pub line: usize,
+    /// The column.
+    pub column: usize,
+}
+
+impl Source {
+    /// The text `text` of the file `name`.
+    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
+        let text = text.into();
+        let newlines = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        let line_starts = std::iter::once(0).chain(newlines.map(|(at, _)| at as u32 + 1)).collect();
+        Self { name: name.into(), text, line_starts }
+    }
+
+    /// The bytes `bytes` of the file `name`; what is not UTF-8 becomes U+FFFD, as comments of older
+    /// files are often Latin-1.
+    pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
+        Self::new(name, String::from_utf8_lossy(bytes))
+    }
+
+    /// The name of the file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The whole text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The text at `span`; empty where the span is not one of this text.
+    pub fn slice(&self, span: Span) -> &str {
+        self.text.get(span.start as usize..span.end as usize).unwrap_or("")
+    }
+
+    /// Line and column of a byte; that of the end for one beyond the end.
+    pub fn position(&self, byte: u32) -> Position {
+        let index = self.line_index(byte);
+        let start = self.line_starts[index] as usize;
+        let before = &self.text.as_bytes()[start..(byte as usize).clamp(start, self.text.len())];
+        // A character begins at each byte that does not continue one (10xxxxxx).
+        let column = 1 + before.iter().filter(|byte| **byte & 0xc0 != 0x80).count();
+        Position { line: index + 1, column }
+    }
+
+    /// The line in which `byte` stands, without its end of line.
+    pub(super) fn line_span(&self, byte: u32) -> Span {
+        let index = self.line_index(byte);
+        let start = self.line_starts[index] as usize;
+        let end = self.line_starts.get(index + 1).map_or(self.text.len(), |next| *next as usize - 1);
+        let end = start + self.text[start..end].trim_end_matches('\r').len();
+        Span { start: start as u32, end: end as u32 }
+    }
+
+    fn line_index(&self, byte: u32) -> usize {
+        // The first line starts at 0, so at least one start is not after `byte`.
+        self.line_starts.partition_point(|start| *start <= byte).saturating_sub(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_count_lines_and_characters() {
+        let source = Source::new("f", "ab\r\n→c\n\nx");
+        let cases = [(0, 1, 1), (1, 1, 2), (4, 2, 1), (7, 2, 2), (9, 3, 1), (10, 4, 1), (99, 4, 2)];
+        for (byte, line, column) in cases {
+            assert_eq!(source.position(byte), Position { line, column }, "byte {byte}");
+        }
+        assert_eq!(source.slice(source.line_span(1)), "ab");
+        assert_eq!(source.slice(source.line_span(9)), "");
+        assert_eq!(source.slice(Span { start: 90, end: 91 }), "");
+    }
+
+    #[test]
+    fn latin_1_is_read() {
+        assert_eq!(Source::from_bytes("f", b"; caf\xe9").text(), "; caf\u{fffd}");
+    }
+}
