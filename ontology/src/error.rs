@@ -1,0 +1,222 @@
+//! What can be wrong with a knowledge base: [`Error`] where it cannot be used, [`Warning`] where reading goes on.
+//!
+//! Codes are stable: `O1xx` errors, `O2xx` warnings of reading, `O3xx` warnings of lowering.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// A place in a document: lines and columns count from 1, columns in characters.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Position {
+    /// The document's path, or the name given for a text.
+    pub file: String,
+    /// Line, from 1.
+    pub line: u64,
+    /// Column, from 1.
+    pub column: u64,
+}
+
+impl Position {
+    /// The place `offset` bytes into `text`; the end of the text where it is shorter.
+    pub(crate) fn of_offset(file: &str, text: &[u8], offset: usize) -> Self {
+        let before = &text[..offset.min(text.len())];
+        let start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |index| index + 1);
+        Self {
+            file: file.to_owned(),
+            line: before.split(|&byte| byte == b'\n').count() as u64,
+            column: String::from_utf8_lossy(&before[start..]).chars().count() as u64 + 1,
+        }
+    }
+}
+
+impl fmt::Display for Position {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.file, self.line, self.column)
+    }
+}
+
+/// Why a knowledge base cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// O101: the file is not there or cannot be read.
+    #[error("{}: error[O101]: cannot be read: {reason}", file.display())]
+    Unreadable {
+        /// The file asked for.
+        file: PathBuf,
+        /// What the operating system says.
+        reason: String,
+    },
+    /// O102: the document breaks the grammar of its syntax.
+    #[error("{position}: error[O102]: not well-formed {syntax}: {message}")]
+    Malformed {
+        /// Where.
+        position: Position,
+        /// The syntax that its content looks like.
+        syntax: crate::Syntax,
+        /// What the parser says.
+        message: String,
+    },
+    /// O103: an import is found nowhere.
+    #[error(
+        "{file}: error[O103]: cannot find the import <{import}>; name a directory that contains it, \
+         or a catalog with <uri name=\"{import}\" uri=\"FILE\"/>"
+    )]
+    UnresolvedImport {
+        /// The document that imports.
+        file: String,
+        /// The IRI that it imports.
+        import: String,
+    },
+    /// O104: a catalog cannot be read.
+    #[error("{}: error[O104]: not a usable catalog: {reason}", file.display())]
+    Catalog {
+        /// The catalog.
+        file: PathBuf,
+        /// Why not.
+        reason: String,
+    },
+    /// O105: the merged documents do not form an OWL ontology.
+    #[error("error[O105]: the documents do not form an OWL ontology: {reason}")]
+    NotAnOntology {
+        /// Why not.
+        reason: String,
+    },
+}
+
+impl Error {
+    /// The stable code, `O1xx`.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Unreadable { .. } => "O101",
+            Self::Malformed { .. } => "O102",
+            Self::UnresolvedImport { .. } => "O103",
+            Self::Catalog { .. } => "O104",
+            Self::NotAnOntology { .. } => "O105",
+        }
+    }
+
+    /// The place in a document, where the error has one.
+    pub fn position(&self) -> Option<&Position> {
+        match self {
+            Self::Malformed { position, .. } => Some(position),
+            _ => None,
+        }
+    }
+}
+
+/// What was read differently from how it is written, or not at all. The rest of the knowledge base holds.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// O201: an entity is used and declared nowhere.
+    #[error("warning[O201]: <{iri}> is declared nowhere; read as {kind} because of its use")]
+    Undeclared {
+        /// The entity.
+        iri: String,
+        /// What it was taken for.
+        kind: &'static str,
+    },
+    /// O202: a statement that is not part of any OWL axiom or SWRL rule.
+    #[error("warning[O202]: not read: {statement} ({reason})")]
+    Unread {
+        /// The statement or its subject.
+        statement: String,
+        /// Why not.
+        reason: String,
+    },
+    /// O203: a rule that could not be read.
+    #[error("warning[O203]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
+    UnreadRule {
+        /// Ontology of the rule.
+        ontology: String,
+        /// Place among its rules, from 0.
+        position: u32,
+        /// The rule's label.
+        label: Option<String>,
+        /// Why.
+        reason: String,
+    },
+    /// O204: a rule argument that is neither a declared variable nor a known individual.
+    #[error(
+        "warning[O204]: <{iri}> in rule <{ontology}>#{position} is neither a declared variable nor an individual \
+         of the knowledge base; read as an individual"
+    )]
+    UnknownArgument {
+        /// The argument.
+        iri: String,
+        /// Ontology of the rule.
+        ontology: String,
+        /// Place among its rules, from 0.
+        position: u32,
+    },
+    /// O205: two documents declare one ontology IRI.
+    #[error("warning[O205]: {first} and {second} both declare the ontology <{iri}>; both are read")]
+    SameOntologyTwice {
+        /// The ontology IRI.
+        iri: String,
+        /// The document read first.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// O206: an import is found nowhere, and the reader was told to go on.
+    #[error("warning[O206]: {file}: the import <{import}> is left out: found nowhere")]
+    MissingImport {
+        /// The document that imports.
+        file: String,
+        /// The IRI that it imports.
+        import: String,
+    },
+    /// O301: an axiom outside the profile that is turned into rules.
+    #[error("warning[O301]: {axiom} is left out ({reason}); conclusions that need it are not drawn")]
+    OutsideProfile {
+        /// The axiom in functional-style syntax.
+        axiom: String,
+        /// What is not supported.
+        reason: String,
+    },
+    /// O302: a rule that the engine cannot evaluate.
+    #[error("warning[O302]: rule <{ontology}>#{position}{} is left out: {reason}", label_suffix(label.as_deref()))]
+    UnusableRule {
+        /// Ontology of the rule.
+        ontology: String,
+        /// Place among its rules, from 0.
+        position: u32,
+        /// The rule's label.
+        label: Option<String>,
+        /// Why.
+        reason: String,
+    },
+    /// O303: a rule is disabled in the editor, and evaluated nevertheless.
+    #[error("warning[O303]: rule <{ontology}>#{position}{} has isRuleEnabled false; it is evaluated all the same", label_suffix(label.as_deref()))]
+    DisabledRule {
+        /// Ontology of the rule.
+        ontology: String,
+        /// Place among its rules, from 0.
+        position: u32,
+        /// The rule's label.
+        label: Option<String>,
+    },
+}
+
+impl Warning {
+    /// The stable code, `O2xx` or `O3xx`.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Undeclared { .. } => "O201",
+            Self::Unread { .. } => "O202",
+            Self::UnreadRule { .. } => "O203",
+            Self::UnknownArgument { .. } => "O204",
+            Self::SameOntologyTwice { .. } => "O205",
+            Self::MissingImport { .. } => "O206",
+            Self::OutsideProfile { .. } => "O301",
+            Self::UnusableRule { .. } => "O302",
+            Self::DisabledRule { .. } => "O303",
+        }
+    }
+}
+
+fn label_suffix(label: Option<&str>) -> String {
+    label.map_or_else(String::new, |label| format!(" ({label})"))
+}

@@ -1,0 +1,481 @@
+//! The only file that knows horned-owl: normalised triples through its RDF reader into our own structures, and
+//! OWL/XML and functional-style documents through its readers into triples.
+//!
+//! horned-owl returns sets in hash order; everything is sorted here. What it leaves over becomes warnings.
+
+use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use horned_owl::error::{HornedError, Location};
+use horned_owl::io::rdf::reader::{ConcreteRcRDFOntology, IncompleteParse, OntologyParser, Term};
+use horned_owl::io::{ParserConfiguration, ofn, owx, rdf};
+use horned_owl::model::{self as ho, Component, RcAnnotatedComponent, RcStr};
+use horned_owl::ontology::component_mapped::ComponentMappedOntology;
+use horned_owl::ontology::set::SetOntology;
+
+use crate::error::Warning;
+use crate::normalize::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
+use crate::owl::{
+    ANONYMOUS, AnnotatedAxiom, Annotation, AnnotationValue, Argument, Atom, Axiom, Bound, Characteristic,
+    ClassExpression, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Rule,
+};
+use crate::read::Syntax;
+use crate::vocab::{rdfs, swrla};
+
+/// Why a document cannot be transcribed.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    /// Bytes into the document, 0 where unknown.
+    pub offset: usize,
+    pub message: String,
+}
+
+/// An OWL/XML or functional-style document as an N-Triples document.
+pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> {
+    let fault = |error: HornedError| {
+        let offset = match &error {
+            HornedError::ParserError(_, location) | HornedError::ValidityError(_, location) => match location
+            {
+                Location::BytePosition(at) => *at,
+                Location::ByteSpan(span) => span.start,
+                Location::Unknown => 0,
+            },
+            _ => 0,
+        };
+        Fault { offset: usize::try_from(offset).unwrap_or(0), message: error.to_string() }
+    };
+    let transcription = || {
+        let (mut text, build) = (text, ho::Build::new_rc());
+        let configuration = ParserConfiguration::new(&build);
+        let ontology: SetOntology<RcStr> = match syntax {
+            Syntax::OwlXml => owx::reader::read(&mut text, configuration)?.0,
+            _ => ofn::reader::read(&mut text, configuration)?.0,
+        };
+        let ontology = ComponentMappedOntology::<RcStr, RcAnnotatedComponent>::from(ontology);
+        rdf::writer::write_to_rdf_format(Vec::new(), &ontology, "nt")
+    };
+    let panicked = |_| Fault { offset: 0, message: format!("the {syntax} reader failed on this document") };
+    catch_unwind(AssertUnwindSafe(transcription)).map_err(panicked)?.map_err(fault)
+}
+
+/// The contents of an ontology, sorted.
+#[derive(Debug, Default)]
+pub(crate) struct Parts {
+    pub entities: Vec<(EntityKind, Iri)>,
+    pub axioms: Vec<AnnotatedAxiom>,
+    pub annotations: Vec<(Iri, Annotation)>,
+    pub rules: Vec<Rule>,
+    pub warnings: Vec<Warning>,
+}
+
+/// Reads a normalised N-Triples document; `origins` says where each rule comes from.
+pub(crate) fn build(ntriples: &[u8], origins: &[Origin]) -> Result<Parts, String> {
+    let reading = || {
+        let build = ho::Build::new_rc();
+        let mut text = ntriples;
+        let parser =
+            OntologyParser::<_, RcAnnotatedComponent, ConcreteRcRDFOntology, _>::from_bufread_with_format(
+                &mut text,
+                ParserConfiguration::new(&build),
+                oxrdfio::RdfFormat::NTriples,
+            )?;
+        parser.parse()
+    };
+    let (ontology, rest) = catch_unwind(AssertUnwindSafe(reading))
+        .map_err(|_| "the OWL reader failed on it".to_owned())?
+        .map_err(|error| error.to_string())?;
+    let mut builder = Builder { names: HashMap::new(), parts: Parts::default(), rules: Vec::new() };
+    for annotated in ontology {
+        builder.component(annotated.component, annotated.ann);
+    }
+    let Builder { mut parts, mut rules, .. } = builder;
+    rules.sort_by_key(|(index, _)| *index);
+    parts.rules =
+        rules.into_iter().filter_map(|(index, rule)| Some(located(rule, origins.get(index)?))).collect();
+    parts.entities.sort();
+    parts.entities.dedup();
+    parts.axioms.sort();
+    parts.axioms.dedup();
+    parts.annotations.sort();
+    parts.annotations.dedup();
+    parts.warnings.extend(leftovers(&rest));
+    Ok(parts)
+}
+
+fn located(rule: Rule, origin: &Origin) -> Rule {
+    Rule { ontology: origin.ontology.clone(), position: origin.position, iri: origin.iri.clone(), ..rule }
+}
+
+/// Converts components, sharing the text of each IRI.
+struct Builder {
+    names: HashMap<String, Iri>,
+    parts: Parts,
+    /// Rules with their index among the origins.
+    rules: Vec<(usize, Rule)>,
+}
+
+impl Builder {
+    fn iri(&mut self, name: &str) -> Iri {
+        if let Some(iri) = self.names.get(name) {
+            return iri.clone();
+        }
+        let iri = Iri::from(name);
+        self.names.insert(name.to_owned(), iri.clone());
+        iri
+    }
+
+    fn iris<'a, T: std::ops::Deref<Target = ho::IRI<RcStr>> + 'a>(
+        &mut self,
+        items: impl IntoIterator<Item = &'a T>,
+    ) -> Vec<Iri> {
+        items.into_iter().map(|item| self.iri(item)).collect()
+    }
+
+    fn component(
+        &mut self,
+        component: Component<RcStr>,
+        annotations: impl IntoIterator<Item = ho::Annotation<RcStr>>,
+    ) {
+        let annotations: Vec<_> =
+            annotations.into_iter().map(|annotation| self.annotation(&annotation)).collect();
+        match component {
+            Component::Rule(rule) => self.rule(&rule, annotations),
+            Component::AnnotationAssertion(assertion) => {
+                let subject = self.iri(&assertion.subject);
+                let annotation = self.annotation(&assertion.ann);
+                self.parts.annotations.push((subject, annotation));
+            }
+            component => {
+                if let Some((kind, iri)) = entity(&component) {
+                    let iri = self.iri(iri);
+                    self.parts.entities.push((kind, iri));
+                } else if let Some(axiom) = self.axiom(&component) {
+                    self.parts.axioms.push(AnnotatedAxiom { axiom, annotations });
+                }
+            }
+        }
+    }
+
+    fn rule(&mut self, rule: &ho::Rule<RcStr>, annotations: Vec<Annotation>) {
+        let text = |property: &str| {
+            annotations.iter().find(|annotation| &*annotation.property == property).and_then(|annotation| {
+                match &annotation.value {
+                    AnnotationValue::Literal(literal) => Some(literal.lexical.clone()),
+                    AnnotationValue::Iri(_) => None,
+                }
+            })
+        };
+        let Some(index) = text(ORIGIN).and_then(|index| index.parse().ok()) else { return };
+        let (label, enabled) = (text(rdfs::LABEL), text(swrla::IS_RULE_ENABLED));
+        let enabled = enabled.map(|value| !["false", "0"].contains(&&*value));
+        let annotations =
+            annotations.into_iter().filter(|annotation| &*annotation.property != ORIGIN).collect();
+        let body = rule.body.iter().filter_map(|atom| self.atom(atom)).collect();
+        let head = rule.head.iter().filter_map(|atom| self.atom(atom)).collect();
+        let ontology = self.iri("");
+        self.rules.push((
+            index,
+            Rule { ontology, position: 0, iri: None, label, enabled, annotations, body, head },
+        ));
+    }
+
+    /// An atom, or `None` for the one that stands for an empty body or head.
+    fn atom(&mut self, atom: &ho::Atom<RcStr>) -> Option<Atom> {
+        Some(match atom {
+            ho::Atom::BuiltInAtom { pred, args } => {
+                Atom::BuiltIn(self.iri(pred), args.iter().map(|argument| self.data(argument)).collect())
+            }
+            ho::Atom::ClassAtom { pred, arg } => Atom::Class(self.class(pred), self.individual(arg)),
+            ho::Atom::DataPropertyAtom { pred, args } => {
+                Atom::DataProperty(self.iri(pred), self.data(&args.0), self.data(&args.1))
+            }
+            ho::Atom::DataRangeAtom { pred, arg } => Atom::DataRange(self.range(pred), self.data(arg)),
+            ho::Atom::DifferentIndividualsAtom(first, second) => {
+                Atom::DifferentIndividuals(self.individual(first), self.individual(second))
+            }
+            ho::Atom::ObjectPropertyAtom { pred, args } => {
+                Atom::ObjectProperty(self.object(pred), self.individual(&args.0), self.individual(&args.1))
+            }
+            ho::Atom::SameIndividualAtom(first, second) => {
+                let (first, second) = (self.individual(first), self.individual(second));
+                if matches!(&first, Argument::Individual(iri) if &**iri == TRUE) {
+                    return None;
+                }
+                Atom::SameIndividual(first, second)
+            }
+        })
+    }
+
+    fn individual(&mut self, argument: &ho::IArgument<RcStr>) -> Argument {
+        match argument {
+            ho::IArgument::Individual(individual) => Argument::Individual(self.named(individual)),
+            ho::IArgument::Variable(variable) => self.variable(&variable.0),
+        }
+    }
+
+    fn data(&mut self, argument: &ho::DArgument<RcStr>) -> Argument {
+        match argument {
+            ho::DArgument::Literal(literal) => Argument::Literal(self.literal(literal)),
+            ho::DArgument::Variable(variable) => self.variable(&variable.0),
+        }
+    }
+
+    fn variable(&mut self, name: &str) -> Argument {
+        if let Some(individual) = name.strip_prefix(INDIVIDUAL) {
+            return Argument::Individual(self.iri(individual));
+        }
+        Argument::Variable(self.iri(name.strip_prefix(VARIABLE).unwrap_or(name)))
+    }
+
+    fn named(&mut self, individual: &ho::Individual<RcStr>) -> Iri {
+        match individual {
+            ho::Individual::Named(node) => self.iri(node),
+            ho::Individual::Anonymous(node) => self.iri(&format!("{ANONYMOUS}{}", &**node)),
+        }
+    }
+
+    fn individuals(&mut self, individuals: &[ho::Individual<RcStr>]) -> Vec<Iri> {
+        individuals.iter().map(|individual| self.named(individual)).collect()
+    }
+
+    fn literal(&mut self, literal: &ho::Literal<RcStr>) -> Literal {
+        let lexical = Arc::from(literal.literal().as_str());
+        match literal {
+            ho::Literal::Simple { .. } => Literal { lexical, datatype: None, language: None },
+            ho::Literal::Language { lang, .. } => {
+                Literal { lexical, datatype: None, language: Some(Arc::from(lang.as_str())) }
+            }
+            ho::Literal::Datatype { datatype_iri, .. } => {
+                Literal { lexical, datatype: Some(self.iri(datatype_iri)), language: None }
+            }
+        }
+    }
+
+    fn annotation(&mut self, annotation: &ho::Annotation<RcStr>) -> Annotation {
+        let value = match &annotation.av {
+            ho::AnnotationValue::Literal(literal) => AnnotationValue::Literal(self.literal(literal)),
+            ho::AnnotationValue::IRI(iri) => AnnotationValue::Iri(self.iri(iri)),
+            // Blank nodes that are only the value of an annotation have no identity of their own.
+            ho::AnnotationValue::AnonymousIndividual(_) => AnnotationValue::Iri(self.iri(ANONYMOUS)),
+        };
+        Annotation { property: self.iri(&annotation.ap), value }
+    }
+
+    fn object(&mut self, property: &ho::ObjectPropertyExpression<RcStr>) -> ObjectPropertyExpression {
+        match property {
+            ho::ObjectPropertyExpression::ObjectProperty(iri) => {
+                ObjectPropertyExpression::Property(self.iri(iri))
+            }
+            ho::ObjectPropertyExpression::InverseObjectProperty(iri) => {
+                ObjectPropertyExpression::Inverse(self.iri(iri))
+            }
+        }
+    }
+
+    fn objects(
+        &mut self,
+        properties: &[ho::ObjectPropertyExpression<RcStr>],
+    ) -> Vec<ObjectPropertyExpression> {
+        properties.iter().map(|property| self.object(property)).collect()
+    }
+
+    fn ranges(&mut self, ranges: &[ho::DataRange<RcStr>]) -> Vec<DataRange> {
+        ranges.iter().map(|range| self.range(range)).collect()
+    }
+
+    fn range(&mut self, range: &ho::DataRange<RcStr>) -> DataRange {
+        match range {
+            ho::DataRange::Datatype(iri) => DataRange::Datatype(self.iri(iri)),
+            ho::DataRange::DataIntersectionOf(ranges) => DataRange::IntersectionOf(self.ranges(ranges)),
+            ho::DataRange::DataUnionOf(ranges) => DataRange::UnionOf(self.ranges(ranges)),
+            ho::DataRange::DataComplementOf(range) => DataRange::ComplementOf(Box::new(self.range(range))),
+            ho::DataRange::DataOneOf(literals) => {
+                DataRange::OneOf(literals.iter().map(|literal| self.literal(literal)).collect())
+            }
+            ho::DataRange::DatatypeRestriction(datatype, facets) => DataRange::Restriction(
+                self.iri(datatype),
+                facets.iter().map(|facet| (self.iri(facet.f.as_ref()), self.literal(&facet.l))).collect(),
+            ),
+        }
+    }
+
+    fn classes(&mut self, classes: &[ho::ClassExpression<RcStr>]) -> Vec<ClassExpression> {
+        classes.iter().map(|class| self.class(class)).collect()
+    }
+
+    fn boxed(&mut self, class: &ho::ClassExpression<RcStr>) -> Box<ClassExpression> {
+        Box::new(self.class(class))
+    }
+
+    fn class(&mut self, class: &ho::ClassExpression<RcStr>) -> ClassExpression {
+        use ClassExpression as Ours;
+        use ho::ClassExpression as Theirs;
+        match class {
+            Theirs::Class(iri) => Ours::Class(self.iri(iri)),
+            Theirs::ObjectIntersectionOf(classes) => Ours::IntersectionOf(self.classes(classes)),
+            Theirs::ObjectUnionOf(classes) => Ours::UnionOf(self.classes(classes)),
+            Theirs::ObjectComplementOf(class) => Ours::ComplementOf(self.boxed(class)),
+            Theirs::ObjectOneOf(individuals) => Ours::OneOf(self.individuals(individuals)),
+            Theirs::ObjectSomeValuesFrom { ope, bce } => {
+                Ours::SomeValuesFrom(self.object(ope), self.boxed(bce))
+            }
+            Theirs::ObjectAllValuesFrom { ope, bce } => {
+                Ours::AllValuesFrom(self.object(ope), self.boxed(bce))
+            }
+            Theirs::ObjectHasValue { ope, i } => Ours::HasValue(self.object(ope), self.named(i)),
+            Theirs::ObjectHasSelf(ope) => Ours::HasSelf(self.object(ope)),
+            Theirs::ObjectMinCardinality { n, ope, bce } => {
+                Ours::Cardinality(Bound::Min, *n, self.object(ope), self.boxed(bce))
+            }
+            Theirs::ObjectMaxCardinality { n, ope, bce } => {
+                Ours::Cardinality(Bound::Max, *n, self.object(ope), self.boxed(bce))
+            }
+            Theirs::ObjectExactCardinality { n, ope, bce } => {
+                Ours::Cardinality(Bound::Exact, *n, self.object(ope), self.boxed(bce))
+            }
+            Theirs::DataSomeValuesFrom { dp, dr } => Ours::DataSomeValuesFrom(self.iri(dp), self.range(dr)),
+            Theirs::DataAllValuesFrom { dp, dr } => Ours::DataAllValuesFrom(self.iri(dp), self.range(dr)),
+            Theirs::DataHasValue { dp, l } => Ours::DataHasValue(self.iri(dp), self.literal(l)),
+            Theirs::DataMinCardinality { n, dp, dr } => {
+                Ours::DataCardinality(Bound::Min, *n, self.iri(dp), self.range(dr))
+            }
+            Theirs::DataMaxCardinality { n, dp, dr } => {
+                Ours::DataCardinality(Bound::Max, *n, self.iri(dp), self.range(dr))
+            }
+            Theirs::DataExactCardinality { n, dp, dr } => {
+                Ours::DataCardinality(Bound::Exact, *n, self.iri(dp), self.range(dr))
+            }
+        }
+    }
+
+    /// The axiom, or `None` for components that are none (ontology headers, annotation axioms).
+    #[allow(clippy::too_many_lines)] // one arm an axiom of the specification
+    fn axiom(&mut self, component: &Component<RcStr>) -> Option<Axiom> {
+        use Characteristic as C;
+        let characteristic =
+            |builder: &mut Self, characteristic, property: &ho::ObjectPropertyExpression<RcStr>| {
+                Axiom::ObjectPropertyCharacteristic(characteristic, builder.object(property))
+            };
+        Some(match component {
+            Component::SubClassOf(a) => Axiom::SubClassOf(self.class(&a.sub), self.class(&a.sup)),
+            Component::EquivalentClasses(a) => Axiom::EquivalentClasses(self.classes(&a.0)),
+            Component::DisjointClasses(a) => Axiom::DisjointClasses(self.classes(&a.0)),
+            Component::DisjointUnion(a) => Axiom::DisjointUnion(self.iri(&a.0), self.classes(&a.1)),
+            Component::SubObjectPropertyOf(a) => match &a.sub {
+                ho::SubObjectPropertyExpression::ObjectPropertyChain(chain) => {
+                    Axiom::SubPropertyChainOf(self.objects(chain), self.object(&a.sup))
+                }
+                ho::SubObjectPropertyExpression::ObjectPropertyExpression(sub) => {
+                    Axiom::SubObjectPropertyOf(self.object(sub), self.object(&a.sup))
+                }
+            },
+            Component::EquivalentObjectProperties(a) => Axiom::EquivalentObjectProperties(self.objects(&a.0)),
+            Component::DisjointObjectProperties(a) => Axiom::DisjointObjectProperties(self.objects(&a.0)),
+            Component::InverseObjectProperties(a) => {
+                Axiom::InverseObjectProperties(self.iri(&a.0), self.iri(&a.1))
+            }
+            Component::ObjectPropertyDomain(a) => {
+                Axiom::ObjectPropertyDomain(self.object(&a.ope), self.class(&a.ce))
+            }
+            Component::ObjectPropertyRange(a) => {
+                Axiom::ObjectPropertyRange(self.object(&a.ope), self.class(&a.ce))
+            }
+            Component::FunctionalObjectProperty(a) => characteristic(self, C::Functional, &a.0),
+            Component::InverseFunctionalObjectProperty(a) => characteristic(self, C::InverseFunctional, &a.0),
+            Component::ReflexiveObjectProperty(a) => characteristic(self, C::Reflexive, &a.0),
+            Component::IrreflexiveObjectProperty(a) => characteristic(self, C::Irreflexive, &a.0),
+            Component::SymmetricObjectProperty(a) => characteristic(self, C::Symmetric, &a.0),
+            Component::AsymmetricObjectProperty(a) => characteristic(self, C::Asymmetric, &a.0),
+            Component::TransitiveObjectProperty(a) => characteristic(self, C::Transitive, &a.0),
+            Component::SubDataPropertyOf(a) => Axiom::SubDataPropertyOf(self.iri(&a.sub), self.iri(&a.sup)),
+            Component::EquivalentDataProperties(a) => Axiom::EquivalentDataProperties(self.iris(&a.0)),
+            Component::DisjointDataProperties(a) => Axiom::DisjointDataProperties(self.iris(&a.0)),
+            Component::DataPropertyDomain(a) => Axiom::DataPropertyDomain(self.iri(&a.dp), self.class(&a.ce)),
+            Component::DataPropertyRange(a) => Axiom::DataPropertyRange(self.iri(&a.dp), self.range(&a.dr)),
+            Component::FunctionalDataProperty(a) => Axiom::FunctionalDataProperty(self.iri(&a.0)),
+            Component::DatatypeDefinition(a) => {
+                Axiom::DatatypeDefinition(self.iri(&a.kind), self.range(&a.range))
+            }
+            Component::HasKey(a) => self.key(a),
+            Component::SameIndividual(a) => Axiom::SameIndividual(self.individuals(&a.0)),
+            Component::DifferentIndividuals(a) => Axiom::DifferentIndividuals(self.individuals(&a.0)),
+            Component::ClassAssertion(a) => Axiom::ClassAssertion(self.class(&a.ce), self.named(&a.i)),
+            Component::ObjectPropertyAssertion(a) => {
+                Axiom::ObjectPropertyAssertion(self.object(&a.ope), self.named(&a.from), self.named(&a.to))
+            }
+            Component::NegativeObjectPropertyAssertion(a) => Axiom::NegativeObjectPropertyAssertion(
+                self.object(&a.ope),
+                self.named(&a.from),
+                self.named(&a.to),
+            ),
+            Component::DataPropertyAssertion(a) => {
+                Axiom::DataPropertyAssertion(self.iri(&a.dp), self.named(&a.from), self.literal(&a.to))
+            }
+            Component::NegativeDataPropertyAssertion(a) => Axiom::NegativeDataPropertyAssertion(
+                self.iri(&a.dp),
+                self.named(&a.from),
+                self.literal(&a.to),
+            ),
+            _ => return None,
+        })
+    }
+
+    fn key(&mut self, key: &ho::HasKey<RcStr>) -> Axiom {
+        let (mut objects, mut data) = (Vec::new(), Vec::new());
+        for property in &key.vpe {
+            match property {
+                ho::PropertyExpression::ObjectPropertyExpression(property) => {
+                    objects.push(self.object(property));
+                }
+                ho::PropertyExpression::DataProperty(property) => data.push(self.iri(property)),
+                ho::PropertyExpression::AnnotationProperty(_) => {}
+            }
+        }
+        Axiom::HasKey(self.class(&key.ce), objects, data)
+    }
+}
+
+fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
+    Some(match component {
+        Component::DeclareClass(d) => (EntityKind::Class, &*d.0),
+        Component::DeclareObjectProperty(d) => (EntityKind::ObjectProperty, &*d.0),
+        Component::DeclareDataProperty(d) => (EntityKind::DataProperty, &*d.0),
+        Component::DeclareAnnotationProperty(d) if !d.0.starts_with(ORIGIN) => {
+            (EntityKind::AnnotationProperty, &*d.0)
+        }
+        Component::DeclareDatatype(d) => (EntityKind::Datatype, &*d.0),
+        Component::DeclareNamedIndividual(d) => (EntityKind::NamedIndividual, &*d.0),
+        _ => return None,
+    })
+}
+
+/// One warning for each thing that horned-owl could not place.
+fn leftovers(rest: &IncompleteParse<RcStr>) -> Vec<Warning> {
+    let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
+        format!("{} {} {}", term(subject), term(predicate), term(object))
+    };
+    let simple = rest.simple.iter().map(|found| triple(found.triple()));
+    let nodes = rest.bnode.iter().flat_map(|found| found.vec_triple().iter().map(triple));
+    let lists = rest.bnode_seq.iter().map(|items| {
+        let items: Vec<_> = items.iter().map(term).collect();
+        format!("the list ({})", items.join(" "))
+    });
+    let classes = rest.class_expression.iter().map(|class| format!("the class expression {class:?}"));
+    let annotations = rest.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
+    let statements = simple.chain(nodes).chain(lists).chain(classes).chain(annotations);
+    let reason = || "part of no axiom or rule".to_owned();
+    statements.map(|statement| Warning::Unread { statement, reason: reason() }).collect()
+}
+
+fn term(term: &Term<RcStr>) -> String {
+    match term {
+        Term::Iri(iri) => format!("<{}>", &**iri),
+        Term::Literal(literal) => format!("{:?}", literal.literal()),
+        Term::OWL(word) => format!("<{}>", &***word),
+        Term::RDF(word) => format!("<{}>", &***word),
+        Term::RDFS(word) => format!("<{}>", &***word),
+        Term::SWRL(word) => format!("<{}>", &***word),
+        other => format!("{other:?}"),
+    }
+}

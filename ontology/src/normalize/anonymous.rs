@@ -1,0 +1,104 @@
+//! Blank nodes that are individuals into IRIs, with names that depend on the documents alone.
+//!
+//! A blank node is an individual if it has a type or a property value, or is one, and no part of it belongs to the
+//! structure of axioms. A blank node with annotations only describes nothing, and is reported.
+
+use std::collections::{BTreeMap, HashSet};
+
+use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
+
+use super::is_reserved;
+use crate::error::Warning;
+use crate::graph::Graph;
+use crate::owl::ANONYMOUS;
+use crate::vocab::{owl, rdf, rdfs, swrla};
+
+pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
+    let structural = structural(graph);
+    let individuals = individuals(graph, &structural);
+    let mut rubbish = Vec::new();
+    let mut stray: BTreeMap<String, usize> = BTreeMap::new();
+    for index in 0..graph.len() {
+        let Some(triple) = graph.get_mut(index) else { continue };
+        if let NamedOrBlankNode::BlankNode(node) = &triple.subject {
+            if individuals.contains(node) {
+                triple.subject = name(node).into();
+            } else if !structural.contains(node) {
+                *stray.entry(triple.predicate.to_string()).or_default() += 1;
+                rubbish.push(index);
+            }
+        }
+        if let Term::BlankNode(node) = &triple.object
+            && individuals.contains(node)
+        {
+            triple.object = name(node).into();
+        }
+    }
+    for index in rubbish {
+        graph.take(index);
+    }
+    warnings.extend(stray.into_iter().map(|(predicate, count)| Warning::Unread {
+        statement: format!("{predicate} of {count} blank nodes"),
+        reason: "nothing else is said of them".to_owned(),
+    }));
+}
+
+fn name(node: &BlankNode) -> NamedNode {
+    NamedNode::new_unchecked(format!("{ANONYMOUS}{}", node.as_str()))
+}
+
+/// Blank nodes that carry part of an axiom, a class expression, a rule or a list.
+fn structural(graph: &Graph) -> HashSet<BlankNode> {
+    let mut nodes = HashSet::new();
+    for (_, triple) in graph.iter() {
+        if let NamedOrBlankNode::BlankNode(node) = &triple.subject
+            && is_structure(triple)
+        {
+            nodes.insert(node.clone());
+        }
+    }
+    nodes
+}
+
+fn is_structure(triple: &Triple) -> bool {
+    let predicate = triple.predicate.as_str();
+    if predicate == rdf::TYPE {
+        let plain = [owl::THING, owl::NOTHING, owl::NAMED_INDIVIDUAL];
+        return matches!(&triple.object, Term::NamedNode(class)
+            if is_reserved(class.as_str()) && !plain.contains(&class.as_str()));
+    }
+    let about_individuals =
+        [owl::SAME_AS, owl::DIFFERENT_FROM, rdfs::LABEL, rdfs::COMMENT, rdfs::SEE_ALSO, rdfs::IS_DEFINED_BY];
+    is_reserved(predicate) && !about_individuals.contains(&predicate)
+}
+
+/// Blank nodes that are individuals.
+fn individuals(graph: &Graph, structural: &HashSet<BlankNode>) -> HashSet<BlankNode> {
+    let annotations: HashSet<_> =
+        graph.instances(owl::ANNOTATION_PROPERTY).into_iter().map(|(_, node)| node).collect();
+    let is_annotation = |predicate: &NamedNode| {
+        predicate.as_str().starts_with(rdfs::NS)
+            || predicate.as_str() == swrla::IS_RULE_ENABLED
+            || annotations.contains(&NamedOrBlankNode::NamedNode(predicate.clone()))
+    };
+    let mut nodes = HashSet::new();
+    for (_, triple) in graph.iter() {
+        let predicate = &triple.predicate;
+        if let NamedOrBlankNode::BlankNode(node) = &triple.subject
+            && !is_annotation(predicate)
+            && !structural.contains(node)
+        {
+            nodes.insert(node.clone());
+        }
+        let links = !is_reserved(predicate.as_str())
+            || [owl::SAME_AS, owl::DIFFERENT_FROM, owl::HAS_VALUE, rdf::FIRST].contains(&predicate.as_str());
+        if let Term::BlankNode(node) = &triple.object
+            && links
+            && !is_annotation(predicate)
+            && !structural.contains(node)
+        {
+            nodes.insert(node.clone());
+        }
+    }
+    nodes
+}

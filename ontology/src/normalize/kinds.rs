@@ -1,0 +1,197 @@
+//! Every entity gets a declaration: horned-owl drops assertions of properties whose kind it does not know.
+//!
+//! Declarations come from the imports closure where it has them. What is declared nowhere gets its kind from its use,
+//! with a warning: a property with literals as values is a data property, one between individuals an object property,
+//! one that describes only classes, properties or ontologies an annotation property.
+
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+
+use oxrdf::{NamedNode, NamedOrBlankNode, Term, Triple};
+
+use super::{ORIGIN, is_reserved};
+use crate::error::Warning;
+use crate::graph::{Graph, is_type};
+use crate::owl::ANONYMOUS;
+use crate::vocab::{owl, rdf, rdfs, swrl, swrla, xsd};
+
+/// How an undeclared property is used.
+#[derive(Clone, Copy, Debug, Default)]
+#[allow(clippy::struct_excessive_bools)] // independent observations
+struct Use {
+    literal: bool,
+    individual: bool,
+    /// By an axiom or rule that says which.
+    data: bool,
+    object: bool,
+    /// On something that is not an individual.
+    entity: bool,
+}
+
+pub(crate) fn declare(graph: &mut Graph, warnings: &mut Vec<Warning>) {
+    let declared = Declared::of(graph);
+    let (mut classes, mut properties) = (BTreeSet::new(), BTreeMap::new());
+    for (_, triple) in graph.iter() {
+        record_classes(triple, &declared, &mut classes);
+        record_property(graph, triple, &declared, &mut properties);
+    }
+    for class in classes {
+        state(graph, &class, owl::CLASS);
+        warnings.push(Warning::Undeclared { iri: class, kind: "a class" });
+    }
+    for (property, used) in properties {
+        let (class, kind) = kind_of(used);
+        state(graph, &property, class);
+        warnings.push(Warning::Undeclared { iri: property, kind });
+    }
+    let enabled = swrla::IS_RULE_ENABLED;
+    let used = graph.iter().any(|(_, triple)| triple.predicate.as_str() == enabled);
+    if used && !declared.annotation_properties.contains(enabled) {
+        state(graph, enabled, owl::ANNOTATION_PROPERTY);
+    }
+    state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
+}
+
+fn kind_of(used: Use) -> (&'static str, &'static str) {
+    if used.data || (used.literal && !used.object && !used.entity) {
+        (owl::DATATYPE_PROPERTY, "a data property")
+    } else if used.object || (used.individual && !used.entity) {
+        (owl::OBJECT_PROPERTY, "an object property")
+    } else {
+        (owl::ANNOTATION_PROPERTY, "an annotation property")
+    }
+}
+
+fn state(graph: &mut Graph, iri: &str, class: &str) {
+    let subject = NamedOrBlankNode::from(NamedNode::new_unchecked(iri));
+    graph.state(&subject, rdf::TYPE, NamedNode::new_unchecked(class));
+}
+
+/// What the closure declares.
+struct Declared {
+    classes: HashSet<String>,
+    datatypes: HashSet<String>,
+    properties: HashSet<String>,
+    object_properties: HashSet<String>,
+    annotation_properties: HashSet<String>,
+}
+
+impl Declared {
+    fn of(graph: &Graph) -> Self {
+        let all = |types: &[&str]| -> HashSet<String> {
+            let typed = types.iter().flat_map(|class| graph.instances(class));
+            typed.filter_map(|(_, node)| named(&node).map(str::to_owned)).collect()
+        };
+        let object_properties = all(&[owl::OBJECT_PROPERTY]);
+        let annotation_properties = all(&[owl::ANNOTATION_PROPERTY]);
+        let mut properties = all(&[owl::DATATYPE_PROPERTY]);
+        properties.extend(object_properties.iter().chain(&annotation_properties).cloned());
+        Self {
+            classes: all(&[owl::CLASS, rdfs::CLASS]),
+            datatypes: all(&[rdfs::DATATYPE]),
+            properties,
+            object_properties,
+            annotation_properties,
+        }
+    }
+
+    fn is_datatype(&self, iri: &str) -> bool {
+        iri.starts_with(xsd::NS)
+            || self.datatypes.contains(iri)
+            || [rdfs::LITERAL, owl::REAL, owl::RATIONAL].contains(&iri)
+            || iri.starts_with(rdf::NS)
+    }
+
+    /// Whether the node is something else than an individual.
+    fn is_entity(&self, graph: &Graph, node: &NamedOrBlankNode) -> bool {
+        named(node).is_none_or(|iri| {
+            let individual = iri.starts_with(ANONYMOUS)
+                || graph.objects(node, rdf::TYPE).any(|class| match class {
+                    Term::NamedNode(class) => {
+                        !is_reserved(class.as_str()) || class.as_str() == owl::NAMED_INDIVIDUAL
+                    }
+                    _ => true,
+                });
+            !individual
+                && (self.classes.contains(iri)
+                    || self.properties.contains(iri)
+                    || graph.of(node).any(|(_, triple)| is_type(triple, owl::ONTOLOGY)))
+        })
+    }
+}
+
+fn named(node: &NamedOrBlankNode) -> Option<&str> {
+    match node {
+        NamedOrBlankNode::NamedNode(node) => Some(node.as_str()),
+        NamedOrBlankNode::BlankNode(_) => None,
+    }
+}
+
+/// Notes the undeclared classes that a triple names.
+fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<String>) {
+    let mut note = |iri: Option<&str>| {
+        if let Some(iri) = iri.filter(|iri| !is_reserved(iri) && !iri.starts_with(xsd::NS))
+            && !declared.classes.contains(iri)
+            && !declared.datatypes.contains(iri)
+        {
+            classes.insert(iri.to_owned());
+        }
+    };
+    let object = crate::read::iri_of(&triple.object);
+    match triple.predicate.as_str() {
+        rdf::TYPE | rdfs::DOMAIN | swrl::CLASS_PREDICATE => note(object),
+        rdfs::RANGE => {
+            let object_property =
+                named(&triple.subject).is_some_and(|iri| declared.object_properties.contains(iri));
+            note(object.filter(|_| object_property));
+        }
+        rdfs::SUB_CLASS_OF | owl::EQUIVALENT_CLASS | owl::DISJOINT_WITH => {
+            note(named(&triple.subject));
+            note(object);
+        }
+        _ => {}
+    }
+}
+
+/// Notes how a triple uses an undeclared property.
+fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &mut BTreeMap<String, Use>) {
+    let mut note = |iri: &str, change: &dyn Fn(&mut Use)| {
+        if !is_reserved(iri)
+            && !declared.properties.contains(iri)
+            && iri != ORIGIN
+            && iri != swrla::IS_RULE_ENABLED
+        {
+            change(uses.entry(iri.to_owned()).or_default());
+        }
+    };
+    let predicate = triple.predicate.as_str();
+    let object = crate::read::iri_of(&triple.object);
+    match predicate {
+        swrl::PROPERTY_PREDICATE => {
+            let data = graph.of(&triple.subject).any(|(_, t)| is_type(t, swrl::DATAVALUED_PROPERTY_ATOM));
+            if let Some(property) = object {
+                note(property, &|used| if data { used.data = true } else { used.object = true });
+            }
+        }
+        rdfs::DOMAIN => drop(named(&triple.subject).map(|property| note(property, &|_| ()))),
+        rdfs::RANGE => {
+            let data = object.is_some_and(|range| declared.is_datatype(range));
+            let class = object.is_some_and(|range| declared.classes.contains(range));
+            if let Some(property) = named(&triple.subject) {
+                note(property, &|used| {
+                    used.data |= data;
+                    used.object |= class;
+                });
+            }
+        }
+        _ => {}
+    }
+    if !is_reserved(predicate) && !declared.properties.contains(predicate) {
+        let entity = declared.is_entity(graph, &triple.subject);
+        let literal = matches!(triple.object, Term::Literal(_));
+        note(predicate, &|used| {
+            used.entity |= entity;
+            used.literal |= literal;
+            used.individual |= !literal;
+        });
+    }
+}

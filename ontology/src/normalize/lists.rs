@@ -1,0 +1,101 @@
+//! Axioms that lie in lists: `AllDisjointClasses` and `AllDisjointProperties` into pairs, a list that several axioms
+//! share into one copy each, property chains that are not lists taken away.
+
+use oxrdf::{NamedOrBlankNode, Term};
+
+use crate::error::Warning;
+use crate::graph::{Graph, subject_of};
+use crate::vocab::{owl, rdf};
+
+pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
+    pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);
+    pairs(graph, owl::ALL_DISJOINT_PROPERTIES, owl::PROPERTY_DISJOINT_WITH, warnings);
+    check_chains(graph, warnings);
+    unshare(graph);
+}
+
+/// Replaces each `class` axiom by `predicate` between all pairs of its members.
+fn pairs(graph: &mut Graph, class: &str, predicate: &str, warnings: &mut Vec<Warning>) {
+    for (_, node) in graph.instances(class) {
+        let members = graph.object(&node, owl::MEMBERS).and_then(|head| graph.list(head));
+        let own: Vec<usize> = graph.of(&node).map(|(index, _)| index).collect();
+        match members {
+            Ok(list) => {
+                let members: Vec<_> = list.items.iter().filter_map(subject_of).collect();
+                for (place, first) in members.iter().enumerate() {
+                    for second in &members[place + 1..] {
+                        graph.state(first, predicate, Term::from(second.clone()));
+                    }
+                }
+                take(graph, list.spine);
+            }
+            Err(reason) => {
+                warnings.push(Warning::Unread { statement: format!("{node} a <{class}>"), reason });
+            }
+        }
+        take(graph, own);
+    }
+}
+
+fn take(graph: &mut Graph, indices: Vec<usize>) {
+    for index in indices {
+        graph.take(index);
+    }
+}
+
+/// horned-owl panics on a property chain whose list holds anything but properties.
+fn check_chains(graph: &mut Graph, warnings: &mut Vec<Warning>) {
+    let chains: Vec<_> = graph
+        .iter()
+        .filter(|(_, triple)| triple.predicate.as_str() == owl::PROPERTY_CHAIN_AXIOM)
+        .map(|(index, triple)| (index, triple.object.clone(), triple.subject.to_string()))
+        .collect();
+    for (index, head, property) in chains {
+        let fault = match graph.list(&head) {
+            Ok(list) if list.items.len() < 2 => Some("a property chain has two members or more".to_owned()),
+            Ok(list) => list.items.iter().find_map(|item| chain_fault(graph, item)),
+            Err(reason) => Some(reason),
+        };
+        if let Some(reason) = fault {
+            warnings.push(Warning::Unread { statement: format!("property chain of {property}"), reason });
+            graph.take(index);
+        }
+    }
+}
+
+fn chain_fault(graph: &Graph, item: &Term) -> Option<String> {
+    match item {
+        Term::NamedNode(_) => None,
+        Term::BlankNode(node) => graph.object(&node.clone().into(), owl::INVERSE_OF).err(),
+        Term::Literal(_) => Some(format!("{item} is not a property")),
+    }
+}
+
+/// Gives each triple that points at a list a list of its own, without types: horned-owl consumes lists.
+fn unshare(graph: &mut Graph) {
+    let references = graph.references();
+    let mut seen = std::collections::HashSet::new();
+    let shared: Vec<(usize, Term)> = graph
+        .iter()
+        .filter(|(_, triple)| triple.predicate.as_str() != rdf::REST)
+        .filter_map(|(index, triple)| match &triple.object {
+            Term::BlankNode(node) if references.get(node).is_some_and(|&count| count > 1) => {
+                let is_list =
+                    graph.objects(&NamedOrBlankNode::from(node.clone()), rdf::FIRST).next().is_some();
+                (is_list && !seen.insert(node.clone())).then(|| (index, triple.object.clone()))
+            }
+            _ => None,
+        })
+        .collect();
+    for (index, head) in shared {
+        if let Ok(list) = graph.list(&head) {
+            let copy = graph.add_list(list.items, None);
+            if let Some(triple) = graph.get_mut(index) {
+                triple.object = copy;
+            }
+        }
+    }
+    for (index, _) in graph.instances(rdf::LIST) {
+        graph.take(index);
+    }
+}

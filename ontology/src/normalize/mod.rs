@@ -1,0 +1,75 @@
+//! Merged triples to triples that horned-owl reads without loss.
+//!
+//! Its RDF reader matches exact shapes and passes over what deviates: rules that have an IRI, atoms with an annotation,
+//! data atoms about an individual, empty bodies, lists used twice, `AllDisjointClasses`, undeclared properties, blank
+//! nodes as individuals. Real knowledge bases contain most of these. The passes below rewrite them, one file each:
+//!
+//! | pass | rewrites |
+//! |---|---|
+//! | here | headers of imported ontologies (taken away) |
+//! | `swrl` | every rule into one canonical shape |
+//! | `lists` | disjointness of many into pairs, shared lists into copies, property chains checked |
+//! | `anonymous` | blank-node individuals into IRIs |
+//! | `kinds` | undeclared entities into declared ones |
+
+mod anonymous;
+mod kinds;
+mod lists;
+mod swrl;
+
+pub(crate) use swrl::{INDIVIDUAL, ORIGIN, TRUE, VARIABLE};
+
+use crate::error::Warning;
+use crate::graph::{Graph, is_type};
+use crate::owl::Iri;
+use crate::read::Document;
+use crate::vocab::{owl, rdf};
+
+/// What normalisation yields.
+#[derive(Debug)]
+pub(crate) struct Normal {
+    /// The document for horned-owl.
+    pub ntriples: Vec<u8>,
+    /// Where each rule comes from; its canonical form is annotated with the index here.
+    pub rules: Vec<Origin>,
+    pub warnings: Vec<Warning>,
+}
+
+/// Where a rule comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Origin {
+    /// The ontology that states it, or the document's name.
+    pub ontology: Iri,
+    /// Its place there, from 0.
+    pub position: u32,
+    /// Its own IRI, if it has one.
+    pub iri: Option<Iri>,
+}
+
+/// Merges and rewrites; see the module documentation.
+pub(crate) fn normalize(documents: Vec<Document>) -> Normal {
+    let (mut graph, mut warnings) = (Graph::default(), Vec::new());
+    let mut parts = Vec::new();
+    for (index, document) in documents.into_iter().enumerate() {
+        let name = document.iri.clone().unwrap_or_else(|| document.name.as_str().into());
+        let start = graph.len();
+        for triple in document.triples {
+            let header = is_type(&triple, owl::ONTOLOGY)
+                || [owl::IMPORTS, owl::VERSION_IRI].contains(&triple.predicate.as_str());
+            if triple.predicate.as_str() != owl::IMPORTS && !(header && index > 0) {
+                graph.add(triple);
+            }
+        }
+        parts.push((start, name));
+    }
+    let rules = swrl::rewrite(&mut graph, &parts, &mut warnings);
+    lists::rewrite(&mut graph, &mut warnings);
+    anonymous::rewrite(&mut graph, &mut warnings);
+    kinds::declare(&mut graph, &mut warnings);
+    Normal { ntriples: graph.to_ntriples(), rules, warnings }
+}
+
+/// Whether an IRI belongs to the vocabularies of RDF, RDFS, OWL or SWRL itself.
+pub(crate) fn is_reserved(iri: &str) -> bool {
+    [rdf::NS, crate::vocab::rdfs::NS, owl::NS, crate::vocab::swrl::NS].iter().any(|ns| iri.starts_with(ns))
+}

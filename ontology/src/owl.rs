@@ -1,0 +1,295 @@
+//! Our own OWL 2 structures: what a knowledge base says, in the nouns of the OWL 2 structural specification [1] and
+//! the SWRL submission [2].
+//!
+//! An [`Ontology`] is the merge of one or more root documents and all that they import. It is plain data, in an order
+//! that depends on nothing but the documents: two reads of the same files give equal values and equal text. Anonymous
+//! individuals have names here (`urn:metaplan:anonymous:…`), so that every individual is an IRI.
+//!
+//! - [1] OWL 2 Web Ontology Language, Structural Specification and Functional-Style Syntax, W3C 2012.
+//! - [2] SWRL: A Semantic Web Rule Language Combining OWL and RuleML, W3C Member Submission 2004.
+
+use std::sync::Arc;
+
+use crate::error::Warning;
+
+/// An IRI, absolute and not shortened.
+pub type Iri = Arc<str>;
+
+/// What the IRIs of anonymous individuals start with.
+pub const ANONYMOUS: &str = "urn:metaplan:anonymous:";
+
+/// A literal as written; [`rules::Literal`] gives it a value.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Literal {
+    /// The lexical form, not canonicalised.
+    pub lexical: Arc<str>,
+    /// The datatype; `None` for plain literals (which are `xsd:string`) and for those with a language.
+    pub datatype: Option<Iri>,
+    /// The language tag, for `rdf:langString` literals.
+    pub language: Option<Arc<str>>,
+}
+
+/// An object property or its inverse.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ObjectPropertyExpression {
+    /// A named property.
+    Property(Iri),
+    /// `ObjectInverseOf` a named property.
+    Inverse(Iri),
+}
+
+/// A set of data values.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum DataRange {
+    /// All values of a datatype.
+    Datatype(Iri),
+    /// The values listed.
+    OneOf(Vec<Literal>),
+    /// The values in all of the ranges.
+    IntersectionOf(Vec<DataRange>),
+    /// The values in any of the ranges.
+    UnionOf(Vec<DataRange>),
+    /// The values outside the range.
+    ComplementOf(Box<DataRange>),
+    /// The values of a datatype within facets (facet IRI, bound).
+    Restriction(Iri, Vec<(Iri, Literal)>),
+}
+
+/// Which side of a cardinality restriction is bounded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Bound {
+    /// At least n.
+    Min,
+    /// At most n.
+    Max,
+    /// Exactly n.
+    Exact,
+}
+
+/// A set of individuals.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ClassExpression {
+    /// A named class.
+    Class(Iri),
+    /// Individuals in all of the classes.
+    IntersectionOf(Vec<ClassExpression>),
+    /// Individuals in any of the classes.
+    UnionOf(Vec<ClassExpression>),
+    /// Individuals outside the class.
+    ComplementOf(Box<ClassExpression>),
+    /// The individuals listed.
+    OneOf(Vec<Iri>),
+    /// Individuals with a property value in the class.
+    SomeValuesFrom(ObjectPropertyExpression, Box<ClassExpression>),
+    /// Individuals whose property values are all in the class.
+    AllValuesFrom(ObjectPropertyExpression, Box<ClassExpression>),
+    /// Individuals with this property value.
+    HasValue(ObjectPropertyExpression, Iri),
+    /// Individuals that are their own property value.
+    HasSelf(ObjectPropertyExpression),
+    /// Individuals with a number of property values in the class.
+    Cardinality(Bound, u32, ObjectPropertyExpression, Box<ClassExpression>),
+    /// Individuals with a data property value in the range.
+    DataSomeValuesFrom(Iri, DataRange),
+    /// Individuals whose data property values are all in the range.
+    DataAllValuesFrom(Iri, DataRange),
+    /// Individuals with this data property value.
+    DataHasValue(Iri, Literal),
+    /// Individuals with a number of data property values in the range.
+    DataCardinality(Bound, u32, Iri, DataRange),
+}
+
+/// What an object property is declared to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Characteristic {
+    /// At most one value a subject.
+    Functional,
+    /// At most one subject a value.
+    InverseFunctional,
+    /// Every individual is its own value.
+    Reflexive,
+    /// No individual is its own value.
+    Irreflexive,
+    /// Holds in both directions.
+    Symmetric,
+    /// Never holds in both directions.
+    Asymmetric,
+    /// Composes with itself.
+    Transitive,
+}
+
+/// A logical axiom; field names follow the structural specification.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[allow(missing_docs)] // the variants are the specification's axioms, one to one
+pub enum Axiom {
+    SubClassOf(ClassExpression, ClassExpression),
+    EquivalentClasses(Vec<ClassExpression>),
+    DisjointClasses(Vec<ClassExpression>),
+    DisjointUnion(Iri, Vec<ClassExpression>),
+    SubObjectPropertyOf(ObjectPropertyExpression, ObjectPropertyExpression),
+    SubPropertyChainOf(Vec<ObjectPropertyExpression>, ObjectPropertyExpression),
+    EquivalentObjectProperties(Vec<ObjectPropertyExpression>),
+    DisjointObjectProperties(Vec<ObjectPropertyExpression>),
+    InverseObjectProperties(Iri, Iri),
+    ObjectPropertyDomain(ObjectPropertyExpression, ClassExpression),
+    ObjectPropertyRange(ObjectPropertyExpression, ClassExpression),
+    ObjectPropertyCharacteristic(Characteristic, ObjectPropertyExpression),
+    SubDataPropertyOf(Iri, Iri),
+    EquivalentDataProperties(Vec<Iri>),
+    DisjointDataProperties(Vec<Iri>),
+    DataPropertyDomain(Iri, ClassExpression),
+    DataPropertyRange(Iri, DataRange),
+    FunctionalDataProperty(Iri),
+    DatatypeDefinition(Iri, DataRange),
+    HasKey(ClassExpression, Vec<ObjectPropertyExpression>, Vec<Iri>),
+    SameIndividual(Vec<Iri>),
+    DifferentIndividuals(Vec<Iri>),
+    ClassAssertion(ClassExpression, Iri),
+    ObjectPropertyAssertion(ObjectPropertyExpression, Iri, Iri),
+    NegativeObjectPropertyAssertion(ObjectPropertyExpression, Iri, Iri),
+    DataPropertyAssertion(Iri, Iri, Literal),
+    NegativeDataPropertyAssertion(Iri, Iri, Literal),
+}
+
+/// What kind of entity an IRI names. An IRI may name several (punning).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum EntityKind {
+    /// A class.
+    Class,
+    /// An object property.
+    ObjectProperty,
+    /// A data property.
+    DataProperty,
+    /// An annotation property.
+    AnnotationProperty,
+    /// A datatype.
+    Datatype,
+    /// A named individual.
+    NamedIndividual,
+}
+
+/// The value of an annotation.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum AnnotationValue {
+    /// A literal.
+    Literal(Literal),
+    /// An IRI or an anonymous individual.
+    Iri(Iri),
+}
+
+/// An annotation: property and value.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Annotation {
+    /// The annotation property.
+    pub property: Iri,
+    /// Its value.
+    pub value: AnnotationValue,
+}
+
+/// An axiom with its annotations.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct AnnotatedAxiom {
+    /// What is said.
+    pub axiom: Axiom,
+    /// What is said about saying it.
+    pub annotations: Vec<Annotation>,
+}
+
+/// An argument of a rule atom.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Argument {
+    /// A variable; its IRI identifies it within its rule only.
+    Variable(Iri),
+    /// An individual.
+    Individual(Iri),
+    /// A data value.
+    Literal(Literal),
+}
+
+/// An atom of a SWRL rule.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Atom {
+    /// The argument is in the class.
+    Class(ClassExpression, Argument),
+    /// The argument is in the data range.
+    DataRange(DataRange, Argument),
+    /// The arguments are related.
+    ObjectProperty(ObjectPropertyExpression, Argument, Argument),
+    /// The individual has the value.
+    DataProperty(Iri, Argument, Argument),
+    /// The arguments are one individual.
+    SameIndividual(Argument, Argument),
+    /// The arguments are two individuals.
+    DifferentIndividuals(Argument, Argument),
+    /// The built-in predicate holds of the arguments.
+    BuiltIn(Iri, Vec<Argument>),
+}
+
+/// A SWRL rule: if the body then the head, for all named individuals and data values (DL-safe).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rule {
+    /// IRI of the ontology that states the rule (or the document's name where it has none).
+    pub ontology: Iri,
+    /// Its place among the rules of that ontology, from 0.
+    pub position: u32,
+    /// The rule's own IRI, if it has one.
+    pub iri: Option<Iri>,
+    /// Its first `rdfs:label`. Labels repeat in real knowledge bases.
+    pub label: Option<Arc<str>>,
+    /// `swrla:isRuleEnabled`, if stated. Reasoners, Pellet among them, ignore it.
+    pub enabled: Option<bool>,
+    /// All annotations, sorted, those above included.
+    pub annotations: Vec<Annotation>,
+    /// Antecedent; all atoms must hold. May be empty.
+    pub body: Vec<Atom>,
+    /// Consequent; all atoms follow. Empty for an integrity constraint.
+    pub head: Vec<Atom>,
+}
+
+/// One document that was read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// The file's path, or the name given for a text.
+    pub name: String,
+    /// The ontology IRI that it declares.
+    pub iri: Option<Iri>,
+    /// Its `owl:versionIRI`.
+    pub version: Option<Iri>,
+    /// The concrete syntax found.
+    pub syntax: crate::Syntax,
+}
+
+/// One or more documents and all that they import, merged.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Ontology {
+    /// The documents in the order in which they were read: each root, then what it imports.
+    pub sources: Vec<Source>,
+    /// Declared entities, and those whose kind was taken from their use; sorted.
+    pub entities: Vec<(EntityKind, Iri)>,
+    /// Logical axioms, sorted.
+    pub axioms: Vec<AnnotatedAxiom>,
+    /// Annotations of entities (subject, annotation), sorted.
+    pub annotations: Vec<(Iri, Annotation)>,
+    /// Rules in document order.
+    pub rules: Vec<Rule>,
+    /// What was read differently from how it is written, or not at all.
+    pub warnings: Vec<Warning>,
+}
+
+impl Ontology {
+    /// The IRI of the first document, if it declares one.
+    pub fn iri(&self) -> Option<&Iri> {
+        self.sources.first().and_then(|source| source.iri.as_ref())
+    }
+
+    /// The SWRL rules, each ontology's own once. Two ontologies that state the same rule count twice here;
+    /// [`crate::lower`] keeps one of them.
+    pub fn rules(&self) -> &[Rule] {
+        &self.rules
+    }
+
+    /// The IRIs of one kind, sorted.
+    pub fn entities(&self, kind: EntityKind) -> impl Iterator<Item = &Iri> {
+        self.entities.iter().filter(move |(k, _)| *k == kind).map(|(_, iri)| iri)
+    }
+}

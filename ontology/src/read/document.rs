@@ -1,0 +1,166 @@
+//! One document to triples: the parser that its content asks for, blank nodes renamed so that documents can be merged.
+//!
+//! OWL/XML and functional-style documents are first written as RDF by `crate::horned`, so that everything after
+//! this file sees triples only.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use oxrdf::{BlankNode, NamedOrBlankNode, Term, Triple};
+
+use super::syntax::Syntax;
+use crate::error::{Error, Position};
+use crate::horned;
+use crate::vocab::{owl, rdf};
+
+/// After so many syntax errors in one document its parser is stopped.
+const MOST_ERRORS: usize = 10;
+
+/// The triples of one document and what they say about the document.
+#[derive(Debug)]
+pub(crate) struct Document {
+    /// Path or name, for messages.
+    pub name: String,
+    pub syntax: Syntax,
+    /// The ontology IRI, if the document declares one.
+    pub iri: Option<Arc<str>>,
+    pub version: Option<Arc<str>>,
+    /// The IRIs imported, in order of appearance.
+    pub imports: Vec<String>,
+    pub triples: Vec<Triple>,
+}
+
+/// Parses `text`. Relative IRIs are resolved against `base`; blank nodes get names that start with `prefix`.
+pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result<Document, Vec<Error>> {
+    let syntax = Syntax::detect(text);
+    let triples = match syntax {
+        Syntax::Turtle => parse_turtle(text, name, base)?,
+        Syntax::RdfXml => parse_rdf_xml(text, name, base)?,
+        Syntax::OwlXml | Syntax::Functional => {
+            let rdf_xml = horned::transcribe(text, syntax).map_err(|fault| {
+                let position = Position::of_offset(name, text, fault.offset);
+                vec![Error::Malformed { position, syntax, message: fault.message }]
+            })?;
+            parse_rdf_xml(&rdf_xml, name, base)?
+        }
+    };
+    let triples = rename_blank_nodes(triples, prefix);
+    let header = triples.iter().find_map(|triple| match (&triple.subject, &triple.object) {
+        (NamedOrBlankNode::NamedNode(subject), Term::NamedNode(object))
+            if triple.predicate.as_str() == rdf::TYPE && object.as_str() == owl::ONTOLOGY =>
+        {
+            Some(Arc::from(subject.as_str()))
+        }
+        _ => None,
+    });
+    let objects = |predicate: &str| -> Vec<String> {
+        let matching = triples.iter().filter(|triple| triple.predicate.as_str() == predicate);
+        matching.filter_map(|triple| iri_of(&triple.object)).map(str::to_owned).collect()
+    };
+    let version = objects(owl::VERSION_IRI).first().map(|iri| Arc::from(iri.as_str()));
+    let imports = objects(owl::IMPORTS);
+    Ok(Document { name: name.to_owned(), syntax, iri: header, version, imports, triples })
+}
+
+/// The ontology IRI declared in `head`, the start of a document (its end may be cut off).
+pub(crate) fn ontology_iri(head: &[u8]) -> Option<String> {
+    let base = "file:///";
+    let is_header = |triple: &Triple| {
+        triple.predicate.as_str() == rdf::TYPE && iri_of(&triple.object) == Some(owl::ONTOLOGY)
+    };
+    let triple = match Syntax::detect(head) {
+        Syntax::Turtle => {
+            let parser = oxttl::TurtleParser::new().with_base_iri(base).ok()?;
+            parser.for_slice(head).map_while(Result::ok).find(is_header)
+        }
+        Syntax::RdfXml => {
+            let parser = oxrdfxml::RdfXmlParser::new().with_base_iri(base).ok()?;
+            parser.for_slice(head).map_while(Result::ok).find(is_header)
+        }
+        Syntax::OwlXml => return between(head, "ontologyIRI=\"", '"'),
+        Syntax::Functional => return between(head, "Ontology(<", '>'),
+    }?;
+    match triple.subject {
+        NamedOrBlankNode::NamedNode(node) => Some(node.into_string()),
+        NamedOrBlankNode::BlankNode(_) => None,
+    }
+}
+
+fn between(text: &[u8], start: &str, end: char) -> Option<String> {
+    let text = String::from_utf8_lossy(text);
+    let rest = &text[text.find(start)? + start.len()..];
+    rest.find(end).map(|length| rest[..length].to_owned())
+}
+
+fn parse_turtle(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<Error>> {
+    let mut parser = oxttl::TurtleParser::new();
+    if let Ok(with_base) = parser.clone().with_base_iri(base) {
+        parser = with_base;
+    }
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let (mut triples, mut errors) = (Vec::new(), Vec::new());
+    for result in parser.for_slice(text) {
+        match result {
+            Ok(triple) => triples.push(triple),
+            Err(error) => {
+                let start = error.location().start;
+                let position =
+                    Position { file: name.to_owned(), line: start.line + 1, column: start.column + 1 };
+                let message = error.message().to_owned();
+                errors.push(Error::Malformed { position, syntax: Syntax::Turtle, message });
+                if errors.len() == MOST_ERRORS {
+                    break;
+                }
+            }
+        }
+    }
+    if errors.is_empty() { Ok(triples) } else { Err(errors) }
+}
+
+fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<Error>> {
+    let mut parser = oxrdfxml::RdfXmlParser::new();
+    if let Ok(with_base) = parser.clone().with_base_iri(base) {
+        parser = with_base;
+    }
+    let mut parser = parser.for_slice(text);
+    let mut triples = Vec::new();
+    while let Some(result) = parser.next() {
+        match result {
+            Ok(triple) => triples.push(triple),
+            Err(error) => {
+                let offset = usize::try_from(parser.buffer_position()).unwrap_or(usize::MAX);
+                let position = Position::of_offset(name, text, offset);
+                let message = error.to_string();
+                return Err(vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]);
+            }
+        }
+    }
+    Ok(triples)
+}
+
+/// Numbers blank nodes in order of appearance: parsers give anonymous ones random names, and two documents may use
+/// one name for two nodes.
+fn rename_blank_nodes(mut triples: Vec<Triple>, prefix: &str) -> Vec<Triple> {
+    let mut names: HashMap<String, BlankNode> = HashMap::new();
+    let mut rename = |node: &mut BlankNode| {
+        let next = names.len();
+        let name = names.entry(node.as_str().to_owned());
+        *node = name.or_insert_with(|| BlankNode::new_unchecked(format!("{prefix}b{next}"))).clone();
+    };
+    for triple in &mut triples {
+        if let NamedOrBlankNode::BlankNode(node) = &mut triple.subject {
+            rename(node);
+        }
+        if let Term::BlankNode(node) = &mut triple.object {
+            rename(node);
+        }
+    }
+    triples
+}
+
+pub(crate) fn iri_of(term: &Term) -> Option<&str> {
+    match term {
+        Term::NamedNode(node) => Some(node.as_str()),
+        _ => None,
+    }
+}

@@ -1,0 +1,170 @@
+//! Documents to an [`Ontology`]: parse, follow imports on this machine, merge, normalise, build the OWL structures.
+//!
+//! ```text
+//! file ── document ──┐
+//!   └ imports ───────┼── normalize ── one N-Triples document ── horned ── Ontology
+//! file ── document ──┘
+//! ```
+
+mod document;
+mod imports;
+mod syntax;
+
+pub(crate) use document::{Document, iri_of};
+pub use syntax::Syntax;
+
+use std::collections::{HashSet, VecDeque};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Warning};
+use crate::owl::{Iri, Ontology, Source};
+use crate::{horned, normalize};
+use imports::{Resolution, Resolver};
+
+/// Where to look for what a document imports.
+#[derive(Clone, Debug, Default)]
+pub struct ReadOptions {
+    /// OASIS XML catalogs.
+    pub catalogs: Vec<PathBuf>,
+    /// Directories to search, with those below them.
+    pub directories: Vec<PathBuf>,
+    /// Whether an import that is found nowhere is a warning instead of an error.
+    pub allow_missing_imports: bool,
+}
+
+/// Reads documents and all that they import into one ontology.
+///
+/// A document reached twice is read once, however it is named.
+///
+/// # Errors
+/// All problems found, and not only the first: files that cannot be read, syntax errors with their positions, imports
+/// found nowhere.
+pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
+    let roots = files.iter().map(|file| Pending::File(file.as_ref().to_owned()));
+    read(roots.collect(), options)
+}
+
+/// Reads an ontology from a text in any supported syntax; `name` stands for the file in messages.
+///
+/// # Errors
+/// As [`read_files`].
+pub fn read_text(text: &str, name: &str, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
+    let root = Pending::Text(name.to_owned(), text.as_bytes().to_vec());
+    read(VecDeque::from([root]), options)
+}
+
+/// A document still to be read.
+enum Pending {
+    File(PathBuf),
+    Text(String, Vec<u8>),
+}
+
+fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
+    let (documents, mut warnings) = closure(roots, options)?;
+    let sources = documents.iter().map(source).collect();
+    let normal = normalize::normalize(documents);
+    warnings.extend(normal.warnings);
+    let parts = horned::build(&normal.ntriples, &normal.rules)
+        .map_err(|reason| vec![Error::NotAnOntology { reason }])?;
+    warnings.extend(parts.warnings);
+    warnings.sort();
+    warnings.dedup();
+    Ok(Ontology {
+        sources,
+        entities: parts.entities,
+        axioms: parts.axioms,
+        annotations: parts.annotations,
+        rules: parts.rules,
+        warnings,
+    })
+}
+
+fn source(document: &Document) -> Source {
+    Source {
+        name: document.name.clone(),
+        iri: document.iri.clone(),
+        version: document.version.clone(),
+        syntax: document.syntax,
+    }
+}
+
+/// Reads the roots and what they import, breadth first.
+fn closure(
+    mut pending: VecDeque<Pending>,
+    options: &ReadOptions,
+) -> Result<(Vec<Document>, Vec<Warning>), Vec<Error>> {
+    let resolver = Resolver::new(options)?;
+    let (mut documents, mut paths) = (Vec::<Document>::new(), Vec::<Option<PathBuf>>::new());
+    let (mut seen, mut errors, mut warnings) = (HashSet::new(), Vec::new(), Vec::new());
+    let mut next = 0;
+    loop {
+        while let Some(item) = pending.pop_front() {
+            match load(item, documents.len(), &mut seen) {
+                Ok(Some((document, path))) => {
+                    warnings.extend(twice(&document, &documents));
+                    documents.push(document);
+                    paths.push(path);
+                }
+                Ok(None) => {}
+                Err(found) => errors.extend(found),
+            }
+        }
+        let Some(importer) = documents.get(next) else { break };
+        for import in &importer.imports {
+            match resolver.resolve(import, paths[next].as_deref(), &documents) {
+                Ok(Some(Resolution::Loaded)) => {}
+                Ok(Some(Resolution::File(path))) => pending.push_back(Pending::File(path)),
+                Ok(Some(Resolution::Embedded(name, text))) => {
+                    pending.push_back(Pending::Text(name.to_owned(), text.as_bytes().to_vec()));
+                }
+                Ok(None) if options.allow_missing_imports => {
+                    warnings
+                        .push(Warning::MissingImport { file: importer.name.clone(), import: import.clone() });
+                }
+                Ok(None) => {
+                    errors.push(Error::UnresolvedImport {
+                        file: importer.name.clone(),
+                        import: import.clone(),
+                    });
+                }
+                Err(error) => errors.push(error),
+            }
+        }
+        next += 1;
+    }
+    if errors.is_empty() { Ok((documents, warnings)) } else { Err(errors) }
+}
+
+type Loaded = Option<(Document, Option<PathBuf>)>;
+
+/// Reads and parses one document; `None` if the same file, or the same text, has been read already.
+fn load(item: Pending, index: usize, seen: &mut HashSet<Vec<u8>>) -> Result<Loaded, Vec<Error>> {
+    let (name, text, path) = match item {
+        Pending::Text(name, text) => (name, text, None),
+        Pending::File(file) => {
+            let unreadable = |error: std::io::Error| {
+                vec![Error::Unreadable { file: file.clone(), reason: error.to_string() }]
+            };
+            let path = file.canonicalize().map_err(unreadable)?;
+            if !seen.insert(path.as_os_str().as_encoded_bytes().to_vec()) {
+                return Ok(None);
+            }
+            let text = std::fs::read(&path).map_err(unreadable)?;
+            (file.display().to_string(), text, Some(path))
+        }
+    };
+    let base =
+        path.as_ref().map_or_else(|| "file:///".to_owned(), |path| format!("file://{}", path.display()));
+    let document = document::parse(&text, &name, &base, &format!("d{index}"))?;
+    Ok(if seen.insert(text) { Some((document, path)) } else { None })
+}
+
+/// A warning where another document declares the same ontology.
+fn twice(document: &Document, documents: &[Document]) -> Option<Warning> {
+    let iri: &Iri = document.iri.as_ref()?;
+    let first = documents
+        .iter()
+        .find(|other| other.iri.as_ref() == Some(iri) && other.version == document.version)?;
+    let (first, second) = (first.name.clone(), document.name.clone());
+    Some(Warning::SameOntologyTwice { iri: iri.to_string(), first, second })
+}

@@ -1,0 +1,148 @@
+//! The IRIs that this crate knows, one module per vocabulary, as constants.
+//!
+//! Each module has `NS`, its namespace, and one constant per term; `OWL` terms are named as in the OWL 2 structural
+//! specification. Knowledge bases in real use spread TOMASys over two namespaces (with and without `www`), so the
+//! typed view in [`crate::tomasys`] goes by a table of these constants and not by one namespace.
+
+macro_rules! vocabulary {
+    ($(#[$doc:meta])* $module:ident = $ns:literal { $($name:ident = $local:literal),* $(,)? }) => {
+        $(#[$doc])*
+        pub mod $module {
+            /// The namespace of this vocabulary.
+            pub const NS: &str = $ns;
+            $(
+                #[doc = concat!("`", $ns, $local, "`")]
+                pub const $name: &str = concat!($ns, $local);
+            )*
+        }
+    };
+}
+
+vocabulary! {
+    /// RDF.
+    rdf = "http://www.w3.org/1999/02/22-rdf-syntax-ns#" {
+        TYPE = "type", FIRST = "first", REST = "rest", NIL = "nil", LIST = "List", PROPERTY = "Property",
+    }
+}
+
+vocabulary! {
+    /// RDF Schema.
+    rdfs = "http://www.w3.org/2000/01/rdf-schema#" {
+        CLASS = "Class", DATATYPE = "Datatype", LITERAL = "Literal", SUB_CLASS_OF = "subClassOf",
+        SUB_PROPERTY_OF = "subPropertyOf", DOMAIN = "domain", RANGE = "range", LABEL = "label",
+        COMMENT = "comment", SEE_ALSO = "seeAlso", IS_DEFINED_BY = "isDefinedBy",
+    }
+}
+
+vocabulary! {
+    /// OWL 2.
+    owl = "http://www.w3.org/2002/07/owl#" {
+        ONTOLOGY = "Ontology", IMPORTS = "imports", VERSION_IRI = "versionIRI", VERSION_INFO = "versionInfo",
+        THING = "Thing", NOTHING = "Nothing", CLASS = "Class", RESTRICTION = "Restriction",
+        OBJECT_PROPERTY = "ObjectProperty", DATATYPE_PROPERTY = "DatatypeProperty",
+        ANNOTATION_PROPERTY = "AnnotationProperty", NAMED_INDIVIDUAL = "NamedIndividual",
+        FUNCTIONAL_PROPERTY = "FunctionalProperty",
+        TOP_OBJECT_PROPERTY = "topObjectProperty", TOP_DATA_PROPERTY = "topDataProperty",
+        SAME_AS = "sameAs", DIFFERENT_FROM = "differentFrom", MEMBERS = "members",
+        ALL_DISJOINT_CLASSES = "AllDisjointClasses", ALL_DISJOINT_PROPERTIES = "AllDisjointProperties",
+        DISJOINT_WITH = "disjointWith", PROPERTY_DISJOINT_WITH = "propertyDisjointWith",
+        EQUIVALENT_CLASS = "equivalentClass", EQUIVALENT_PROPERTY = "equivalentProperty",
+        PROPERTY_CHAIN_AXIOM = "propertyChainAxiom", INVERSE_OF = "inverseOf", ON_PROPERTY = "onProperty",
+        HAS_VALUE = "hasValue", ONE_OF = "oneOf", AXIOM = "Axiom", ANNOTATION = "Annotation",
+        ANNOTATED_SOURCE = "annotatedSource",
+        REAL = "real", RATIONAL = "rational",
+    }
+}
+
+vocabulary! {
+    /// XML Schema datatypes.
+    xsd = "http://www.w3.org/2001/XMLSchema#" {
+        STRING = "string", BOOLEAN = "boolean", DECIMAL = "decimal", INTEGER = "integer", FLOAT = "float",
+        DOUBLE = "double",
+    }
+}
+
+vocabulary! {
+    /// SWRL in its RDF syntax.
+    swrl = "http://www.w3.org/2003/11/swrl#" {
+        IMP = "Imp", BODY = "body", HEAD = "head", ATOM_LIST = "AtomList", VARIABLE = "Variable",
+        CLASS_ATOM = "ClassAtom", DATA_RANGE_ATOM = "DataRangeAtom",
+        INDIVIDUAL_PROPERTY_ATOM = "IndividualPropertyAtom",
+        DATAVALUED_PROPERTY_ATOM = "DatavaluedPropertyAtom", SAME_INDIVIDUAL_ATOM = "SameIndividualAtom",
+        DIFFERENT_INDIVIDUALS_ATOM = "DifferentIndividualsAtom", BUILTIN_ATOM = "BuiltinAtom",
+        CLASS_PREDICATE = "classPredicate", PROPERTY_PREDICATE = "propertyPredicate", DATA_RANGE = "dataRange",
+        ARGUMENT1 = "argument1", ARGUMENT2 = "argument2", BUILTIN = "builtin", ARGUMENTS = "arguments",
+    }
+}
+
+vocabulary! {
+    /// SWRL built-ins.
+    swrlb = "http://www.w3.org/2003/11/swrlb#" {
+        LESS_THAN = "lessThan", GREATER_THAN = "greaterThan",
+    }
+}
+
+vocabulary! {
+    /// The rule annotations that Protégé writes.
+    swrla = "http://swrl.stanford.edu/ontologies/3.3/swrla.owl#" {
+        IS_RULE_ENABLED = "isRuleEnabled",
+    }
+}
+
+vocabulary! {
+    /// TOMASys as the Metacontrol and MROS knowledge bases use it, with the co-adaptation terms of `kb/tomasys.ttl`.
+    tomasys = "http://metacontrol.org/tomasys#" {
+        FUNCTION = "Function", FUNCTION_DESIGN = "FunctionDesign", FUNCTION_GROUNDING = "FunctionGrounding",
+        OBJECTIVE = "Objective", COMPONENT = "Component", QUALITY_ATTRIBUTE_TYPE = "QualityAttributeType",
+        QA_VALUE = "QAvalue", ACTION = "Action", REQUIREMENT = "Requirement",
+        SOLVES_F = "solvesF", REQUIRES_F = "requiresF", REQUIRES_C = "requiresC",
+        HAS_REQUIREMENT = "hasRequirement", HAS_MINIMUM = "hasMinimum", HAS_MAXIMUM = "hasMaximum",
+        IS_QA_TYPE = "isQAtype", HAS_VALUE = "hasValue", HAS_QA_ESTIMATION = "hasQAestimation",
+        IS_MEASURED = "isMeasured", C_STATUS = "c_status", FD_REALISABILITY = "fd_realisability",
+        FD_AVAILABLE = "fd_available", FD_EFFICACY = "fd_efficacy",
+        QA_COMPARISON_OPERATOR = "qa_comparison_operator",
+    }
+}
+
+vocabulary! {
+    /// TOMASys as the PLANTA knowledge bases use it (note `www`).
+    pddl_tomasys = "http://www.metacontrol.org/tomasys#" {
+        FUNCTION = "Function", FUNCTION_DESIGN = "FunctionDesign", COMPONENT = "Component",
+        QUALITY_ATTRIBUTE_TYPE = "QualityAttributeType", QA_VALUE = "QAvalue", ACTION = "Action",
+        SOLVES_F = "solvesF", REQUIRES_F = "requiresF", REQUIRES_C = "requiresC", IS_QA_TYPE = "isQAtype",
+        QA_HAS_VALUE = "qa_has_value", HAS_QA_ESTIMATION = "hasQAestimation", C_STATUS = "c_status",
+        FD_REALISABILITY = "fd_realisability", FD_UTILITY = "fd_utility",
+        FUNCTION_GROUNDING = "functionGrounding", FD_UNGROUND = "fd_unground",
+    }
+}
+
+vocabulary! {
+    /// The extension of TOMASys by MROS.
+    mros = "http://ros/mros#" {
+        REQUIRED_BY = "requiredBy",
+    }
+}
+
+vocabulary! {
+    /// The predecessor of [`mros`], in older knowledge bases.
+    navigation = "http://ros/navigation#" {
+        REQUIRED_BY = "requiredBy",
+    }
+}
+
+vocabulary! {
+    /// PDDL names of ontology entities, as PLANTA annotates them.
+    pddl = "http://www.metacontrol.org/pddl#" {
+        HAS_PDDL_TYPE = "hasPddlType", PDDL_NAME = "pddlName",
+    }
+}
+
+/// The part of an IRI after its last `#`, or else after its last `/` (or the whole IRI).
+///
+/// ```
+/// assert_eq!(ontology::vocab::local_name("http://metacontrol.org/tomasys#Function"), "Function");
+/// ```
+pub fn local_name(iri: &str) -> &str {
+    let start = iri.rfind('#').or_else(|| iri.rfind('/')).map_or(0, |index| index + 1);
+    if start < iri.len() { &iri[start..] } else { iri }
+}
