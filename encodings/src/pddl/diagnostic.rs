@@ -146,12 +146,12 @@ impl<'s> Sink<'s> {
         span: Span,
         message: String,
     ) -> &mut Diagnostic {
-        // Beyond the limit the last slot is written again and again; `finish` replaces it.
-        if self.diagnostics.len() > LIMIT {
+        // Beyond the limit all share the last slot, whose message `finish` replaces.
+        let index = self.diagnostics.len().min(LIMIT);
+        if self.is_full() {
             self.beyond_limit += 1;
-            self.diagnostics.truncate(LIMIT);
+            return &mut self.diagnostics[index];
         }
-        let index = self.diagnostics.len();
         self.diagnostics.push(Diagnostic::new(self.source, span, severity, code, message));
         &mut self.diagnostics[index]
     }
@@ -163,6 +163,11 @@ impl<'s> Sink<'s> {
     /// How many there were so far.
     pub(crate) fn len(&self) -> usize {
         self.diagnostics.len() + self.beyond_limit
+    }
+
+    /// Whether more messages would only be counted, so that no work should go into them.
+    pub(crate) fn is_full(&self) -> bool {
+        self.diagnostics.len() > LIMIT
     }
 
     pub(crate) fn has_errors(&self) -> bool {

@@ -42,7 +42,9 @@ impl Parser<'_> {
     /// `:condition` of a durative action.
     pub(super) fn timed_conditions(&mut self, item: Item<'_>, found: &mut TimedConditions) {
         if is_conjunction(item) {
-            item.rest().for_each(|item| self.timed_conditions(item, found));
+            for item in item.rest() {
+                self.timed_conditions(item, found);
+            }
         } else if let Some((time, inner)) = timed(item) {
             match self.condition(inner) {
                 Some(Condition::And(parts)) => found.extend(parts.into_iter().map(|part| (time, part))),
@@ -83,7 +85,9 @@ impl Parser<'_> {
     /// `:effect` of a durative action.
     pub(super) fn timed_effects(&mut self, item: Item<'_>, found: &mut TimedEffects) {
         if is_conjunction(item) {
-            item.rest().for_each(|item| self.timed_effects(item, found));
+            for item in item.rest() {
+                self.timed_effects(item, found);
+            }
         } else if let Some((time, inner)) = timed(item) {
             self.effect_at(item, time, inner, found);
         } else if item.is_headed("forall") {
@@ -139,7 +143,9 @@ impl Parser<'_> {
     /// `:duration`.
     pub(super) fn duration(&mut self, item: Item<'_>, found: &mut Vec<DurationConstraint>) {
         if is_conjunction(item) {
-            item.rest().for_each(|item| self.duration(item, found));
+            for item in item.rest() {
+                self.duration(item, found);
+            }
             return;
         }
         let (time, constraint) = match timed(item) {

@@ -24,7 +24,9 @@ impl Parser<'_> {
                 found.extend(self.fact(inner).map(InitialElement::NegatedFact));
             }
             _ if head.eq_ignore_ascii_case("and") => {
-                item.rest().for_each(|item| self.initial(item, found));
+                for item in item.rest() {
+                    self.initial(item, found);
+                }
             }
             _ if head.eq_ignore_ascii_case("at") && is_timed_literal(item) => {
                 found.extend(self.timed_literal(item));
