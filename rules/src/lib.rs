@@ -1,1 +1,28 @@
 //! What follows: SWRL and Datalog rules over interned facts, maintained incrementally.
+
+mod builtin;
+mod engine;
+mod error;
+mod explain;
+mod fact;
+mod fixpoint;
+mod literal;
+mod maintain;
+mod network;
+mod plan;
+mod record;
+mod rule;
+mod store;
+mod strata;
+mod swrl;
+mod symbol;
+
+pub use builtin::{BuiltIn, SWRLB};
+pub use engine::{DEFAULT_STEP_BUDGET, Delta, Engine};
+pub use error::Error;
+pub use explain::{Cause, Derivation, DerivationStep, Reason, Violation};
+pub use fact::{Arguments, Fact};
+pub use literal::{Decimal, Duration, Literal, Moment, MomentKind};
+pub use rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
+pub use swrl::{Prefixes, parse_rules, print_rules};
+pub use symbol::{Symbol, Symbols, Value};

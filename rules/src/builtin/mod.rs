@@ -1,0 +1,180 @@
+//! The built-ins of SWRL (`swrlb`), by the value spaces of XSD and the functions of `XPath` ([1], section 8).
+//!
+//! Arguments of an unsuitable kind make a built-in false, never an error. A computed result is compared with a bound
+//! first argument by value *identity* (interned value), so that the outcome does not depend on evaluation order.
+//!
+//! [1] W3C Member Submission: SWRL, 2004.
+
+mod math;
+mod text;
+
+use std::cmp::Ordering;
+
+use crate::literal::Literal;
+
+/// The namespace of SWRL's built-ins.
+pub const SWRLB: &str = "http://www.w3.org/2003/11/swrlb#";
+
+macro_rules! built_ins {
+    ($($(#[$doc:meta])* $variant:ident $name:literal $minimum:literal..=$maximum:literal $kind:ident,)*) => {
+        /// A built-in predicate or function on literals.
+        #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+        #[non_exhaustive]
+        pub enum BuiltIn { $($(#[$doc])* $variant,)* }
+
+        impl BuiltIn {
+            /// Every built-in there is.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
+
+            /// The local name in the `swrlb` namespace.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)* }
+            }
+
+            fn shape(self) -> (usize, usize, Kind) {
+                match self { $(Self::$variant => ($minimum, $maximum, Kind::$kind),)* }
+            }
+        }
+    };
+}
+
+/// A test has no result; a function computes its first argument from the others.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Test,
+    Function,
+}
+
+built_ins! {
+    /// The values are equal.
+    Equal "equal" 2..=2 Test,
+    /// The values are comparable and not equal.
+    NotEqual "notEqual" 2..=2 Test,
+    /// First < second.
+    LessThan "lessThan" 2..=2 Test,
+    /// First <= second.
+    LessThanOrEqual "lessThanOrEqual" 2..=2 Test,
+    /// First > second.
+    GreaterThan "greaterThan" 2..=2 Test,
+    /// First >= second.
+    GreaterThanOrEqual "greaterThanOrEqual" 2..=2 Test,
+    /// Sum of the second and all further arguments.
+    Add "add" 3..=32 Function,
+    /// Second minus third.
+    Subtract "subtract" 3..=3 Function,
+    /// Product of the second and all further arguments.
+    Multiply "multiply" 3..=32 Function,
+    /// Second divided by third.
+    Divide "divide" 3..=3 Function,
+    /// Second divided by third, truncated to an integer.
+    IntegerDivide "integerDivide" 3..=3 Function,
+    /// Remainder of the truncating division.
+    Mod "mod" 3..=3 Function,
+    /// Second to the power of third.
+    Pow "pow" 3..=3 Function,
+    /// The second, unchanged.
+    UnaryPlus "unaryPlus" 2..=2 Function,
+    /// The second, negated.
+    UnaryMinus "unaryMinus" 2..=2 Function,
+    /// Absolute value.
+    Abs "abs" 2..=2 Function,
+    /// Smallest integer not below.
+    Ceiling "ceiling" 2..=2 Function,
+    /// Largest integer not above.
+    Floor "floor" 2..=2 Function,
+    /// Nearest integer, halves towards positive infinity.
+    Round "round" 2..=2 Function,
+    /// Nearest value with the third argument's number of fractional digits (0 if absent), halves to even.
+    RoundHalfToEven "roundHalfToEven" 2..=3 Function,
+    /// Sine of radians.
+    Sin "sin" 2..=2 Function,
+    /// Cosine of radians.
+    Cos "cos" 2..=2 Function,
+    /// Tangent of radians.
+    Tan "tan" 2..=2 Function,
+    /// Negation.
+    BooleanNot "booleanNot" 2..=2 Function,
+    /// Equal strings, case ignored.
+    StringEqualIgnoreCase "stringEqualIgnoreCase" 2..=2 Test,
+    /// Concatenation of the second and all further arguments.
+    StringConcat "stringConcat" 2..=32 Function,
+    /// Characters of the second from the third (counted from 1), as many as the fourth says.
+    Substring "substring" 3..=4 Function,
+    /// Number of characters.
+    StringLength "stringLength" 2..=2 Function,
+    /// White space at the ends removed, inside collapsed.
+    NormalizeSpace "normalizeSpace" 2..=2 Function,
+    /// In upper case.
+    UpperCase "upperCase" 2..=2 Function,
+    /// In lower case.
+    LowerCase "lowerCase" 2..=2 Function,
+    /// Characters of the third replaced by those at the same place in the fourth, or removed.
+    Translate "translate" 4..=4 Function,
+    /// The first contains the second.
+    Contains "contains" 2..=2 Test,
+    /// The first contains the second, case ignored.
+    ContainsIgnoreCase "containsIgnoreCase" 2..=2 Test,
+    /// The first starts with the second.
+    StartsWith "startsWith" 2..=2 Test,
+    /// The first ends with the second.
+    EndsWith "endsWith" 2..=2 Test,
+    /// The part of the second before the third, empty if it does not occur.
+    SubstringBefore "substringBefore" 3..=3 Function,
+    /// The part of the second after the third, empty if it does not occur.
+    SubstringAfter "substringAfter" 3..=3 Function,
+}
+
+impl BuiltIn {
+    /// The built-in of an IRI in the `swrlb` namespace.
+    pub fn from_iri(iri: &str) -> Option<Self> {
+        Self::from_name(iri.strip_prefix(SWRLB)?)
+    }
+
+    /// The built-in with this local name.
+    pub fn from_name(local: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|built_in| built_in.name() == local)
+    }
+
+    /// Whether it can take this many arguments.
+    pub fn accepts(self, count: usize) -> bool {
+        let (minimum, maximum, _) = self.shape();
+        (minimum..=maximum).contains(&count)
+    }
+
+    /// Whether the first argument is computed from the others and so may be unbound.
+    pub fn is_function(self) -> bool {
+        self.shape().2 == Kind::Function
+    }
+
+    /// Whether a test holds of its arguments; for a function, whether the first argument is its result.
+    pub fn holds(self, arguments: &[&Literal]) -> bool {
+        match arguments {
+            [result, rest @ ..] if self.is_function() => {
+                self.compute(rest).is_some_and(|value| value == **result)
+            }
+            [left, right] => self.test(left, right),
+            _ => false,
+        }
+    }
+
+    fn test(self, left: &Literal, right: &Literal) -> bool {
+        let order = || left.compare(right);
+        match self {
+            Self::Equal => order() == Some(Ordering::Equal),
+            Self::NotEqual => order().is_some_and(|order| order != Ordering::Equal),
+            Self::LessThan => order() == Some(Ordering::Less),
+            Self::LessThanOrEqual => order().is_some_and(Ordering::is_le),
+            Self::GreaterThan => order() == Some(Ordering::Greater),
+            Self::GreaterThanOrEqual => order().is_some_and(Ordering::is_ge),
+            _ => text::test(self, left, right),
+        }
+    }
+
+    /// The result of a function on its arguments (without the first); `None` where it is undefined.
+    pub fn compute(self, arguments: &[&Literal]) -> Option<Literal> {
+        if !self.is_function() || !self.accepts(arguments.len() + 1) {
+            return None;
+        }
+        math::compute(self, arguments).or_else(|| text::compute(self, arguments))
+    }
+}

@@ -1,0 +1,204 @@
+//! A program and its facts in, consequences out, and kept so under insertion and deletion.
+//!
+//! Every derived row records the derivation by which it was first concluded, and these derivations never support each
+//! other in a circle. Deletion is delete-and-rederive [1] restricted to them: a row loses its support only when its
+//! recorded derivation loses an atom, where the original algorithm over-deletes whatever *some* derivation loses. What
+//! is over-deleted is rederived stratum by stratum, so that a deletion seldom spreads.
+//!
+//! [1] Gupta, Mumick, Subrahmanian, "Maintaining views incrementally", SIGMOD 1993.
+
+use std::sync::Arc;
+
+use smallvec::SmallVec;
+
+use crate::error::Error;
+use crate::fact::Fact;
+use crate::maintain::{Maintenance, state_change};
+use crate::network::{Network, compile};
+use crate::record::Records;
+use crate::rule::Program;
+use crate::store::{Record, Store, columns, state};
+use crate::symbol::{Symbol, Symbols};
+
+/// How many partial matches one update may extend, unless the caller says otherwise.
+pub const DEFAULT_STEP_BUDGET: u64 = 10_000_000_000;
+
+/// A change: facts that begin and facts that cease to be stated (input) or to hold (output).
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub struct Delta {
+    /// What is new.
+    pub insert: Vec<Fact>,
+    /// What is gone. A fact that is in both lists of an input is stated afterwards.
+    pub delete: Vec<Fact>,
+}
+
+/// Facts, rules, and everything that follows from them.
+#[derive(Clone, Debug)]
+pub struct Engine {
+    pub(crate) symbols: Symbols,
+    pub(crate) program: Arc<Program>,
+    pub(crate) network: Arc<Network>,
+    pub(crate) store: Store,
+    pub(crate) records: Records,
+    pub(crate) budget: u64,
+}
+
+impl Engine {
+    /// Derives everything that follows.
+    ///
+    /// # Errors
+    /// All errors of all rules: R2xx, R302, R303; or R301 where the rules do not come to an end.
+    pub fn new(
+        symbols: Symbols,
+        program: Program,
+        facts: impl IntoIterator<Item = Fact>,
+    ) -> Result<Self, Vec<Error>> {
+        Self::with_step_budget(symbols, program, facts, DEFAULT_STEP_BUDGET)
+    }
+
+    /// As [`Engine::new`], where this derivation and each later update may extend so many partial matches.
+    ///
+    /// # Errors
+    /// As [`Engine::new`].
+    pub fn with_step_budget(
+        symbols: Symbols,
+        program: Program,
+        facts: impl IntoIterator<Item = Fact>,
+        budget: u64,
+    ) -> Result<Self, Vec<Error>> {
+        let (mut symbols, mut store) = (symbols, Store::default());
+        for fact in facts {
+            check_fact(&fact, &symbols).map_err(|error| vec![error])?;
+            let relation = store.relation(fact.predicate, fact.arguments.len());
+            let relation = store.get_mut(relation);
+            if relation.find(&fact.arguments).is_none() {
+                relation.insert(&fact.arguments, state::ASSERTED, Record::NONE);
+            }
+        }
+        let network = compile(&program, &mut symbols, &mut store)?;
+        let records = Records::new(&network);
+        let (program, network) = (Arc::new(program), Arc::new(network));
+        let mut engine = Self { symbols, program, network, store, records, budget };
+        Maintenance::new(&mut engine).derive_all().map_err(|error| vec![error])?;
+        Ok(engine)
+    }
+
+    /// Changes which facts are stated and returns the net change of all facts that hold, stated or derived, sorted.
+    ///
+    /// Facts that are already stated, and deletions of facts that are not, change nothing.
+    ///
+    /// # Errors
+    /// R301 where the step budget is used up, R302 and R303; the engine is then as it was before.
+    pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
+        for fact in delta.insert.iter().chain(&delta.delete) {
+            check_fact(fact, &self.symbols)?;
+        }
+        let stated = state_change(self, delta);
+        let mut maintenance = Maintenance::new(self);
+        match maintenance.update(&stated) {
+            Ok(()) => Ok(maintenance.finish()),
+            Err(error) => {
+                self.restore(&stated.undo());
+                Err(error)
+            }
+        }
+    }
+
+    /// Derives everything anew after an update that was stopped, from what was stated before.
+    fn restore(&mut self, undo: &Delta) {
+        let kept = self.facts_with(state::ASSERTED).filter(|fact| !undo.delete.contains(fact));
+        let facts: Vec<Fact> = kept.chain(undo.insert.iter().cloned()).collect();
+        for relation in &mut self.store.relations {
+            relation.clear_all();
+        }
+        self.records = Records::new(&self.network);
+        for fact in facts {
+            let relation = self.store.relation(fact.predicate, fact.arguments.len());
+            self.store.get_mut(relation).insert(&fact.arguments, state::ASSERTED, Record::NONE);
+        }
+        let budget = std::mem::replace(&mut self.budget, u64::MAX);
+        // It ended within the budget before, and so does now without one.
+        let _ = Maintenance::new(self).derive_all();
+        self.budget = budget;
+    }
+
+    /// Whether a fact holds.
+    pub fn holds(&self, fact: &Fact) -> bool {
+        self.state_of(fact).is_some()
+    }
+
+    /// Whether a fact is stated, whether or not it would also be derived.
+    pub fn is_asserted(&self, fact: &Fact) -> bool {
+        self.state_of(fact).is_some_and(|state| state & state::ASSERTED != 0)
+    }
+
+    fn state_of(&self, fact: &Fact) -> Option<u8> {
+        let relation = self.store.get(self.store.find(fact.predicate, fact.arguments.len())?);
+        Some(relation.state(relation.find(&fact.arguments)?))
+    }
+
+    /// Everything that holds, in the order of symbols.
+    pub fn facts(&self) -> impl Iterator<Item = Fact> {
+        let mut facts: Vec<Fact> = self.facts_with(0).collect();
+        facts.sort_unstable();
+        facts.into_iter()
+    }
+
+    fn facts_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
+        let named = self.store.relations.iter().filter_map(|relation| Some((relation, relation.predicate?)));
+        named.flat_map(move |(relation, predicate)| {
+            let rows = relation.scan().filter(move |&row| relation.state(row) & bits == bits);
+            rows.map(move |row| Fact { predicate, arguments: SmallVec::from_slice(relation.row(row)) })
+        })
+    }
+
+    /// The arguments of the facts of a predicate that agree with the pattern where it is given, by index where there
+    /// is one. The order is that of the engine's history: equal histories give equal orders.
+    pub fn matching<'a>(
+        &'a self,
+        predicate: Symbol,
+        pattern: &'a [Option<Symbol>],
+    ) -> impl Iterator<Item = &'a [Symbol]> {
+        let relation = self.store.find(predicate, pattern.len()).map(|id| self.store.get(id));
+        let fits =
+            move |row: &&[Symbol]| row.iter().zip(pattern).all(|(&v, wanted)| wanted.is_none_or(|w| w == v));
+        relation.into_iter().flat_map(move |relation| {
+            let bound = (0..pattern.len()).filter(|&c| pattern[c].is_some()).fold(0, |mask, c| mask | 1 << c);
+            let rows: Box<dyn Iterator<Item = u32>> = match relation.best_index(bound) {
+                Some((index, mask)) => {
+                    let key: SmallVec<[Symbol; 4]> =
+                        columns(mask).filter_map(|column| pattern[column]).collect();
+                    Box::new(relation.lookup(index, &key))
+                }
+                None => Box::new(relation.scan()),
+            };
+            rows.map(|row| relation.row(row)).filter(fits)
+        })
+    }
+
+    /// The interner that facts and rules refer to.
+    pub fn symbols(&self) -> &Symbols {
+        &self.symbols
+    }
+
+    /// The interner, to add names and literals for new facts.
+    pub fn symbols_mut(&mut self) -> &mut Symbols {
+        &mut self.symbols
+    }
+
+    /// The rules.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+}
+
+fn check_fact(fact: &Fact, symbols: &Symbols) -> Result<(), Error> {
+    if fact.arguments.len() > 32 {
+        return Err(Error::FactArity { count: fact.arguments.len() });
+    }
+    let mut used = std::iter::once(fact.predicate).chain(fact.arguments.iter().copied());
+    match used.find(|symbol| symbol.index() >= symbols.len()) {
+        Some(symbol) => Err(Error::UnknownSymbol { index: symbol.index() }),
+        None => Ok(()),
+    }
+}

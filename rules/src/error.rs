@@ -1,0 +1,117 @@
+//! Everything that can be wrong with rules or an update, one numbered variant per cause.
+
+use crate::rule::RuleIdentity;
+
+/// What is wrong. R1xx: rule text; R2xx: a rule; R3xx: an update.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The text is not a rule.
+    #[error("{file}:{line}:{column}: R101 {message}")]
+    Syntax {
+        /// The source as named by the caller.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// In characters, counted from 1.
+        column: u32,
+        /// What was expected, what was found.
+        message: String,
+    },
+    /// A prefix that nothing declares.
+    #[error("{file}:{line}:{column}: R102 undeclared prefix `{prefix}:`")]
+    UndeclaredPrefix {
+        /// The source as named by the caller.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// In characters, counted from 1.
+        column: u32,
+        /// Without the colon.
+        prefix: String,
+    },
+    /// A `swrlb` name that the engine does not know.
+    #[error("{file}:{line}:{column}: R103 unknown or unsupported built-in `{name}`")]
+    UnknownBuiltIn {
+        /// The source as named by the caller.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// In characters, counted from 1.
+        column: u32,
+        /// As written.
+        name: String,
+    },
+    /// A head variable that no body atom binds.
+    #[error("R202 rule {rule}: variable ?{variable} in the head is not bound by the body")]
+    UnsafeHead {
+        /// Which rule.
+        rule: RuleIdentity,
+        /// Without question mark.
+        variable: String,
+    },
+    /// A variable that occurs only in negated, comparison or equality atoms.
+    #[error("R203 rule {rule}: variable ?{variable} is only tested, never bound")]
+    UnsafeBody {
+        /// Which rule.
+        rule: RuleIdentity,
+        /// Without question mark.
+        variable: String,
+    },
+    /// A built-in with too few or too many arguments.
+    #[error("R204 rule {rule}: built-in {built_in} does not take {count} arguments")]
+    BuiltInArity {
+        /// Which rule.
+        rule: RuleIdentity,
+        /// Local name.
+        built_in: &'static str,
+        /// How many it was given.
+        count: usize,
+    },
+    /// A head atom that cannot be concluded.
+    #[error("R205 rule {rule}: a head may not contain {what}")]
+    HeadAtom {
+        /// Which rule.
+        rule: RuleIdentity,
+        /// The kind of atom.
+        what: &'static str,
+    },
+    /// Negation through recursion.
+    #[error(
+        "R206 rule {rule}: `not {predicate}` depends on its own conclusion, so the rules have no stratification"
+    )]
+    Unstratified {
+        /// A rule on the cycle.
+        rule: RuleIdentity,
+        /// The negated predicate.
+        predicate: String,
+    },
+    /// An atom with more arguments than the engine stores.
+    #[error("R207 rule {rule}: {count} arguments, at most 32 are supported")]
+    Arity {
+        /// Which rule.
+        rule: RuleIdentity,
+        /// How many there are.
+        count: usize,
+    },
+    /// The evaluation was stopped; the engine is as it was before the update.
+    #[error("R301 step budget of {budget} used up, last in rule {rule}")]
+    BudgetExhausted {
+        /// The rule that was being evaluated.
+        rule: RuleIdentity,
+        /// In partial matches.
+        budget: u64,
+    },
+    /// A fact or rule with a symbol that the engine's interner never gave out.
+    #[error("R302 symbol number {index} is not in the engine's symbols")]
+    UnknownSymbol {
+        /// Its number.
+        index: usize,
+    },
+    /// A fact with more arguments than the engine stores.
+    #[error("R303 a fact with {count} arguments, at most 32 are supported")]
+    FactArity {
+        /// How many there are.
+        count: usize,
+    },
+}

@@ -1,0 +1,171 @@
+//! Why a fact holds, from the derivations that the engine recorded; and which integrity constraints are violated.
+
+use rustc_hash::FxHashMap;
+
+use crate::engine::Engine;
+use crate::fact::Fact;
+use crate::fixpoint::resolve;
+use crate::plan::{Condition, Source};
+use crate::rule::{Rule, RuleIdentity, Variable};
+use crate::store::{Record, RelationId, Row, state};
+use crate::symbol::Symbol;
+
+/// A derivation: each fact that it rests on once, so that its size is that of the facts involved, not of the tree
+/// that repeats them.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Derivation {
+    /// The first is the fact asked for; supports come after what they support.
+    pub steps: Vec<DerivationStep>,
+}
+
+/// A fact and what makes it hold.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct DerivationStep {
+    /// What holds.
+    pub fact: Fact,
+    /// By what.
+    pub reason: Reason,
+}
+
+/// What makes a fact hold.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Reason {
+    /// It is stated.
+    Asserted,
+    /// A rule concludes it.
+    Rule {
+        /// Which rule.
+        identity: RuleIdentity,
+        /// The rule's variables and their values; variables are named without question mark.
+        bindings: Vec<(String, Symbol)>,
+        /// For each relation atom of the body, in order, the position of its fact in [`Derivation::steps`].
+        supports: Vec<usize>,
+        /// For each negated atom of the body, in order, the fact that does not hold.
+        absent: Vec<Fact>,
+    },
+}
+
+/// Something that must not hold, and does.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub struct Violation {
+    /// What is violated.
+    pub cause: Cause,
+    /// The facts that together violate it.
+    pub supports: Vec<Fact>,
+}
+
+/// What a [`Violation`] violates.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[non_exhaustive]
+pub enum Cause {
+    /// A rule with an empty head.
+    Constraint(RuleIdentity),
+    /// A literal whose lexical form its datatype forbids.
+    IllTyped(Symbol),
+}
+
+impl Engine {
+    /// Why a fact holds: the derivation by which it was first concluded, down to what is stated. `None` where it does
+    /// not hold. Takes time proportional to the answer. A fact that is stated and derived is reported as stated.
+    pub fn why(&self, fact: &Fact) -> Option<Derivation> {
+        let relation = self.store.find(fact.predicate, fact.arguments.len())?;
+        let row = self.store.get(relation).find(&fact.arguments)?;
+        let mut search = Search { engine: self, positions: FxHashMap::default(), queue: Vec::new() };
+        search.position(relation, row);
+        let mut steps = Vec::new();
+        while let Some(&(relation, row)) = search.queue.get(steps.len()) {
+            let fact = self.store.get(relation).fact(row)?;
+            steps.push(DerivationStep { fact, reason: search.reason(relation, row) });
+        }
+        Some(Derivation { steps })
+    }
+
+    /// The integrity constraints (rules with an empty head) that fire, once per match, and the facts with ill-typed
+    /// literals; sorted. A knowledge base is consistent where there are none.
+    pub fn violations(&self) -> Vec<Violation> {
+        let mut violations = Vec::new();
+        for &(relation, position) in &self.network.constraints {
+            let relation = self.store.get(relation);
+            for row in relation.scan() {
+                let record = relation.record(row);
+                let supports = self.body_facts(record, false);
+                let cause = Cause::Constraint(self.program.rules[position].identity.clone());
+                violations.push(Violation { cause, supports });
+            }
+        }
+        if self.symbols.any_ill_typed() {
+            violations.extend(self.ill_typed());
+        }
+        violations.sort();
+        violations
+    }
+
+    fn ill_typed(&self) -> impl Iterator<Item = Violation> {
+        let is_bad =
+            |symbol: &Symbol| self.symbols.as_literal(*symbol).is_some_and(crate::Literal::is_ill_typed);
+        self.facts().filter_map(move |fact| {
+            let bad = fact.arguments.iter().copied().find(is_bad)?;
+            Some(Violation { cause: Cause::IllTyped(bad), supports: vec![fact] })
+        })
+    }
+
+    /// The ground relation atoms of a recorded derivation's body, or its negated ones.
+    fn body_facts(&self, record: Record, negated: bool) -> Vec<Fact> {
+        let bound = self.records.get(record);
+        self.body(record, negated)
+            .filter_map(|(relation, sources)| {
+                let arguments = sources.iter().map(|&source| resolve(source, bound));
+                Some(Fact::new(self.store.get(relation).predicate?, arguments))
+            })
+            .collect()
+    }
+
+    fn body(&self, record: Record, negated: bool) -> impl Iterator<Item = (RelationId, &[Source])> {
+        let rule = self.network.rules.get(record.rule as usize);
+        rule.into_iter().flat_map(|rule| &rule.body).filter_map(move |condition| match condition {
+            Condition::Relation(relation, sources) if !negated => Some((*relation, sources.as_slice())),
+            Condition::Not(relation, sources) if negated => Some((*relation, sources.as_slice())),
+            _ => None,
+        })
+    }
+
+    fn rule_of(&self, record: Record) -> Option<&Rule> {
+        Some(&self.program.rules[self.network.rules.get(record.rule as usize)?.rule])
+    }
+}
+
+/// A breadth-first walk from a row through recorded derivations.
+struct Search<'a> {
+    engine: &'a Engine,
+    positions: FxHashMap<(RelationId, Row), usize>,
+    queue: Vec<(RelationId, Row)>,
+}
+
+impl Search<'_> {
+    fn position(&mut self, relation: RelationId, row: Row) -> usize {
+        let queue = &mut self.queue;
+        *self.positions.entry((relation, row)).or_insert_with(|| {
+            queue.push((relation, row));
+            queue.len() - 1
+        })
+    }
+
+    fn reason(&mut self, relation: RelationId, row: Row) -> Reason {
+        let engine = self.engine;
+        let record = engine.store.get(relation).record(row);
+        let asserted = engine.store.get(relation).state(row) & state::ASSERTED != 0;
+        let Some(rule) = engine.rule_of(record).filter(|_| !asserted) else { return Reason::Asserted };
+        let bound = engine.records.get(record);
+        let used = (0..rule.variable_count()).map(|number| Variable(number as u16));
+        let bindings = used.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
+        let mut supports = Vec::new();
+        for (relation, sources) in engine.body(record, false) {
+            let arguments: Vec<Symbol> = sources.iter().map(|&source| resolve(source, bound)).collect();
+            if let Some(row) = engine.store.get(relation).find(&arguments) {
+                supports.push(self.position(relation, row));
+            }
+        }
+        let absent = engine.body_facts(record, true);
+        Reason::Rule { identity: rule.identity.clone(), bindings, supports, absent }
+    }
+}

@@ -1,0 +1,359 @@
+//! One round of evaluation as one fixed crepe program over rules that are data.
+//!
+//! A change enters as `Delta`: ranges of changed rows, per plan. `Match` says that a block of partial matches has
+//! passed so many steps of its plan; extending a block by the next atom is a look-up in the persistent store, which
+//! the program sees by reference. `Head` is a block of complete matches. Evaluation is set-at-a-time: crepe's tuples
+//! name blocks of matches, so its own bookkeeping costs nothing per match, and the store is never copied.
+//!
+//! A block is handed over, not shared: it is consumed by the one rule that extends it.
+
+use std::cell::{Cell, RefCell};
+use std::hash::{BuildHasherDefault, Hash, Hasher};
+
+use rustc_hash::FxHasher;
+
+use crate::literal::Literal;
+use crate::plan::{Pattern, Plan, Source, Step};
+use crate::store::{Relation, RelationId, Row, Store, state};
+use crate::symbol::{Symbol, Symbols};
+
+/// A position in the plans of a round.
+pub(crate) type PlanId = u32;
+
+/// A range of the changed rows from which a plan starts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seed {
+    pub plan: PlanId,
+    /// The relation of the rows; `None` starts from one empty match.
+    pub relation: Option<RelationId>,
+    /// First position in [`Round::rows`].
+    pub from: u32,
+    /// One past the last.
+    pub to: u32,
+}
+
+/// Complete matches of a plan, side by side.
+#[derive(Debug)]
+pub(crate) struct Matches {
+    pub plan: PlanId,
+    pub bindings: Vec<Symbol>,
+}
+
+/// What a round reads, and the blocks it passes along.
+pub(crate) struct Round<'a> {
+    pub store: &'a Store,
+    pub plans: &'a [Plan],
+    /// Variables per match, by compiled rule.
+    pub widths: &'a [usize],
+    pub symbols: RefCell<&'a mut Symbols>,
+    /// Changed rows, as ranges of [`Seed`]s.
+    pub rows: &'a [Row],
+    /// Whether the state before the update is asked for, of which the store holds a superset.
+    pub retracting: bool,
+    pub budget: &'a Budget,
+    pub blocks: RefCell<Vec<Vec<Symbol>>>,
+}
+
+/// Steps left, and the rule that used up the last.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Budget {
+    pub left: Cell<u64>,
+    pub exhausted_by: Cell<Option<u32>>,
+}
+
+/// A block in [`Round::blocks`].
+type BlockId = u32;
+
+mod program {
+    //! The crepe program.
+
+    use super::{BlockId, Handle, PlanId};
+    use crepe::crepe;
+
+    crepe! {
+        @input
+        pub struct Reads<'a>(pub Handle<'a>);
+        @input
+        pub struct Delta(pub u32, pub PlanId);
+
+        struct Match(PlanId, u32, BlockId);
+
+        @output
+        pub struct Head(pub PlanId, pub BlockId);
+
+        Match(plan, 0, block) <- Delta(seed, plan), Reads(round), let Some(block) = round.seed(seed);
+        Match(plan, step + 1, longer) <-
+            Match(plan, step, block), Reads(round), let Some(longer) = round.extend(plan, step, block);
+        Head(plan, block) <- Match(plan, step, block), Reads(round), (round.is_complete(plan, step));
+    }
+}
+
+/// Identity of a round, so that crepe can keep it in a relation.
+#[derive(Clone, Copy)]
+pub(crate) struct Handle<'a>(&'a dyn Evaluate);
+
+trait Evaluate {
+    fn seed(&self, seed: u32) -> Option<BlockId>;
+    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId>;
+    fn is_complete(&self, plan: PlanId, step: u32) -> bool;
+}
+
+impl Handle<'_> {
+    fn address(&self) -> *const () {
+        std::ptr::from_ref(self.0).cast()
+    }
+
+    fn seed(&self, seed: u32) -> Option<BlockId> {
+        self.0.seed(seed)
+    }
+
+    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId> {
+        self.0.extend(plan, step, block)
+    }
+
+    fn is_complete(&self, plan: PlanId, step: u32) -> bool {
+        self.0.is_complete(plan, step)
+    }
+}
+
+impl PartialEq for Handle<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.address() == other.address()
+    }
+}
+
+impl Eq for Handle<'_> {}
+
+impl Hash for Handle<'_> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.address().hash(state);
+    }
+}
+
+/// Evaluates the plans from their seeds; matches come in the order of seeds.
+pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
+    let seeded = Seeded { round, seeds };
+    let mut runtime = program::Crepe::new();
+    runtime.extend([program::Reads(Handle(&seeded))]);
+    runtime.extend(seeds.iter().enumerate().map(|(number, seed)| program::Delta(number as u32, seed.plan)));
+    let (heads,) = runtime.run_with_hasher::<BuildHasherDefault<FxHasher>>();
+    let mut heads: Vec<(PlanId, BlockId)> = heads.into_iter().map(|head| (head.0, head.1)).collect();
+    heads.sort_unstable();
+    let matches = |(plan, block)| Matches { plan, bindings: round.take(block) };
+    heads.into_iter().map(matches).collect()
+}
+
+struct Seeded<'r, 'a> {
+    round: &'r Round<'a>,
+    seeds: &'r [Seed],
+}
+
+impl Evaluate for Seeded<'_, '_> {
+    fn seed(&self, seed: u32) -> Option<BlockId> {
+        self.round.seed(&self.seeds[seed as usize])
+    }
+
+    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId> {
+        self.round.extend(plan, step, block)
+    }
+
+    fn is_complete(&self, plan: PlanId, step: u32) -> bool {
+        self.round.plans[plan as usize].steps.len() == step as usize
+    }
+}
+
+impl Round<'_> {
+    fn take(&self, block: BlockId) -> Vec<Symbol> {
+        std::mem::take(&mut self.blocks.borrow_mut()[block as usize])
+    }
+
+    fn put(&self, block: Vec<Symbol>) -> Option<BlockId> {
+        if block.is_empty() {
+            return None;
+        }
+        let mut blocks = self.blocks.borrow_mut();
+        blocks.push(block);
+        Some(blocks.len() as BlockId - 1)
+    }
+
+    fn width(&self, plan: &Plan) -> usize {
+        self.widths[plan.rule as usize]
+    }
+
+    /// Takes steps from the budget; `false` once it is used up.
+    fn spend(&self, steps: u64, rule: u32) -> bool {
+        let left = self.budget.left.get();
+        if left < steps {
+            self.budget.exhausted_by.set(Some(rule));
+        }
+        self.budget.left.set(left.saturating_sub(steps));
+        left >= steps
+    }
+
+    fn seed(&self, seed: &Seed) -> Option<BlockId> {
+        let plan = &self.plans[seed.plan as usize];
+        let empty = vec![Symbol(0); self.width(plan)];
+        let Some(relation) = seed.relation else { return self.put(empty) };
+        let relation = self.store.get(relation);
+        let mut block = Vec::with_capacity(self.width(plan) * (seed.to - seed.from) as usize);
+        for &row in &self.rows[seed.from as usize..seed.to as usize] {
+            extend_match(&mut block, &empty, relation.row(row), &plan.seed);
+        }
+        self.put(block)
+    }
+
+    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId> {
+        let plan = &self.plans[plan as usize];
+        let step = plan.steps.get(step as usize)?;
+        let block = self.take(block);
+        let width = self.width(plan);
+        if !self.spend((block.len() / width) as u64, plan.rule) {
+            return None;
+        }
+        self.put(match step {
+            Step::Join { relation, skip, index, key, pattern } => {
+                let lookup =
+                    Lookup { relation: self.store.get(*relation), skip: *skip, index: *index, key, pattern };
+                self.join(&lookup, &block, width, plan.rule)
+            }
+            Step::Contains { relation, skip, key } => {
+                let (relation, skip) = (self.store.get(*relation), self.visibility(*skip));
+                retain(block, width, |bound| {
+                    find(relation, key, bound).is_some_and(|r| relation.state(r) & skip == 0)
+                })
+            }
+            Step::Absent { .. } if self.retracting => block,
+            Step::Absent { relation, key } => {
+                let relation = self.store.get(*relation);
+                let gone = |row: Row| relation.state(row) & state::DOOMED != 0;
+                retain(block, width, |bound| find(relation, key, bound).is_none_or(gone))
+            }
+            Step::Test { built_in, arguments } => {
+                let symbols = self.symbols.borrow();
+                retain(block, width, |bound| {
+                    literals(&symbols, arguments, bound).is_some_and(|values| built_in.holds(&values))
+                })
+            }
+            Step::Compute { built_in, result, arguments } => {
+                self.compute(block, width, *result, |symbols, bound| {
+                    built_in.compute(&literals(symbols, arguments, bound)?)
+                })
+            }
+            Step::Equate { variable, source } => {
+                let mut block = block;
+                for bound in block.chunks_exact_mut(width) {
+                    bound[usize::from(*variable)] = resolve(*source, bound);
+                }
+                block
+            }
+            Step::Compare { left, right, equal } => {
+                retain(block, width, |bound| (resolve(*left, bound) == resolve(*right, bound)) == *equal)
+            }
+        })
+    }
+
+    /// The row states to skip: when retracting, everything that held before is visible.
+    fn visibility(&self, skip: u8) -> u8 {
+        if self.retracting { state::FREE } else { skip }
+    }
+
+    fn join(&self, lookup: &Lookup, block: &[Symbol], width: usize, rule: u32) -> Vec<Symbol> {
+        let (relation, skip) = (lookup.relation, self.visibility(lookup.skip));
+        let mut longer = Vec::with_capacity(block.len());
+        let mut key = [Symbol(0); 32];
+        for bound in block.chunks_exact(width) {
+            let before = longer.len();
+            let mut visit = |row: Row| {
+                if relation.state(row) & skip == 0 {
+                    extend_match(&mut longer, bound, relation.row(row), lookup.pattern);
+                }
+            };
+            if let Some(index) = lookup.index {
+                for (slot, source) in key.iter_mut().zip(lookup.key) {
+                    *slot = resolve(*source, bound);
+                }
+                relation.lookup(index, &key[..lookup.key.len()]).for_each(&mut visit);
+            } else {
+                (0..relation.bound()).for_each(&mut visit);
+            }
+            if !self.spend(((longer.len() - before) / width) as u64, rule) {
+                return Vec::new();
+            }
+        }
+        longer
+    }
+
+    fn compute(
+        &self,
+        mut block: Vec<Symbol>,
+        width: usize,
+        result: u16,
+        function: impl Fn(&Symbols, &[Symbol]) -> Option<Literal>,
+    ) -> Vec<Symbol> {
+        let mut symbols = self.symbols.borrow_mut();
+        let mut kept = 0;
+        for start in (0..block.len()).step_by(width) {
+            let Some(value) = function(&symbols, &block[start..start + width]) else { continue };
+            block[start + usize::from(result)] = symbols.literal(value);
+            block.copy_within(start..start + width, kept);
+            kept += width;
+        }
+        block.truncate(kept);
+        block
+    }
+}
+
+/// The parts of a join step.
+struct Lookup<'a> {
+    relation: &'a Relation,
+    skip: u8,
+    index: Option<usize>,
+    key: &'a [Source],
+    pattern: &'a Pattern,
+}
+
+/// Appends a partial match, extended by a row, where the row fits.
+fn extend_match(block: &mut Vec<Symbol>, bound: &[Symbol], row: &[Symbol], pattern: &Pattern) {
+    let start = block.len();
+    block.extend_from_slice(bound);
+    let longer = &mut block[start..];
+    for &(column, variable) in &pattern.binds {
+        longer[usize::from(variable)] = row[column];
+    }
+    if pattern.checks.iter().any(|&(column, source)| resolve(source, longer) != row[column]) {
+        block.truncate(start);
+    }
+}
+
+/// The value of a source under a match.
+pub(crate) fn resolve(source: Source, bound: &[Symbol]) -> Symbol {
+    match source {
+        Source::Variable(number) => bound[usize::from(number)],
+        Source::Constant(symbol) => symbol,
+    }
+}
+
+fn find(relation: &Relation, key: &[Source], bound: &[Symbol]) -> Option<Row> {
+    let mut arguments = [Symbol(0); 32];
+    for (slot, &source) in arguments.iter_mut().zip(key) {
+        *slot = resolve(source, bound);
+    }
+    relation.find(&arguments[..key.len()])
+}
+
+fn literals<'s>(symbols: &'s Symbols, sources: &[Source], bound: &[Symbol]) -> Option<Vec<&'s Literal>> {
+    sources.iter().map(|&source| symbols.as_literal(resolve(source, bound))).collect()
+}
+
+/// Keeps the matches that pass a test, in place.
+fn retain(mut block: Vec<Symbol>, width: usize, test: impl Fn(&[Symbol]) -> bool) -> Vec<Symbol> {
+    let mut kept = 0;
+    for start in (0..block.len()).step_by(width) {
+        if test(&block[start..start + width]) {
+            block.copy_within(start..start + width, kept);
+            kept += width;
+        }
+    }
+    block.truncate(kept);
+    block
+}

@@ -1,0 +1,182 @@
+//! The value space of `xsd:decimal` and all its integer types: exact, of any size.
+//!
+//! Values that fit 64 bits and 18 fractional digits compare without allocating; that is every value of real
+//! knowledge bases.
+
+use std::cmp::Ordering;
+use std::fmt;
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Signed, ToPrimitive, Zero};
+
+/// The largest exponent accepted in a lexical form; keeps hostile input such as `1e999999999` from filling memory.
+const MAX_EXPONENT: i64 = 1000;
+/// The largest scale of the small representation.
+const SMALL_SCALE: u32 = 18;
+/// Fractional digits kept by a division.
+const DIVISION_DIGITS: u32 = 34;
+
+/// A decimal number `unscaled / 10^scale`, kept with the smallest scale, so that equal values are equal structs.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct Decimal(Repr);
+
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+enum Repr {
+    Small { unscaled: i64, scale: u32 },
+    Large { unscaled: Box<BigInt>, scale: u32 },
+}
+
+impl Decimal {
+    /// Reads `-12.50`, and `1e-05` as Python writes decimals. `None` where the form is not a decimal.
+    pub fn parse(lexical: &str) -> Option<Self> {
+        let (mantissa, exponent) = match lexical.find(['e', 'E']) {
+            Some(at) => (&lexical[..at], lexical[at + 1..].parse::<i64>().ok()?),
+            None => (lexical, 0),
+        };
+        let (negative, digits) = match mantissa.as_bytes().first()? {
+            b'-' => (true, &mantissa[1..]),
+            b'+' => (false, &mantissa[1..]),
+            _ => (false, mantissa),
+        };
+        let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+        let all = format!("{whole}{fraction}");
+        if all.is_empty() || !all.bytes().all(|b| b.is_ascii_digit()) || exponent.abs() > MAX_EXPONENT {
+            return None;
+        }
+        let magnitude: BigInt = all.parse().ok()?;
+        let unscaled = if negative { -magnitude } else { magnitude };
+        Some(Self::from_exponent(unscaled, exponent - i64::try_from(fraction.len()).ok()?))
+    }
+
+    fn from_exponent(unscaled: BigInt, exponent: i64) -> Self {
+        match u32::try_from(-exponent) {
+            Ok(scale) => Self::new(unscaled, scale),
+            Err(_) => Self::new(unscaled * power_of_ten(exponent.unsigned_abs() as u32), 0),
+        }
+    }
+
+    /// `unscaled / 10^scale`.
+    pub fn new(unscaled: BigInt, scale: u32) -> Self {
+        let (mut unscaled, mut scale) = (unscaled, scale);
+        if let Some(small) = unscaled.to_i64() {
+            let (small, scale) = strip_zeros(small, scale);
+            if scale <= SMALL_SCALE {
+                return Self(Repr::Small { unscaled: small, scale });
+            }
+            unscaled = small.into();
+            return Self(Repr::Large { unscaled: Box::new(unscaled), scale });
+        }
+        let ten = BigInt::from(10);
+        while scale > 0 && (&unscaled % &ten).is_zero() {
+            unscaled /= &ten;
+            scale -= 1;
+        }
+        match unscaled.to_i64() {
+            Some(small) if scale <= SMALL_SCALE => Self(Repr::Small { unscaled: small, scale }),
+            _ => Self(Repr::Large { unscaled: Box::new(unscaled), scale }),
+        }
+    }
+
+    /// Unscaled value and scale.
+    pub fn parts(&self) -> (BigInt, u32) {
+        match &self.0 {
+            Repr::Small { unscaled, scale } => (BigInt::from(*unscaled), *scale),
+            Repr::Large { unscaled, scale } => ((**unscaled).clone(), *scale),
+        }
+    }
+
+    /// Whether the value is an integer.
+    pub fn is_integer(&self) -> bool {
+        matches!(self.0, Repr::Small { scale: 0, .. } | Repr::Large { scale: 0, .. })
+    }
+
+    /// The exact value.
+    pub fn to_rational(&self) -> BigRational {
+        let (unscaled, scale) = self.parts();
+        BigRational::new(unscaled, power_of_ten(scale))
+    }
+
+    /// The nearest decimal with at most 34 fractional digits, rounded half away from zero.
+    pub fn from_rational(value: &BigRational) -> Self {
+        let scaled = value * BigRational::from_integer(power_of_ten(DIVISION_DIGITS));
+        Self::new(scaled.round().to_integer(), DIVISION_DIGITS)
+    }
+
+    /// The nearest double.
+    pub fn to_f64(&self) -> f64 {
+        self.to_string().parse().unwrap_or(f64::NAN)
+    }
+
+    /// The nearest float.
+    pub fn to_f32(&self) -> f32 {
+        self.to_string().parse().unwrap_or(f32::NAN)
+    }
+}
+
+impl From<i64> for Decimal {
+    fn from(value: i64) -> Self {
+        Self(Repr::Small { unscaled: value, scale: 0 })
+    }
+}
+
+fn strip_zeros(mut unscaled: i64, mut scale: u32) -> (i64, u32) {
+    if unscaled == 0 {
+        return (0, 0);
+    }
+    while scale > 0 && unscaled % 10 == 0 {
+        unscaled /= 10;
+        scale -= 1;
+    }
+    (unscaled, scale)
+}
+
+fn power_of_ten(exponent: u32) -> BigInt {
+    BigInt::from(10).pow(exponent)
+}
+
+impl Ord for Decimal {
+    fn cmp(&self, other: &Self) -> Ordering {
+        if let (Repr::Small { unscaled: a, scale: s }, Repr::Small { unscaled: b, scale: t }) =
+            (&self.0, &other.0)
+        {
+            let scale = *s.max(t);
+            let widen = |unscaled: i64, from: u32| i128::from(unscaled) * 10_i128.pow(scale - from);
+            return widen(*a, *s).cmp(&widen(*b, *t));
+        }
+        let ((a, s), (b, t)) = (self.parts(), other.parts());
+        let scale = s.max(t);
+        (a * power_of_ten(scale - s)).cmp(&(b * power_of_ten(scale - t)))
+    }
+}
+
+impl PartialOrd for Decimal {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// The shortest form: `-0.5`, `12`.
+impl fmt::Display for Decimal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (unscaled, scale) = self.parts();
+        let sign = if unscaled.is_negative() { "-" } else { "" };
+        if scale == 0 {
+            return write!(f, "{sign}{}", unscaled.magnitude());
+        }
+        let digits = format!("{:0>width$}", unscaled.magnitude().to_string(), width = scale as usize + 1);
+        let (whole, fraction) = digits.split_at(digits.len() - scale as usize);
+        write!(f, "{sign}{whole}.{fraction}")
+    }
+}
+
+/// Whether a value lies between two optional powers of two: `-(2^below)` to `2^above - 1`.
+pub(super) fn in_range(value: &Decimal, minimum: Option<i128>, maximum: Option<i128>) -> bool {
+    let (unscaled, _) = value.parts();
+    minimum.is_none_or(|m| unscaled >= BigInt::from(m)) && maximum.is_none_or(|m| unscaled <= BigInt::from(m))
+}
+
+/// `10^exponent` as a decimal, for rounding.
+pub(crate) fn ten_to(exponent: u32) -> BigInt {
+    if exponent == 0 { BigInt::one() } else { power_of_ten(exponent) }
+}

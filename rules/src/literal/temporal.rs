@@ -1,0 +1,301 @@
+//! `xsd:dateTime`, `xsd:date`, `xsd:time` and `xsd:duration`: lexical forms to seconds and months, partially ordered.
+//!
+//! A moment is seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar, with its time zone subtracted
+//! if it has one. A moment without time zone compares with one that has only where every zone gives the same order.
+
+use std::cmp::Ordering;
+use std::fmt;
+
+use super::decimal::Decimal;
+use num_bigint::BigInt;
+use num_traits::Zero;
+
+const DAY: i64 = 86_400;
+/// The widest time zone, in seconds.
+const ZONE_LIMIT: i64 = 14 * 3600;
+
+/// Which of the three datatypes a [`Moment`] belongs to.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum MomentKind {
+    /// `xsd:dateTime`.
+    DateTime,
+    /// `xsd:date`.
+    Date,
+    /// `xsd:time`, on the day 1970-01-01.
+    Time,
+}
+
+/// A point in time.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct Moment {
+    kind: MomentKind,
+    /// Seconds since 1970-01-01T00:00:00, in UTC if `zoned`, else local.
+    seconds: Decimal,
+    zoned: bool,
+}
+
+/// An `xsd:duration`: months and seconds do not convert into each other.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct Duration {
+    months: i64,
+    seconds: Decimal,
+}
+
+impl Moment {
+    /// Reads the lexical form of `dateTime`, `dateTimeStamp`, `date` or `time`.
+    pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
+        let (body, zone) = split_zone(lexical)?;
+        let (kind, days, time) = match local {
+            "date" => (MomentKind::Date, parse_date(body)?, None),
+            "time" => (MomentKind::Time, 0, Some(body)),
+            _ => {
+                let (date, time) = body.split_once('T')?;
+                (MomentKind::DateTime, parse_date(date)?, Some(time))
+            }
+        };
+        if local == "dateTimeStamp" && zone.is_none() {
+            return None;
+        }
+        let clock = time.map_or(Some(Decimal::from(0)), parse_clock)?;
+        let offset = days.checked_mul(DAY)?.checked_sub(zone.unwrap_or(0))?;
+        Some(Self { kind, seconds: add_seconds(&clock, offset), zoned: zone.is_some() })
+    }
+
+    /// Seconds since 1970-01-01T00:00:00, in UTC where the moment has a time zone, else local.
+    pub fn seconds(&self) -> &Decimal {
+        &self.seconds
+    }
+
+    /// Which datatype.
+    pub fn kind(&self) -> MomentKind {
+        self.kind
+    }
+
+    pub(super) fn datatype(&self) -> &'static str {
+        match self.kind {
+            MomentKind::DateTime => "http://www.w3.org/2001/XMLSchema#dateTime",
+            MomentKind::Date => "http://www.w3.org/2001/XMLSchema#date",
+            MomentKind::Time => "http://www.w3.org/2001/XMLSchema#time",
+        }
+    }
+}
+
+impl PartialOrd for Moment {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        if self.kind != other.kind {
+            return None;
+        }
+        if self.zoned == other.zoned {
+            return Some(self.seconds.cmp(&other.seconds));
+        }
+        let earliest = add_seconds(&self.seconds, -ZONE_LIMIT).cmp(&other.seconds);
+        let latest = add_seconds(&self.seconds, ZONE_LIMIT).cmp(&other.seconds);
+        (earliest == latest && earliest != Ordering::Equal).then_some(earliest)
+    }
+}
+
+/// Canonical form, in UTC where there is a time zone.
+impl fmt::Display for Moment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (day, clock) = split_day(&self.seconds);
+        let (year, month, date) = civil_from_days(day);
+        let sign = if year < 0 { "-" } else { "" };
+        let calendar = format!("{sign}{:04}-{month:02}-{date:02}", year.unsigned_abs());
+        let zone = if self.zoned { "Z" } else { "" };
+        match self.kind {
+            MomentKind::Date => write!(f, "{calendar}{zone}"),
+            MomentKind::Time => write!(f, "{clock}{zone}"),
+            MomentKind::DateTime => write!(f, "{calendar}T{clock}{zone}"),
+        }
+    }
+}
+
+impl Duration {
+    /// Reads `P1Y2M3DT4H5M6.7S` with optional minus.
+    pub(super) fn parse(lexical: &str, local: &str) -> Option<Self> {
+        let (negative, rest) = lexical.strip_prefix('-').map_or((false, lexical), |rest| (true, rest));
+        let rest = rest.strip_prefix('P')?;
+        let (date, time) = rest.split_once('T').map_or((rest, None), |(date, time)| (date, Some(time)));
+        if rest.is_empty() || time == Some("") {
+            return None;
+        }
+        let (years, date) = take_field(date, 'Y')?;
+        let (months, date) = take_field(date, 'M')?;
+        let (days, date) = take_field(date, 'D')?;
+        let (hours, time) = take_field(time.unwrap_or(""), 'H')?;
+        let (minutes, time) = take_field(time, 'M')?;
+        let seconds = match time.strip_suffix('S') {
+            Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => Decimal::parse(text)?,
+            _ if time.is_empty() => Decimal::from(0),
+            _ => return None,
+        };
+        if !date.is_empty() {
+            return None;
+        }
+        let months = years.checked_mul(12)?.checked_add(months)?;
+        let whole = days
+            .checked_mul(DAY)?
+            .checked_add(hours.checked_mul(3600)?)?
+            .checked_add(minutes.checked_mul(60)?)?;
+        let seconds = add_seconds(&seconds, whole);
+        let forbidden = match local {
+            "dayTimeDuration" => months != 0,
+            "yearMonthDuration" => rest.contains(['D', 'T']),
+            _ => false,
+        };
+        (!forbidden).then(|| {
+            if negative {
+                Self { months: -months, seconds: negate(&seconds) }
+            } else {
+                Self { months, seconds }
+            }
+        })
+    }
+
+    pub(super) fn datatype(&self) -> &'static str {
+        if self.months == 0 {
+            "http://www.w3.org/2001/XMLSchema#dayTimeDuration"
+        } else if self.seconds == Decimal::from(0) {
+            "http://www.w3.org/2001/XMLSchema#yearMonthDuration"
+        } else {
+            "http://www.w3.org/2001/XMLSchema#duration"
+        }
+    }
+}
+
+impl PartialOrd for Duration {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        let (months, seconds) = (self.months.cmp(&other.months), self.seconds.cmp(&other.seconds));
+        match (months, seconds) {
+            (Ordering::Equal, order) | (order, Ordering::Equal) => Some(order),
+            (a, b) if a == b => Some(a),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Duration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let negative = self.months < 0 || self.seconds < Decimal::from(0);
+        let (months, seconds) =
+            (self.months.unsigned_abs(), if negative { negate(&self.seconds) } else { self.seconds.clone() });
+        f.write_str(if negative { "-P" } else { "P" })?;
+        if months > 0 {
+            write!(f, "{}Y{}M", months / 12, months % 12)?;
+        }
+        if months == 0 || seconds != Decimal::from(0) {
+            write!(f, "T{seconds}S")?;
+        }
+        Ok(())
+    }
+}
+
+/// `12H…` with unit `H` gives 12 and the rest; no field gives 0 and the whole.
+fn take_field(text: &str, unit: char) -> Option<(i64, &str)> {
+    let digits = text.bytes().take_while(u8::is_ascii_digit).count();
+    match text[digits..].strip_prefix(unit) {
+        Some(rest) if digits > 0 => Some((text[..digits].parse().ok()?, rest)),
+        Some(_) => None,
+        None => Some((0, text)),
+    }
+}
+
+fn negate(value: &Decimal) -> Decimal {
+    let (unscaled, scale) = value.parts();
+    Decimal::new(-unscaled, scale)
+}
+
+fn add_seconds(value: &Decimal, whole: i64) -> Decimal {
+    let (unscaled, scale) = value.parts();
+    Decimal::new(unscaled + BigInt::from(whole) * super::ten_to(scale), scale)
+}
+
+/// The text before the time zone, and the zone in seconds east of UTC.
+fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
+    if let Some(body) = lexical.strip_suffix('Z') {
+        return Some((body, Some(0)));
+    }
+    let Some(at) = lexical.len().checked_sub(6).filter(|&at| lexical.is_char_boundary(at)) else {
+        return Some((lexical, None));
+    };
+    let (body, zone) = lexical.split_at(at);
+    let sign = match zone.as_bytes()[0] {
+        b'+' => 1,
+        b'-' if zone.as_bytes()[3] == b':' => -1,
+        _ => return Some((lexical, None)),
+    };
+    let (hours, minutes) = zone[1..].split_once(':')?;
+    let seconds = number(hours, 2)? * 3600 + number(minutes, 2)? * 60;
+    (seconds <= ZONE_LIMIT).then_some((body, Some(sign * seconds)))
+}
+
+/// A number of exactly `width` digits.
+fn number(text: &str, width: usize) -> Option<i64> {
+    (text.len() == width && text.bytes().all(|b| b.is_ascii_digit())).then(|| text.parse().ok())?
+}
+
+/// `hh:mm:ss.fff` in seconds; `24:00:00` is allowed.
+fn parse_clock(text: &str) -> Option<Decimal> {
+    let mut parts = text.splitn(3, ':');
+    let (hours, minutes, seconds) = (number(parts.next()?, 2)?, number(parts.next()?, 2)?, parts.next()?);
+    let whole = seconds.split('.').next()?;
+    let fraction_ok = seconds.len() == 2 || (seconds.len() > 3 && seconds.as_bytes()[2] == b'.');
+    if number(whole, 2)? > 59 || minutes > 59 || !fraction_ok || seconds.contains(['e', 'E']) {
+        return None;
+    }
+    let value = add_seconds(&Decimal::parse(seconds)?, hours * 3600 + minutes * 60);
+    (value <= Decimal::from(DAY) && (hours < 24 || value == Decimal::from(DAY))).then_some(value)
+}
+
+/// `-?yyyy-mm-dd` as days since 1970-01-01.
+fn parse_date(text: &str) -> Option<i64> {
+    let (negative, rest) = text.strip_prefix('-').map_or((false, text), |rest| (true, rest));
+    let mut parts = rest.splitn(3, '-');
+    let (year, month, day) = (parts.next()?, number(parts.next()?, 2)?, number(parts.next()?, 2)?);
+    let plain = (4..=9).contains(&year.len()) && (year.len() == 4 || !year.starts_with('0'));
+    let year = number(year, year.len()).filter(|_| plain)?;
+    let year = if negative { -year } else { year };
+    let days = days_from_civil(year, month, day);
+    (civil_from_days(days) == (year, month, day)).then_some(days)
+}
+
+/// Howard Hinnant's calendar arithmetic: a date to days since 1970-01-01.
+fn days_from_civil(year: i64, month: i64, day: i64) -> i64 {
+    let year = if month <= 2 { year - 1 } else { year };
+    let era = year.div_euclid(400);
+    let year_of_era = year.rem_euclid(400);
+    let day_of_year = (153 * (month + if month > 2 { -3 } else { 9 }) + 2) / 5 + day - 1;
+    era * 146_097 + year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year - 719_468
+}
+
+/// The inverse: days since 1970-01-01 to year, month and day.
+fn civil_from_days(days: i64) -> (i64, i64, i64) {
+    let days = days + 719_468;
+    let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted = (5 * day_of_year + 2) / 153;
+    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    (year, month, day_of_year - (153 * shifted + 2) / 5 + 1)
+}
+
+/// Whole days, and the clock time `hh:mm:ss.fff` of the rest.
+fn split_day(seconds: &Decimal) -> (i64, String) {
+    let (unscaled, scale) = seconds.parts();
+    let unit = super::ten_to(scale);
+    let (mut whole, mut fraction) = (&unscaled / &unit, &unscaled % &unit);
+    if fraction < BigInt::zero() {
+        whole -= 1;
+        fraction += &unit;
+    }
+    let whole = i64::try_from(whole).unwrap_or(0);
+    let clock = whole.rem_euclid(DAY);
+    let tail = if scale == 0 {
+        String::new()
+    } else {
+        format!(".{:0>width$}", fraction.to_string(), width = scale as usize)
+    };
+    let text = format!("{:02}:{:02}:{:02}{tail}", clock / 3600, clock / 60 % 60, clock % 60);
+    (whole.div_euclid(DAY), text)
+}

@@ -1,0 +1,347 @@
+//! The maintenance algorithm: from a change of what is stated to the change of what holds, stratum by stratum.
+//!
+//! In each stratum: 1. over-delete the rows whose recorded derivation lost an atom; 2. rederive what has another
+//! derivation from what is left; 3. insert semi-naively what follows from new and revived rows.
+
+use std::cell::{Cell, RefCell};
+use std::sync::Arc;
+
+use rustc_hash::FxHashSet;
+use smallvec::SmallVec;
+
+use crate::engine::{Delta, Engine};
+use crate::error::Error;
+use crate::fact::Fact;
+use crate::fixpoint::{Budget, Matches, PlanId, Round, Seed, resolve, run};
+use crate::network::{Network, Stratum};
+use crate::store::{Record, RelationId, Row, state};
+use crate::symbol::Symbol;
+
+/// Rows that start one run of the crepe program; bounds the memory of partial matches.
+const CHUNK: usize = 2048;
+
+/// Rows by relation.
+type Rows = Vec<(RelationId, Row)>;
+
+/// What an update states, and which rows that concerned.
+#[derive(Default)]
+pub(crate) struct Stated {
+    /// What changed, without what was so already.
+    effective: Delta,
+    added: Rows,
+    doomed: Rows,
+}
+
+impl Stated {
+    /// The change that takes it back.
+    pub fn undo(self) -> Delta {
+        Delta { insert: self.effective.delete, delete: self.effective.insert }
+    }
+}
+
+/// Marks in the store what a change states and no longer states.
+pub(crate) fn state_change(engine: &mut Engine, delta: Delta) -> Stated {
+    let store = &mut engine.store;
+    let mut stated = Stated::default();
+    let kept: FxHashSet<&Fact> = delta.insert.iter().collect();
+    for fact in delta.delete.iter().filter(|fact| !kept.contains(fact)) {
+        let Some(id) = store.find(fact.predicate, fact.arguments.len()) else { continue };
+        let relation = store.get_mut(id);
+        let Some(row) = relation.find(&fact.arguments) else { continue };
+        if relation.state(row) & state::ASSERTED == 0 {
+            continue;
+        }
+        relation.clear(row, state::ASSERTED);
+        if relation.record(row) == Record::NONE {
+            relation.set(row, state::DOOMED);
+            stated.doomed.push((id, row));
+        }
+        stated.effective.delete.push(fact.clone());
+    }
+    for fact in delta.insert {
+        let id = store.relation(fact.predicate, fact.arguments.len());
+        let relation = store.get_mut(id);
+        match relation.find(&fact.arguments) {
+            Some(row) if relation.state(row) & state::ASSERTED != 0 => continue,
+            Some(row) => relation.set(row, state::ASSERTED),
+            None => {
+                let bits = state::ASSERTED | state::NEW;
+                stated.added.push((id, relation.insert(&fact.arguments, bits, Record::NONE)));
+            }
+        }
+        stated.effective.insert.push(fact);
+    }
+    stated
+}
+
+/// An update in progress.
+pub(crate) struct Maintenance<'a> {
+    engine: &'a mut Engine,
+    network: Arc<Network>,
+    /// Rows that did not hold before.
+    added: Rows,
+    /// Rows that held before and may not any more.
+    doomed: Rows,
+    /// Rows concluded in the current round.
+    pending: Rows,
+    /// Strata that a change reached.
+    touched: Vec<bool>,
+    budget: Budget,
+}
+
+impl<'a> Maintenance<'a> {
+    pub fn new(engine: &'a mut Engine) -> Self {
+        let network = Arc::clone(&engine.network);
+        let touched = vec![false; network.strata.len()];
+        let budget = Budget { left: Cell::new(engine.budget), exhausted_by: Cell::new(None) };
+        Self { engine, network, added: Vec::new(), doomed: Vec::new(), pending: Vec::new(), touched, budget }
+    }
+
+    /// Derives everything from the stated facts of an engine that has derived nothing yet.
+    pub fn derive_all(mut self) -> Result<(), Error> {
+        let network = Arc::clone(&self.network);
+        for stratum in &network.strata {
+            for &(relation, plan) in &stratum.initial {
+                if let Some(relation) = relation {
+                    let rows: Rows =
+                        self.engine.store.get(relation).scan().map(|row| (relation, row)).collect();
+                    self.run(&rows, |_| Some(std::slice::from_ref(&plan)), false)?;
+                } else {
+                    self.run_chunk(&[Seed { plan, relation: None, from: 0, to: 1 }], &[], false)?;
+                }
+            }
+            self.saturate(stratum)?;
+        }
+        for (relation, row) in self.added {
+            self.engine.store.get_mut(relation).clear(row, state::NEW);
+        }
+        Ok(())
+    }
+
+    /// Makes the store hold what follows after a change of what is stated; what does not any more is doomed.
+    pub fn update(&mut self, stated: &Stated) -> Result<(), Error> {
+        self.added.clone_from(&stated.added);
+        self.doomed.clone_from(&stated.doomed);
+        for &(relation, _) in stated.added.iter().chain(&stated.doomed) {
+            self.touch(relation);
+        }
+        let network = Arc::clone(&self.network);
+        for (number, stratum) in network.strata.iter().enumerate() {
+            if self.touched[number] {
+                self.over_delete(stratum)?;
+                self.rederive(stratum)?;
+                self.insert(stratum)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes what is doomed and reports the net change.
+    pub fn finish(self) -> Delta {
+        let Engine { store, records, .. } = self.engine;
+        let mut delta = Delta::default();
+        for (id, row) in self.added {
+            let relation = store.get_mut(id);
+            relation.clear(row, state::NEW);
+            delta.insert.extend(relation.fact(row));
+        }
+        for (id, row) in self.doomed {
+            let relation = store.get_mut(id);
+            if relation.state(row) & state::DOOMED != 0 {
+                delta.delete.extend(relation.fact(row));
+                records.remove(relation.record(row));
+                relation.remove(row);
+            }
+        }
+        delta.insert.sort_unstable();
+        delta.delete.sort_unstable();
+        delta
+    }
+
+    fn touch(&mut self, relation: RelationId) {
+        for &stratum in self.network.readers.get(relation.0 as usize).into_iter().flatten() {
+            self.touched[stratum as usize] = true;
+        }
+    }
+
+    fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
+        let appeared = self.added.clone();
+        self.run(&appeared, |relation| stratum.negative.get(&relation).map(Vec::as_slice), true)?;
+        let mut done = 0;
+        while done < self.doomed.len() {
+            let front = self.doomed[done..].to_vec();
+            done = self.doomed.len();
+            self.run(&front, |relation| stratum.positive.get(&relation).map(Vec::as_slice), true)?;
+        }
+        Ok(())
+    }
+
+    fn rederive(&mut self, stratum: &Stratum) -> Result<(), Error> {
+        let doomed = self.still_doomed();
+        self.run(&doomed, |relation| stratum.rederive.get(&relation).map(Vec::as_slice), false)
+    }
+
+    fn still_doomed(&self) -> Rows {
+        let is_doomed =
+            |&&(id, row): &&(RelationId, Row)| self.engine.store.get(id).state(row) & state::DOOMED != 0;
+        self.doomed.iter().filter(is_doomed).copied().collect()
+    }
+
+    fn insert(&mut self, stratum: &Stratum) -> Result<(), Error> {
+        let disappeared = self.still_doomed();
+        let relevant = |&&(id, _): &&(RelationId, Row)| stratum.positive.contains_key(&id);
+        let front: Rows = self.added.iter().filter(relevant).copied().collect();
+        let revived = std::mem::take(&mut self.pending);
+        self.promote(&revived);
+        let front = [front, revived].concat();
+        self.mark(&front, true);
+        self.run(&front, |relation| stratum.positive.get(&relation).map(Vec::as_slice), false)?;
+        self.mark(&front, false);
+        self.run(&disappeared, |relation| stratum.negative.get(&relation).map(Vec::as_slice), false)?;
+        self.saturate(stratum)
+    }
+
+    /// Semi-naive rounds until nothing new follows.
+    fn saturate(&mut self, stratum: &Stratum) -> Result<(), Error> {
+        while !self.pending.is_empty() {
+            let front = std::mem::take(&mut self.pending);
+            self.promote(&front);
+            self.mark(&front, true);
+            self.run(&front, |relation| stratum.positive.get(&relation).map(Vec::as_slice), false)?;
+            self.mark(&front, false);
+        }
+        Ok(())
+    }
+
+    /// Makes concluded rows visible.
+    fn promote(&mut self, rows: &Rows) {
+        for &(relation, row) in rows {
+            self.engine.store.get_mut(relation).clear(row, state::PENDING);
+        }
+    }
+
+    fn mark(&mut self, rows: &Rows, fresh: bool) {
+        for &(relation, row) in rows {
+            let relation = self.engine.store.get_mut(relation);
+            if fresh { relation.set(row, state::FRESH) } else { relation.clear(row, state::FRESH) }
+        }
+    }
+
+    /// Runs the plans that rows start, by chunks.
+    fn run<'p>(
+        &mut self,
+        rows: &[(RelationId, Row)],
+        plans: impl Fn(RelationId) -> Option<&'p [PlanId]>,
+        retracting: bool,
+    ) -> Result<(), Error> {
+        let starts = |&(relation, row): &(RelationId, Row)| {
+            plans(relation).unwrap_or(&[]).iter().map(move |&plan| (plan, relation, row))
+        };
+        let mut starts: Vec<(PlanId, RelationId, Row)> = rows.iter().flat_map(starts).collect();
+        starts.sort_by_key(|&(plan, ..)| plan);
+        for chunk in starts.chunks(CHUNK) {
+            let rows: Vec<Row> = chunk.iter().map(|&(.., row)| row).collect();
+            let mut seeds: Vec<Seed> = Vec::new();
+            for (position, &(plan, relation, _)) in chunk.iter().enumerate() {
+                let position = position as u32;
+                match seeds.last_mut() {
+                    Some(seed) if seed.plan == plan => seed.to = position + 1,
+                    _ => {
+                        seeds.push(Seed { plan, relation: Some(relation), from: position, to: position + 1 });
+                    }
+                }
+            }
+            self.run_chunk(&seeds, &rows, retracting)?;
+        }
+        Ok(())
+    }
+
+    fn run_chunk(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<(), Error> {
+        let round = Round {
+            store: &self.engine.store,
+            plans: &self.network.plans,
+            widths: &self.network.widths,
+            symbols: RefCell::new(&mut self.engine.symbols),
+            rows,
+            retracting,
+            budget: &self.budget,
+            blocks: RefCell::default(),
+        };
+        let matches = run(&round, seeds);
+        if let Some(rule) = self.budget.exhausted_by.get() {
+            let rule = &self.engine.program.rules[self.network.rules[rule as usize].rule];
+            return Err(Error::BudgetExhausted { rule: rule.identity.clone(), budget: self.engine.budget });
+        }
+        for matches in matches {
+            if retracting { self.retract(&matches) } else { self.conclude(&matches) }
+        }
+        Ok(())
+    }
+
+    /// Adds the heads of complete matches that do not hold yet.
+    fn conclude(&mut self, matches: &Matches) {
+        let network = Arc::clone(&self.network);
+        let number = network.plans[matches.plan as usize].rule;
+        let rule = &network.rules[number as usize];
+        let Engine { store, records, .. } = &mut *self.engine;
+        let mut arguments: SmallVec<[Symbol; 16]> = SmallVec::new();
+        for bound in matches.bindings.chunks_exact(rule.width) {
+            for head in &rule.heads {
+                arguments.clear();
+                arguments.extend(head.arguments.iter().map(|&source| resolve(source, bound)));
+                let relation = store.get_mut(head.relation);
+                match relation.find(&arguments) {
+                    None => {
+                        let record = records.add(number, bound);
+                        let row = relation.insert(&arguments, state::PENDING | state::NEW, record);
+                        self.added.push((head.relation, row));
+                        self.pending.push((head.relation, row));
+                    }
+                    Some(row) if relation.state(row) & state::DOOMED != 0 => {
+                        records.remove(relation.record(row));
+                        relation.set_record(row, records.add(number, bound));
+                        relation.clear(row, state::DOOMED);
+                        relation.set(row, state::PENDING);
+                        self.pending.push((head.relation, row));
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+        for head in &rule.heads {
+            self.touch(head.relation);
+        }
+    }
+
+    /// Dooms the heads whose recorded derivation is one of these matches.
+    fn retract(&mut self, matches: &Matches) {
+        let network = Arc::clone(&self.network);
+        let number = network.plans[matches.plan as usize].rule;
+        let rule = &network.rules[number as usize];
+        let Engine { store, records, .. } = &mut *self.engine;
+        let mut arguments: SmallVec<[Symbol; 16]> = SmallVec::new();
+        for bound in matches.bindings.chunks_exact(rule.width) {
+            for head in &rule.heads {
+                arguments.clear();
+                arguments.extend(head.arguments.iter().map(|&source| resolve(source, bound)));
+                let relation = store.get_mut(head.relation);
+                let Some(row) = relation.find(&arguments) else { continue };
+                let record = relation.record(row);
+                let bits = relation.state(row);
+                if bits & state::DOOMED != 0 || record.rule != number || records.get(record) != bound {
+                    continue;
+                }
+                if bits & state::ASSERTED == 0 {
+                    relation.set(row, state::DOOMED);
+                    self.doomed.push((head.relation, row));
+                } else {
+                    records.remove(record);
+                    relation.set_record(row, Record::NONE);
+                }
+            }
+        }
+        for head in &rule.heads {
+            self.touch(head.relation);
+        }
+    }
+}

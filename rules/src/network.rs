@@ -1,0 +1,239 @@
+//! Turns a program into what the engine runs: lowered rules, their plans, and strata that say which plan a change of
+//! which relation starts.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::error::Error;
+use crate::fixpoint::PlanId;
+use crate::plan::{Condition, Lowered, Plan, Planner, Source, Template, check};
+use crate::rule::{Atom, Program, Rule, Term};
+use crate::store::{Relation, RelationId, Store};
+use crate::strata::components;
+use crate::symbol::{Symbol, Symbols};
+
+/// The relation in which equal individuals are concluded.
+pub(crate) const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
+/// The relation in which different individuals are concluded.
+pub(crate) const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
+
+/// A compiled program. Its parts refer to each other and to the store's relations by number.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Network {
+    pub rules: Vec<Lowered>,
+    pub widths: Vec<usize>,
+    pub plans: Vec<Plan>,
+    pub strata: Vec<Stratum>,
+    /// By relation: the strata that a change of it concerns.
+    pub readers: Vec<Vec<u32>>,
+    /// The relation of each integrity constraint's matches, with its position in the program.
+    pub constraints: Vec<(RelationId, usize)>,
+}
+
+/// Relations that are derived together, and the plans that derive them.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Stratum {
+    pub relations: Vec<RelationId>,
+    /// Plans from nothing or from all rows of a relation, for the first evaluation.
+    pub initial: Vec<(Option<RelationId>, PlanId)>,
+    /// Plans from the rows of a relation that came or went.
+    pub positive: FxHashMap<RelationId, Vec<PlanId>>,
+    /// Plans from the rows of a negated relation that went or came.
+    pub negative: FxHashMap<RelationId, Vec<PlanId>>,
+    /// Plans from a row that lost its support.
+    pub rederive: FxHashMap<RelationId, Vec<PlanId>>,
+}
+
+/// Compiles a program, or reports what is wrong with every rule.
+pub(crate) fn compile(
+    program: &Program,
+    symbols: &mut Symbols,
+    store: &mut Store,
+) -> Result<Network, Vec<Error>> {
+    let mut errors: Vec<Error> = program.rules.iter().flat_map(check).collect();
+    errors.extend(program.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let mut network = Network::default();
+    let mut seen = FxHashSet::default();
+    let mut lowered = Vec::new();
+    for (position, rule) in program.rules.iter().enumerate() {
+        if seen.insert((&rule.head, &rule.body)) {
+            lowered.push(lower(position, rule, symbols, store, &mut network.constraints));
+        }
+    }
+    let strata = stratify(program, symbols, store, &lowered)?;
+    network.rules = split_by_stratum(lowered, &strata);
+    network.widths = network.rules.iter().map(|rule| rule.width).collect();
+    plan_all(&mut network, store, &strata);
+    Ok(network)
+}
+
+fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
+    let atoms = || rule.head.iter().chain(&rule.body);
+    let predicates = atoms().filter_map(|atom| match atom {
+        Atom::Relation { predicate, .. } | Atom::Not { predicate, .. } => Some(*predicate),
+        _ => None,
+    });
+    let constants = atoms().flat_map(Atom::terms).filter_map(|term| match term {
+        Term::Constant(symbol) => Some(symbol),
+        Term::Variable(_) => None,
+    });
+    let unknown = predicates.chain(constants).find(|symbol| symbol.index() >= symbols.len())?;
+    Some(Error::UnknownSymbol { index: unknown.index() })
+}
+
+fn sources(terms: &[Term]) -> Vec<Source> {
+    terms.iter().copied().map(Source::from).collect()
+}
+
+fn lower(
+    position: usize,
+    rule: &Rule,
+    symbols: &mut Symbols,
+    store: &mut Store,
+    constraints: &mut Vec<(RelationId, usize)>,
+) -> Lowered {
+    let width = rule.variable_count().max(1);
+    let mut relation_of = |predicate: Symbol, terms: &[Term]| store.relation(predicate, terms.len());
+    let body = rule.body.iter().map(|atom| match atom {
+        Atom::Relation { predicate, arguments } => {
+            Condition::Relation(relation_of(*predicate, arguments), sources(arguments))
+        }
+        Atom::Not { predicate, arguments } => {
+            Condition::Not(relation_of(*predicate, arguments), sources(arguments))
+        }
+        Atom::BuiltIn { built_in, arguments } => Condition::BuiltIn(*built_in, sources(arguments)),
+        Atom::Same(left, right) => Condition::Same((*left).into(), (*right).into()),
+        Atom::Different(left, right) => Condition::Different((*left).into(), (*right).into()),
+    });
+    let body = body.collect();
+    let mut heads = Vec::new();
+    for atom in &rule.head {
+        let (predicate, terms) = match atom {
+            Atom::Relation { predicate, arguments } => (*predicate, arguments.clone()),
+            Atom::Same(left, right) => (symbols.name(SAME_AS), vec![*left, *right]),
+            Atom::Different(left, right) => (symbols.name(DIFFERENT_FROM), vec![*left, *right]),
+            Atom::Not { .. } | Atom::BuiltIn { .. } => continue,
+        };
+        heads.push(Template { relation: store.relation(predicate, terms.len()), arguments: sources(&terms) });
+    }
+    if rule.head.is_empty() {
+        let relation = store.anonymous(rule.variable_count());
+        let arguments = (0..rule.variable_count()).map(|number| Source::Variable(number as u16)).collect();
+        heads.push(Template { relation, arguments });
+        constraints.push((relation, position));
+    }
+    Lowered { rule: position, width, heads, body }
+}
+
+/// The stratum of each relation.
+fn stratify(
+    program: &Program,
+    symbols: &Symbols,
+    store: &Store,
+    rules: &[Lowered],
+) -> Result<Vec<usize>, Vec<Error>> {
+    let mut successors = vec![Vec::new(); store.relations.len()];
+    for rule in rules {
+        let heads = || rule.heads.iter().map(|head| head.relation.0 as usize);
+        for condition in &rule.body {
+            if let Condition::Relation(relation, _) | Condition::Not(relation, _) = condition {
+                successors[relation.0 as usize].extend(heads());
+            }
+        }
+    }
+    let strata = components(&successors);
+    let mut errors = Vec::new();
+    for rule in rules {
+        for condition in &rule.body {
+            let Condition::Not(relation, _) = condition else { continue };
+            let stratum = strata[relation.0 as usize];
+            if rule.heads.iter().any(|head| strata[head.relation.0 as usize] == stratum) {
+                let name = store.get(*relation).predicate.map(|p| symbols.value(p).to_string());
+                let identity = program.rules[rule.rule].identity.clone();
+                errors.push(Error::Unstratified { rule: identity, predicate: name.unwrap_or_default() });
+            }
+        }
+    }
+    if errors.is_empty() { Ok(strata) } else { Err(errors) }
+}
+
+/// A rule whose heads lie in several strata becomes one rule per stratum.
+fn split_by_stratum(rules: Vec<Lowered>, strata: &[usize]) -> Vec<Lowered> {
+    let mut split = Vec::with_capacity(rules.len());
+    for rule in rules {
+        let stratum_of = |head: &Template| strata[head.relation.0 as usize];
+        let mut wanted: Vec<usize> = rule.heads.iter().map(stratum_of).collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        for stratum in wanted {
+            let heads = rule.heads.iter().filter(|head| stratum_of(head) == stratum).cloned().collect();
+            split.push(Lowered { heads, ..rule.clone() });
+        }
+    }
+    split
+}
+
+fn plan_all(network: &mut Network, store: &mut Store, strata: &[usize]) {
+    let derived: FxHashSet<RelationId> =
+        network.rules.iter().flat_map(|r| &r.heads).map(|h| h.relation).collect();
+    let derived_size = store.relations.iter().map(Relation::len).max().unwrap_or(0).max(64);
+    let mut by_stratum: Vec<Stratum> = vec![Stratum::default(); strata.iter().max().map_or(0, |max| max + 1)];
+    for (relation, &stratum) in strata.iter().enumerate() {
+        let relation = RelationId(relation as u32);
+        if derived.contains(&relation) {
+            by_stratum[stratum].relations.push(relation);
+        }
+    }
+    let Network { rules, plans, .. } = network;
+    for (number, lowered) in rules.iter().enumerate() {
+        let Some(stratum) = lowered.heads.first().map(|head| strata[head.relation.0 as usize]) else {
+            continue;
+        };
+        let is_derived = |relation| derived.contains(&relation);
+        let planner =
+            Planner { store, lowered, number: number as u32, derived_size, is_derived: &is_derived };
+        plan_rule(planner, plans, &mut by_stratum[stratum]);
+    }
+    by_stratum.retain(|stratum| !stratum.relations.is_empty());
+    network.readers = vec![Vec::new(); store.relations.len()];
+    for (number, stratum) in by_stratum.iter().enumerate() {
+        let used = stratum.positive.keys().chain(stratum.negative.keys()).chain(stratum.rederive.keys());
+        for relation in used.collect::<FxHashSet<_>>() {
+            network.readers[relation.0 as usize].push(number as u32);
+        }
+    }
+    network.strata = by_stratum;
+}
+
+fn plan_rule(mut planner: Planner, plans: &mut Vec<Plan>, stratum: &mut Stratum) {
+    let lowered = planner.lowered;
+    let mut add = |plan: Option<Plan>| {
+        plan.map(|plan| {
+            plans.push(plan);
+            plans.len() as PlanId - 1
+        })
+    };
+    for (position, condition) in lowered.body.iter().enumerate() {
+        let (relation, starts) = match condition {
+            Condition::Relation(relation, _) => (*relation, &mut stratum.positive),
+            Condition::Not(relation, _) => (*relation, &mut stratum.negative),
+            _ => continue,
+        };
+        let exactly_once = matches!(condition, Condition::Relation(..));
+        starts.entry(relation).or_default().extend(add(planner.start_at_condition(position, exactly_once)));
+    }
+    for (position, head) in lowered.heads.iter().enumerate() {
+        stratum.rederive.entry(head.relation).or_default().extend(add(planner.start_at_head(position)));
+    }
+    let smallest = lowered.body.iter().enumerate().filter_map(|(position, condition)| match condition {
+        Condition::Relation(relation, _) => Some((planner.expected_rows(*relation), position, *relation)),
+        _ => None,
+    });
+    let (start, plan) = match smallest.min() {
+        Some((_, position, relation)) => (Some(relation), planner.start_at_condition(position, false)),
+        None => (None, planner.start_at_nothing()),
+    };
+    stratum.initial.extend(add(plan).map(|plan| (start, plan)));
+}

@@ -1,0 +1,335 @@
+//! Turns a rule into join plans: one per way in which a change can reach it, each an ordered list of steps.
+//!
+//! A plan starts from a row of one atom (its seed) and extends partial matches by one atom at a time, cheapest first:
+//! tests as soon as their variables are bound, then the atom with the smallest expected number of matches, given the
+//! columns bound so far and the size of its relation.
+
+use crate::builtin::BuiltIn;
+use crate::error::Error;
+use crate::rule::{Atom, Rule, Term, Variable};
+use crate::store::{RelationId, Store, state};
+use crate::symbol::Symbol;
+
+/// Rows that no step of an insertion sees.
+pub(crate) const HIDDEN: u8 = state::FREE | state::PENDING | state::DOOMED;
+
+/// Where a step takes a value from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Source {
+    Variable(u16),
+    Constant(Symbol),
+}
+
+/// What a row must look like, and which variables it binds.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Pattern {
+    /// Columns whose value binds a variable.
+    pub binds: Vec<(usize, u16)>,
+    /// Columns that must equal a value known by then.
+    pub checks: Vec<(usize, Source)>,
+}
+
+/// One extension of a partial match.
+#[derive(Clone, Debug)]
+pub(crate) enum Step {
+    /// Rows of a relation; `index` is on the columns of `key`, in ascending order.
+    Join { relation: RelationId, skip: u8, index: Option<usize>, key: Vec<Source>, pattern: Pattern },
+    /// A row with all columns known.
+    Contains { relation: RelationId, skip: u8, key: Vec<Source> },
+    /// No row with these columns.
+    Absent { relation: RelationId, key: Vec<Source> },
+    /// A built-in with all arguments known.
+    Test { built_in: BuiltIn, arguments: Vec<Source> },
+    /// A built-in that binds its first argument.
+    Compute { built_in: BuiltIn, result: u16, arguments: Vec<Source> },
+    /// Binds a variable to a known value.
+    Equate { variable: u16, source: Source },
+    /// Whether two known values are the same.
+    Compare { left: Source, right: Source, equal: bool },
+}
+
+/// A seed and its extensions, up to a complete match of the rule's body.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    /// Which compiled rule.
+    pub rule: u32,
+    pub seed: Pattern,
+    pub steps: Vec<Step>,
+}
+
+/// A head atom, to be filled in.
+#[derive(Clone, Debug)]
+pub(crate) struct Template {
+    pub relation: RelationId,
+    pub arguments: Vec<Source>,
+}
+
+/// A rule whose atoms name relations.
+#[derive(Clone, Debug)]
+pub(crate) struct Lowered {
+    /// Position in the program.
+    pub rule: usize,
+    /// How many variables a match binds, at least 1.
+    pub width: usize,
+    pub heads: Vec<Template>,
+    pub body: Vec<Condition>,
+}
+
+/// A body atom whose predicate is a relation.
+#[derive(Clone, Debug)]
+pub(crate) enum Condition {
+    Relation(RelationId, Vec<Source>),
+    Not(RelationId, Vec<Source>),
+    BuiltIn(BuiltIn, Vec<Source>),
+    Same(Source, Source),
+    Different(Source, Source),
+}
+
+impl From<Term> for Source {
+    fn from(term: Term) -> Self {
+        match term {
+            Term::Variable(Variable(number)) => Self::Variable(number),
+            Term::Constant(symbol) => Self::Constant(symbol),
+        }
+    }
+}
+
+impl Condition {
+    fn sources(&self) -> Vec<Source> {
+        match self {
+            Self::Relation(_, sources) | Self::Not(_, sources) | Self::BuiltIn(_, sources) => sources.clone(),
+            Self::Same(left, right) | Self::Different(left, right) => vec![*left, *right],
+        }
+    }
+}
+
+/// The variables bound so far.
+#[derive(Clone)]
+struct Bound(Vec<bool>);
+
+impl Bound {
+    fn knows(&self, source: Source) -> bool {
+        match source {
+            Source::Constant(_) => true,
+            Source::Variable(number) => self.0[usize::from(number)],
+        }
+    }
+
+    fn knows_all(&self, sources: &[Source]) -> bool {
+        sources.iter().all(|&source| self.knows(source))
+    }
+
+    fn bind(&mut self, number: u16) {
+        self.0[usize::from(number)] = true;
+    }
+
+    /// Matches a row against terms: known columns are checked, others bind.
+    fn pattern(&mut self, columns: impl Iterator<Item = (usize, Source)>) -> Pattern {
+        let mut pattern = Pattern::default();
+        let (known, unknown): (Vec<_>, Vec<_>) = columns.partition(|&(_, source)| self.knows(source));
+        pattern.checks = known;
+        for (column, source) in unknown {
+            match source {
+                Source::Variable(number) if !self.knows(source) => {
+                    self.bind(number);
+                    pattern.binds.push((column, number));
+                }
+                _ => pattern.checks.push((column, source)),
+            }
+        }
+        pattern
+    }
+}
+
+/// Plans one lowered rule. `estimate` is the expected size of a relation.
+pub(crate) struct Planner<'a> {
+    pub store: &'a mut Store,
+    pub lowered: &'a Lowered,
+    /// Which compiled rule the plans belong to.
+    pub number: u32,
+    /// Expected rows of a relation that rules derive.
+    pub derived_size: usize,
+    pub is_derived: &'a dyn Fn(RelationId) -> bool,
+}
+
+impl Planner<'_> {
+    /// A plan that starts from a row of the condition at `position`. Conditions before it do not see fresh rows, so
+    /// that each match is found from exactly one of its fresh rows.
+    pub fn start_at_condition(&mut self, position: usize, exactly_once: bool) -> Option<Plan> {
+        let (Condition::Relation(_, sources) | Condition::Not(_, sources)) = &self.lowered.body[position]
+        else {
+            return None;
+        };
+        let fresh_from = if exactly_once { position } else { 0 };
+        self.plan(sources.clone(), Some(position), fresh_from)
+    }
+
+    /// A plan that starts from a row of a head atom and looks for its support.
+    pub fn start_at_head(&mut self, head: usize) -> Option<Plan> {
+        self.plan(self.lowered.heads[head].arguments.clone(), None, 0)
+    }
+
+    /// A plan that starts from nothing.
+    pub fn start_at_nothing(&mut self) -> Option<Plan> {
+        self.plan(Vec::new(), None, 0)
+    }
+
+    /// `None` where a condition stays unbound, which [`check`] rules out.
+    fn plan(&mut self, seed: Vec<Source>, skip: Option<usize>, fresh_from: usize) -> Option<Plan> {
+        let mut bound = Bound(vec![false; self.lowered.width]);
+        let seed = bound.pattern(seed.into_iter().enumerate());
+        let mut rest: Vec<usize> = (0..self.lowered.body.len()).filter(|&p| Some(p) != skip).collect();
+        let mut steps = Vec::new();
+        while !rest.is_empty() {
+            let ready = rest.iter().position(|&p| is_ready(&self.lowered.body[p], &bound));
+            let chosen = ready.or_else(|| self.cheapest(&rest, &bound))?;
+            let position = rest.remove(chosen);
+            let hidden = if position < fresh_from { HIDDEN | state::FRESH } else { HIDDEN };
+            steps.push(self.step(position, hidden, &mut bound));
+        }
+        Some(Plan { rule: self.number, seed, steps })
+    }
+
+    /// The position within `rest` of the relation with the fewest expected matches.
+    fn cheapest(&self, rest: &[usize], bound: &Bound) -> Option<usize> {
+        let mut best: Option<(f64, usize)> = None;
+        for (at, &position) in rest.iter().enumerate() {
+            if let Condition::Relation(relation, sources) = &self.lowered.body[position] {
+                let cost = self.expected_matches(*relation, sources, bound);
+                if best.is_none_or(|(least, _)| cost < least) {
+                    best = Some((cost, at));
+                }
+            }
+        }
+        best.map(|(_, at)| at)
+    }
+
+    pub fn expected_rows(&self, relation: RelationId) -> usize {
+        let size = self.store.get(relation).len();
+        if (self.is_derived)(relation) { size.max(self.derived_size) } else { size }
+    }
+
+    fn expected_matches(&self, relation: RelationId, sources: &[Source], bound: &Bound) -> f64 {
+        let free = sources.iter().filter(|&&source| !bound.knows(source)).count();
+        let rows = self.expected_rows(relation).max(1) as f64;
+        rows.powf(free as f64 / sources.len().max(1) as f64)
+    }
+
+    fn step(&mut self, position: usize, skip: u8, bound: &mut Bound) -> Step {
+        match &self.lowered.body[position] {
+            Condition::Relation(relation, sources) if bound.knows_all(sources) => {
+                Step::Contains { relation: *relation, skip, key: sources.clone() }
+            }
+            Condition::Relation(relation, sources) => {
+                let known = |column: &usize| bound.knows(sources[*column]);
+                let columns: Vec<usize> = (0..sources.len()).filter(known).collect();
+                let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
+                let index = (mask != 0).then(|| self.store.get_mut(*relation).index(mask));
+                let key = columns.iter().map(|&column| sources[column]).collect();
+                let others =
+                    sources.iter().copied().enumerate().filter(|(column, _)| mask & (1 << column) == 0);
+                Step::Join { relation: *relation, skip, index, key, pattern: bound.pattern(others) }
+            }
+            Condition::Not(relation, sources) => Step::Absent { relation: *relation, key: sources.clone() },
+            Condition::BuiltIn(built_in, sources) => match sources[0] {
+                Source::Variable(result) if !bound.knows(sources[0]) => {
+                    bound.bind(result);
+                    Step::Compute { built_in: *built_in, result, arguments: sources[1..].to_vec() }
+                }
+                _ => Step::Test { built_in: *built_in, arguments: sources.clone() },
+            },
+            Condition::Same(left, right) => match (*left, *right) {
+                (Source::Variable(variable), source) | (source, Source::Variable(variable))
+                    if !bound.knows(Source::Variable(variable)) =>
+                {
+                    bound.bind(variable);
+                    Step::Equate { variable, source }
+                }
+                (left, right) => Step::Compare { left, right, equal: true },
+            },
+            Condition::Different(left, right) => Step::Compare { left: *left, right: *right, equal: false },
+        }
+    }
+}
+
+/// Whether a condition that does not enumerate rows can be evaluated.
+fn is_ready(condition: &Condition, bound: &Bound) -> bool {
+    match condition {
+        Condition::Same(left, right) => bound.knows(*left) || bound.knows(*right),
+        Condition::BuiltIn(built_in, sources) if built_in.is_function() => bound.knows_all(&sources[1..]),
+        other => bound.knows_all(&other.sources()),
+    }
+}
+
+/// The errors of one rule: built-in arities, forbidden head atoms, variables that nothing binds.
+pub(crate) fn check(rule: &Rule) -> Vec<Error> {
+    let mut errors = Vec::new();
+    let identity = || rule.identity.clone();
+    for atom in &rule.head {
+        let what = match atom {
+            Atom::Not { .. } => "a negated atom",
+            Atom::BuiltIn { .. } => "a built-in",
+            _ => continue,
+        };
+        errors.push(Error::HeadAtom { rule: identity(), what });
+    }
+    for atom in rule.head.iter().chain(&rule.body) {
+        match atom {
+            Atom::BuiltIn { built_in, arguments } if !built_in.accepts(arguments.len()) => {
+                let (built_in, count) = (built_in.name(), arguments.len());
+                errors.push(Error::BuiltInArity { rule: identity(), built_in, count });
+            }
+            Atom::Relation { arguments, .. } | Atom::Not { arguments, .. } if arguments.len() > 32 => {
+                errors.push(Error::Arity { rule: identity(), count: arguments.len() });
+            }
+            _ => {}
+        }
+    }
+    if errors.is_empty() { unbound(rule) } else { errors }
+}
+
+fn unbound(rule: &Rule) -> Vec<Error> {
+    let bound = bound_variables(rule);
+    let mut errors = Vec::new();
+    let mut reported = vec![false; bound.len()];
+    let head = rule.head.iter().flat_map(Atom::terms).map(|term| (true, term));
+    let body = rule.body.iter().flat_map(Atom::terms).map(|term| (false, term));
+    for (in_head, term) in body.chain(head) {
+        let Some(variable) = term.as_variable().filter(|v| !bound[usize::from(v.0)]) else { continue };
+        if std::mem::replace(&mut reported[usize::from(variable.0)], true) {
+            continue;
+        }
+        let (rule, variable) = (rule.identity.clone(), rule.variable_name(variable));
+        errors.push(if in_head {
+            Error::UnsafeHead { rule, variable }
+        } else {
+            Error::UnsafeBody { rule, variable }
+        });
+    }
+    errors
+}
+
+/// Which variables relation atoms, equalities and computed results bind.
+fn bound_variables(rule: &Rule) -> Vec<bool> {
+    let mut bound = Bound(vec![false; rule.variable_count()]);
+    loop {
+        let before = bound.0.clone();
+        for atom in &rule.body {
+            let terms: Vec<Source> = atom.terms().into_iter().map(Source::from).collect();
+            let binds = match atom {
+                Atom::Relation { .. } => true,
+                Atom::Same(..) => terms.iter().any(|&term| bound.knows(term)),
+                Atom::BuiltIn { built_in, .. } => built_in.is_function() && bound.knows_all(&terms[1..]),
+                Atom::Not { .. } | Atom::Different(..) => false,
+            };
+            let numbers = terms.iter().filter_map(|term| match term {
+                Source::Variable(number) if binds => Some(*number),
+                _ => None,
+            });
+            numbers.for_each(|number| bound.bind(number));
+        }
+        if before == bound.0 {
+            return bound.0;
+        }
+    }
+}

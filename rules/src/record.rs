@@ -1,0 +1,52 @@
+//! Bindings of recorded derivations: per compiled rule one vector of slots, reused when a row goes.
+
+use crate::network::Network;
+use crate::store::Record;
+use crate::symbol::Symbol;
+
+/// The recorded bindings of all derived rows.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Records {
+    rules: Vec<Slots>,
+}
+
+#[derive(Clone, Default, Debug)]
+struct Slots {
+    width: usize,
+    bindings: Vec<Symbol>,
+    free: Vec<u32>,
+}
+
+impl Records {
+    pub fn new(network: &Network) -> Self {
+        let slots = |&width: &usize| Slots { width, ..Slots::default() };
+        Self { rules: network.widths.iter().map(slots).collect() }
+    }
+
+    pub fn add(&mut self, rule: u32, bindings: &[Symbol]) -> Record {
+        let slots = &mut self.rules[rule as usize];
+        let slot = if let Some(slot) = slots.free.pop() {
+            let start = slot as usize * slots.width;
+            slots.bindings[start..start + slots.width].copy_from_slice(bindings);
+            slot
+        } else {
+            slots.bindings.extend_from_slice(bindings);
+            (slots.bindings.len() / slots.width) as u32 - 1
+        };
+        Record { rule, slot }
+    }
+
+    pub fn remove(&mut self, record: Record) {
+        if record != Record::NONE {
+            self.rules[record.rule as usize].free.push(record.slot);
+        }
+    }
+
+    /// The bindings of a record, none for [`Record::NONE`].
+    pub fn get(&self, record: Record) -> &[Symbol] {
+        self.rules.get(record.rule as usize).map_or(&[], |slots| {
+            let start = record.slot as usize * slots.width;
+            &slots.bindings[start..start + slots.width]
+        })
+    }
+}

@@ -1,0 +1,158 @@
+//! Rules as data: what the engine evaluates, whatever syntax it came from.
+
+use std::fmt;
+use std::sync::Arc;
+
+use crate::builtin::BuiltIn;
+use crate::symbol::Symbol;
+
+/// A variable, numbered within its rule from 0.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub struct Variable(pub u16);
+
+/// An argument of an atom.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub enum Term {
+    /// Ranges over the symbols that occur in facts (DL-safety holds by construction).
+    Variable(Variable),
+    /// A name or literal.
+    Constant(Symbol),
+}
+
+/// One conjunct of a body or head.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub enum Atom {
+    /// `predicate(arguments)` holds.
+    Relation {
+        /// Class, property or relation.
+        predicate: Symbol,
+        /// Any number of arguments.
+        arguments: Vec<Term>,
+    },
+    /// `predicate(arguments)` does not hold: stratified negation as failure, in bodies only.
+    Not {
+        /// Class, property or relation.
+        predicate: Symbol,
+        /// Each variable must be bound by another atom.
+        arguments: Vec<Term>,
+    },
+    /// A comparison or computation on literals, in bodies only.
+    BuiltIn {
+        /// Which.
+        built_in: BuiltIn,
+        /// The result comes first, as in `swrlb`.
+        arguments: Vec<Term>,
+    },
+    /// Both terms denote the same individual.
+    Same(Term, Term),
+    /// The terms denote different individuals.
+    Different(Term, Term),
+}
+
+/// Which rule it is. Labels repeat in real knowledge bases; the position does not.
+#[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub struct RuleIdentity {
+    /// The IRI of the ontology, or the file.
+    pub source: Arc<str>,
+    /// What its author called it.
+    pub label: Option<Arc<str>>,
+    /// The position in the source, counted from 0.
+    pub position: u32,
+}
+
+impl RuleIdentity {
+    /// An identity without a label.
+    pub fn new(source: impl Into<Arc<str>>, position: u32) -> Self {
+        Self { source: source.into(), label: None, position }
+    }
+}
+
+/// `source#position` and the label, if any.
+impl fmt::Display for RuleIdentity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}#{}", self.source, self.position)?;
+        match &self.label {
+            Some(label) => write!(f, " ({label})"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// If the body holds, every head atom holds. An empty head is an integrity constraint, an empty body states facts.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Rule {
+    /// Which rule it is.
+    pub identity: RuleIdentity,
+    /// Conclusions.
+    pub head: Vec<Atom>,
+    /// Conditions.
+    pub body: Vec<Atom>,
+    /// The name of each variable, without question mark, for printing; may be shorter than the variables used.
+    pub variables: Vec<Box<str>>,
+}
+
+impl Rule {
+    /// A rule whose variables have no names of their own.
+    pub fn new(identity: RuleIdentity, head: Vec<Atom>, body: Vec<Atom>) -> Self {
+        Self { identity, head, body, variables: Vec::new() }
+    }
+
+    /// How many variables the rule uses: one more than the largest number in it.
+    pub fn variable_count(&self) -> usize {
+        let terms = self.head.iter().chain(&self.body).flat_map(Atom::terms);
+        terms.filter_map(Term::as_variable).map(|v| usize::from(v.0) + 1).max().unwrap_or(0)
+    }
+
+    /// The name of a variable, without question mark.
+    pub fn variable_name(&self, variable: Variable) -> String {
+        self.variables
+            .get(usize::from(variable.0))
+            .map_or_else(|| format!("v{}", variable.0), ToString::to_string)
+    }
+}
+
+/// Rules that are evaluated together.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub struct Program {
+    /// In any order.
+    pub rules: Vec<Rule>,
+}
+
+impl Term {
+    /// The variable, where the term is one.
+    pub fn as_variable(self) -> Option<Variable> {
+        match self {
+            Self::Variable(variable) => Some(variable),
+            Self::Constant(_) => None,
+        }
+    }
+}
+
+impl From<Variable> for Term {
+    fn from(variable: Variable) -> Self {
+        Self::Variable(variable)
+    }
+}
+
+impl From<Symbol> for Term {
+    fn from(symbol: Symbol) -> Self {
+        Self::Constant(symbol)
+    }
+}
+
+impl Atom {
+    /// `predicate(arguments)`.
+    pub fn relation(predicate: Symbol, arguments: impl IntoIterator<Item = Term>) -> Self {
+        Self::Relation { predicate, arguments: arguments.into_iter().collect() }
+    }
+
+    /// The arguments, in order.
+    pub fn terms(&self) -> Vec<Term> {
+        match self {
+            Self::Relation { arguments, .. }
+            | Self::Not { arguments, .. }
+            | Self::BuiltIn { arguments, .. } => arguments.clone(),
+            Self::Same(left, right) | Self::Different(left, right) => vec![*left, *right],
+        }
+    }
+}

@@ -1,0 +1,340 @@
+//! The facts that hold, as columns of symbols with hash indexes on exactly the columns that rules look up.
+//!
+//! A relation holds the facts of one predicate and arity. A row is a number; its arguments lie side by side in one
+//! vector, its state in a byte. An index threads the rows with equal key columns into a doubly linked list, so that
+//! insertion and deletion cost O(indexes) and allocate nothing per row.
+
+use hashbrown::HashTable;
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use std::hash::BuildHasher;
+
+use crate::fact::{Arguments, Fact};
+use crate::symbol::Symbol;
+
+/// A position in [`Store::relations`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub(crate) struct RelationId(pub u32);
+
+/// A row of a relation.
+pub(crate) type Row = u32;
+
+const NONE: Row = Row::MAX;
+
+/// State bits of a row.
+pub(crate) mod state {
+    /// The row is unused.
+    pub const FREE: u8 = 1;
+    /// Part of the change that the current round starts from.
+    pub const FRESH: u8 = 2;
+    /// Concluded in the current round, invisible until the next.
+    pub const PENDING: u8 = 4;
+    /// Lost its support in this update; removed at its end unless revived.
+    pub const DOOMED: u8 = 8;
+    /// Stated, not only derived.
+    pub const ASSERTED: u8 = 16;
+    /// Did not hold before this update.
+    pub const NEW: u8 = 32;
+}
+
+/// Why a row was derived: which compiled rule, and which of its recorded bindings.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Record {
+    pub rule: u32,
+    pub slot: u32,
+}
+
+impl Record {
+    /// No derivation is recorded.
+    pub const NONE: Self = Self { rule: u32::MAX, slot: 0 };
+}
+
+/// All relations.
+#[derive(Clone, Default, Debug)]
+pub(crate) struct Store {
+    pub relations: Vec<Relation>,
+    by_predicate: FxHashMap<(Symbol, u32), RelationId>,
+}
+
+impl Store {
+    pub fn find(&self, predicate: Symbol, arity: usize) -> Option<RelationId> {
+        self.by_predicate.get(&(predicate, arity as u32)).copied()
+    }
+
+    /// The relation of a predicate, created on first use.
+    pub fn relation(&mut self, predicate: Symbol, arity: usize) -> RelationId {
+        if let Some(id) = self.find(predicate, arity) {
+            return id;
+        }
+        let id = self.push(Relation::new(Some(predicate), arity));
+        self.by_predicate.insert((predicate, arity as u32), id);
+        id
+    }
+
+    /// A relation that belongs to no predicate: the matches of an integrity constraint.
+    pub fn anonymous(&mut self, arity: usize) -> RelationId {
+        self.push(Relation::new(None, arity))
+    }
+
+    fn push(&mut self, relation: Relation) -> RelationId {
+        let id = RelationId(self.relations.len() as u32);
+        self.relations.push(relation);
+        id
+    }
+
+    pub fn get(&self, id: RelationId) -> &Relation {
+        &self.relations[id.0 as usize]
+    }
+
+    pub fn get_mut(&mut self, id: RelationId) -> &mut Relation {
+        &mut self.relations[id.0 as usize]
+    }
+}
+
+/// The facts of one predicate and arity.
+#[derive(Clone, Debug)]
+pub(crate) struct Relation {
+    /// `None` for the matches of a constraint.
+    pub predicate: Option<Symbol>,
+    arity: usize,
+    arguments: Vec<Symbol>,
+    states: Vec<u8>,
+    records: Vec<Record>,
+    rows: HashTable<Row>,
+    indexes: Vec<Index>,
+    free: Vec<Row>,
+}
+
+/// Rows by the values of some columns.
+#[derive(Clone, Debug)]
+struct Index {
+    columns: u32,
+    heads: HashTable<Row>,
+    next: Vec<Row>,
+    previous: Vec<Row>,
+}
+
+/// The columns of a bit mask, in ascending order.
+pub(crate) fn columns(mask: u32) -> impl Iterator<Item = usize> {
+    let mut rest = mask;
+    std::iter::from_fn(move || {
+        let column = rest.trailing_zeros() as usize;
+        rest &= rest.wrapping_sub(1);
+        (column < 32).then_some(column)
+    })
+}
+
+fn hash(key: impl Iterator<Item = Symbol>) -> u64 {
+    let mut hash = 0_u64;
+    for symbol in key {
+        hash = (hash.rotate_left(26) ^ u64::from(symbol.0)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+    FxBuildHasher.hash_one(hash ^ (hash >> 32))
+}
+
+impl Relation {
+    fn new(predicate: Option<Symbol>, arity: usize) -> Self {
+        Self {
+            predicate,
+            arity,
+            arguments: Vec::new(),
+            states: Vec::new(),
+            records: Vec::new(),
+            rows: HashTable::new(),
+            indexes: Vec::new(),
+            free: Vec::new(),
+        }
+    }
+
+    /// How many facts are stored, whatever their state.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// One more than the largest row in use.
+    pub fn bound(&self) -> Row {
+        self.states.len() as Row
+    }
+
+    pub fn row(&self, row: Row) -> &[Symbol] {
+        let start = row as usize * self.arity;
+        &self.arguments[start..start + self.arity]
+    }
+
+    /// The row as a fact; `None` for the matches of a constraint.
+    pub fn fact(&self, row: Row) -> Option<Fact> {
+        Some(Fact { predicate: self.predicate?, arguments: Arguments::from_slice(self.row(row)) })
+    }
+
+    /// Removes every row; keeps the indexes.
+    pub fn clear_all(&mut self) {
+        let indexes = std::mem::take(&mut self.indexes);
+        *self = Self::new(self.predicate, self.arity);
+        for index in indexes {
+            self.index(index.columns);
+        }
+    }
+
+    pub fn state(&self, row: Row) -> u8 {
+        self.states[row as usize]
+    }
+
+    pub fn set(&mut self, row: Row, bits: u8) {
+        self.states[row as usize] |= bits;
+    }
+
+    pub fn clear(&mut self, row: Row, bits: u8) {
+        self.states[row as usize] &= !bits;
+    }
+
+    pub fn record(&self, row: Row) -> Record {
+        self.records[row as usize]
+    }
+
+    pub fn set_record(&mut self, row: Row, record: Record) {
+        self.records[row as usize] = record;
+    }
+
+    pub fn find(&self, arguments: &[Symbol]) -> Option<Row> {
+        self.rows.find(hash(arguments.iter().copied()), |&row| self.row(row) == arguments).copied()
+    }
+
+    /// Adds a row that is not there yet.
+    pub fn insert(&mut self, arguments: &[Symbol], state: u8, record: Record) -> Row {
+        let row = if let Some(row) = self.free.pop() {
+            let start = row as usize * self.arity;
+            self.arguments[start..start + self.arity].copy_from_slice(arguments);
+            self.states[row as usize] = state;
+            self.records[row as usize] = record;
+            row
+        } else {
+            self.arguments.extend_from_slice(arguments);
+            self.states.push(state);
+            self.records.push(record);
+            self.states.len() as Row - 1
+        };
+        let (all, arity) = (&self.arguments, self.arity);
+        let row_of = |row: Row| &all[row as usize * arity..(row as usize + 1) * arity];
+        self.rows
+            .insert_unique(hash(arguments.iter().copied()), row, |&row| hash(row_of(row).iter().copied()));
+        for index in &mut self.indexes {
+            index.insert(row, row_of);
+        }
+        row
+    }
+
+    /// Removes a row for good; its number may be used again.
+    pub fn remove(&mut self, row: Row) {
+        let (all, arity) = (&self.arguments, self.arity);
+        let row_of = |row: Row| &all[row as usize * arity..(row as usize + 1) * arity];
+        if let Ok(entry) = self.rows.find_entry(hash(row_of(row).iter().copied()), |&other| other == row) {
+            entry.remove();
+        }
+        for index in &mut self.indexes {
+            index.remove(row, row_of);
+        }
+        self.states[row as usize] = state::FREE;
+        self.records[row as usize] = Record::NONE;
+        self.free.push(row);
+    }
+
+    /// The number of the index on these columns, built on first use.
+    pub fn index(&mut self, columns: u32) -> usize {
+        if let Some(position) = self.indexes.iter().position(|index| index.columns == columns) {
+            return position;
+        }
+        let mut index = Index { columns, heads: HashTable::new(), next: Vec::new(), previous: Vec::new() };
+        let (all, arity) = (&self.arguments, self.arity);
+        for row in 0..self.states.len() as Row {
+            if self.states[row as usize] & state::FREE == 0 {
+                index.insert(row, |row| &all[row as usize * arity..(row as usize + 1) * arity]);
+            }
+        }
+        self.indexes.push(index);
+        self.indexes.len() - 1
+    }
+
+    /// The index on the most columns among those given, with its columns.
+    pub fn best_index(&self, bound: u32) -> Option<(usize, u32)> {
+        let usable = self.indexes.iter().enumerate().filter(|(_, index)| index.columns & !bound == 0);
+        usable.max_by_key(|(_, index)| index.columns.count_ones()).map(|(at, index)| (at, index.columns))
+    }
+
+    /// The rows whose indexed columns have these values, in ascending column order.
+    pub fn lookup<'a>(&'a self, index: usize, key: &[Symbol]) -> Rows<'a> {
+        let index = &self.indexes[index];
+        let same = |&row: &Row| {
+            columns(index.columns).zip(key).all(|(column, &value)| self.row(row)[column] == value)
+        };
+        let next = index.heads.find(hash(key.iter().copied()), same).copied().unwrap_or(NONE);
+        Rows { links: &index.next, next }
+    }
+
+    /// Every row in use.
+    pub fn scan(&self) -> impl Iterator<Item = Row> + '_ {
+        (0..self.bound()).filter(|&row| self.state(row) & state::FREE == 0)
+    }
+}
+
+/// The rows of one key.
+pub(crate) struct Rows<'a> {
+    links: &'a [Row],
+    next: Row,
+}
+
+impl Iterator for Rows<'_> {
+    type Item = Row;
+
+    fn next(&mut self) -> Option<Row> {
+        let row = self.next;
+        if row == NONE {
+            return None;
+        }
+        self.next = self.links[row as usize];
+        Some(row)
+    }
+}
+
+impl Index {
+    fn key(mask: u32, row: &[Symbol]) -> impl Iterator<Item = Symbol> + '_ {
+        columns(mask).map(|column| row[column])
+    }
+
+    fn insert<'a>(&mut self, row: Row, row_of: impl Fn(Row) -> &'a [Symbol]) {
+        let needed = row as usize + 1;
+        if self.next.len() < needed {
+            self.next.resize(needed, NONE);
+            self.previous.resize(needed, NONE);
+        }
+        let mask = self.columns;
+        let hash_of = |row: Row| hash(Self::key(mask, row_of(row)));
+        let same = |&head: &Row| Self::key(mask, row_of(head)).eq(Self::key(mask, row_of(row)));
+        self.previous[row as usize] = NONE;
+        if let Some(head) = self.heads.find_mut(hash_of(row), same) {
+            self.next[row as usize] = *head;
+            self.previous[*head as usize] = row;
+            *head = row;
+        } else {
+            self.next[row as usize] = NONE;
+            self.heads.insert_unique(hash_of(row), row, |&row| hash_of(row));
+        }
+    }
+
+    fn remove<'a>(&mut self, row: Row, row_of: impl Fn(Row) -> &'a [Symbol]) {
+        let (next, previous) = (self.next[row as usize], self.previous[row as usize]);
+        if next != NONE {
+            self.previous[next as usize] = previous;
+        }
+        if previous != NONE {
+            self.next[previous as usize] = next;
+            return;
+        }
+        let hash = hash(Self::key(self.columns, row_of(row)));
+        if let Ok(mut entry) = self.heads.find_entry(hash, |&head| head == row) {
+            if next == NONE {
+                entry.remove();
+            } else {
+                *entry.get_mut() = next;
+            }
+        }
+    }
+}

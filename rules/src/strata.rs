@@ -1,0 +1,83 @@
+//! Orders relations so that each is complete before anything negates it: strongly connected components of "is used
+//! to derive", dependencies first ([1]).
+//!
+//! One stratum per component, not per negation: what over-deletion removes in a component is rederived before the
+//! next one looks at it.
+//!
+//! [1] Tarjan, "Depth-first search and linear graph algorithms", SIAM Journal on Computing 1(2), 1972.
+
+/// The component of each node, numbered so that every edge leads to the same or a larger number.
+pub(crate) fn components(successors: &[Vec<usize>]) -> Vec<usize> {
+    let mut search = Search {
+        successors,
+        order: vec![None; successors.len()],
+        low: vec![0; successors.len()],
+        component: vec![None; successors.len()],
+        stack: Vec::new(),
+        visited: 0,
+        closed: 0,
+    };
+    for node in 0..successors.len() {
+        if search.order[node].is_none() {
+            search.visit(node);
+        }
+    }
+    // Tarjan closes sinks first; the numbers are turned round.
+    search.component.iter().map(|number| search.closed - 1 - number.unwrap_or(0)).collect()
+}
+
+struct Search<'a> {
+    successors: &'a [Vec<usize>],
+    order: Vec<Option<usize>>,
+    low: Vec<usize>,
+    component: Vec<Option<usize>>,
+    stack: Vec<usize>,
+    visited: usize,
+    closed: usize,
+}
+
+impl Search<'_> {
+    /// Depth-first search with its own stack, so that long chains of rules cannot overflow the thread's.
+    fn visit(&mut self, root: usize) {
+        let mut path = vec![(root, 0)];
+        self.open(root);
+        while let Some((node, position)) = path.pop() {
+            let Some(&next) = self.successors[node].get(position) else {
+                self.close(node);
+                if let Some(&(parent, _)) = path.last() {
+                    self.low[parent] = self.low[parent].min(self.low[node]);
+                }
+                continue;
+            };
+            path.push((node, position + 1));
+            match self.order[next] {
+                None => {
+                    self.open(next);
+                    path.push((next, 0));
+                }
+                Some(order) if self.component[next].is_none() => self.low[node] = self.low[node].min(order),
+                Some(_) => {}
+            }
+        }
+    }
+
+    fn open(&mut self, node: usize) {
+        self.order[node] = Some(self.visited);
+        self.low[node] = self.visited;
+        self.visited += 1;
+        self.stack.push(node);
+    }
+
+    fn close(&mut self, node: usize) {
+        if self.order[node] != Some(self.low[node]) {
+            return;
+        }
+        while let Some(member) = self.stack.pop() {
+            self.component[member] = Some(self.closed);
+            if member == node {
+                break;
+            }
+        }
+        self.closed += 1;
+    }
+}

@@ -1,0 +1,21 @@
+//! Rule text: the human-readable syntax of SWRL as Protégé writes it ([1], section 2.2), to rules and back.
+//!
+//! ```text
+//! @prefix t: <http://metacontrol.org/tomasys#> .
+//! # A comment.
+//! [S2] t:Binding(?b) ^ t:binding_component(?b, ?c) ^ t:c_status(?c, "FALSE") -> t:b_status(?b, false) .
+//! [idle] t:Objective(?o) ^ not t:o_status(?o, "IN_ERROR_NFR") -> t:idle(?o, true) .
+//! ```
+//!
+//! `^`, `∧` and `,` separate atoms; `->` or `→` separates body and head; the full stop is optional before another
+//! rule that does not start with an arrow, and after an empty head required. `sameAs`, `differentFrom` and the
+//! built-ins of `swrlb:` are what they are in SWRL. `not`, our own, is negation as failure.
+//!
+//! [1] W3C Member Submission: SWRL, 2004.
+
+mod lexer;
+mod parser;
+mod printer;
+
+pub use parser::{Prefixes, parse_rules};
+pub use printer::print_rules;

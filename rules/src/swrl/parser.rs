@@ -1,0 +1,347 @@
+//! Tokens to rules, by recursive descent; after an error it goes on with the next rule, so that all are reported.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::lexer::{Fault, Spanned, Token, tokens};
+use crate::builtin::{BuiltIn, SWRLB};
+use crate::error::Error;
+use crate::literal::{Literal, XSD};
+use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
+use crate::symbol::{Symbol, Symbols};
+
+/// Abbreviations of IRIs. `swrlb`, `xsd`, `rdf`, `rdfs` and `owl` are always there unless declared otherwise.
+///
+/// A name without colon takes the empty prefix where that is declared, and else stands for itself.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Prefixes(BTreeMap<String, String>);
+
+impl Default for Prefixes {
+    fn default() -> Self {
+        let standard = [
+            ("owl", "http://www.w3.org/2002/07/owl#"),
+            ("rdf", "http://www.w3.org/1999/02/22-rdf-syntax-ns#"),
+            ("rdfs", "http://www.w3.org/2000/01/rdf-schema#"),
+            ("swrlb", SWRLB),
+            ("xsd", XSD),
+        ];
+        Self(standard.into_iter().map(|(prefix, iri)| (prefix.to_string(), iri.to_string())).collect())
+    }
+}
+
+impl Prefixes {
+    /// The standard prefixes.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Declares a prefix (without colon).
+    pub fn insert(&mut self, prefix: &str, iri: &str) {
+        self.0.insert(prefix.to_string(), iri.to_string());
+    }
+
+    /// Declares a prefix (without colon), for chaining.
+    #[must_use]
+    pub fn with(mut self, prefix: &str, iri: &str) -> Self {
+        self.insert(prefix, iri);
+        self
+    }
+
+    /// The IRI of a prefix.
+    pub fn get(&self, prefix: &str) -> Option<&str> {
+        self.0.get(prefix).map(String::as_str)
+    }
+
+    /// All prefixes with their IRIs, sorted.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.0.iter().map(|(prefix, iri)| (prefix.as_str(), iri.as_str()))
+    }
+}
+
+/// Reads rules. `source` names the text in rule identities and errors; prefixes that the text declares come on top
+/// of those given.
+///
+/// # Errors
+/// All errors of the text: R101, R102, R103.
+pub fn parse_rules(
+    text: &str,
+    source: &str,
+    symbols: &mut Symbols,
+    prefixes: &Prefixes,
+) -> Result<Program, Vec<Error>> {
+    let (tokens, faults) = tokens(text);
+    let errors = faults.into_iter().map(|fault| syntax(source, fault)).collect();
+    let source: Arc<str> = source.into();
+    let prefixes = prefixes.clone();
+    let mut parser = Parser { tokens, at: 0, source, symbols, prefixes, variables: Vec::new(), errors };
+    let program = parser.program();
+    if parser.errors.is_empty() { Ok(program) } else { Err(parser.errors) }
+}
+
+fn syntax(source: &str, fault: Fault) -> Error {
+    Error::Syntax { file: source.to_string(), line: fault.line, column: fault.column, message: fault.message }
+}
+
+struct Parser<'a> {
+    tokens: Vec<Spanned>,
+    at: usize,
+    source: Arc<str>,
+    symbols: &'a mut Symbols,
+    prefixes: Prefixes,
+    variables: Vec<Box<str>>,
+    errors: Vec<Error>,
+}
+
+/// The rest of a rule is skipped after an error.
+type Parsed<T> = Result<T, Error>;
+
+impl Parser<'_> {
+    fn program(&mut self) -> Program {
+        let mut program = Program::default();
+        while *self.peek() != Token::End {
+            let parsed = if *self.peek() == Token::Prefix {
+                self.prefix().map(|()| None)
+            } else {
+                self.rule(program.rules.len() as u32).map(Some)
+            };
+            match parsed {
+                Ok(rule) => program.rules.extend(rule),
+                Err(error) => {
+                    self.errors.push(error);
+                    self.recover();
+                }
+            }
+        }
+        program
+    }
+
+    fn peek(&self) -> &Token {
+        &self.tokens[self.at.min(self.tokens.len() - 1)].token
+    }
+
+    fn bump(&mut self) -> Token {
+        let token = self.peek().clone();
+        self.at += 1;
+        token
+    }
+
+    fn accept(&mut self, token: &Token) -> bool {
+        let found = self.peek() == token;
+        self.at += usize::from(found);
+        found
+    }
+
+    fn position(&self) -> (u32, u32) {
+        let spanned = &self.tokens[self.at.min(self.tokens.len() - 1)];
+        (spanned.line, spanned.column)
+    }
+
+    fn error(&self, expected: &str) -> Error {
+        let (line, column) = self.position();
+        let message = format!("expected {expected}, found {}", describe(self.peek()));
+        syntax(&self.source, Fault { message, line, column })
+    }
+
+    fn expect(&mut self, token: &Token, expected: &str) -> Parsed<()> {
+        if self.accept(token) { Ok(()) } else { Err(self.error(expected)) }
+    }
+
+    /// Goes on after the next full stop, or before the next label or prefix.
+    fn recover(&mut self) {
+        loop {
+            match self.peek() {
+                Token::End | Token::Label(_) | Token::Prefix => return,
+                Token::Stop => {
+                    self.at += 1;
+                    return;
+                }
+                _ => self.at += 1,
+            }
+        }
+    }
+
+    fn prefix(&mut self) -> Parsed<()> {
+        self.bump();
+        let Token::Name(Some(prefix), local) = self.peek().clone() else { return Err(self.error("`name:`")) };
+        if !local.is_empty() {
+            return Err(self.error("`name:` before a blank"));
+        }
+        self.bump();
+        let Token::Iri(iri) = self.peek().clone() else { return Err(self.error("an IRI in angle brackets")) };
+        self.bump();
+        self.accept(&Token::Stop);
+        self.prefixes.insert(&prefix, &iri);
+        Ok(())
+    }
+
+    fn rule(&mut self, position: u32) -> Parsed<Rule> {
+        self.variables.clear();
+        let mut label = None;
+        if let Token::Label(text) = self.peek() {
+            label = Some(Arc::from(text.as_str()));
+            self.bump();
+        }
+        let body = if *self.peek() == Token::Arrow { Vec::new() } else { self.atoms()? };
+        self.expect(&Token::Arrow, "`^`, `,` or `->`")?;
+        let empty = matches!(self.peek(), Token::Stop | Token::End);
+        let head = if empty { Vec::new() } else { self.atoms()? };
+        self.accept(&Token::Stop);
+        let identity = RuleIdentity { source: Arc::clone(&self.source), label, position };
+        Ok(Rule { identity, head, body, variables: std::mem::take(&mut self.variables) })
+    }
+
+    fn atoms(&mut self) -> Parsed<Vec<Atom>> {
+        let mut atoms = vec![self.atom()?];
+        while matches!(self.peek(), Token::And | Token::Comma) {
+            self.bump();
+            atoms.push(self.atom()?);
+        }
+        Ok(atoms)
+    }
+
+    fn atom(&mut self) -> Parsed<Atom> {
+        let is_not = matches!(self.peek(), Token::Name(None, name) if name == "not");
+        let negated = is_not && self.tokens.get(self.at + 1).is_some_and(|next| next.token != Token::Open);
+        self.at += usize::from(negated);
+        let at = self.position();
+        let name = self.peek().clone();
+        let predicate = self.name()?;
+        self.expect(&Token::Open, "`(`")?;
+        let mut arguments = Vec::new();
+        if !self.accept(&Token::Close) {
+            arguments.push(self.term()?);
+            while self.accept(&Token::Comma) {
+                arguments.push(self.term()?);
+            }
+            self.expect(&Token::Close, "`,` or `)`")?;
+        }
+        if negated {
+            let predicate = self.symbols.name(&predicate);
+            return Ok(Atom::Not { predicate, arguments });
+        }
+        if let Some(local) = predicate.strip_prefix(SWRLB) {
+            return match BuiltIn::from_name(local) {
+                Some(built_in) => Ok(Atom::BuiltIn { built_in, arguments }),
+                None => Err(self.unknown_built_in(local, at)),
+            };
+        }
+        let owl = predicate.strip_prefix("http://www.w3.org/2002/07/owl#");
+        let word = match &name {
+            Token::Name(None, word) => Some(word.as_str()),
+            _ => owl,
+        };
+        Ok(match (word, arguments.as_slice()) {
+            (Some("sameAs"), &[left, right]) => Atom::Same(left, right),
+            (Some("differentFrom"), &[left, right]) => Atom::Different(left, right),
+            _ => Atom::Relation { predicate: self.symbols.name(&predicate), arguments },
+        })
+    }
+
+    fn unknown_built_in(&self, name: &str, (line, column): (u32, u32)) -> Error {
+        Error::UnknownBuiltIn { file: self.source.to_string(), line, column, name: name.to_string() }
+    }
+
+    /// A name or IRI, in full.
+    fn name(&mut self) -> Parsed<String> {
+        let (line, column) = self.position();
+        let name = match self.peek().clone() {
+            Token::Iri(iri) => iri,
+            Token::Name(None, word) => format!("{}{word}", self.prefixes.get("").unwrap_or_default()),
+            Token::Name(Some(prefix), local) => match self.prefixes.get(&prefix) {
+                Some(iri) => format!("{iri}{local}"),
+                None => {
+                    return Err(Error::UndeclaredPrefix {
+                        file: self.source.to_string(),
+                        line,
+                        column,
+                        prefix,
+                    });
+                }
+            },
+            _ => return Err(self.error("a name")),
+        };
+        self.bump();
+        Ok(name)
+    }
+
+    fn term(&mut self) -> Parsed<Term> {
+        match self.peek().clone() {
+            Token::Variable(name) => {
+                self.bump();
+                self.variable(&name)
+            }
+            Token::Text(_) | Token::Number(_) => self.literal().map(Term::Constant),
+            Token::Name(None, word) if word == "true" || word == "false" => {
+                self.bump();
+                Ok(Term::Constant(self.symbols.literal(Literal::Boolean(word == "true"))))
+            }
+            Token::Name(..) | Token::Iri(_) => {
+                let name = self.name()?;
+                Ok(Term::Constant(self.symbols.name(&name)))
+            }
+            _ => Err(self.error("a variable, name or literal")),
+        }
+    }
+
+    fn variable(&mut self, name: &str) -> Parsed<Term> {
+        let known = self.variables.iter().position(|known| **known == *name);
+        let number = known.unwrap_or_else(|| {
+            self.variables.push(name.into());
+            self.variables.len() - 1
+        });
+        match u16::try_from(number) {
+            Ok(number) => Ok(Term::Variable(Variable(number))),
+            Err(_) => Err(self.error("fewer than 65,536 variables in a rule")),
+        }
+    }
+
+    /// `"text"`, `"text"@en`, `"text"^^xsd:decimal`, `5`, `0.5` or `1e3`.
+    fn literal(&mut self) -> Parsed<Symbol> {
+        let literal = match self.bump() {
+            Token::Number(text) => {
+                let kind = match () {
+                    () if text.contains(['e', 'E']) => "double",
+                    () if text.contains('.') => "decimal",
+                    () => "integer",
+                };
+                Literal::parse(&text, Some(&format!("{XSD}{kind}")), None)
+            }
+            Token::Text(text) => match self.peek().clone() {
+                Token::Language(tag) => {
+                    self.bump();
+                    Literal::parse(&text, None, Some(&tag))
+                }
+                Token::Carets => {
+                    self.bump();
+                    let datatype = self.name()?;
+                    Literal::parse(&text, Some(&datatype), None)
+                }
+                _ => Literal::string(&text),
+            },
+            _ => return Err(self.error("a literal")),
+        };
+        Ok(self.symbols.literal(literal))
+    }
+}
+
+fn describe(token: &Token) -> String {
+    match token {
+        Token::Prefix => "`@prefix`".into(),
+        Token::Iri(iri) => format!("`<{iri}>`"),
+        Token::Name(Some(prefix), local) => format!("`{prefix}:{local}`"),
+        Token::Name(None, word) => format!("`{word}`"),
+        Token::Variable(name) => format!("`?{name}`"),
+        Token::Text(text) => format!("\"{text}\""),
+        Token::Language(tag) => format!("`@{tag}`"),
+        Token::Number(text) => format!("`{text}`"),
+        Token::Label(label) => format!("`[{label}]`"),
+        Token::Carets => "`^^`".into(),
+        Token::Open => "`(`".into(),
+        Token::Close => "`)`".into(),
+        Token::And => "`^`".into(),
+        Token::Comma => "`,`".into(),
+        Token::Arrow => "`->`".into(),
+        Token::Stop => "`.`".into(),
+        Token::End => "the end of the text".into(),
+    }
+}

@@ -1,0 +1,80 @@
+//! Rules to text that [`super::parse_rules`] reads back as the same rules.
+
+use std::fmt::Write;
+
+use super::parser::Prefixes;
+use crate::builtin::SWRLB;
+use crate::rule::{Atom, Program, Rule, Term};
+use crate::symbol::{Symbol, Symbols, Value};
+
+/// Prints rules one a line, with labels and names abbreviated by the prefixes, whose declarations come first.
+pub fn print_rules(program: &Program, symbols: &Symbols, prefixes: &Prefixes) -> String {
+    let mut text = String::new();
+    for (prefix, iri) in prefixes.iter().filter(|&(prefix, iri)| Prefixes::default().get(prefix) != Some(iri))
+    {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "@prefix {prefix}: <{iri}> .");
+    }
+    let printer = Printer { symbols, prefixes };
+    for rule in &program.rules {
+        let _ = writeln!(text, "{}", printer.rule(rule));
+    }
+    text
+}
+
+struct Printer<'a> {
+    symbols: &'a Symbols,
+    prefixes: &'a Prefixes,
+}
+
+impl Printer<'_> {
+    fn rule(&self, rule: &Rule) -> String {
+        let label = rule.identity.label.as_ref().map(|label| format!("[{label}] ")).unwrap_or_default();
+        let (body, head) = (self.atoms(rule, &rule.body), self.atoms(rule, &rule.head));
+        let space = |text: &str| if text.is_empty() { "" } else { " " };
+        format!("{label}{body}{}->{}{head} .", space(&body), space(&head))
+    }
+
+    fn atoms(&self, rule: &Rule, atoms: &[Atom]) -> String {
+        atoms.iter().map(|atom| self.atom(rule, atom)).collect::<Vec<_>>().join(" ^ ")
+    }
+
+    fn atom(&self, rule: &Rule, atom: &Atom) -> String {
+        let name = match atom {
+            Atom::Relation { predicate, .. } => self.constant(*predicate),
+            Atom::Not { predicate, .. } => format!("not {}", self.constant(*predicate)),
+            Atom::BuiltIn { built_in, .. } => self.name(&format!("{SWRLB}{}", built_in.name())),
+            Atom::Same(..) => "sameAs".into(),
+            Atom::Different(..) => "differentFrom".into(),
+        };
+        let arguments: Vec<String> = atom.terms().into_iter().map(|term| self.term(rule, term)).collect();
+        format!("{name}({})", arguments.join(", "))
+    }
+
+    fn term(&self, rule: &Rule, term: Term) -> String {
+        match term {
+            Term::Variable(variable) => format!("?{}", rule.variable_name(variable)),
+            Term::Constant(symbol) => self.constant(symbol),
+        }
+    }
+
+    fn constant(&self, symbol: Symbol) -> String {
+        match self.symbols.value(symbol) {
+            Value::Name(name) => self.name(name),
+            Value::Literal(literal) => literal.to_string(),
+        }
+    }
+
+    fn name(&self, iri: &str) -> String {
+        let plain = |text: &str| {
+            let mut characters = text.chars();
+            characters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
+                && characters.all(|c| c.is_alphanumeric() || c == '_')
+        };
+        let longest = self.prefixes.iter().filter(|(_, base)| iri.strip_prefix(base).is_some_and(plain));
+        match longest.max_by_key(|(_, base)| base.len()) {
+            Some((prefix, base)) => format!("{prefix}:{}", &iri[base.len()..]),
+            None => format!("<{iri}>"),
+        }
+    }
+}
