@@ -1,7 +1,7 @@
 //! What the robot is: OWL 2 knowledge bases, read and lowered to rules and facts.
 //!
 //! [`read_files`] reads RDF/XML, Turtle, N-Triples, OWL/XML and functional-style documents with their imports into an
-//! [`Ontology`]; [`lower`](lower()) turns that into a `rules::Program` and facts; [`tomasys`] is the typed view on what an
+//! [`Ontology`]; [`lower`](lower()) turns that into a `rules::Program` and facts; `tomasys` is the typed view on what an
 //! engine has concluded; [`kb`] holds the knowledge bases that we wrote.
 //!
 //! Absent here: PDDL, plans, clocks and the network.
@@ -11,13 +11,18 @@ pub mod vocab;
 mod owl;
 
 mod error;
+mod functional;
 mod graph;
 mod horned;
+mod lower;
 mod normalize;
+mod ntriples;
 mod read;
 
 pub mod kb;
 
 pub use error::{Error, Position, Warning};
+pub use lower::{AXIOM_SOURCE, Equality, INTERNAL, Lowered, lower, lower_with};
+pub use ntriples::ntriples;
 pub use owl::*;
 pub use read::{ReadOptions, Syntax, read_files, read_text};

@@ -1,0 +1,331 @@
+//! Axioms to rules (OWL 2 RL, table by table) and assertions to facts.
+
+use std::collections::HashMap;
+
+use rules::{Atom, RuleIdentity, Term};
+
+use super::class;
+use super::context::{Conjunction, Context, Variables, identity};
+use super::range;
+use crate::owl::{
+    AnnotatedAxiom, Axiom, Characteristic, ClassExpression, DataRange, Iri,
+    ObjectPropertyExpression as Property,
+};
+use crate::vocab::owl;
+
+/// What keeps (a part of) an axiom from becoming rules.
+type Outside = Result<(), &'static str>;
+
+pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) {
+    let definitions = definitions(axioms);
+    for (position, annotated) in axioms.iter().enumerate() {
+        let axiom = &annotated.axiom;
+        if assertion(context, axiom) {
+            continue;
+        }
+        let mut lowering =
+            Lowering { identity: identity(axiom, position), definitions: &definitions, context };
+        if let Err(reason) = lowering.axiom(axiom) {
+            context.outside(axiom, reason);
+        }
+    }
+}
+
+/// Named data ranges.
+fn definitions(axioms: &[AnnotatedAxiom]) -> HashMap<Iri, DataRange> {
+    let defined = axioms.iter().filter_map(|annotated| match &annotated.axiom {
+        Axiom::DatatypeDefinition(name, range) => Some((name.clone(), range.clone())),
+        _ => None,
+    });
+    defined.collect()
+}
+
+/// Adds the facts of an assertion about named classes and properties; false for any other axiom.
+fn assertion(context: &mut Context, axiom: &Axiom) -> bool {
+    match axiom {
+        Axiom::ClassAssertion(ClassExpression::Class(class), individual) => {
+            if &**class != owl::THING {
+                let (class, individual) = (context.name(class), context.name(individual));
+                context.state(class, [individual]);
+            }
+        }
+        Axiom::ObjectPropertyAssertion(property, from, to) => {
+            let (from, to) = (context.name(from), context.name(to));
+            match property {
+                Property::Property(iri) => {
+                    let property = context.name(iri);
+                    context.state(property, [from, to]);
+                }
+                Property::Inverse(iri) => {
+                    let property = context.name(iri);
+                    context.state(property, [to, from]);
+                }
+            }
+        }
+        Axiom::DataPropertyAssertion(property, from, to) => {
+            let (property, from, to) = (context.name(property), context.name(from), context.literal(to));
+            context.state(property, [from, to]);
+        }
+        Axiom::SameIndividual(individuals) => {
+            let same = context.name(owl::SAME_AS);
+            for pair in individuals.windows(2) {
+                let (first, second) = (context.name(&pair[0]), context.name(&pair[1]));
+                context.state(same, [first, second]);
+            }
+        }
+        Axiom::DifferentIndividuals(individuals) => {
+            let different = context.name(owl::DIFFERENT_FROM);
+            for (place, first) in individuals.iter().enumerate() {
+                for second in &individuals[place + 1..] {
+                    let (first, second) = (context.name(first), context.name(second));
+                    context.state(different, [first, second]);
+                }
+            }
+        }
+        Axiom::DatatypeDefinition(..) => {}
+        _ => return false,
+    }
+    true
+}
+
+/// One axiom on its way.
+struct Lowering<'c, 'a, 'd> {
+    identity: RuleIdentity,
+    definitions: &'d HashMap<Iri, DataRange>,
+    context: &'c mut Context<'a>,
+}
+
+impl Lowering<'_, '_, '_> {
+    fn rule(&mut self, body: Conjunction, head: Vec<Atom>, variables: &Variables) {
+        self.context.rule(&self.identity, head, body, variables);
+    }
+
+    fn axiom(&mut self, axiom: &Axiom) -> Outside {
+        match axiom {
+            Axiom::SubClassOf(sub, sup) => self.sub_class(sub, sup),
+            Axiom::EquivalentClasses(classes) => self.equivalent_classes(classes),
+            Axiom::DisjointClasses(classes) => self.disjoint_classes(classes),
+            Axiom::DisjointUnion(class, parts) => self.disjoint_union(class, parts),
+            Axiom::ClassAssertion(class, individual) => {
+                let x = self.context.constant(individual);
+                let mut variables = Variables::default();
+                let conclusions = class::conclusions(self.context, class, x, &mut variables)?;
+                for (body, head) in conclusions {
+                    self.rule(body, head, &variables);
+                }
+                Ok(())
+            }
+            Axiom::HasKey(class, objects, data) => self.key(class, objects, data),
+            Axiom::ObjectPropertyCharacteristic(characteristic, property) => {
+                self.characteristic(*characteristic, property)
+            }
+            Axiom::NegativeObjectPropertyAssertion(property, from, to) => {
+                let (from, to) = (self.context.constant(from), self.context.constant(to));
+                let atom = self.context.property(property, from, to);
+                self.rule(vec![atom], Vec::new(), &Variables::default());
+                Ok(())
+            }
+            Axiom::NegativeDataPropertyAssertion(property, from, to) => {
+                let (from, to) = (self.context.constant(from), Term::Constant(self.context.literal(to)));
+                let atom = self.context.relation(property, [from, to]);
+                self.rule(vec![atom], Vec::new(), &Variables::default());
+                Ok(())
+            }
+            _ => self.properties(axiom),
+        }
+    }
+
+    /// Axioms about properties.
+    fn properties(&mut self, axiom: &Axiom) -> Outside {
+        let data = |iris: &[Iri]| -> Vec<Property> { iris.iter().cloned().map(Property::Property).collect() };
+        let one = |iri: &Iri| Property::Property(iri.clone());
+        match axiom {
+            Axiom::SubObjectPropertyOf(sub, sup) => self.sub_property(sub, sup),
+            Axiom::SubDataPropertyOf(sub, sup) => self.sub_property(&one(sub), &one(sup)),
+            Axiom::SubPropertyChainOf(chain, sup) => self.chain(chain, sup),
+            Axiom::EquivalentObjectProperties(properties) => self.equivalent_properties(properties),
+            Axiom::EquivalentDataProperties(properties) => self.equivalent_properties(&data(properties)),
+            Axiom::DisjointObjectProperties(properties) => self.disjoint_properties(properties),
+            Axiom::DisjointDataProperties(properties) => self.disjoint_properties(&data(properties)),
+            Axiom::InverseObjectProperties(first, second) => {
+                let inverse = Property::Inverse(second.clone());
+                self.equivalent_properties(&[one(first), inverse]);
+            }
+            Axiom::ObjectPropertyDomain(property, class) => return self.end(property, class, true),
+            Axiom::ObjectPropertyRange(property, class) => return self.end(property, class, false),
+            Axiom::DataPropertyDomain(property, class) => return self.end(&one(property), class, true),
+            Axiom::DataPropertyRange(property, range) => return self.data_range(property, range),
+            Axiom::FunctionalDataProperty(property) => {
+                let mut v = Variables::default();
+                let (x, y, z) = (v.fresh("x"), v.fresh("y"), v.fresh("z"));
+                let first = self.context.relation(property, [x, y]);
+                let second = self.context.relation(property, [x, z]);
+                self.rule(vec![first, second, Atom::Different(y, z)], Vec::new(), &v);
+            }
+            _ => return Err("no rule form"),
+        }
+        Ok(())
+    }
+
+    fn sub_class(&mut self, sub: &ClassExpression, sup: &ClassExpression) -> Outside {
+        let mut variables = Variables::default();
+        let x = variables.fresh("x");
+        let bodies = class::condition(self.context, sub, x, &mut variables)?;
+        let conclusions = class::conclusions(self.context, sup, x, &mut variables)?;
+        for body in &bodies {
+            for (more, head) in &conclusions {
+                let body: Conjunction = body.iter().chain(more).cloned().collect();
+                if body.is_empty() {
+                    return Err("a statement about all individuals");
+                }
+                self.rule(body, head.clone(), &variables);
+            }
+        }
+        Ok(())
+    }
+
+    /// A circle of subclass axioms; the directions that have a rule form are kept.
+    fn equivalent_classes(&mut self, classes: &[ClassExpression]) -> Outside {
+        let next = classes.iter().cycle().skip(1);
+        let results: Vec<_> = classes.iter().zip(next).map(|(sub, sup)| self.sub_class(sub, sup)).collect();
+        results.into_iter().collect()
+    }
+
+    fn disjoint_classes(&mut self, classes: &[ClassExpression]) -> Outside {
+        for (place, first) in classes.iter().enumerate() {
+            for second in &classes[place + 1..] {
+                let mut variables = Variables::default();
+                let x = variables.fresh("x");
+                let left = class::condition(self.context, first, x, &mut variables)?;
+                let right = class::condition(self.context, second, x, &mut variables)?;
+                for body in class::cross(&left, &right) {
+                    self.rule(body, Vec::new(), &variables);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn disjoint_union(&mut self, class: &Iri, parts: &[ClassExpression]) -> Outside {
+        let class = ClassExpression::Class(class.clone());
+        for part in parts {
+            self.sub_class(part, &class)?;
+        }
+        self.disjoint_classes(parts)?;
+        Err("that the parts cover the class")
+    }
+
+    /// Two named members that agree on all key properties are one.
+    fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) -> Outside {
+        let mut variables = Variables::default();
+        let (x, y) = (variables.fresh("x"), variables.fresh("y"));
+        let left = class::condition(self.context, class, x, &mut variables)?;
+        let right = class::condition(self.context, class, y, &mut variables)?;
+        let mut keys = Vec::new();
+        for property in objects {
+            let value = variables.fresh("v");
+            keys.extend([x, y].map(|end| self.context.property(property, end, value)));
+        }
+        for property in data {
+            let value = variables.fresh("v");
+            keys.extend([x, y].map(|end| self.context.relation(property, [end, value])));
+        }
+        for body in class::cross(&class::cross(&left, &right), &[keys]) {
+            self.context.merge(&self.identity, [x, y], body, &variables);
+        }
+        Ok(())
+    }
+
+    fn sub_property(&mut self, sub: &Property, sup: &Property) {
+        let mut variables = Variables::default();
+        let (x, y) = (variables.fresh("x"), variables.fresh("y"));
+        let (Property::Property(name) | Property::Inverse(name)) = sup;
+        if ![owl::TOP_OBJECT_PROPERTY, owl::TOP_DATA_PROPERTY].contains(&&**name) {
+            let body = self.context.property(sub, x, y);
+            let head = self.context.property(sup, x, y);
+            self.rule(vec![body], vec![head], &variables);
+        }
+    }
+
+    fn equivalent_properties(&mut self, properties: &[Property]) {
+        for (sub, sup) in properties.iter().zip(properties.iter().cycle().skip(1)) {
+            self.sub_property(sub, sup);
+        }
+    }
+
+    fn chain(&mut self, chain: &[Property], sup: &Property) {
+        let mut variables = Variables::default();
+        let first = variables.fresh("x");
+        let (mut body, mut end) = (Vec::new(), first);
+        for link in chain {
+            let next = variables.fresh("y");
+            body.push(self.context.property(link, end, next));
+            end = next;
+        }
+        let head = self.context.property(sup, first, end);
+        self.rule(body, vec![head], &variables);
+    }
+
+    fn disjoint_properties(&mut self, properties: &[Property]) {
+        let mut variables = Variables::default();
+        let (x, y) = (variables.fresh("x"), variables.fresh("y"));
+        for (place, first) in properties.iter().enumerate() {
+            for second in &properties[place + 1..] {
+                let body = vec![self.context.property(first, x, y), self.context.property(second, x, y)];
+                self.rule(body, Vec::new(), &variables);
+            }
+        }
+    }
+
+    /// Domain (of the subject) or range (of the object).
+    fn end(&mut self, property: &Property, class: &ClassExpression, subject: bool) -> Outside {
+        let mut variables = Variables::default();
+        let (x, y) = (variables.fresh("x"), variables.fresh("y"));
+        let edge = self.context.property(property, x, y);
+        let end = if subject { x } else { y };
+        for (more, head) in class::conclusions(self.context, class, end, &mut variables)? {
+            let body = std::iter::once(edge.clone()).chain(more).collect();
+            self.rule(body, head, &variables);
+        }
+        Ok(())
+    }
+
+    fn data_range(&mut self, property: &Iri, range: &DataRange) -> Outside {
+        let range = match range {
+            DataRange::Datatype(name) => self.definitions.get(name).unwrap_or(range),
+            _ => range,
+        };
+        let mut variables = Variables::default();
+        let (x, value) = (variables.fresh("x"), variables.fresh("v"));
+        let edge = self.context.relation(property, [x, value]);
+        for body in range::violations(self.context, range, &[edge], value)? {
+            self.rule(body, Vec::new(), &variables);
+        }
+        Ok(())
+    }
+
+    fn characteristic(&mut self, characteristic: Characteristic, property: &Property) -> Outside {
+        let mut v = Variables::default();
+        let (x, y) = (v.fresh("x"), v.fresh("y"));
+        let mut edge = |first, second| self.context.property(property, first, second);
+        let (body, head) = match characteristic {
+            Characteristic::Functional | Characteristic::InverseFunctional => {
+                let z = v.fresh("z");
+                let functional = characteristic == Characteristic::Functional;
+                let pair = if functional { [edge(x, y), edge(x, z)] } else { [edge(y, x), edge(z, x)] };
+                self.context.merge(&self.identity, [y, z], pair.to_vec(), &v);
+                return Ok(());
+            }
+            Characteristic::Irreflexive => (vec![edge(x, x)], Vec::new()),
+            Characteristic::Symmetric => (vec![edge(x, y)], vec![edge(y, x)]),
+            Characteristic::Asymmetric => (vec![edge(x, y), edge(y, x)], Vec::new()),
+            Characteristic::Transitive => {
+                let z = v.fresh("z");
+                (vec![edge(x, y), edge(y, z)], vec![edge(x, z)])
+            }
+            Characteristic::Reflexive => return Err("a statement about all individuals"),
+        };
+        self.rule(body, head, &v);
+        Ok(())
+    }
+}

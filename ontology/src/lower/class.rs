@@ -1,0 +1,171 @@
+//! Class expressions as conditions (in bodies) and as conclusions (in heads), as far as OWL 2 RL allows each.
+
+use rules::{Atom, Term};
+
+use super::context::{Conjunction, Context, Variables};
+use super::range;
+use crate::owl::{Bound, ClassExpression, DataRange};
+use crate::vocab::owl;
+
+/// What follows from being in a class: for each part, further conditions and then heads (none for a contradiction).
+pub(crate) type Conclusions = Vec<(Conjunction, Vec<Atom>)>;
+
+/// The ways in which `x` can be seen to be in `class`: any of the conjunctions. `Err` says what cannot be seen.
+pub(crate) fn condition(
+    context: &mut Context,
+    class: &ClassExpression,
+    x: Term,
+    variables: &mut Variables,
+) -> Result<Vec<Conjunction>, &'static str> {
+    use ClassExpression as C;
+    Ok(match class {
+        C::Class(iri) if &**iri == owl::THING => vec![Vec::new()],
+        C::Class(iri) if &**iri == owl::NOTHING => Vec::new(),
+        C::Class(iri) => vec![vec![context.relation(iri, [x])]],
+        C::IntersectionOf(classes) => {
+            let mut product = vec![Vec::new()];
+            for class in classes {
+                product = cross(&product, &condition(context, class, x, variables)?);
+            }
+            product
+        }
+        C::UnionOf(classes) => {
+            let mut any = Vec::new();
+            for class in classes {
+                any.extend(condition(context, class, x, variables)?);
+            }
+            any
+        }
+        C::OneOf(individuals) => {
+            individuals.iter().map(|iri| vec![Atom::Same(x, context.constant(iri))]).collect()
+        }
+        C::SomeValuesFrom(property, filler) | C::Cardinality(Bound::Min, 1, property, filler) => {
+            let y = variables.fresh("y");
+            let edge = vec![vec![context.property(property, x, y)]];
+            cross(&edge, &condition(context, filler, y, variables)?)
+        }
+        C::HasValue(property, individual) => {
+            let value = context.constant(individual);
+            vec![vec![context.property(property, x, value)]]
+        }
+        C::HasSelf(property) => vec![vec![context.property(property, x, x)]],
+        C::DataSomeValuesFrom(property, range) | C::DataCardinality(Bound::Min, 1, property, range) => {
+            let value = variables.fresh("v");
+            let edge = vec![vec![context.relation(property, [x, value])]];
+            cross(&edge, &range::condition(context, range, value)?)
+        }
+        C::DataHasValue(property, literal) => {
+            let value = Term::Constant(context.literal(literal));
+            vec![vec![context.relation(property, [x, value])]]
+        }
+        C::ComplementOf(_) => return Err("a complement as a condition"),
+        C::AllValuesFrom(..) | C::DataAllValuesFrom(..) => {
+            return Err("a universal restriction as a condition");
+        }
+        C::Cardinality(..) | C::DataCardinality(..) => return Err("a cardinality as a condition"),
+    })
+}
+
+/// Every conjunction of the first with every one of the second.
+pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
+    left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
+}
+
+/// What follows from `x` being in `class`. `Err` says what cannot be concluded by rules.
+pub(crate) fn conclusions(
+    context: &mut Context,
+    class: &ClassExpression,
+    x: Term,
+    variables: &mut Variables,
+) -> Result<Conclusions, &'static str> {
+    use ClassExpression as C;
+    let heads = |atom| vec![(Vec::new(), vec![atom])];
+    Ok(match class {
+        C::Class(iri) if &**iri == owl::THING => Vec::new(),
+        C::Class(iri) if &**iri == owl::NOTHING => vec![(Vec::new(), Vec::new())],
+        C::Class(iri) => heads(context.relation(iri, [x])),
+        C::IntersectionOf(classes) => {
+            let mut all = Vec::new();
+            for class in classes {
+                all.extend(conclusions(context, class, x, variables)?);
+            }
+            all
+        }
+        C::OneOf(individuals) if individuals.len() == 1 => {
+            heads(Atom::Same(x, context.constant(&individuals[0])))
+        }
+        C::HasValue(property, individual) => {
+            let value = context.constant(individual);
+            heads(context.property(property, x, value))
+        }
+        C::HasSelf(property) => heads(context.property(property, x, x)),
+        C::DataHasValue(property, literal) => {
+            let value = Term::Constant(context.literal(literal));
+            heads(context.relation(property, [x, value]))
+        }
+        C::ComplementOf(class) => {
+            let forbidden = condition(context, class, x, variables)?;
+            forbidden.into_iter().map(|body| (body, Vec::new())).collect()
+        }
+        C::AllValuesFrom(property, filler) => {
+            let y = variables.fresh("y");
+            let edge = context.property(property, x, y);
+            let inner = conclusions(context, filler, y, variables)?;
+            inner.into_iter().map(|(body, head)| (with(edge.clone(), body), head)).collect()
+        }
+        C::DataAllValuesFrom(property, range) => {
+            let value = variables.fresh("v");
+            let edge = context.relation(property, [x, value]);
+            range::violations(context, range, &[edge], value)?
+                .into_iter()
+                .map(|body| (body, Vec::new()))
+                .collect()
+        }
+        C::Cardinality(Bound::Max, 0, property, filler) => {
+            let y = variables.fresh("y");
+            let edge = vec![vec![context.property(property, x, y)]];
+            let forbidden = cross(&edge, &condition(context, filler, y, variables)?);
+            forbidden.into_iter().map(|body| (body, Vec::new())).collect()
+        }
+        C::Cardinality(Bound::Max, 1, property, filler) => {
+            let (y, z) = (variables.fresh("y"), variables.fresh("z"));
+            let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];
+            let bodies = cross(&edges, &condition(context, filler, y, variables)?);
+            let bodies = cross(&bodies, &condition(context, filler, z, variables)?);
+            bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
+        }
+        C::DataCardinality(Bound::Max, most @ (0 | 1), property, range) => {
+            at_most(context, *most, property, range, x, variables)?
+        }
+        C::UnionOf(_) | C::OneOf(_) => return Err("a union as a conclusion"),
+        C::SomeValuesFrom(..) | C::DataSomeValuesFrom(..) => {
+            return Err("an existential restriction as a conclusion");
+        }
+        C::Cardinality(..) | C::DataCardinality(..) => return Err("a cardinality as a conclusion"),
+    })
+}
+
+/// A contradiction where `x` has more than `most` (0 or 1) values in a range.
+fn at_most(
+    context: &mut Context,
+    most: u32,
+    property: &str,
+    range: &DataRange,
+    x: Term,
+    variables: &mut Variables,
+) -> Result<Conclusions, &'static str> {
+    let value = variables.fresh("v");
+    let edge = vec![vec![context.relation(property, [x, value])]];
+    let mut bodies = cross(&edge, &range::condition(context, range, value)?);
+    if most == 1 {
+        let other = variables.fresh("w");
+        let second = vec![vec![context.relation(property, [x, other]), Atom::Different(value, other)]];
+        bodies = cross(&bodies, &cross(&second, &range::condition(context, range, other)?));
+    }
+    Ok(bodies.into_iter().map(|body| (body, Vec::new())).collect())
+}
+
+fn with(atom: Atom, mut body: Conjunction) -> Conjunction {
+    body.insert(0, atom);
+    body
+}

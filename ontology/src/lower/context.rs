@@ -1,0 +1,148 @@
+//! What lowering collects, and the small vocabulary in which the other files of this folder write rules.
+
+use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term, Variable};
+
+use super::{AXIOM_SOURCE, Equality, INTERNAL};
+use crate::error::Warning;
+use crate::owl::{Axiom, Iri, Literal, ObjectPropertyExpression};
+use crate::vocab::{local_name, owl};
+
+/// Atoms that must all hold.
+pub(crate) type Conjunction = Vec<Atom>;
+
+/// Rules, facts and warnings so far.
+pub(crate) struct Context<'a> {
+    pub symbols: &'a mut Symbols,
+    pub rules: Vec<Rule>,
+    pub facts: Vec<Fact>,
+    pub warnings: Vec<Warning>,
+    pub equality: Equality,
+    /// Internal relations in use.
+    relations: usize,
+}
+
+/// The variables of one rule.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Variables {
+    /// By number; an IRI where the rule has one.
+    keys: Vec<Iri>,
+}
+
+impl Variables {
+    /// A new variable.
+    pub(crate) fn fresh(&mut self, name: &str) -> Term {
+        self.keys.push(name.into());
+        Term::Variable(Variable((self.keys.len() - 1) as u16))
+    }
+
+    /// The variable of that IRI, new if there is none.
+    pub(crate) fn of_iri(&mut self, iri: &Iri) -> Term {
+        match self.keys.iter().position(|key| key == iri) {
+            Some(index) => Term::Variable(Variable(index as u16)),
+            None => self.fresh(iri),
+        }
+    }
+
+    /// What to print for each.
+    fn names(&self) -> Vec<Box<str>> {
+        self.keys.iter().map(|key| local_name(key).into()).collect()
+    }
+}
+
+/// The identity of the rules of an axiom.
+pub(crate) fn identity(axiom: &Axiom, position: usize) -> RuleIdentity {
+    RuleIdentity {
+        source: AXIOM_SOURCE.into(),
+        label: Some(axiom.to_string().into()),
+        position: position as u32,
+    }
+}
+
+impl<'a> Context<'a> {
+    pub(crate) fn new(symbols: &'a mut Symbols, equality: Equality) -> Self {
+        Self { symbols, rules: Vec::new(), facts: Vec::new(), warnings: Vec::new(), equality, relations: 0 }
+    }
+
+    pub(crate) fn name(&mut self, iri: &str) -> Symbol {
+        self.symbols.name(iri)
+    }
+
+    pub(crate) fn constant(&mut self, iri: &str) -> Term {
+        Term::Constant(self.symbols.name(iri))
+    }
+
+    pub(crate) fn literal(&mut self, literal: &Literal) -> Symbol {
+        let value =
+            rules::Literal::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref());
+        self.symbols.literal(value)
+    }
+
+    /// `name(arguments)`.
+    pub(crate) fn relation<const N: usize>(&mut self, name: &str, arguments: [Term; N]) -> Atom {
+        Atom::relation(self.symbols.name(name), arguments)
+    }
+
+    /// `property(first, second)`, or the other way round for an inverse.
+    pub(crate) fn property(
+        &mut self,
+        property: &ObjectPropertyExpression,
+        first: Term,
+        second: Term,
+    ) -> Atom {
+        match property {
+            ObjectPropertyExpression::Property(iri) => self.relation(iri, [first, second]),
+            ObjectPropertyExpression::Inverse(iri) => self.relation(iri, [second, first]),
+        }
+    }
+
+    /// Adds that two individuals are one where `body` holds, unless every name is an individual of its own.
+    pub(crate) fn merge(
+        &mut self,
+        identity: &RuleIdentity,
+        pair: [Term; 2],
+        body: Conjunction,
+        variables: &Variables,
+    ) {
+        if self.equality == Equality::Owl {
+            // The engine compares symbols here: an individual is not concluded to be the same as itself.
+            let body = body.into_iter().chain([Atom::Different(pair[0], pair[1])]).collect();
+            self.rule(identity, vec![Atom::Same(pair[0], pair[1])], body, variables);
+        }
+    }
+
+    /// The condition that two individuals differ.
+    pub(crate) fn different(&mut self, first: Term, second: Term) -> Atom {
+        match self.equality {
+            Equality::Owl => self.relation(owl::DIFFERENT_FROM, [first, second]),
+            Equality::UniqueNames => Atom::Different(first, second),
+        }
+    }
+
+    /// A relation that serves this crate only.
+    pub(crate) fn internal(&mut self) -> Symbol {
+        self.relations += 1;
+        self.symbols.name(&format!("{INTERNAL}relation:{}", self.relations))
+    }
+
+    /// Adds a fact.
+    pub(crate) fn state<const N: usize>(&mut self, predicate: Symbol, arguments: [Symbol; N]) {
+        self.facts.push(Fact::new(predicate, arguments));
+    }
+
+    /// Adds a rule.
+    pub(crate) fn rule(
+        &mut self,
+        identity: &RuleIdentity,
+        head: Vec<Atom>,
+        body: Conjunction,
+        variables: &Variables,
+    ) {
+        let variables = variables.names();
+        self.rules.push(Rule { identity: identity.clone(), head, body, variables });
+    }
+
+    /// Reports an axiom, or a part of one, that is left out.
+    pub(crate) fn outside(&mut self, axiom: &Axiom, reason: &str) {
+        self.warnings.push(Warning::OutsideProfile { axiom: axiom.to_string(), reason: reason.to_owned() });
+    }
+}

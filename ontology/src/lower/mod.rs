@@ -1,0 +1,98 @@
+//! An [`Ontology`] to what the engine evaluates: assertions become facts, axioms of OWL 2 RL and SWRL rules become
+//! rules, and every axiom that has no rule form is reported.
+//!
+//! A class is a relation with one argument and a property one with two, both named by their IRI. The rules for axioms
+//! are those of the OWL 2 RL profile [1], instantiated with each axiom's own classes and properties (so that the engine
+//! indexes by class and property instead of joining with a schema). `sameAs` and `differentFrom` are relations of that
+//! name; functional and inverse functional properties conclude equality. Where an axiom forbids something, the rule has
+//! an empty head and is an integrity constraint.
+//!
+//! Not every axiom that OWL 2 RL lists outside its profile is useless: what can be had of it (one direction of an
+//! equivalence, say) is lowered, and the rest reported, so conclusions are always sound and possibly incomplete.
+//!
+//! - [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
+
+mod axiom;
+mod class;
+mod context;
+mod equality;
+mod range;
+mod swrl;
+
+use rules::{Error, Fact, Program, Rule, RuleIdentity, Symbols};
+
+use crate::error::Warning;
+use crate::owl::Ontology;
+use context::Context;
+pub use equality::Equality;
+
+/// What the names of relations start with that serve this crate only; they are no part of the knowledge base.
+pub const INTERNAL: &str = "urn:metaplan:";
+
+/// The identity's source of rules that stand for axioms; the label is then the axiom in functional-style syntax.
+pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
+
+/// An ontology as rules and facts.
+#[derive(Clone, Debug)]
+pub struct Lowered {
+    /// The rules of the knowledge base, then those that stand for axioms.
+    pub program: Program,
+    /// The assertions.
+    pub facts: Vec<Fact>,
+    /// How many SWRL rules were left out because another ontology states the same rule.
+    pub duplicates: usize,
+    /// Axioms and rules that were left out, or kept against their annotation.
+    pub warnings: Vec<Warning>,
+}
+
+/// Lowers an ontology with the semantics of OWL; names and literals are interned in `symbols`.
+pub fn lower(ontology: &Ontology, symbols: &mut Symbols) -> Lowered {
+    lower_with(ontology, Equality::Owl, symbols)
+}
+
+/// As [`lower()`], under the given semantics of names.
+pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols) -> Lowered {
+    let mut context = Context::new(symbols, equality);
+    let duplicates = swrl::lower(&ontology.rules, &mut context);
+    context.drop_unusable();
+    axiom::lower(&ontology.axioms, &mut context);
+    if equality == Equality::Owl {
+        equality::lower(&ontology.axioms, &mut context);
+    }
+    let Context { rules, facts, mut warnings, .. } = context;
+    warnings.sort();
+    warnings.dedup();
+    Lowered { program: Program { rules }, facts, duplicates, warnings }
+}
+
+impl Context<'_> {
+    /// Takes out the rules that the engine rejects (unsafe variables, for one): it would reject the whole program.
+    fn drop_unusable(&mut self) {
+        let program = Program { rules: self.rules.clone() };
+        let Err(errors) = rules::Engine::new(self.symbols.clone(), program, []) else { return };
+        for error in errors {
+            let Some(identity) = culprit(&error) else { continue };
+            let identity = identity.clone();
+            self.rules.retain(|rule: &Rule| rule.identity != identity);
+            self.warnings.push(Warning::UnusableRule {
+                ontology: identity.source.to_string(),
+                position: identity.position,
+                label: identity.label.as_ref().map(ToString::to_string),
+                reason: error.to_string(),
+            });
+        }
+    }
+}
+
+/// The rule that an error is about.
+fn culprit(error: &Error) -> Option<&RuleIdentity> {
+    match error {
+        Error::UnsafeHead { rule, .. }
+        | Error::UnsafeBody { rule, .. }
+        | Error::BuiltInArity { rule, .. }
+        | Error::HeadAtom { rule, .. }
+        | Error::Unstratified { rule, .. }
+        | Error::Arity { rule, .. } => Some(rule),
+        _ => None,
+    }
+}

@@ -1,0 +1,137 @@
+//! SWRL rules to the engine's rules, each once.
+
+use std::collections::HashSet;
+
+use rules::{BuiltIn, RuleIdentity, Term};
+
+use super::class;
+use super::context::{Conjunction, Context, Variables};
+use super::range;
+use crate::error::Warning;
+use crate::owl::{Argument, Atom, ClassExpression, Rule};
+use crate::vocab::owl;
+
+/// Lowers the rules; returns how many repeat another one (but for the names of variables).
+pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
+    let mut seen = HashSet::new();
+    let mut duplicates = 0;
+    for rule in rules {
+        let identity = RuleIdentity {
+            source: rule.ontology.clone(),
+            label: rule.label.clone(),
+            position: rule.position,
+        };
+        let position = context.rules.len();
+        let (ontology, label) = (rule.ontology.to_string(), rule.label.as_ref().map(ToString::to_string));
+        if let Err(reason) = lower_rule(rule, &identity, context) {
+            context.rules.truncate(position);
+            context.warnings.push(Warning::UnusableRule { ontology, position: rule.position, label, reason });
+            continue;
+        }
+        let content: Vec<_> =
+            context.rules[position..].iter().map(|r| (r.body.clone(), r.head.clone())).collect();
+        if !seen.insert(content) {
+            context.rules.truncate(position);
+            duplicates += 1;
+        } else if rule.enabled == Some(false) {
+            context.warnings.push(Warning::DisabledRule { ontology, position: rule.position, label });
+        }
+    }
+    duplicates
+}
+
+fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Result<(), String> {
+    let mut variables = Variables::default();
+    let mut bodies: Vec<Conjunction> = vec![Vec::new()];
+    for atom in &rule.body {
+        bodies = class::cross(&bodies, &condition(context, atom, &mut variables)?);
+    }
+    let (mut heads, mut further) = (Vec::new(), Vec::new());
+    for atom in &rule.head {
+        for (body, head) in conclusions(context, atom, &mut variables)? {
+            if body.is_empty() && !head.is_empty() {
+                heads.extend(head);
+            } else {
+                further.push((body, head));
+            }
+        }
+    }
+    for body in &bodies {
+        if !heads.is_empty() || rule.head.is_empty() {
+            context.rule(identity, heads.clone(), body.clone(), &variables);
+        }
+        for (more, head) in &further {
+            let body = body.iter().chain(more).cloned().collect();
+            context.rule(identity, head.clone(), body, &variables);
+        }
+    }
+    Ok(())
+}
+
+fn term(context: &mut Context, argument: &Argument, variables: &mut Variables) -> Term {
+    match argument {
+        Argument::Variable(iri) => variables.of_iri(iri),
+        Argument::Individual(iri) => context.constant(iri),
+        Argument::Literal(literal) => Term::Constant(context.literal(literal)),
+    }
+}
+
+/// An atom of a body.
+fn condition(
+    context: &mut Context,
+    atom: &Atom,
+    variables: &mut Variables,
+) -> Result<Vec<Conjunction>, String> {
+    Ok(match atom {
+        Atom::Class(ClassExpression::Class(iri), _) if &**iri == owl::THING => vec![Vec::new()],
+        Atom::Class(class, argument) => {
+            let x = term(context, argument, variables);
+            class::condition(context, class, x, variables)?
+        }
+        Atom::DataRange(range, argument) => {
+            let value = term(context, argument, variables);
+            range::condition(context, range, value)?
+        }
+        Atom::ObjectProperty(property, first, second) => {
+            let (x, y) = (term(context, first, variables), term(context, second, variables));
+            vec![vec![context.property(property, x, y)]]
+        }
+        Atom::DataProperty(property, first, second) => {
+            let (x, y) = (term(context, first, variables), term(context, second, variables));
+            vec![vec![context.relation(property, [x, y])]]
+        }
+        Atom::SameIndividual(first, second) => {
+            vec![vec![rules::Atom::Same(term(context, first, variables), term(context, second, variables))]]
+        }
+        Atom::DifferentIndividuals(first, second) => {
+            let (x, y) = (term(context, first, variables), term(context, second, variables));
+            vec![vec![context.different(x, y)]]
+        }
+        Atom::BuiltIn(iri, arguments) => {
+            let built_in =
+                BuiltIn::from_iri(iri).ok_or_else(|| format!("the built-in <{iri}> is not known"))?;
+            let arguments = arguments.iter().map(|argument| term(context, argument, variables)).collect();
+            vec![vec![rules::Atom::BuiltIn { built_in, arguments }]]
+        }
+    })
+}
+
+/// An atom of a head.
+fn conclusions(
+    context: &mut Context,
+    atom: &Atom,
+    variables: &mut Variables,
+) -> Result<class::Conclusions, String> {
+    match atom {
+        Atom::Class(class, argument) => {
+            let x = term(context, argument, variables);
+            Ok(class::conclusions(context, class, x, variables)?)
+        }
+        Atom::DataRange(..) => Err("a data range as a conclusion".to_owned()),
+        Atom::BuiltIn(..) => Err("a built-in as a conclusion".to_owned()),
+        _ => {
+            let alternatives = condition(context, atom, variables)?;
+            Ok(alternatives.into_iter().map(|atoms| (Vec::new(), atoms)).collect())
+        }
+    }
+}
