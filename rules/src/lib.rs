@@ -26,3 +26,10 @@ pub use literal::{Decimal, Duration, Literal, Moment, MomentKind};
 pub use rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
 pub use swrl::{Prefixes, parse_rules, print_rules};
 pub use symbol::{Symbol, Symbols, Value};
+
+/// The status rules of the `TOMASys` metamodel as rule text, written for retraction; the names are those of
+/// `http://metacontrol.org/tomasys#`.
+pub const TOMASYS_RULES: &str = include_str!("../swrl/tomasys.swrl");
+
+/// Rules that say which function designs are available, as rule text over `http://metacontrol.org/tomasys#`.
+pub const COADAPTATION_RULES: &str = include_str!("../swrl/coadaptation.swrl");

@@ -1,0 +1,149 @@
+//! The oracle: naive evaluation of a program, round by round from scratch, sharing nothing with the engine but the
+//! meaning of single built-ins.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use metaplan_rules::{Atom, BuiltIn, Fact, Literal, Program, Rule, Symbol, Symbols, Term, Variable};
+
+/// Values of variables.
+pub type Binding = BTreeMap<Variable, Symbol>;
+
+/// Everything that follows, given the level of each predicate: rules run level by level, so that what a rule negates
+/// is complete.
+pub fn naive(
+    program: &Program,
+    symbols: &mut Symbols,
+    stated: &BTreeSet<Fact>,
+    level: impl Fn(Symbol) -> usize,
+) -> BTreeSet<Fact> {
+    let mut facts = stated.clone();
+    let head_level = |rule: &Rule| rule.head.iter().map(|atom| level(predicate(atom))).max();
+    let levels: BTreeSet<usize> = program.rules.iter().filter_map(head_level).collect();
+    for wanted in levels {
+        loop {
+            let mut new = BTreeSet::new();
+            for rule in program.rules.iter().filter(|rule| head_level(rule) == Some(wanted)) {
+                for binding in matches(rule, symbols, &facts) {
+                    new.extend(rule.head.iter().map(|atom| ground(atom, &binding)));
+                }
+            }
+            let before = facts.len();
+            facts.append(&mut new);
+            if facts.len() == before {
+                break;
+            }
+        }
+    }
+    facts
+}
+
+fn predicate(atom: &Atom) -> Symbol {
+    match atom {
+        Atom::Relation { predicate, .. } | Atom::Not { predicate, .. } => *predicate,
+        other => panic!("{other:?} has no predicate"),
+    }
+}
+
+/// A relation or negated atom under a binding of all its variables.
+pub fn ground(atom: &Atom, binding: &Binding) -> Fact {
+    Fact::new(predicate(atom), atom.terms().into_iter().map(|term| value(term, binding).expect("bound")))
+}
+
+pub fn value(term: Term, binding: &Binding) -> Option<Symbol> {
+    match term {
+        Term::Constant(symbol) => Some(symbol),
+        Term::Variable(variable) => binding.get(&variable).copied(),
+    }
+}
+
+/// All matches of a body: relations first in textual order, then the rest as soon as it is bound.
+pub fn matches(rule: &Rule, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeSet<Binding> {
+    let mut partial = vec![Binding::new()];
+    for atom in rule.body.iter().filter(|atom| matches!(atom, Atom::Relation { .. })) {
+        partial = partial.iter().flat_map(|binding| extend(atom, binding, facts)).collect();
+    }
+    let mut rest: Vec<&Atom> =
+        rule.body.iter().filter(|atom| !matches!(atom, Atom::Relation { .. })).collect();
+    while !rest.is_empty() {
+        let known = |atom: &Atom, binding: &Binding| {
+            let unbound = atom.terms().iter().filter(|&&term| value(term, binding).is_none()).count();
+            let binds = match atom {
+                Atom::Same(..) => 1,
+                Atom::BuiltIn { built_in, arguments } if built_in.is_function() => {
+                    usize::from(value(arguments[0], binding).is_none())
+                }
+                _ => 0,
+            };
+            unbound <= binds
+        };
+        let Some(example) = partial.first() else { return BTreeSet::new() };
+        let ready = rest.iter().position(|atom| known(atom, example)).expect("a safe rule");
+        let atom = rest.remove(ready);
+        partial = partial.into_iter().filter_map(|binding| filter(atom, binding, symbols, facts)).collect();
+    }
+    partial.into_iter().collect()
+}
+
+fn extend(atom: &Atom, binding: &Binding, facts: &BTreeSet<Fact>) -> Vec<Binding> {
+    let terms = atom.terms();
+    let rows =
+        facts.iter().filter(|fact| fact.predicate == predicate(atom) && fact.arguments.len() == terms.len());
+    rows.filter_map(|fact| {
+        let mut longer = binding.clone();
+        for (&term, &symbol) in terms.iter().zip(&fact.arguments) {
+            match term {
+                Term::Variable(variable) => {
+                    if *longer.entry(variable).or_insert(symbol) != symbol {
+                        return None;
+                    }
+                }
+                Term::Constant(constant) if constant != symbol => return None,
+                Term::Constant(_) => {}
+            }
+        }
+        Some(longer)
+    })
+    .collect()
+}
+
+fn filter(atom: &Atom, binding: Binding, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> Option<Binding> {
+    match atom {
+        Atom::Not { .. } => (!facts.contains(&ground(atom, &binding))).then_some(binding),
+        Atom::Same(left, right) => match (value(*left, &binding), value(*right, &binding)) {
+            (Some(a), Some(b)) => (a == b).then_some(binding),
+            (Some(known), None) => bind(*right, known, binding),
+            (None, Some(known)) => bind(*left, known, binding),
+            (None, None) => panic!("an unsafe equality"),
+        },
+        Atom::Different(left, right) => {
+            (value(*left, &binding) != value(*right, &binding)).then_some(binding)
+        }
+        Atom::BuiltIn { built_in, arguments } if value(arguments[0], &binding).is_some() => {
+            holds(*built_in, arguments, &binding, symbols).then_some(binding)
+        }
+        Atom::BuiltIn { built_in, arguments } => {
+            let values: Option<Vec<&Literal>> =
+                arguments[1..].iter().map(|&term| literal(term, &binding, symbols)).collect();
+            let result = built_in.compute(&values?)?;
+            let result = symbols.literal(result);
+            bind(arguments[0], result, binding)
+        }
+        Atom::Relation { .. } => panic!("relations come first"),
+    }
+}
+
+fn bind(term: Term, symbol: Symbol, mut binding: Binding) -> Option<Binding> {
+    binding.insert(term.as_variable()?, symbol);
+    Some(binding)
+}
+
+/// Whether a built-in holds of bound arguments.
+pub fn holds(built_in: BuiltIn, arguments: &[Term], binding: &Binding, symbols: &Symbols) -> bool {
+    let values: Option<Vec<&Literal>> =
+        arguments.iter().map(|&term| literal(term, binding, symbols)).collect();
+    values.is_some_and(|values| built_in.holds(&values))
+}
+
+fn literal<'s>(term: Term, binding: &Binding, symbols: &'s Symbols) -> Option<&'s Literal> {
+    symbols.value(value(term, binding)?).as_literal()
+}

@@ -1,0 +1,264 @@
+//! The master test: after every step of a random script of changes, the engine holds exactly what naive evaluation
+//! derives from scratch, reports exactly the difference, and can prove every fact.
+
+mod common;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use common::{Binding, ground, holds, matches, naive, value};
+use metaplan_rules::{
+    Atom, BuiltIn, Cause, Delta, Derivation, Engine, Fact, Literal, Program, Reason, Rule, RuleIdentity,
+    Symbol, Symbols, Term, Variable,
+};
+use proptest::prelude::*;
+
+const PREDICATES: u8 = 6;
+const VARIABLES: u8 = 4;
+const CONSTANTS: u8 = 6;
+
+/// An atom before it is made safe: kind, predicate, arguments.
+type RawAtom = (u8, u8, [u8; 3]);
+/// A rule before it is made safe: head predicate and arguments, body.
+type RawRule = ((u8, [u8; 2]), Vec<RawAtom>);
+/// A change: whether it inserts, predicate, arguments.
+type RawChange = (bool, u8, [u8; 2]);
+
+struct World {
+    symbols: Symbols,
+    predicates: Vec<Symbol>,
+    constants: Vec<Symbol>,
+}
+
+impl World {
+    fn new() -> Self {
+        let mut symbols = Symbols::new();
+        let predicates = (0..PREDICATES).map(|number| symbols.name(&format!("p{number}"))).collect();
+        let names = ["a", "b", "c"].map(|name| symbols.name(name));
+        let numbers = [1, 2, 3].map(|number| symbols.literal(Literal::integer(number)));
+        Self { symbols, predicates, constants: names.into_iter().chain(numbers).collect() }
+    }
+
+    /// Predicates come in pairs of a level: a unary and a binary one.
+    fn level(&self, predicate: Symbol) -> usize {
+        self.predicates.iter().position(|&known| known == predicate).map_or(0, |position| position / 2)
+    }
+
+    fn fact(&self, predicate: u8, arguments: [u8; 2]) -> Fact {
+        let predicate = predicate % PREDICATES;
+        let arguments = arguments.iter().take(1 + usize::from(predicate % 2));
+        let constant = |&number: &u8| self.constants[usize::from(number % CONSTANTS)];
+        Fact::new(self.predicates[usize::from(predicate)], arguments.map(constant))
+    }
+
+    fn term(&self, number: u8) -> Term {
+        match number % (VARIABLES + CONSTANTS) {
+            variable if variable < VARIABLES => Term::Variable(Variable(variable.into())),
+            constant => Term::Constant(self.constants[usize::from(constant - VARIABLES)]),
+        }
+    }
+
+    fn relation(&self, predicate: u8, arguments: &[u8]) -> Atom {
+        let arity = 1 + usize::from(predicate % 2);
+        let arguments = arguments.iter().take(arity).map(|&number| self.term(number));
+        Atom::relation(self.predicates[usize::from(predicate)], arguments)
+    }
+
+    /// Levels make negation stratified; terms that nothing binds become constants.
+    fn rule(&self, position: usize, raw: &RawRule) -> Rule {
+        let ((head, head_arguments), body) = raw;
+        let constraint = head % 9 == 8;
+        let head = if constraint { PREDICATES - 1 } else { head % PREDICATES };
+        let level = head / 2;
+        let positive = body.iter().filter(|(kind, ..)| kind % 10 < 6 || level == 0 && kind % 10 == 6);
+        let relations = positive.map(|(_, p, arguments)| self.relation(p % (2 * (level + 1)), arguments));
+        let mut atoms: Vec<Atom> = relations.collect();
+        let mut bound: BTreeSet<Term> = atoms.iter().flat_map(Atom::terms).collect();
+        let safe = |term: Term, bound: &BTreeSet<Term>| match term {
+            Term::Variable(_) if !bound.contains(&term) => Term::Constant(self.constants[0]),
+            other => other,
+        };
+        for &(kind, p, [a, b, c]) in body {
+            let [left, right] = [a, b].map(|number| safe(self.term(number), &bound));
+            match kind % 10 {
+                6 if level > 0 => {
+                    let p = p % (2 * level);
+                    let arguments = [left, right].into_iter().take(1 + usize::from(p % 2)).collect();
+                    atoms.push(Atom::Not { predicate: self.predicates[usize::from(p)], arguments });
+                }
+                7 => atoms.push(Atom::BuiltIn {
+                    built_in: if p % 2 == 0 { BuiltIn::LessThan } else { BuiltIn::NotEqual },
+                    arguments: vec![left, right],
+                }),
+                8 if p % 2 == 0 => atoms.push(Atom::Different(left, right)),
+                8 => {
+                    let result = Term::Variable(Variable(u16::from(c % VARIABLES)));
+                    bound.insert(result);
+                    atoms.push(Atom::Same(result, right));
+                }
+                9 if level > 0 && atoms.iter().all(|atom| self.is_below(atom, level)) => {
+                    let result = Term::Variable(Variable(u16::from(VARIABLES + c % 2)));
+                    bound.insert(result);
+                    let arguments = vec![result, left, right];
+                    atoms.push(Atom::BuiltIn { built_in: BuiltIn::Subtract, arguments });
+                }
+                _ => {}
+            }
+        }
+        let has_result = bound.contains(&Term::Variable(Variable(u16::from(VARIABLES))));
+        let first = if has_result {
+            Term::Variable(Variable(u16::from(VARIABLES)))
+        } else {
+            self.term(head_arguments[0])
+        };
+        let head_terms = [first, self.term(head_arguments[1])].map(|term| safe(term, &bound));
+        let arguments = head_terms.into_iter().take(1 + usize::from(head % 2));
+        let head = Atom::relation(self.predicates[usize::from(head)], arguments);
+        let identity = RuleIdentity::new("random", position as u32);
+        Rule::new(identity, if constraint { vec![] } else { vec![head] }, atoms)
+    }
+
+    fn is_below(&self, atom: &Atom, level: u8) -> bool {
+        match atom {
+            Atom::Relation { predicate, .. } => self.level(*predicate) < usize::from(level),
+            _ => true,
+        }
+    }
+}
+
+/// Every step follows from its supports by its rule, and no fact supports itself.
+fn check_derivation(engine: &Engine, derivation: &Derivation) {
+    let mut supported = vec![false; derivation.steps.len()];
+    // Supports are settled in as many passes as the longest chain; a circle never is.
+    for _ in 0..derivation.steps.len() {
+        for (position, step) in derivation.steps.iter().enumerate() {
+            supported[position] |= match &step.reason {
+                Reason::Asserted => engine.is_asserted(&step.fact),
+                Reason::Rule { supports, .. } => supports.iter().all(|&support| supported[support]),
+            };
+        }
+    }
+    assert!(supported.iter().all(|&supported| supported), "circular: {derivation:?}");
+    for step in &derivation.steps {
+        let Reason::Rule { identity, bindings, supports, absent } = &step.reason else { continue };
+        let rule = &engine.program().rules[identity.position as usize];
+        let values: Binding = (0..).map(Variable).zip(bindings.iter().map(|(_, value)| *value)).collect();
+        assert!(rule.head.iter().any(|head| ground(head, &values) == step.fact), "{step:?}");
+        let body = |negated: bool| {
+            let atoms = rule.body.iter().filter(move |atom| match atom {
+                Atom::Relation { .. } => !negated,
+                Atom::Not { .. } => negated,
+                _ => false,
+            });
+            atoms.map(|atom| ground(atom, &values)).collect::<Vec<_>>()
+        };
+        let supporting: Vec<Fact> = supports.iter().map(|&at| derivation.steps[at].fact.clone()).collect();
+        assert_eq!(body(false), supporting);
+        assert_eq!(&body(true), absent);
+        assert!(absent.iter().all(|fact| !engine.holds(fact)));
+        for atom in &rule.body {
+            assert!(match atom {
+                Atom::BuiltIn { built_in, arguments } =>
+                    holds(*built_in, arguments, &values, engine.symbols()),
+                Atom::Same(left, right) => value(*left, &values) == value(*right, &values),
+                Atom::Different(left, right) => value(*left, &values) != value(*right, &values),
+                Atom::Relation { .. } | Atom::Not { .. } => true,
+            });
+        }
+    }
+}
+
+/// The constraints that fire, with how many matches each has.
+fn violations(program: &Program, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<u32, usize> {
+    let constraints = program.rules.iter().filter(|rule| rule.head.is_empty());
+    let counts = constraints.map(|rule| (rule.identity.position, matches(rule, symbols, facts).len()));
+    counts.filter(|&(_, count)| count > 0).collect()
+}
+
+fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTreeSet<Fact> {
+    let mut symbols = engine.symbols().clone();
+    let expected = naive(engine.program(), &mut symbols, stated, |predicate| world.level(predicate));
+    let facts: BTreeSet<Fact> = engine.facts().collect();
+    assert_eq!(facts, expected);
+    for fact in &facts {
+        assert_eq!(engine.is_asserted(fact), stated.contains(fact));
+        check_derivation(engine, &engine.why(fact).expect("a derivation of what holds"));
+        let pattern: Vec<Option<Symbol>> =
+            fact.arguments.iter().enumerate().map(|(at, &symbol)| (at != 1).then_some(symbol)).collect();
+        assert!(engine.matching(fact.predicate, &pattern).any(|row| row == fact.arguments.as_slice()));
+    }
+    let mut counts = BTreeMap::new();
+    for violation in engine.violations() {
+        if let Cause::Constraint(identity) = violation.cause {
+            assert!(violation.supports.iter().all(|fact| facts.contains(fact)));
+            *counts.entry(identity.position).or_insert(0) += 1;
+        }
+    }
+    assert_eq!(counts, violations(engine.program(), &mut symbols, &facts));
+    facts
+}
+
+fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>]) {
+    let world = World::new();
+    let program = Program { rules: rules.iter().enumerate().map(|(at, raw)| world.rule(at, raw)).collect() };
+    // Identical rules are evaluated once, under the first one's identity.
+    let mut seen = BTreeSet::new();
+    let distinct = |rule: &Rule| seen.insert(format!("{:?}{:?}", rule.head, rule.body));
+    let program = Program { rules: program.rules.into_iter().filter(distinct).collect() };
+    let program = renumber(program);
+    let mut stated: BTreeSet<Fact> =
+        start.iter().map(|&(_, p, arguments)| world.fact(p, arguments)).collect();
+    let mut engine =
+        Engine::new(world.symbols.clone(), program.clone(), stated.iter().cloned()).expect("safe rules");
+    let mut before = check_state(&engine, &world, &stated);
+    for step in script {
+        let facts = |wanted: bool| {
+            let chosen = step.iter().filter(move |(insert, ..)| *insert == wanted);
+            chosen.map(|&(_, p, arguments)| world.fact(p, arguments)).collect::<Vec<_>>()
+        };
+        let delta = Delta { insert: facts(true), delete: facts(false) };
+        delta.delete.iter().for_each(|fact| {
+            stated.remove(fact);
+        });
+        stated.extend(delta.insert.iter().cloned());
+        let change = engine.apply(delta).expect("within the budget");
+        let after = check_state(&engine, &world, &stated);
+        assert_eq!(change.insert, after.difference(&before).cloned().collect::<Vec<_>>());
+        assert_eq!(change.delete, before.difference(&after).cloned().collect::<Vec<_>>());
+        before = after;
+    }
+    let reversed = renumber(Program { rules: program.rules.into_iter().rev().collect() });
+    let engine =
+        Engine::new(engine.symbols().clone(), reversed, stated.into_iter().rev()).expect("safe rules");
+    assert_eq!(engine.facts().collect::<BTreeSet<_>>(), before);
+}
+
+fn renumber(program: Program) -> Program {
+    let number = |(position, rule)| Rule { identity: RuleIdentity::new("random", position as u32), ..rule };
+    Program { rules: program.rules.into_iter().enumerate().map(number).collect() }
+}
+
+fn case() -> impl Strategy<Value = (Vec<RawRule>, Vec<RawChange>, Vec<Vec<RawChange>>)> {
+    let atom = (any::<u8>(), any::<u8>(), any::<[u8; 3]>());
+    let rule = ((any::<u8>(), any::<[u8; 2]>()), prop::collection::vec(atom, 1..5));
+    let change = || (any::<bool>(), any::<u8>(), any::<[u8; 2]>());
+    let start = prop::collection::vec(change(), 0..12);
+    let step = prop::collection::vec(change(), 1..4);
+    (prop::collection::vec(rule, 1..7), start, prop::collection::vec(step, 1..20))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
+    #[test]
+    fn incremental_is_from_scratch((rules, start, script) in case()) {
+        check(&rules, &start, &script);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200_000, ..ProptestConfig::default() })]
+    #[test]
+    #[ignore = "minutes long; run with --release"]
+    fn incremental_is_from_scratch_at_length((rules, start, script) in case()) {
+        check(&rules, &start, &script);
+    }
+}
