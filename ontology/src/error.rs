@@ -82,6 +82,16 @@ pub enum Error {
         /// Why not.
         reason: String,
     },
+    /// O106: a name that the knowledge base does not have.
+    #[error("error[O106]: the knowledge base has no {kind} `{name}`; it has {}", listed(known))]
+    Unknown {
+        /// What was asked for.
+        kind: &'static str,
+        /// By this name.
+        name: String,
+        /// The names that there are, sorted.
+        known: Vec<String>,
+    },
 }
 
 impl Error {
@@ -93,6 +103,7 @@ impl Error {
             Self::UnresolvedImport { .. } => "O103",
             Self::Catalog { .. } => "O104",
             Self::NotAnOntology { .. } => "O105",
+            Self::Unknown { .. } => "O106",
         }
     }
 
@@ -215,6 +226,10 @@ impl Warning {
             Self::DisabledRule { .. } => "O303",
         }
     }
+}
+
+fn listed(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 fn label_suffix(label: Option<&str>) -> String {

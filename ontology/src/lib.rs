@@ -1,7 +1,7 @@
 //! What the robot is: OWL 2 knowledge bases, read and lowered to rules and facts.
 //!
 //! [`read_files`] reads RDF/XML, Turtle, N-Triples, OWL/XML and functional-style documents with their imports into an
-//! [`Ontology`]; [`lower`](lower()) turns that into a `rules::Program` and facts; `tomasys` is the typed view on what an
+//! [`Ontology`]; [`lower`](lower()) turns that into a `rules::Program` and facts; [`tomasys`] is the typed view on what an
 //! engine has concluded; [`kb`] holds the knowledge bases that we wrote.
 //!
 //! Absent here: PDDL, plans, clocks and the network.
@@ -20,6 +20,7 @@ mod ntriples;
 mod read;
 
 pub mod kb;
+pub mod tomasys;
 
 pub use error::{Error, Position, Warning};
 pub use lower::{AXIOM_SOURCE, Equality, INTERNAL, Lowered, lower, lower_with};

@@ -100,7 +100,7 @@ vocabulary! {
         IS_QA_TYPE = "isQAtype", HAS_VALUE = "hasValue", HAS_QA_ESTIMATION = "hasQAestimation",
         IS_MEASURED = "isMeasured", C_STATUS = "c_status", FD_REALISABILITY = "fd_realisability",
         FD_AVAILABLE = "fd_available", FD_EFFICACY = "fd_efficacy",
-        QA_COMPARISON_OPERATOR = "qa_comparison_operator",
+        QA_COMPARISON_OPERATOR = "qa_comparison_operator", TYPE_FD = "typeFD", HAS_QA_VALUE = "hasQAvalue",
     }
 }
 

@@ -1,0 +1,133 @@
+//! The knowledge bases that we wrote: they load without warnings, say what the missions need, and react to what the
+//! robot reports.
+
+use ontology::tomasys::{View, change};
+use ontology::{ReadOptions, kb, lower, read_text};
+use rules::{Engine, Literal, Symbols};
+
+fn engine(text: &str, name: &str) -> Engine {
+    let ontology = read_text(text, name, &ReadOptions::default()).expect("well-formed");
+    assert_eq!(ontology.warnings, [], "{name}");
+    let mut symbols = Symbols::new();
+    let lowered = lower(&ontology, &mut symbols);
+    assert_eq!(lowered.warnings, [], "{name}");
+    let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe rules");
+    assert_eq!(engine.violations(), [], "{name}");
+    engine
+}
+
+/// One line a design: name, function, components, estimations, availability.
+fn designs(engine: &Engine) -> Vec<String> {
+    let line = |design: ontology::tomasys::FunctionDesign| {
+        let names = |individuals: &[ontology::tomasys::Individual]| {
+            individuals.iter().map(|individual| individual.name.clone()).collect::<Vec<_>>().join("+")
+        };
+        let estimations: Vec<_> =
+            design.estimations.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        let (functions, components) = (names(&design.solves), names(&design.components));
+        let available = if design.available { "available" } else { "unavailable" };
+        format!("{} {functions} {components} {} {available}", design.individual.name, estimations.join(" "))
+    };
+    View::new(engine).function_designs().into_iter().map(line).collect()
+}
+
+fn available(engine: &Engine) -> Vec<String> {
+    let designs = View::new(engine).function_designs().into_iter();
+    designs.filter(|design| design.available).map(|design| design.individual.name).collect()
+}
+
+#[test]
+fn tomasys_loads_alone() {
+    engine(kb::TOMASYS, "tomasys.ttl");
+}
+
+#[test]
+fn ugv_has_the_designs_of_the_mission() {
+    let engine = engine(kb::UGV, "ugv.ttl");
+    assert_eq!(
+        designs(&engine),
+        [
+            "fd_amcl_kinect f_localization c_kinect battery_usage=2 minimum_illuminance=0 safety=1 available",
+            "fd_amcl_lidar f_localization c_lidar battery_usage=4 minimum_illuminance=0 safety=2/5 available",
+            "fd_aruco f_localization c_camera battery_usage=7 minimum_illuminance=1 safety=7/10 available",
+            "fd_aruco_with_light f_localization c_camera+c_flashlight battery_usage=10 minimum_illuminance=0 \
+             safety=7/10 available",
+            "fd_mrpt_kinect f_localization c_kinect battery_usage=4 minimum_illuminance=0 safety=9/10 available",
+            "fd_mrpt_lidar f_localization c_lidar battery_usage=6 minimum_illuminance=0 safety=3/10 available",
+        ]
+    );
+    let view = View::new(&engine);
+    let [action] = &view.actions()[..] else { panic!("one action") };
+    assert_eq!(
+        (action.individual.name.as_str(), action.requires[0].name.as_str()),
+        ("a_move", "f_localization")
+    );
+    assert_eq!(view.components().len(), 4);
+    assert_eq!(view.individuals_of_class_named("Function").len(), 1);
+}
+
+#[test]
+fn uuv_has_the_designs_of_the_mission() {
+    let engine = engine(kb::UUV, "uuv.ttl");
+    let view = View::new(&engine);
+    let solves = |function: &str| {
+        let designs = view.function_designs().into_iter().filter(|design| design.solves[0].name == function);
+        designs.map(|design| design.individual.name).collect::<Vec<_>>()
+    };
+    assert_eq!(solves("f_maintain_motion"), ["fd_speed_high", "fd_speed_low", "fd_speed_medium"]);
+    assert_eq!(solves("f_generate_search_path"), ["fd_search_high", "fd_search_low", "fd_search_medium"]);
+    assert_eq!(solves("f_follow_pipeline"), ["fd_follow"]);
+    assert_eq!(solves("f_recharge"), ["fd_recharge"]);
+    assert!(view.actions().iter().all(|action| action.requires.len() == 2));
+    assert!(view.function_designs().iter().all(|design| design.available && design.estimations.len() == 2));
+}
+
+#[test]
+fn a_failed_component_makes_its_designs_unavailable_until_it_recovers() {
+    let mut engine = engine(kb::UGV, "ugv.ttl");
+    let all = available(&engine);
+    for (status, expected) in [
+        (change::Status::Failed, vec!["fd_amcl_lidar", "fd_aruco", "fd_aruco_with_light", "fd_mrpt_lidar"]),
+        (change::Status::Recovered, all.iter().map(String::as_str).collect()),
+    ] {
+        let delta = change::component_status(&mut engine, "c_kinect", status).expect("known");
+        engine.apply(delta).expect("applied");
+        assert_eq!(available(&engine), expected, "{status:?}");
+        assert_eq!(engine.violations(), []);
+    }
+    let delta = change::clear_component_status(&mut engine, "c_kinect").expect("known");
+    engine.apply(delta).expect("applied");
+    assert_eq!(available(&engine), all);
+}
+
+#[test]
+fn a_measurement_outside_a_requirement_makes_designs_unavailable() {
+    let check = |text: &str, attribute: &str, value: &str, expected: &[&str]| {
+        let mut engine = engine(text, attribute);
+        let value = Literal::parse(value, Some(ontology::vocab::xsd::DECIMAL), None);
+        let delta = change::measured_value(&mut engine, attribute, value).expect("known");
+        engine.apply(delta).expect("applied");
+        assert_eq!(engine.violations(), []);
+        let designs = View::new(&engine).function_designs().into_iter();
+        let unavailable: Vec<_> =
+            designs.filter(|design| !design.available).map(|design| design.individual.name).collect();
+        assert_eq!(unavailable, expected, "{attribute}");
+    };
+    check(kb::UGV, "ambient_light", "0.8", &[]);
+    check(kb::UGV, "ambient_light", "0.81", &["fd_amcl_kinect", "fd_mrpt_kinect"]);
+    check(kb::UUV, "water_visibility", "2.5", &["fd_search_high"]);
+    check(kb::UUV, "water_visibility", "1.0", &["fd_search_high", "fd_search_low", "fd_search_medium"]);
+    // Nothing measures battery usage yet: an observation is made, and no design requires anything of it.
+    check(kb::UUV, "battery_usage", "1.0", &[]);
+}
+
+#[test]
+fn unknown_names_are_reported_with_those_that_exist() {
+    let mut engine = engine(kb::UGV, "ugv.ttl");
+    let error =
+        change::component_status(&mut engine, "c_radar", change::Status::Failed).expect_err("unknown");
+    assert_eq!(
+        error.to_string(),
+        "error[O106]: the knowledge base has no component `c_radar`; it has c_camera, c_flashlight, c_kinect, c_lidar"
+    );
+}
