@@ -6,8 +6,8 @@
 pub mod ast;
 pub mod check;
 pub mod diagnostic;
-mod names;
-mod number;
+pub(crate) mod names;
+pub(crate) mod number;
 pub mod parse;
 pub mod print;
 mod sexp;

@@ -10,7 +10,7 @@ const DIGITS_LIMIT: usize = 400;
 
 /// What a symbol is, read as a number.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Literal {
+pub(crate) enum Literal {
     /// Not of the form of a number.
     Name,
     /// A number.
@@ -20,7 +20,7 @@ pub(super) enum Literal {
 }
 
 /// Reads `5`, `-0.5`, `100.`, `.5`, `1e-3`; anything else, for example `0.8_decimal`, is a name.
-pub(super) fn literal(text: &str) -> Literal {
+pub(crate) fn literal(text: &str) -> Literal {
     let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
     let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, Some(exponent)),

@@ -6,8 +6,8 @@ mod layout;
 mod tree;
 
 use crate::pddl::ast::{
-    Action, ActionBody, Atom, Condition, Declaration, Direction, Domain, Expression, Identifier,
-    InitialElement, Problem, TypeExpression, TypedName,
+    Action, ActionBody, Condition, Declaration, Direction, Domain, Identifier, InitialElement, Problem,
+    TypeExpression, TypedName,
 };
 use layout::{Doc, layout, list, text};
 
@@ -51,16 +51,6 @@ pub fn print_problem(problem: &Problem) -> String {
 /// A condition on one line, for messages.
 pub(crate) fn condition_text(condition: &Condition) -> String {
     tree::condition(condition).on_one_line()
-}
-
-/// An expression on one line, for messages.
-pub(crate) fn expression_text(expression: &Expression) -> String {
-    tree::expression(expression).on_one_line()
-}
-
-/// An atom as written.
-pub(crate) fn atom_text(atom: &Atom) -> String {
-    tree::atom(atom).on_one_line()
 }
 
 /// A declaration as written: `(at ?x - robot)`.

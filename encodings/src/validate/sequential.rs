@@ -1,0 +1,76 @@
+//! One action after another, in the order of their starts.
+
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use crate::pddl::ast::{ConditionTime, EffectTime};
+
+use super::execute::{Execution, Running, is_durative};
+use super::step::Step;
+use super::verdict::{Violation, ViolationKind};
+
+/// Executes the steps; adds up their durations as long as nothing is wrong.
+pub(super) fn run<'e, 'p>(
+    execution: &mut Execution<'e, 'p>,
+    steps: &'e [Step<'p>],
+    total_time: &mut BigRational,
+) -> Result<(), Box<Violation>> {
+    let is_timed = steps.iter().all(|step| step.text.start.is_some());
+    let mut order: Vec<_> = steps.iter().collect();
+    if is_timed {
+        order.sort_by(|left, right| left.text.start.cmp(&right.text.start));
+    }
+    let mut clock = BigRational::zero();
+    for step in order {
+        let time = match &step.text.start {
+            Some(start) if is_timed => start.clone(),
+            _ => clock.clone(),
+        };
+        starts_late_enough(execution, step, &time, &clock)?;
+        while execution.next_timed().is_some_and(|next| *next <= time) {
+            execution.apply_next_timed();
+        }
+        let running = execution.begin(step, &time)?;
+        let changes = execution.changes(&running, EffectTime::AtStart, &time)?;
+        execution.apply(step, &time, changes)?;
+        if is_durative(&running.instance) {
+            finish(execution, &running, &time)?;
+        }
+        *total_time += &running.duration;
+        clock = running.end;
+    }
+    Ok(())
+}
+
+/// What happens between the start and the end of an action, and at its end.
+fn finish<'e, 'p>(
+    execution: &mut Execution<'e, 'p>,
+    running: &Running<'e, 'p>,
+    start: &BigRational,
+) -> Result<(), Box<Violation>> {
+    execution.check(running, ConditionTime::OverAll, start)?;
+    while let Some(next) = execution.next_timed().filter(|next| **next < running.end).cloned() {
+        execution.apply_next_timed();
+        execution.check(running, ConditionTime::OverAll, &next)?;
+    }
+    execution.check(running, ConditionTime::AtEnd, &running.end)?;
+    let changes = execution.changes(running, EffectTime::AtEnd, &running.end)?;
+    execution.apply(running.step, &running.end, changes)
+}
+
+/// No step starts before the one before it has ended, up to the tolerance.
+fn starts_late_enough(
+    execution: &Execution<'_, '_>,
+    step: &Step<'_>,
+    time: &BigRational,
+    clock: &BigRational,
+) -> Result<(), Box<Violation>> {
+    if time + &execution.options.tolerance >= *clock {
+        return Ok(());
+    }
+    let (time_text, clock_text) = (super::show_number(time), super::show_number(clock));
+    let message = format!(
+        "it starts at {time_text}, before the step before it ends at {clock_text}; actions are executed one after another"
+    );
+    Err(step.violation(time, ViolationKind::Overlap, message))
+}
