@@ -23,6 +23,11 @@ use crate::symbol::{Symbol, Symbols};
 /// How many partial matches one update may extend, unless the caller says otherwise.
 pub const DEFAULT_STEP_BUDGET: u64 = 10_000_000_000;
 
+/// Joins are planned anew when the facts have grown by this factor ...
+const REPLAN_FACTOR: usize = 4;
+/// ... of at least so many.
+const REPLAN_FROM: usize = 32;
+
 /// A change: facts that begin and facts that cease to be stated (input) or to hold (output).
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Delta {
@@ -93,6 +98,7 @@ impl Engine {
         for fact in delta.insert.iter().chain(&delta.delete) {
             check_fact(fact, &self.symbols)?;
         }
+        self.replan();
         let stated = state_change(self, delta);
         let mut maintenance = Maintenance::new(self);
         match maintenance.update(&stated) {
@@ -101,6 +107,13 @@ impl Engine {
                 self.restore(&stated.undo());
                 Err(error)
             }
+        }
+    }
+
+    /// Plans the joins anew once there are many more facts than they were planned for.
+    fn replan(&mut self) {
+        if self.store.len() > REPLAN_FACTOR * self.network.planned_for.max(REPLAN_FROM) {
+            Arc::make_mut(&mut self.network).plan(&mut self.store, true);
         }
     }
 

@@ -1,6 +1,7 @@
 //! What follows: SWRL and Datalog rules over interned facts, maintained incrementally.
 
 mod builtin;
+mod cost;
 mod engine;
 mod error;
 mod explain;

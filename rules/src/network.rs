@@ -3,11 +3,12 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::cost::Costs;
 use crate::error::Error;
 use crate::fixpoint::PlanId;
 use crate::plan::{Condition, Lowered, Plan, Planner, Source, Template, check};
 use crate::rule::{Atom, Program, Rule, Term};
-use crate::store::{Relation, RelationId, Store};
+use crate::store::{RelationId, Store};
 use crate::strata::components;
 use crate::symbol::{Symbol, Symbols};
 
@@ -23,6 +24,10 @@ pub(crate) struct Network {
     pub widths: Vec<usize>,
     pub plans: Vec<Plan>,
     pub strata: Vec<Stratum>,
+    /// The stratum of each relation, dependencies first; strata without rules are not in `strata`.
+    stratum_of: Vec<usize>,
+    /// How many facts there were when the plans were made.
+    pub planned_for: usize,
     /// By relation: the strata that a change of it concerns.
     pub readers: Vec<Vec<u32>>,
     /// The relation of each integrity constraint's matches, with its position in the program.
@@ -32,7 +37,6 @@ pub(crate) struct Network {
 /// Relations that are derived together, and the plans that derive them.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Stratum {
-    pub relations: Vec<RelationId>,
     /// Plans from nothing or from all rows of a relation, for the first evaluation.
     pub initial: Vec<(Option<RelationId>, PlanId)>,
     /// Plans from the rows of a relation that came or went.
@@ -62,10 +66,10 @@ pub(crate) fn compile(
             lowered.push(lower(position, rule, symbols, store, &mut network.constraints));
         }
     }
-    let strata = stratify(program, symbols, store, &lowered)?;
-    network.rules = split_by_stratum(lowered, &strata);
+    network.stratum_of = stratify(program, symbols, store, &lowered)?;
+    network.rules = split_by_stratum(lowered, &network.stratum_of);
     network.widths = network.rules.iter().map(|rule| rule.width).collect();
-    plan_all(&mut network, store, &strata);
+    network.plan(store, false);
     Ok(network)
 }
 
@@ -175,36 +179,30 @@ fn split_by_stratum(rules: Vec<Lowered>, strata: &[usize]) -> Vec<Lowered> {
     split
 }
 
-fn plan_all(network: &mut Network, store: &mut Store, strata: &[usize]) {
-    let derived: FxHashSet<RelationId> =
-        network.rules.iter().flat_map(|r| &r.heads).map(|h| h.relation).collect();
-    let derived_size = store.relations.iter().map(Relation::len).max().unwrap_or(0).max(64);
-    let mut by_stratum: Vec<Stratum> = vec![Stratum::default(); strata.iter().max().map_or(0, |max| max + 1)];
-    for (relation, &stratum) in strata.iter().enumerate() {
-        let relation = RelationId(relation as u32);
-        if derived.contains(&relation) {
-            by_stratum[stratum].relations.push(relation);
+impl Network {
+    /// Plans all rules anew by the sizes that relations have now. `complete` says that the rules have been evaluated.
+    pub fn plan(&mut self, store: &mut Store, complete: bool) {
+        let heads = self.rules.iter().flat_map(|rule| &rule.heads);
+        let derived: FxHashSet<RelationId> = heads.map(|head| head.relation).collect();
+        let costs = Costs::new(store, |relation| !complete && derived.contains(&relation));
+        let mut strata = vec![Stratum::default(); self.stratum_of.iter().max().map_or(0, |max| max + 1)];
+        self.plans.clear();
+        for (number, lowered) in self.rules.iter().enumerate() {
+            let Some(head) = lowered.heads.first() else { continue };
+            let planner = Planner { store, lowered, number: number as u32, costs: &costs };
+            plan_rule(planner, &mut self.plans, &mut strata[self.stratum_of[head.relation.0 as usize]]);
         }
-    }
-    let Network { rules, plans, .. } = network;
-    for (number, lowered) in rules.iter().enumerate() {
-        let Some(stratum) = lowered.heads.first().map(|head| strata[head.relation.0 as usize]) else {
-            continue;
-        };
-        let is_derived = |relation| derived.contains(&relation);
-        let planner =
-            Planner { store, lowered, number: number as u32, derived_size, is_derived: &is_derived };
-        plan_rule(planner, plans, &mut by_stratum[stratum]);
-    }
-    by_stratum.retain(|stratum| !stratum.relations.is_empty());
-    network.readers = vec![Vec::new(); store.relations.len()];
-    for (number, stratum) in by_stratum.iter().enumerate() {
-        let used = stratum.positive.keys().chain(stratum.negative.keys()).chain(stratum.rederive.keys());
-        for relation in used.collect::<FxHashSet<_>>() {
-            network.readers[relation.0 as usize].push(number as u32);
+        strata.retain(|stratum| !stratum.rederive.is_empty());
+        self.readers = vec![Vec::new(); self.stratum_of.len()];
+        for (number, stratum) in strata.iter().enumerate() {
+            let used = stratum.positive.keys().chain(stratum.negative.keys()).chain(stratum.rederive.keys());
+            for relation in used.collect::<FxHashSet<_>>() {
+                self.readers[relation.0 as usize].push(number as u32);
+            }
         }
+        self.strata = strata;
+        self.planned_for = store.len();
     }
-    network.strata = by_stratum;
 }
 
 fn plan_rule(mut planner: Planner, plans: &mut Vec<Plan>, stratum: &mut Stratum) {
@@ -228,10 +226,10 @@ fn plan_rule(mut planner: Planner, plans: &mut Vec<Plan>, stratum: &mut Stratum)
         stratum.rederive.entry(head.relation).or_default().extend(add(planner.start_at_head(position)));
     }
     let smallest = lowered.body.iter().enumerate().filter_map(|(position, condition)| match condition {
-        Condition::Relation(relation, _) => Some((planner.expected_rows(*relation), position, *relation)),
+        Condition::Relation(relation, _) => Some((planner.costs.rows(*relation), position, *relation)),
         _ => None,
     });
-    let (start, plan) = match smallest.min() {
+    let (start, plan) = match smallest.min_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((_, position, relation)) => (Some(relation), planner.start_at_condition(position, false)),
         None => (None, planner.start_at_nothing()),
     };

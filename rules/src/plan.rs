@@ -5,6 +5,7 @@
 //! columns bound so far and the size of its relation.
 
 use crate::builtin::BuiltIn;
+use crate::cost::Costs;
 use crate::error::Error;
 use crate::rule::{Atom, Rule, Term, Variable};
 use crate::store::{RelationId, Store, state};
@@ -141,15 +142,14 @@ impl Bound {
     }
 }
 
-/// Plans one lowered rule. `estimate` is the expected size of a relation.
+/// Plans one lowered rule.
 pub(crate) struct Planner<'a> {
+    /// Gets the indexes that the plans look up.
     pub store: &'a mut Store,
     pub lowered: &'a Lowered,
     /// Which compiled rule the plans belong to.
     pub number: u32,
-    /// Expected rows of a relation that rules derive.
-    pub derived_size: usize,
-    pub is_derived: &'a dyn Fn(RelationId) -> bool,
+    pub costs: &'a Costs,
 }
 
 impl Planner<'_> {
@@ -204,15 +204,8 @@ impl Planner<'_> {
         best.map(|(_, at)| at)
     }
 
-    pub fn expected_rows(&self, relation: RelationId) -> usize {
-        let size = self.store.get(relation).len();
-        if (self.is_derived)(relation) { size.max(self.derived_size) } else { size }
-    }
-
     fn expected_matches(&self, relation: RelationId, sources: &[Source], bound: &Bound) -> f64 {
-        let free = sources.iter().filter(|&&source| !bound.knows(source)).count();
-        let rows = self.expected_rows(relation).max(1) as f64;
-        rows.powf(free as f64 / sources.len().max(1) as f64)
+        self.costs.matches(relation, (0..sources.len()).filter(|&column| bound.knows(sources[column])))
     }
 
     fn step(&mut self, position: usize, skip: u8, bound: &mut Bound) -> Step {

@@ -81,6 +81,11 @@ impl Store {
         id
     }
 
+    /// How many facts are stored, matches of constraints included.
+    pub fn len(&self) -> usize {
+        self.relations.iter().map(Relation::len).sum()
+    }
+
     pub fn get(&self, id: RelationId) -> &Relation {
         &self.relations[id.0 as usize]
     }
@@ -148,6 +153,11 @@ impl Relation {
     /// How many facts are stored, whatever their state.
     pub fn len(&self) -> usize {
         self.rows.len()
+    }
+
+    /// Arguments per fact.
+    pub fn arity(&self) -> usize {
+        self.arity
     }
 
     /// One more than the largest row in use.
