@@ -38,6 +38,22 @@ fn is_conjunction(item: Item<'_>) -> bool {
     item.is_headed("and") || (item.is_list() && item.items().next().is_none())
 }
 
+/// Gives each conjunct its time.
+fn spread_condition(time: ConditionTime, condition: Condition, found: &mut TimedConditions) {
+    match condition {
+        Condition::And(parts) => parts.into_iter().for_each(|part| spread_condition(time, part, found)),
+        condition => found.push((time, condition)),
+    }
+}
+
+/// Gives each conjunct its time.
+fn spread_effect(time: EffectTime, effect: Effect, found: &mut TimedEffects) {
+    match effect {
+        Effect::And(parts) => parts.into_iter().for_each(|part| spread_effect(time, part, found)),
+        effect => found.push((time, effect)),
+    }
+}
+
 impl Parser<'_> {
     /// `:condition` of a durative action.
     pub(super) fn timed_conditions(&mut self, item: Item<'_>, found: &mut TimedConditions) {
@@ -46,10 +62,8 @@ impl Parser<'_> {
                 self.timed_conditions(item, found);
             }
         } else if let Some((time, inner)) = timed(item) {
-            match self.condition(inner) {
-                Some(Condition::And(parts)) => found.extend(parts.into_iter().map(|part| (time, part))),
-                Some(condition) => found.push((time, condition)),
-                None => {}
+            if let Some(condition) = self.condition(inner) {
+                spread_condition(time, condition, found);
             }
         } else if item.is_headed("forall") {
             let Some([variables, body]) = self.operands(item, "(forall (?x - type) (at start (p ?x)))")
@@ -115,10 +129,8 @@ impl Parser<'_> {
                 .help("write `(at start (…))` or `(at end (…))`");
             return;
         };
-        match self.effect(inner) {
-            Some(Effect::And(parts)) => found.extend(parts.into_iter().map(|part| (time, part))),
-            Some(effect) => found.push((time, effect)),
-            None => {}
+        if let Some(effect) = self.effect(inner) {
+            spread_effect(time, effect, found);
         }
     }
 
