@@ -1,3 +1,34 @@
 //! What to do about it: PDDL to a ground task, to CNF, to a plan that is proved optimal.
+//!
+//! Modules in the order of the pipeline; each turns one thing into the next:
+//! `pddl` text → syntax tree → `normalize` → lifted task → `ground` → ground task → `bounds`, `search` → `encode` → formula → `optimize` → plan.
+//! `validate` checks a plan against the syntax tree and shares nothing with the rest.
+//!
+//! What is absent: OWL. Availability of designs arrives as facts of the problem.
 
 pub mod pddl;
+pub mod validate;
+
+mod error;
+mod lifted;
+mod normalize;
+
+mod configuration;
+mod ground;
+mod quantity;
+mod task;
+
+mod bounds;
+mod encode;
+mod limits;
+mod optimize;
+mod plan;
+mod sat;
+mod search;
+
+pub use error::{Error, File, Place};
+pub use ground::{Config as GroundConfig, ground};
+pub use limits::Limits;
+pub use optimize::{Config, Improvement, Proof, Solution, Statistics, Status, Unbounded, optimize};
+pub use plan::{Exact, Plan, Step};
+pub use task::Task;

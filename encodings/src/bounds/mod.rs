@@ -1,0 +1,90 @@
+//! Lower bounds on the cost of plans, and on the number of steps that a cheaper plan can have.
+//!
+//! A projection of the task to a few finite-domain variables is small enough to be solved outright: Dijkstra from its
+//! goal states gives a consistent, admissible estimate [1]; dynamic programming over (step, abstract state) says which
+//! operators can still be at which step of a plan cheaper than the best known one, and beyond which step there is none.
+//!
+//! [1] S. Edelkamp: Planning with pattern databases, ECP 2001.
+
+mod projection;
+
+pub(crate) use projection::Projection;
+
+use crate::task::{State, Task};
+
+/// Longest plan that step bounds are computed for.
+const STEP_LIMIT: usize = 4_000;
+/// Largest number of states of a projection.
+const STATE_LIMIT: usize = 20_000;
+/// How many projections to pairs of variables are tried.
+const PAIR_LIMIT: usize = 40;
+
+/// Projections of a task, the one with the highest estimate of the initial state first.
+pub(crate) struct Bounds {
+    pub(crate) projections: Vec<Projection>,
+}
+
+/// What is known of plans whose cost stays below some limit.
+pub(crate) struct Window {
+    /// No such plan has more steps; none if projections do not tell.
+    pub(crate) steps: Option<usize>,
+    /// For each step, whether each operator can be there.
+    pub(crate) allowed: Vec<Vec<bool>>,
+}
+
+impl Bounds {
+    pub(crate) fn new(task: &Task) -> Self {
+        let goal_variables: Vec<_> = task.goal.facts.iter().map(|fact| fact.variable).collect();
+        let mut patterns: Vec<Vec<_>> = goal_variables.iter().map(|variable| vec![*variable]).collect();
+        let mut others: Vec<_> = (0..task.variables.len() as u32).map(crate::task::VariableId).collect();
+        others.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
+        for other in &others {
+            for goal in &goal_variables {
+                let size = task.variables[goal.index()].values.len() * task.variables[other.index()].values.len();
+                if goal != other && size <= STATE_LIMIT && patterns.len() < goal_variables.len() + PAIR_LIMIT {
+                    patterns.push(vec![*goal.min(other), *goal.max(other)]);
+                }
+            }
+        }
+        patterns.sort();
+        patterns.dedup();
+        if patterns.is_empty() {
+            patterns.push(Vec::new());
+        }
+        let mut projections: Vec<_> = patterns.into_iter().map(|pattern| Projection::new(task, pattern)).collect();
+        projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
+        // Beyond the best few, projections cost more time than they save steps.
+        projections.truncate(12);
+        Self { projections }
+    }
+
+    /// A lower bound on the cost from a state to the goal; none if the goal cannot be reached.
+    pub(crate) fn estimate(&self, state: &State) -> Option<i64> {
+        let mut best = 0;
+        for projection in &self.projections {
+            best = best.max(projection.estimate(state)?);
+        }
+        Some(best)
+    }
+
+    /// What is known of plans with cost at most `limit` and at most `horizon` steps, where either is given.
+    pub(crate) fn window(&self, task: &Task, limit: Option<i64>, horizon: Option<usize>) -> Window {
+        let mut steps: Option<usize> = None;
+        if let Some(limit) = limit {
+            for projection in &self.projections {
+                if let Some(bound) = projection.step_bound(limit, STEP_LIMIT) {
+                    steps = Some(steps.map_or(bound, |known| known.min(bound)));
+                }
+            }
+        }
+        let length = match (steps, horizon) {
+            (Some(a), Some(b)) => a.min(b),
+            (a, b) => a.or(b).unwrap_or(0),
+        };
+        let mut allowed = vec![vec![true; task.operators.len()]; length];
+        for projection in &self.projections {
+            projection.restrict(limit, &mut allowed);
+        }
+        Window { steps, allowed }
+    }
+}

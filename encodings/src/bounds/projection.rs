@@ -1,0 +1,218 @@
+//! A task seen through a few of its finite-domain variables.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::task::{OperatorId, State, Task, VariableId};
+
+/// An operator leads from one abstract state to another.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Transition {
+    pub(crate) source: u32,
+    pub(crate) target: u32,
+}
+
+/// A projection with its abstract state space and the cost to go from each abstract state.
+pub(crate) struct Projection {
+    pub(crate) pattern: Vec<VariableId>,
+    sizes: Vec<usize>,
+    initial: u32,
+    goals: Vec<u32>,
+    /// For each operator its cost with the cheapest designs and where it leads; empty if it reads and changes
+    /// nothing of the pattern.
+    operators: Vec<(i64, Vec<Transition>)>,
+    /// The least cost of an operator that touches nothing of the pattern.
+    idle_cost: Option<i64>,
+    /// Cost to the nearest goal state.
+    to_go: Vec<Option<i64>>,
+}
+
+impl Projection {
+    pub(crate) fn new(task: &Task, pattern: Vec<VariableId>) -> Self {
+        let sizes: Vec<_> = pattern.iter().map(|variable| task.variables[variable.index()].values.len()).collect();
+        let mut projection = Self {
+            pattern,
+            sizes,
+            initial: 0,
+            goals: Vec::new(),
+            operators: Vec::new(),
+            idle_cost: None,
+            to_go: Vec::new(),
+        };
+        projection.initial = projection.state(&task.initial);
+        let goal = projection.required(&task.goal.facts);
+        projection.goals = projection.matching(&goal);
+        for operator in &task.operators {
+            // Rewards (negative costs) have no place in Dijkstra's algorithm; counting them as 0 serves reachability.
+            let cost = operator.cost.minimum().max(0);
+            let before = projection.required(&operator.condition.facts);
+            let after = projection.required(&operator.effects);
+            let touched = before.iter().chain(&after).any(Option::is_some);
+            let mut transitions = Vec::new();
+            if touched {
+                for source in projection.matching(&before) {
+                    transitions.push(Transition { source, target: projection.moved(source, &after) });
+                }
+            } else {
+                projection.idle_cost = Some(projection.idle_cost.map_or(cost, |known: i64| known.min(cost)));
+            }
+            projection.operators.push((cost, transitions));
+        }
+        projection.to_go = projection.costs_to_go();
+        projection
+    }
+
+    fn size(&self) -> usize {
+        self.sizes.iter().product()
+    }
+
+    /// The abstract state of a state.
+    pub(crate) fn state(&self, state: &State) -> u32 {
+        let values = self.pattern.iter().map(|variable| state.values[variable.index()] as usize);
+        self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * size + value) as u32
+    }
+
+    /// The value of each pattern variable in an abstract state.
+    pub(crate) fn values(&self, state: u32) -> Vec<u32> {
+        let mut rest = state as usize;
+        let mut values: Vec<_> = self
+            .sizes
+            .iter()
+            .rev()
+            .map(|size| {
+                let value = rest % size;
+                rest /= size;
+                value as u32
+            })
+            .collect();
+        values.reverse();
+        values
+    }
+
+    fn required(&self, facts: &[crate::task::Fact]) -> Vec<Option<u32>> {
+        let value = |variable| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
+        self.pattern.iter().map(|variable| value(*variable)).collect()
+    }
+
+    fn matching(&self, required: &[Option<u32>]) -> Vec<u32> {
+        let mut states = vec![0_u32];
+        for (size, value) in self.sizes.iter().zip(required) {
+            let range = value.map_or(0..*size as u32, |value| value..value + 1);
+            states = states.iter().flat_map(|s| range.clone().map(move |value| s * *size as u32 + value)).collect();
+        }
+        states
+    }
+
+    fn moved(&self, source: u32, effects: &[Option<u32>]) -> u32 {
+        let values = self.values(source);
+        let after = values.iter().zip(effects).map(|(old, new)| new.unwrap_or(*old));
+        self.sizes.iter().zip(after).fold(0, |index, (size, value)| index * *size as u32 + value)
+    }
+
+    fn costs_to_go(&self) -> Vec<Option<i64>> {
+        let mut incoming: Vec<Vec<(u32, i64)>> = vec![Vec::new(); self.size()];
+        for (cost, transitions) in &self.operators {
+            for transition in transitions.iter().filter(|t| t.source != t.target) {
+                incoming[transition.target as usize].push((transition.source, *cost));
+            }
+        }
+        let mut to_go = vec![None; self.size()];
+        let mut heap: BinaryHeap<_> = self.goals.iter().map(|goal| Reverse((0_i64, *goal))).collect();
+        while let Some(Reverse((cost, state))) = heap.pop() {
+            if to_go[state as usize].is_some() {
+                continue;
+            }
+            to_go[state as usize] = Some(cost);
+            for (source, step) in &incoming[state as usize] {
+                if to_go[*source as usize].is_none() {
+                    heap.push(Reverse((cost + step, *source)));
+                }
+            }
+        }
+        to_go
+    }
+
+    /// The cost to go from the abstract state of a state; none if the goal is out of reach.
+    pub(crate) fn estimate(&self, state: &State) -> Option<i64> {
+        self.to_go[self.state(state) as usize]
+    }
+
+    pub(crate) fn to_go(&self, state: u32) -> Option<i64> {
+        self.to_go[state as usize]
+    }
+
+    /// Where an operator leads, and whether it touches the pattern at all.
+    pub(crate) fn transitions(&self, operator: OperatorId) -> &[Transition] {
+        &self.operators[operator.index()].1
+    }
+
+    /// Least cost of reaching each abstract state in exactly one more step.
+    fn advance(&self, costs: &[Option<i64>]) -> Vec<Option<i64>> {
+        let improve = |slot: &mut Option<i64>, cost: i64| *slot = Some(slot.map_or(cost, |known| known.min(cost)));
+        let mut next = vec![None; costs.len()];
+        if let Some(idle) = self.idle_cost {
+            for (slot, cost) in next.iter_mut().zip(costs) {
+                if let Some(cost) = cost {
+                    improve(slot, cost + idle);
+                }
+            }
+        }
+        for (step, transitions) in &self.operators {
+            for transition in transitions {
+                if let Some(cost) = costs[transition.source as usize] {
+                    improve(&mut next[transition.target as usize], cost + step);
+                }
+            }
+        }
+        next
+    }
+
+    fn start(&self) -> Vec<Option<i64>> {
+        let mut costs = vec![None; self.size()];
+        costs[self.initial as usize] = Some(0);
+        costs
+    }
+
+    /// The most steps that a plan with cost at most `limit` can have; none if there is no such bound, or one above `most`.
+    pub(crate) fn step_bound(&self, limit: i64, most: usize) -> Option<usize> {
+        let fits = |costs: &[Option<i64>]| {
+            costs.iter().zip(&self.to_go).any(|(c, h)| matches!((c, h), (Some(c), Some(h)) if c + h <= limit))
+        };
+        let mut costs = self.start();
+        let mut bound = 0;
+        for step in 0..=most {
+            if !fits(&costs) {
+                return Some(bound);
+            }
+            bound = step;
+            let next = self.advance(&costs);
+            if next == costs {
+                return None;
+            }
+            costs = next;
+        }
+        None
+    }
+
+    /// Clears `allowed[step][operator]` wherever no plan with cost at most `limit` has the operator at that step.
+    pub(crate) fn restrict(&self, limit: Option<i64>, allowed: &mut [Vec<bool>]) {
+        let within = |cost: i64| limit.is_none_or(|limit| cost <= limit);
+        let mut costs = self.start();
+        for row in allowed {
+            let through = |(c, h): (&Option<i64>, &Option<i64>)| Some((*c)? + (*h)?);
+            let cheapest = costs.iter().zip(&self.to_go).filter_map(through).min();
+            for (flag, (cost, transitions)) in row.iter_mut().zip(&self.operators) {
+                *flag = *flag
+                    && if transitions.is_empty() {
+                        cheapest.is_some_and(|known| within(known + cost))
+                    } else {
+                        transitions.iter().any(|transition| {
+                            let through = (&costs[transition.source as usize], &self.to_go[transition.target as usize]);
+                            matches!(through, (Some(c), Some(h)) if within(c + cost + h))
+                        })
+                    };
+            }
+            costs = self.advance(&costs);
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Which parameters of an action schema are function designs that need not be grounded.
+//!
+//! In the explicit way of modelling (Metaplan paper, Listings 1 and 2) a schema has parameters `?fd` with
+//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable*, and becomes a slot that is filled step by step, if no fluent
+//! mentions it: then the designs of one action instance do not multiply the ground operators.
+
+use smallvec::SmallVec;
+
+use crate::lifted::{Effect, Expression, Formula, Lifted, Schema, Term};
+use crate::pddl::ast::Name;
+use crate::quantity::SlotSet;
+
+/// A parameter that stands for a function design, and the function that the design solves.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SlotParameter {
+    pub(crate) parameter: u32,
+    pub(crate) function: Term,
+}
+
+/// The design parameters of a schema with the function that each solves, ascending. `solves` names the
+/// predicates whose first argument is a design and whose second is the function that it solves.
+pub(crate) fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> Vec<SlotParameter> {
+    let conjuncts = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
+    let mut designs: Vec<SlotParameter> = Vec::new();
+    for conjunct in conjuncts {
+        if let Formula::Literal { positive: true, predicate, terms } = conjunct
+            && solves.contains(&lifted.predicates[predicate.index()].name)
+            && let [Term::Parameter(parameter), function] = terms[..]
+            && function != Term::Parameter(parameter)
+            && designs.iter().all(|slot| slot.parameter != parameter && Term::Parameter(slot.parameter) != function)
+        {
+            designs.push(SlotParameter { parameter, function });
+        }
+    }
+    designs.sort_by_key(|slot| slot.parameter);
+    designs
+}
+
+/// Those design parameters that are separable.
+pub(crate) fn slot_parameters(lifted: &Lifted, schema: &Schema, designs: &[SlotParameter]) -> Vec<SlotParameter> {
+    designs.iter().filter(|design| is_separable(lifted, schema, design.parameter)).copied().collect()
+}
+
+/// The parts of a conjunction, flattened.
+pub(crate) fn conjuncts(formula: &Formula) -> Vec<&Formula> {
+    match formula {
+        Formula::And(parts) => parts.iter().flat_map(conjuncts).collect(),
+        other => vec![other],
+    }
+}
+
+fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
+    let conditions = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
+    let effects = schema.start_effects.iter().chain(&schema.end_effects);
+    let is = |term: &Term| *term == Term::Parameter(parameter);
+    conditions.into_iter().all(|conjunct| match conjunct {
+        Formula::Compare(_, left, right, _) => {
+            expression_separable(lifted, left, parameter) && expression_separable(lifted, right, parameter)
+        }
+        other => !mentions(other, parameter) || is_static(lifted, other),
+    }) && effects.into_iter().all(|effect| match effect {
+        Effect::Add(_, terms) | Effect::Delete(_, terms) => !terms.iter().any(is),
+        Effect::Assign { terms, expression, .. } => {
+            !terms.iter().any(is) && expression_separable(lifted, expression, parameter)
+        }
+    }) && schema.duration.as_ref().is_none_or(|duration| expression_separable(lifted, duration, parameter))
+}
+
+/// Whether the parameter occurs only below static functions, and not as a factor of a fluent.
+fn expression_separable(lifted: &Lifted, expression: &Expression, parameter: u32) -> bool {
+    match expression {
+        Expression::Sum(parts) => parts.iter().all(|part| expression_separable(lifted, part, parameter)),
+        Expression::Negate(inner) => expression_separable(lifted, inner, parameter),
+        other => !expression_mentions(other, parameter) || is_static_expression(lifted, other),
+    }
+}
+
+/// Whether no fluent occurs in a condition.
+pub(crate) fn is_static(lifted: &Lifted, formula: &Formula) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().all(|part| is_static(lifted, part)),
+        Formula::Literal { predicate, .. } => !lifted.predicates[predicate.index()].fluent,
+        Formula::Equal { .. } => true,
+        Formula::Compare(_, left, right, _) => is_static_expression(lifted, left) && is_static_expression(lifted, right),
+    }
+}
+
+fn is_static_expression(lifted: &Lifted, expression: &Expression) -> bool {
+    match expression {
+        Expression::Number(_) | Expression::TotalTime => true,
+        Expression::Function(function, _, _) => !lifted.functions[function.index()].fluent,
+        Expression::Negate(inner) => is_static_expression(lifted, inner),
+        Expression::Sum(parts) | Expression::Product(parts, _) => {
+            parts.iter().all(|part| is_static_expression(lifted, part))
+        }
+        Expression::Quotient(left, right, _) => is_static_expression(lifted, left) && is_static_expression(lifted, right),
+    }
+}
+
+fn mentions(formula: &Formula, parameter: u32) -> bool {
+    let mut found = false;
+    formula_terms(formula, &mut |term| found |= term == Term::Parameter(parameter));
+    found
+}
+
+fn expression_mentions(expression: &Expression, parameter: u32) -> bool {
+    let mut found = false;
+    expression_terms(expression, &mut |term| found |= term == Term::Parameter(parameter));
+    found
+}
+
+/// The positions (in `slots`) of the slot parameters that a condition mentions.
+pub(crate) fn slots_of_formula(formula: &Formula, slots: &[SlotParameter]) -> SlotSet {
+    let mut set = SmallVec::new();
+    formula_terms(formula, &mut |term| insert(&mut set, term, slots));
+    set
+}
+
+/// The positions (in `slots`) of the slot parameters that an expression mentions.
+pub(crate) fn slots_of_expression(expression: &Expression, slots: &[SlotParameter]) -> SlotSet {
+    let mut set = SmallVec::new();
+    expression_terms(expression, &mut |term| insert(&mut set, term, slots));
+    set
+}
+
+fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
+    if let Term::Parameter(parameter) = term
+        && let Some(position) = slots.iter().position(|slot| slot.parameter == parameter)
+        && let Err(place) = set.binary_search(&(position as u16))
+    {
+        set.insert(place, position as u16);
+    }
+}
+
+fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| formula_terms(part, visit)),
+        Formula::Literal { terms, .. } => terms.iter().for_each(|term| visit(*term)),
+        Formula::Equal { left, right, .. } => [left, right].into_iter().for_each(|term| visit(*term)),
+        Formula::Compare(_, left, right, _) => {
+            expression_terms(left, visit);
+            expression_terms(right, visit);
+        }
+    }
+}
+
+fn expression_terms(expression: &Expression, visit: &mut dyn FnMut(Term)) {
+    match expression {
+        Expression::Number(_) | Expression::TotalTime => {}
+        Expression::Function(_, terms, _) => terms.iter().for_each(|term| visit(*term)),
+        Expression::Negate(inner) => expression_terms(inner, visit),
+        Expression::Sum(parts) | Expression::Product(parts, _) => {
+            parts.iter().for_each(|part| expression_terms(part, visit));
+        }
+        Expression::Quotient(left, right, _) => {
+            expression_terms(left, visit);
+            expression_terms(right, visit);
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Binary numbers in clauses: two's complement, ripple-carry addition, constants folded.
+
+use crate::encode::formula::{Family, Formula, Meaning};
+use crate::sat::Lit;
+
+/// Bits of a number, the lowest first; the last one is the sign.
+pub(crate) type Bits = Vec<Lit>;
+
+/// How many bits a number needs, sign included.
+pub(crate) fn width(low: i64, high: i64) -> usize {
+    let bits = |number: i64| 65 - if number < 0 { (!number).leading_zeros() } else { number.leading_zeros() } as usize;
+    bits(low).max(bits(high))
+}
+
+/// Builds numbers for one family of clauses.
+pub(crate) struct Arithmetic<'f> {
+    pub(crate) formula: &'f mut Formula,
+    pub(crate) family: Family,
+}
+
+impl Arithmetic<'_> {
+    fn bit(&mut self) -> Lit {
+        let bit = self.formula.variables() as u32;
+        self.formula.fresh(Meaning::Bit { bit })
+    }
+
+    pub(crate) fn constant(value: i64, width: usize) -> Bits {
+        let bit = |index: usize| if value >> index.min(63) & 1 == 1 { Formula::truth() } else { !Formula::truth() };
+        (0..width).map(bit).collect()
+    }
+
+    /// The same number with more bits.
+    pub(crate) fn extend(bits: &Bits, width: usize) -> Bits {
+        let sign = bits.last().copied().unwrap_or(!Formula::truth());
+        bits.iter().copied().chain(std::iter::repeat(sign)).take(width.max(bits.len())).collect()
+    }
+
+    /// Conjunction of two literals.
+    pub(crate) fn and(&mut self, a: Lit, b: Lit) -> Lit {
+        let (truth, falsum) = (Formula::truth(), !Formula::truth());
+        match (a, b) {
+            _ if a == falsum || b == falsum || a == !b => falsum,
+            _ if a == truth || a == b => b,
+            _ if b == truth => a,
+            _ => {
+                let and = self.bit();
+                self.formula.add(self.family, [!and, a]);
+                self.formula.add(self.family, [!and, b]);
+                self.formula.add(self.family, [and, !a, !b]);
+                and
+            }
+        }
+    }
+
+    fn or(&mut self, a: Lit, b: Lit) -> Lit {
+        !self.and(!a, !b)
+    }
+
+    fn xor(&mut self, a: Lit, b: Lit) -> Lit {
+        let (truth, falsum) = (Formula::truth(), !Formula::truth());
+        match (a, b) {
+            _ if a == falsum => b,
+            _ if b == falsum => a,
+            _ if a == truth => !b,
+            _ if b == truth => !a,
+            _ if a == b => falsum,
+            _ if a == !b => truth,
+            _ => {
+                let xor = self.bit();
+                self.formula.add(self.family, [!xor, a, b]);
+                self.formula.add(self.family, [!xor, !a, !b]);
+                self.formula.add(self.family, [xor, !a, b]);
+                self.formula.add(self.family, [xor, a, !b]);
+                xor
+            }
+        }
+    }
+
+    fn majority(&mut self, a: Lit, b: Lit, c: Lit) -> Lit {
+        let (truth, falsum) = (Formula::truth(), !Formula::truth());
+        let constants = [(a, b, c), (b, a, c), (c, a, b)];
+        for (constant, x, y) in constants {
+            if constant == falsum {
+                return self.and(x, y);
+            }
+            if constant == truth {
+                return self.or(x, y);
+            }
+            if x == y {
+                return x;
+            }
+            if x == !y {
+                return constant;
+            }
+        }
+        let majority = self.bit();
+        for (x, y) in [(a, b), (a, c), (b, c)] {
+            self.formula.add(self.family, [!majority, x, y]);
+            self.formula.add(self.family, [majority, !x, !y]);
+        }
+        majority
+    }
+
+    /// The sum, at a width that holds it.
+    pub(crate) fn add(&mut self, a: &Bits, b: &Bits, width: usize) -> Bits {
+        let (a, b) = (Self::extend(a, width), Self::extend(b, width));
+        let mut carry = !Formula::truth();
+        let mut sum = Vec::with_capacity(width);
+        for (a, b) in a.iter().zip(&b).take(width) {
+            let half = self.xor(*a, *b);
+            sum.push(self.xor(half, carry));
+            carry = self.majority(*a, *b, carry);
+        }
+        sum
+    }
+
+    /// A multiple of a number, by shifts and additions.
+    pub(crate) fn multiple(&mut self, bits: &Bits, factor: i64, width: usize) -> Bits {
+        if factor == 1 {
+            return Self::extend(bits, width);
+        }
+        let mut sum = Self::constant(0, width);
+        for shift in (0..63).filter(|shift| factor.unsigned_abs() >> shift & 1 == 1) {
+            let shifted: Bits =
+                std::iter::repeat_n(!Formula::truth(), shift).chain(Self::extend(bits, width)).take(width).collect();
+            sum = self.add(&sum, &shifted, width);
+        }
+        if factor < 0 {
+            let inverted: Bits = sum.iter().map(|bit| !*bit).collect();
+            sum = self.add(&inverted, &Self::constant(1, width), width);
+        }
+        sum
+    }
+
+    /// A number that is the given value under each premise (a conjunction), and 0 if `active` is false. At most
+    /// one premise holds at a time, and one does whenever `active` does.
+    pub(crate) fn choose(&mut self, premises: &[(Vec<Lit>, i64)], active: Lit) -> Bits {
+        let low = premises.iter().map(|(_, value)| *value).fold(0, i64::min);
+        let high = premises.iter().map(|(_, value)| *value).fold(0, i64::max);
+        (0..width(low, high))
+            .map(|index| {
+                let set = |value: i64| value >> index & 1 == 1;
+                if premises.iter().all(|(_, value)| !set(*value)) {
+                    return !Formula::truth();
+                }
+                let bit = self.bit();
+                self.formula.add(self.family, [active, !bit]);
+                for (premise, value) in premises {
+                    let conclusion = if set(*value) { bit } else { !bit };
+                    self.formula.add(self.family, premise.iter().map(|l| !*l).chain([conclusion]));
+                }
+                bit
+            })
+            .collect()
+    }
+
+    /// Under the premise the two numbers are equal.
+    pub(crate) fn equal_if(&mut self, premise: Lit, a: &Bits, b: &Bits) {
+        let width = a.len().max(b.len());
+        for (a, b) in Self::extend(a, width).into_iter().zip(Self::extend(b, width)) {
+            self.formula.add(self.family, [!premise, !a, b]);
+            self.formula.add(self.family, [!premise, a, !b]);
+        }
+    }
+
+    /// The number is at most a constant.
+    pub(crate) fn at_most(&mut self, bits: &Bits, limit: i64) {
+        let width = bits.len().max(width(limit, limit));
+        let bits = Self::extend(bits, width);
+        let Some((sign, magnitude)) = bits.split_last() else { return };
+        // Two's complement order is that of the magnitudes with the sign inverted as the highest bit.
+        let order: Vec<(Lit, bool)> =
+            magnitude.iter().enumerate().map(|(i, bit)| (*bit, limit >> i & 1 == 1)).chain([(!*sign, limit >= 0)]).collect();
+        for (index, (bit, set)) in order.iter().enumerate() {
+            if !set {
+                let above = order[index + 1..].iter().filter(|(_, set)| *set).map(|(bit, _)| !*bit);
+                let smaller_above = above.collect::<Vec<_>>();
+                self.formula.add(self.family, smaller_above.into_iter().chain([!*bit]));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::Limits;
+    use crate::sat::{Answer, Solver, Varisat};
+
+    /// Whether the formula has an assignment in which the bits read as the value.
+    fn can_be(formula: &Formula, bits: &Bits, value: i64) -> bool {
+        let mut solver = Varisat::new(&Limits::none());
+        formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));
+        for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
+            solver.add_clause(&[if wanted == Formula::truth() { *bit } else { !*bit }]);
+        }
+        solver.solve() == Answer::Satisfiable
+    }
+
+    fn free(formula: &mut Formula, bits: usize) -> Bits {
+        (0..bits).map(|bit| formula.fresh(Meaning::Bit { bit: bit as u32 })).collect()
+    }
+
+    fn fix(formula: &mut Formula, bits: &Bits, value: i64) {
+        for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
+            formula.add(Family::Numeric, [if wanted == Formula::truth() { *bit } else { !*bit }]);
+        }
+    }
+
+    #[test]
+    fn sums_and_multiples_are_exact() {
+        for a in -4..4 {
+            for b in -4..4 {
+                let mut formula = Formula::new();
+                let (x, y) = (free(&mut formula, 3), free(&mut formula, 3));
+                fix(&mut formula, &x, a);
+                fix(&mut formula, &y, b);
+                let mut arithmetic = Arithmetic { formula: &mut formula, family: Family::Numeric };
+                let sum = arithmetic.add(&x, &y, 4);
+                let multiple = arithmetic.multiple(&x, b, 7);
+                for value in -8..8 {
+                    assert_eq!(can_be(&formula, &sum, value), value == a + b, "{a} + {b} = {value}?");
+                    assert_eq!(can_be(&formula, &multiple, value), value == a * b, "{a} * {b} = {value}?");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn upper_limits_cut_exactly() {
+        for limit in -9..9 {
+            let mut formula = Formula::new();
+            let x = free(&mut formula, 4);
+            Arithmetic { formula: &mut formula, family: Family::Numeric }.at_most(&x, limit);
+            for value in -8..8 {
+                assert_eq!(can_be(&formula, &x, value), value <= limit, "{value} <= {limit}?");
+            }
+        }
+    }
+
+    #[test]
+    fn widths_hold_their_numbers() {
+        for (low, high, expected) in [(0, 0, 1), (0, 1, 2), (-1, 0, 1), (-2, 1, 2), (0, 7, 4), (-8, 7, 4), (-9, 7, 5)] {
+            assert_eq!(width(low, high), expected, "{low}..={high}");
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! The accumulated cost, and the limit on it.
+//!
+//! Costs are *reduced* by a potential: with h the cost to go in a projection, an operator from abstract state α to β counts
+//! c + h(β) − h(α) ≥ 0, and the sum over a plan is its cost less h(initial), because h is 0 in goal states. So only
+//! the gap between the limit and the lower bound has to be counted, and an operator on a cheapest path counts nothing.
+//! Tables of designs count what they add to their cheapest entry.
+//!
+//! The sum is kept in order encoding, one variable for each amount that can occur, and one direction only: the
+//! variables say *at least* how much has been spent. Where too many amounts can occur, binary addition takes over.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::encode::arithmetic::{Arithmetic, Bits};
+use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::selection::global;
+use crate::encode::{CostLimit, Encoding};
+use crate::sat::Lit;
+use crate::task::{Operator, OperatorId};
+
+/// More amounts than this at one step, and the sum is binary.
+const AMOUNT_LIMIT: usize = 1_000;
+
+/// What one source adds to the cost of a step: the amount if the premise (a conjunction) holds.
+type Increments = Vec<(Vec<Lit>, i64)>;
+
+/// The spent cost at the end, less its lower bound.
+pub(super) struct Cost {
+    lower: i64,
+    spent: Spent,
+}
+
+enum Spent {
+    /// `at least amount`, for every positive amount that can occur.
+    Order(BTreeMap<i64, Lit>),
+    Binary(Bits),
+}
+
+impl Cost {
+    /// Adds clauses that admit only plans with cost at most `limit`.
+    pub(super) fn at_most(&self, formula: &mut Formula, limit: i64) {
+        let gap = limit - self.lower;
+        if gap < 0 {
+            formula.add(Family::Bound, []);
+            return;
+        }
+        match &self.spent {
+            Spent::Order(amounts) => {
+                if let Some((_, literal)) = amounts.range(gap + 1..).next() {
+                    formula.add(Family::Bound, [!*literal]);
+                }
+            }
+            Spent::Binary(bits) => Arithmetic { formula, family: Family::Bound }.at_most(bits, gap),
+        }
+    }
+}
+
+impl Encoding<'_> {
+    /// Adds up the cost of all steps and limits it.
+    pub(super) fn accumulate(&mut self, cost: &CostLimit<'_>) -> Cost {
+        let lower = cost.bounds.estimate(&self.task.initial);
+        let Some(potential) = cost.bounds.projections.first() else {
+            return Cost { lower: 0, spent: Spent::Order(BTreeMap::new()) };
+        };
+        let (Some(_), Some(lower)) = (lower, potential.estimate(&self.task.initial)) else {
+            self.formula.add(Family::Bound, []);
+            return Cost { lower: i64::MAX, spent: Spent::Order(BTreeMap::new()) };
+        };
+        let gap = cost.limit - lower;
+        if gap < 0 {
+            self.formula.add(Family::Bound, []);
+            return Cost { lower, spent: Spent::Order(BTreeMap::new()) };
+        }
+        let steps: Vec<Vec<Increments>> = (0..self.horizon).map(|step| self.increments(step, cost)).collect();
+        let spent = if amounts_fit(&steps, gap) {
+            Spent::Order(self.add_in_order(&steps, gap))
+        } else {
+            Spent::Binary(self.add_in_binary(&steps, gap))
+        };
+        Cost { lower, spent }
+    }
+
+    /// What a step can add, by source: the operator itself, and each table of designs.
+    fn increments(&mut self, step: usize, cost: &CostLimit<'_>) -> Vec<Increments> {
+        let mut own = Increments::new();
+        for index in 0..self.operators[step].len() {
+            let (id, literal) = self.operators[step][index];
+            self.reduced(step, id, literal, cost, &mut own);
+        }
+        let mut all = vec![own];
+        let mut by_slots: BTreeMap<Vec<usize>, Increments> = BTreeMap::new();
+        for ((entries, values), members) in self.partition(step, residual_tables) {
+            let group = self.group(step, &members, Family::Cost);
+            for (combination, value) in entries.iter().zip(values) {
+                let designs = combination.iter().map(|(slot, design)| self.designs[step][*slot][*design]);
+                let premise: Vec<_> = designs.chain([group]).collect();
+                let slots = combination.iter().map(|(slot, _)| *slot).collect();
+                by_slots.entry(slots).or_default().push((premise, value));
+            }
+        }
+        all.extend(by_slots.into_values());
+        all
+    }
+
+    /// The reduced cost of an operator with its cheapest designs, by abstract state where that matters.
+    fn reduced(&mut self, step: usize, id: OperatorId, literal: Lit, cost: &CostLimit<'_>, out: &mut Increments) {
+        let potential = &cost.bounds.projections[0];
+        let operator = &self.task.operators[id.index()];
+        let least = operator.cost.minimum();
+        let transitions = potential.transitions(id);
+        if transitions.is_empty() {
+            out.push((vec![literal], least));
+            return;
+        }
+        let mut alive = Vec::new();
+        for transition in transitions {
+            let values = potential.values(transition.source);
+            let known = |variable| operator.condition.facts.iter().any(|fact| fact.variable == variable);
+            let here: Vec<_> = potential
+                .pattern
+                .iter()
+                .zip(values)
+                .filter(|(variable, _)| !known(**variable))
+                .map(|(variable, value)| self.values[step][variable.index()][value as usize])
+                .collect();
+            match (potential.to_go(transition.source), potential.to_go(transition.target)) {
+                (Some(before), Some(after)) => alive.push((here, least + after - before)),
+                _ => self.formula.add(Family::Cost, here.iter().map(|state| !*state).chain([!literal])),
+            }
+        }
+        match alive.split_first() {
+            Some(((_, first), rest)) if rest.iter().all(|(_, amount)| amount == first) => {
+                out.push((vec![literal], *first));
+            }
+            _ => out.extend(alive.into_iter().map(|(mut here, amount)| {
+                here.push(literal);
+                (here, amount)
+            })),
+        }
+    }
+
+    fn add_in_order(&mut self, steps: &[Vec<Increments>], gap: i64) -> BTreeMap<i64, Lit> {
+        let mut spent: BTreeMap<i64, Lit> = BTreeMap::new();
+        for (step, sources) in steps.iter().enumerate() {
+            for (stage, source) in sources.iter().enumerate() {
+                spent = self.add_amounts(source, &spent, gap, step as u32, stage as u32);
+            }
+        }
+        spent
+    }
+
+    /// `spent ≥ v ∧ increment ≥ w → spent' ≥ v + w`; sums above the gap are conflicts.
+    fn add_amounts(
+        &mut self,
+        source: &Increments,
+        spent: &BTreeMap<i64, Lit>,
+        gap: i64,
+        step: u32,
+        stage: u32,
+    ) -> BTreeMap<i64, Lit> {
+        let mut increments: BTreeMap<i64, Lit> = BTreeMap::new();
+        for (premise, amount) in source.iter().filter(|(_, amount)| *amount > 0) {
+            let conclusion = if *amount > gap {
+                !Formula::truth()
+            } else {
+                let formula = &mut self.formula;
+                let meaning = Meaning::Increment { amount: *amount, step, stage };
+                *increments.entry(*amount).or_insert_with(|| formula.fresh(meaning))
+            };
+            self.formula.add(Family::Cost, premise.iter().map(|literal| !*literal).chain([conclusion]));
+        }
+        if increments.is_empty() {
+            return spent.clone();
+        }
+        let amounts: BTreeSet<i64> = next_amounts(&spent.keys().copied().collect(), increments.keys().copied(), gap);
+        let mut after: BTreeMap<i64, Lit> = BTreeMap::new();
+        for amount in amounts {
+            let literal = self.formula.fresh(Meaning::CostAtLeast { amount, step: step + 1, stage });
+            if let Some((_, smaller)) = after.last_key_value() {
+                self.formula.add(Family::Cost, [!literal, *smaller]);
+            }
+            after.insert(amount, literal);
+        }
+        for (amount, literal) in spent.iter().chain(&increments) {
+            self.formula.add(Family::Cost, [!*literal, after[amount]]);
+        }
+        for (before, spent) in spent {
+            for (amount, increment) in &increments {
+                let sum = after.get(&(before + amount)).copied().unwrap_or(!Formula::truth());
+                self.formula.add(Family::Cost, [!*spent, !*increment, sum]);
+            }
+        }
+        after
+    }
+
+    fn add_in_binary(&mut self, steps: &[Vec<Increments>], gap: i64) -> Bits {
+        let width = crate::encode::arithmetic::width(0, gap) + 2;
+        let mut spent = Arithmetic::constant(0, 1);
+        for (step, sources) in steps.iter().enumerate() {
+            for source in sources {
+                let possible: Vec<_> = source.iter().filter(|(_, amount)| *amount <= gap).cloned().collect();
+                for (premise, _) in source.iter().filter(|(_, amount)| *amount > gap) {
+                    self.formula.add(Family::Cost, premise.iter().map(|literal| !*literal));
+                }
+                let active = self.busy[step];
+                let mut arithmetic = Arithmetic { formula: &mut self.formula, family: Family::Cost };
+                let more = arithmetic.choose(&possible, active);
+                // Neither summand is above the gap, so their sum fits; then the limit cuts it back.
+                spent = arithmetic.add(&spent, &more, width);
+                arithmetic.at_most(&spent, gap);
+            }
+        }
+        spent
+    }
+}
+
+/// The tables of an operator in the task's numbering: combinations of (slot, design), and how much more than
+/// the cheapest each of them costs.
+#[allow(clippy::type_complexity)]
+fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<i64>)> {
+    let tables = operator.cost.tables.iter();
+    tables
+        .map(|table| {
+            let least = table.values.iter().min().copied().unwrap_or(0);
+            let residual = table.values.iter().map(|value| value - least).collect();
+            (combinations(operator, &table.slots), residual)
+        })
+        .collect()
+}
+
+/// All combinations of designs of some slots in the order of `Table::values`, in the task's numbering.
+pub(super) fn combinations(operator: &Operator, slots: &[u16]) -> Vec<Vec<(usize, usize)>> {
+    let mut all = vec![Vec::new()];
+    for slot in slots {
+        let designs = 0..operator.slots[*slot as usize].designs.len() as u16;
+        all = all
+            .iter()
+            .flat_map(|known: &Vec<(usize, usize)>| {
+                designs.clone().map(move |design| {
+                    let mut longer = known.clone();
+                    longer.push(global(&operator.slots, *slot, design));
+                    longer
+                })
+            })
+            .collect();
+    }
+    all
+}
+
+/// The amounts that can be spent after one more source.
+fn next_amounts(spent: &BTreeSet<i64>, increments: impl Iterator<Item = i64>, gap: i64) -> BTreeSet<i64> {
+    let mut amounts = spent.clone();
+    for increment in increments {
+        amounts.insert(increment);
+        amounts.extend(spent.iter().map(|amount| amount + increment).filter(|sum| *sum <= gap));
+    }
+    amounts
+}
+
+/// Whether so few amounts can occur that the order encoding is worth its clauses.
+fn amounts_fit(steps: &[Vec<Increments>], gap: i64) -> bool {
+    let mut spent = BTreeSet::new();
+    for source in steps.iter().flatten() {
+        let increments: BTreeSet<i64> =
+            source.iter().map(|(_, amount)| *amount).filter(|amount| (1..=gap).contains(amount)).collect();
+        if spent.len().saturating_mul(increments.len()) > AMOUNT_LIMIT * 50 {
+            return false;
+        }
+        spent = next_amounts(&spent, increments.into_iter(), gap);
+        if spent.len() > AMOUNT_LIMIT {
+            return false;
+        }
+    }
+    true
+}

@@ -1,0 +1,205 @@
+//! Clauses under construction, each with its family and with names for its variables.
+
+use std::fmt;
+
+use crate::sat::Lit;
+
+/// What a clause is for. The documentation of each family stands in the file that writes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) enum Family {
+    /// State variables have exactly one value.
+    Domain,
+    /// At most one operator a step, none after the last.
+    Sequence,
+    /// Operators need their conditions.
+    Condition,
+    /// Operators have their effects.
+    Effect,
+    /// What no operator changes stays.
+    Frame,
+    /// Each function in use has one design, and one that suits.
+    Selection,
+    /// Exact integers of numeric variables.
+    Numeric,
+    /// The accumulated cost.
+    Cost,
+    /// The last state satisfies the goal.
+    Goal,
+    /// The plan is cheaper than the best known.
+    Bound,
+}
+
+impl Family {
+    pub(crate) const ALL: [Self; 10] = [
+        Self::Domain,
+        Self::Sequence,
+        Self::Condition,
+        Self::Effect,
+        Self::Frame,
+        Self::Selection,
+        Self::Numeric,
+        Self::Cost,
+        Self::Goal,
+        Self::Bound,
+    ];
+
+    /// Its name in statistics.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Domain => "domain",
+            Self::Sequence => "sequence",
+            Self::Condition => "condition",
+            Self::Effect => "effect",
+            Self::Frame => "frame",
+            Self::Selection => "selection",
+            Self::Numeric => "numeric",
+            Self::Cost => "cost",
+            Self::Goal => "goal",
+            Self::Bound => "bound",
+        }
+    }
+}
+
+/// What a variable of the formula stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Meaning {
+    /// The constant true.
+    True,
+    /// The operator is executed at the step.
+    Operator { operator: u32, step: u32 },
+    /// Some operator is executed at the step.
+    Busy { step: u32 },
+    /// The finite-domain variable has the value before the step.
+    Value { variable: u32, value: u32, step: u32 },
+    /// The slot is filled with its design at the step.
+    Design { slot: u32, design: u16, step: u32 },
+    /// The operator at the step is one of a group.
+    Group { group: u32, step: u32 },
+    /// The accumulated cost before the step, less its lower bound, is at least the amount.
+    CostAtLeast { amount: i64, step: u32, stage: u32 },
+    /// The step adds at least the amount.
+    Increment { amount: i64, step: u32, stage: u32 },
+    /// A bit of a number.
+    Bit { bit: u32 },
+    /// A helper of an at-most-one constraint.
+    Ladder,
+}
+
+/// A formula in conjunctive normal form.
+#[derive(Default)]
+pub(crate) struct Formula {
+    meanings: Vec<Meaning>,
+    literals: Vec<Lit>,
+    /// End of each clause in `literals`, and its family.
+    clauses: Vec<(u32, Family)>,
+}
+
+impl Formula {
+    /// An empty formula with the constant true.
+    pub(crate) fn new() -> Self {
+        let mut formula = Self::default();
+        let truth = formula.fresh(Meaning::True);
+        formula.literals.push(truth);
+        formula.clauses.push((1, Family::Domain));
+        formula
+    }
+
+    /// The literal that is always true.
+    pub(crate) const fn truth() -> Lit {
+        Lit::TRUE
+    }
+
+    pub(crate) fn fresh(&mut self, meaning: Meaning) -> Lit {
+        self.meanings.push(meaning);
+        Lit::positive(self.meanings.len() as u32 - 1)
+    }
+
+    /// Adds a clause; one that is true for constants' sake is dropped, false constants are left out.
+    pub(crate) fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
+        let start = self.literals.len();
+        for literal in clause {
+            if literal == Self::truth() || self.literals[start..].contains(&!literal) {
+                self.literals.truncate(start);
+                return;
+            }
+            if literal != !Self::truth() && !self.literals[start..].contains(&literal) {
+                self.literals.push(literal);
+            }
+        }
+        self.clauses.push((self.literals.len() as u32, family));
+    }
+
+    /// A literal that is true if one of the given ones is; itself one of them where that is enough. One
+    /// direction only.
+    pub(crate) fn any(&mut self, family: Family, meaning: Meaning, literals: &[Lit]) -> Lit {
+        match literals {
+            [] => !Self::truth(),
+            [only] => *only,
+            _ => {
+                let any = self.fresh(meaning);
+                for literal in literals {
+                    self.add(family, [!*literal, any]);
+                }
+                any
+            }
+        }
+    }
+
+    /// At most one of the literals: pairwise for few, else Sinz's sequential counter [1].
+    ///
+    /// [1] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.
+    pub(crate) fn at_most_one(&mut self, family: Family, literals: &[Lit]) {
+        if literals.len() <= 5 {
+            for (position, a) in literals.iter().enumerate() {
+                for b in &literals[position + 1..] {
+                    self.add(family, [!*a, !*b]);
+                }
+            }
+            return;
+        }
+        let mut before = self.fresh(Meaning::Ladder);
+        self.add(family, [!literals[0], before]);
+        for (position, literal) in literals.iter().enumerate().skip(1) {
+            self.add(family, [!before, !*literal]);
+            if position + 1 < literals.len() {
+                let next = self.fresh(Meaning::Ladder);
+                self.add(family, [!before, next]);
+                self.add(family, [!*literal, next]);
+                before = next;
+            }
+        }
+    }
+
+    pub(crate) fn variables(&self) -> usize {
+        self.meanings.len()
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.clauses.len()
+    }
+
+    /// All clauses in the order in which they were added.
+    pub(crate) fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
+        (0..self.clauses.len()).map(|index| {
+            let start = if index == 0 { 0 } else { self.clauses[index - 1].0 as usize };
+            let (end, family) = self.clauses[index];
+            (family, &self.literals[start..end as usize])
+        })
+    }
+
+    /// How many clauses each family has.
+    pub(crate) fn counts(&self) -> Vec<(&'static str, usize)> {
+        let count = |family| self.clauses.iter().filter(|(_, own)| *own == family).count();
+        Family::ALL.iter().map(|family| (family.name(), count(*family))).collect()
+    }
+
+    pub(crate) fn meaning(&self, variable: u32) -> Meaning {
+        self.meanings[variable as usize]
+    }
+}
+
+impl fmt::Debug for Formula {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Formula({} variables, {} clauses)", self.variables(), self.len())
+    }
+}

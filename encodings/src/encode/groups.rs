@@ -1,0 +1,52 @@
+//! Groups of operators at a step: one variable that says that the operator at the step is one of them.
+//!
+//! `o@t → g@t` for each member, and `g@t → ⋁ o@t`. Groups make clauses about designs, costs and consumptions independent of
+//! how many operators share them.
+
+use crate::encode::Encoding;
+use crate::encode::formula::{Family, Formula, Meaning};
+use crate::sat::Lit;
+use crate::task::OperatorId;
+
+impl Encoding<'_> {
+    /// The variable of a group of operators at a step; members that cannot be at the step are left out.
+    pub(super) fn group(&mut self, step: usize, members: &[OperatorId], family: Family) -> Lit {
+        let present: Vec<_> = {
+            let candidates = &self.operators[step];
+            let find = |id: &OperatorId| candidates.binary_search_by_key(id, |(id, _)| *id).ok();
+            members.iter().filter_map(|id| find(id).map(|index| candidates[index])).collect()
+        };
+        match present[..] {
+            [] => return !Formula::truth(),
+            [(_, only)] => return only,
+            _ if present.len() == self.operators[step].len() => return self.busy[step],
+            _ => {}
+        }
+        let key = (step, present.iter().map(|(id, _)| *id).collect::<Vec<_>>());
+        if let Some(known) = self.groups.get(&key) {
+            return *known;
+        }
+        let group = self.formula.fresh(Meaning::Group { group: self.groups.len() as u32, step: step as u32 });
+        for (_, literal) in &present {
+            self.formula.add(family, [!*literal, group]);
+        }
+        self.formula.add(family, present.iter().map(|(_, literal)| *literal).chain([!group]));
+        self.groups.insert(key, group);
+        group
+    }
+
+    /// Sorts the operators at a step by a property, in order of the property.
+    pub(super) fn partition<K: Ord>(
+        &self,
+        step: usize,
+        property: impl Fn(&crate::task::Operator) -> Vec<K>,
+    ) -> std::collections::BTreeMap<K, Vec<OperatorId>> {
+        let mut parts: std::collections::BTreeMap<K, Vec<OperatorId>> = Default::default();
+        for (id, _) in &self.operators[step] {
+            for key in property(&self.task.operators[id.index()]) {
+                parts.entry(key).or_default().push(*id);
+            }
+        }
+        parts
+    }
+}

@@ -1,0 +1,132 @@
+//! Ground task to formula: is there a plan of at most `horizon` steps that costs at most `limit`?
+//!
+//! A sequential encoding over finite-domain variables with explanatory frame axioms [1]. Steps that a plan does not need
+//! are idle, and stand at its end. The designs of an operator's slots are variables of their own beside the operator's, so that
+//! the formula grows with the sum of the designs, not with their product. Each family of clauses has a file.
+//!
+//! [1] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic search, AAAI 1996.
+
+mod arithmetic;
+mod cost;
+mod formula;
+mod groups;
+mod numeric;
+mod operators;
+mod selection;
+mod state;
+
+use rustc_hash::FxHashMap;
+
+use crate::bounds::Bounds;
+use crate::plan::GroundStep;
+use crate::sat::{Lit, Solver};
+use crate::task::{Fact, OperatorId, Task};
+use cost::Cost;
+use formula::{Family, Formula};
+
+/// A formula and what its variables mean.
+pub(crate) struct Encoding<'a> {
+    task: &'a Task,
+    pub(crate) formula: Formula,
+    horizon: usize,
+    /// For each step the operators that can be there, ascending, with their variables.
+    operators: Vec<Vec<(OperatorId, Lit)>>,
+    /// Whether any operator is executed at the step.
+    busy: Vec<Lit>,
+    /// `values[step][variable][value]`: the variable has the value before the step.
+    values: Vec<Vec<Vec<Lit>>>,
+    /// `designs[step][slot][design]`.
+    designs: Vec<Vec<Vec<Lit>>>,
+    groups: FxHashMap<(usize, Vec<OperatorId>), Lit>,
+    cost: Option<Cost>,
+}
+
+/// The cost limit of an encoding: only plans with cost at most `limit` count, by the estimates of `bounds`.
+pub(crate) struct CostLimit<'a> {
+    pub(crate) limit: i64,
+    pub(crate) bounds: &'a Bounds,
+}
+
+impl<'a> Encoding<'a> {
+    /// Encodes plans of at most `allowed.len()` steps, with the operators allowed at each step.
+    pub(crate) fn new(task: &'a Task, allowed: &[Vec<bool>], cost: Option<CostLimit<'_>>) -> Self {
+        let horizon = allowed.len();
+        let mut encoding = Self {
+            task,
+            formula: Formula::new(),
+            horizon,
+            operators: Vec::new(),
+            busy: Vec::new(),
+            values: Vec::new(),
+            designs: Vec::new(),
+            groups: FxHashMap::default(),
+            cost: None,
+        };
+        encoding.declare(allowed);
+        for step in 0..horizon {
+            encoding.domain(step);
+            encoding.sequence(step);
+            encoding.conditions(step);
+            encoding.effects(step);
+            encoding.frame(step);
+            encoding.selection(step);
+        }
+        encoding.domain(horizon);
+        let numbers = encoding.numeric();
+        encoding.goal(&numbers);
+        if let Some(cost) = cost {
+            encoding.cost = Some(encoding.accumulate(&cost));
+        }
+        encoding
+    }
+
+    /// The variable of a fact before a step.
+    fn fact(&self, fact: Fact, step: usize) -> Lit {
+        self.values[step][fact.variable.index()][fact.value as usize]
+    }
+
+    /// The last state satisfies the goal; idle steps at the end keep it satisfied.
+    fn goal(&mut self, numbers: &[arithmetic::Bits]) {
+        let task = self.task;
+        for fact in &task.goal.facts {
+            let literal = self.fact(*fact, self.horizon);
+            self.formula.add(Family::Goal, [literal]);
+        }
+        for clause in &task.goal.clauses {
+            let literals: Vec<_> = clause
+                .iter()
+                .map(|literal| {
+                    let fact = self.fact(literal.fact, self.horizon);
+                    if literal.positive { fact } else { !fact }
+                })
+                .collect();
+            self.formula.add(Family::Goal, literals);
+        }
+        self.numeric_goal(numbers);
+    }
+
+    /// From now on only plans with cost at most `limit`, which must not be above the limit of the encoding.
+    pub(crate) fn tighten(&mut self, limit: i64) {
+        if let Some(cost) = self.cost.take() {
+            cost.at_most(&mut self.formula, limit);
+            self.cost = Some(cost);
+        }
+    }
+
+    /// The plan of the assignment that the solver found.
+    pub(crate) fn decode(&self, solver: &dyn Solver) -> Vec<GroundStep> {
+        let holds = |literal: Lit| literal == Formula::truth() || solver.value(literal.variable()) == literal.is_positive();
+        let mut steps = Vec::new();
+        for (step, candidates) in self.operators.iter().enumerate() {
+            let Some((id, _)) = candidates.iter().find(|(_, literal)| holds(*literal)) else { continue };
+            let operator = &self.task.operators[id.index()];
+            let choice = operator.slots.iter().map(|slot| {
+                let designs = &self.designs[step][slot.slot.index()];
+                let chosen = slot.designs.iter().position(|design| holds(designs[*design as usize]));
+                chosen.unwrap_or(0) as u16
+            });
+            steps.push(GroundStep { operator: *id, choice: choice.collect() });
+        }
+        steps
+    }
+}

@@ -1,0 +1,279 @@
+//! Numeric variables, exact, in binary.
+//!
+//! At every step an effect `x := Σ f·y + q` of the operator there gives the next value, where q is a constant plus
+//! tables of designs; what no operator changes stays. A condition `Σ f·y + q ≥ 0` asks for the sign bit of its sum to be 0
+//! whenever its operator is there. Where a condition is the very value that an effect of the same operator assigns (a battery that
+//! must not fall below 0), the sign bit of the next value serves.
+
+use std::collections::BTreeMap;
+
+use crate::encode::Encoding;
+use crate::encode::arithmetic::{Arithmetic, Bits, width};
+use crate::encode::cost::combinations;
+use crate::encode::formula::{Family, Formula};
+use crate::sat::Lit;
+use crate::task::{NumericId, Operator, OperatorId};
+use crate::quantity::{Linear, Quantity};
+
+/// Factors of numeric variables.
+type Shape = Vec<(NumericId, i64)>;
+
+/// The values that a number can have.
+#[derive(Debug, Clone, Copy)]
+struct Range {
+    low: i64,
+    high: i64,
+}
+
+impl Encoding<'_> {
+    /// Encodes all numeric variables; returns their values after the last step.
+    pub(super) fn numeric(&mut self) -> Vec<Bits> {
+        let task = self.task;
+        let mut ranges: Vec<Range> = task.initial.numbers.iter().map(|n| Range { low: *n, high: *n }).collect();
+        let mut numbers: Vec<Bits> =
+            task.initial.numbers.iter().map(|n| Arithmetic::constant(*n, width(*n, *n))).collect();
+        for step in 0..self.horizon {
+            let next_ranges = self.next_ranges(step, &ranges);
+            let mut next = Vec::with_capacity(numbers.len());
+            for variable in 0..numbers.len() {
+                next.push(self.next_number(step, NumericId(variable as u32), &numbers, next_ranges[variable], &ranges));
+            }
+            self.comparisons(step, &numbers, &next, &ranges);
+            (numbers, ranges) = (next, next_ranges);
+        }
+        numbers
+    }
+
+    fn next_ranges(&self, step: usize, ranges: &[Range]) -> Vec<Range> {
+        let mut next = ranges.to_vec();
+        for (id, _) in &self.operators[step] {
+            for effect in &self.task.operators[id.index()].numeric_effects {
+                let range = linear_range(&effect.value, ranges);
+                let slot = &mut next[effect.variable.index()];
+                *slot = Range { low: slot.low.min(range.low), high: slot.high.max(range.high) };
+            }
+        }
+        next
+    }
+
+    fn next_number(
+        &mut self,
+        step: usize,
+        variable: NumericId,
+        numbers: &[Bits],
+        range: Range,
+        ranges: &[Range],
+    ) -> Bits {
+        let own = |operator: &Operator| -> Vec<Linear<i64>> {
+            let effects = operator.numeric_effects.iter().filter(|effect| effect.variable == variable);
+            effects.map(|effect| effect.value.clone()).collect()
+        };
+        let shapes = self.partition(step, |operator| own(operator).into_iter().map(|value| value.coefficients).collect());
+        let current = numbers[variable.index()].clone();
+        if shapes.is_empty() {
+            return current;
+        }
+        let members: Vec<OperatorId> = shapes.values().flatten().copied().collect();
+        let mut members = members;
+        members.sort_unstable();
+        let active = self.group(step, &members, Family::Numeric);
+        let stay: Shape = vec![(variable, 1)];
+        let base = if shapes.keys().all(|shape| *shape == stay) {
+            current
+        } else {
+            self.base(step, &shapes, &current, numbers, ranges)
+        };
+        let width = width(range.low, range.high) + 1;
+        let quantity = |operator: &Operator| own(operator).into_iter().map(|value| value.quantity).collect();
+        self.plus_quantities(step, base, &members, &quantity, active, width)
+    }
+
+    /// The part of the next value that depends on the present ones, by the shape of the effect at the step.
+    fn base(
+        &mut self,
+        step: usize,
+        shapes: &BTreeMap<Shape, Vec<OperatorId>>,
+        current: &Bits,
+        numbers: &[Bits],
+        ranges: &[Range],
+    ) -> Bits {
+        let mut options = Vec::new();
+        let mut length = current.len();
+        let mut changing = Vec::new();
+        for (shape, members) in shapes {
+            let group = self.group(step, members, Family::Numeric);
+            let bits = self.weighted(shape, numbers, ranges);
+            length = length.max(bits.len());
+            changing.push(group);
+            options.push((group, bits));
+        }
+        let base: Bits = (0..length)
+            .map(|_| {
+                let bit = self.formula.variables() as u32;
+                self.formula.fresh(crate::encode::formula::Meaning::Bit { bit })
+            })
+            .collect();
+        for (group, bits) in options {
+            Arithmetic { formula: &mut self.formula, family: Family::Numeric }.equal_if(group, &base, &bits);
+        }
+        let unchanged = self.formula.fresh(crate::encode::formula::Meaning::Ladder);
+        self.formula.add(Family::Numeric, changing.into_iter().chain([unchanged]));
+        Arithmetic { formula: &mut self.formula, family: Family::Numeric }.equal_if(unchanged, &base, current);
+        base
+    }
+
+    fn weighted(&mut self, shape: &Shape, numbers: &[Bits], ranges: &[Range]) -> Bits {
+        let linear = Linear { coefficients: shape.clone(), quantity: Quantity::constant(0) };
+        let range = linear_range(&linear, ranges);
+        let width = width(range.low, range.high) + 2;
+        let mut sum: Option<Bits> = None;
+        let mut arithmetic = Arithmetic { formula: &mut self.formula, family: Family::Numeric };
+        for (variable, factor) in shape {
+            let multiple = arithmetic.multiple(&numbers[variable.index()], *factor, width);
+            sum = Some(match sum {
+                None => multiple,
+                Some(sum) => arithmetic.add(&sum, &multiple, width),
+            });
+        }
+        sum.unwrap_or_else(|| Arithmetic::constant(0, 1))
+    }
+
+    /// Adds what the operators' quantities contribute: one number for their constants, one for each table.
+    fn plus_quantities(
+        &mut self,
+        step: usize,
+        base: Bits,
+        members: &[OperatorId],
+        quantities: &dyn Fn(&Operator) -> Vec<Quantity<i64>>,
+        active: Lit,
+        width: usize,
+    ) -> Bits {
+        let is_member = |id: &OperatorId| members.binary_search(id).is_ok();
+        let mut constants: BTreeMap<i64, Vec<OperatorId>> = BTreeMap::new();
+        let mut tables: BTreeMap<TableKey, Vec<OperatorId>> = BTreeMap::new();
+        for (id, _) in self.operators[step].iter().filter(|(id, _)| is_member(id)) {
+            let operator = &self.task.operators[id.index()];
+            for quantity in quantities(operator) {
+                constants.entry(quantity.constant).or_default().push(*id);
+                for table in &quantity.tables {
+                    let entries = combinations(operator, &table.slots);
+                    tables.entry((entries, table.values.clone())).or_default().push(*id);
+                }
+            }
+        }
+        let mut sources: Vec<Vec<(Vec<Lit>, i64)>> = Vec::new();
+        let mut own = Vec::new();
+        for (constant, members) in constants {
+            own.push((vec![self.group(step, &members, Family::Numeric)], constant));
+        }
+        sources.push(own);
+        let mut by_slots: BTreeMap<Vec<usize>, (Vec<Lit>, Vec<(Vec<Lit>, i64)>)> = BTreeMap::new();
+        for ((entries, values), members) in tables {
+            let group = self.group(step, &members, Family::Numeric);
+            let slots = entries.first().map(|entry| entry.iter().map(|(slot, _)| *slot).collect()).unwrap_or_default();
+            let (groups, premises) = by_slots.entry(slots).or_default();
+            groups.push(group);
+            for (entry, value) in entries.iter().zip(values) {
+                let designs = entry.iter().map(|(slot, design)| self.designs[step][*slot][*design]);
+                premises.push((designs.chain([group]).collect(), value));
+            }
+        }
+        let mut sum = self.add_source(base, &sources[0], active, width);
+        for (groups, premises) in by_slots.into_values() {
+            let meaning = crate::encode::formula::Meaning::Ladder;
+            let any = self.formula.any(Family::Numeric, meaning, &groups);
+            if let [_, _, ..] = groups[..] {
+                self.formula.add(Family::Numeric, groups.iter().copied().chain([!any]));
+            }
+            sum = self.add_source(sum, &premises, any, width);
+        }
+        sum
+    }
+
+    fn add_source(&mut self, base: Bits, premises: &[(Vec<Lit>, i64)], active: Lit, width: usize) -> Bits {
+        let mut arithmetic = Arithmetic { formula: &mut self.formula, family: Family::Numeric };
+        let more = arithmetic.choose(premises, active);
+        if more.iter().all(|bit| *bit == !Formula::truth()) {
+            return base;
+        }
+        arithmetic.add(&base, &more, width)
+    }
+
+    /// The numeric conditions of the operators at a step.
+    fn comparisons(&mut self, step: usize, numbers: &[Bits], next: &[Bits], ranges: &[Range]) {
+        for index in 0..self.operators[step].len() {
+            let (id, literal) = self.operators[step][index];
+            let operator = &self.task.operators[id.index()];
+            for comparison in &operator.condition.comparisons {
+                if let Some(effect) = operator.numeric_effects.iter().find(|effect| effect.value == *comparison)
+                    && let Some(sign) = next[effect.variable.index()].last()
+                {
+                    self.formula.add(Family::Numeric, [!literal, !*sign]);
+                }
+            }
+        }
+        let remaining = |operator: &Operator| -> Vec<(usize, Linear<i64>)> {
+            let assigned = |c: &&Linear<i64>| operator.numeric_effects.iter().any(|effect| effect.value == **c);
+            operator.condition.comparisons.iter().filter(|c| !assigned(c)).cloned().enumerate().collect()
+        };
+        let shapes = self.partition(step, |operator| {
+            remaining(operator).into_iter().map(|(position, linear)| (linear.coefficients, position)).collect()
+        });
+        for ((shape, position), members) in shapes {
+            let group = self.group(step, &members, Family::Numeric);
+            let base = self.weighted(&shape, numbers, ranges);
+            let own = |operator: &Operator| -> Vec<Quantity<i64>> {
+                let matching = remaining(operator).into_iter().filter(|(p, l)| *p == position && l.coefficients == shape);
+                matching.map(|(_, linear)| linear.quantity).collect()
+            };
+            let values = members.iter().flat_map(|id| remaining(&self.task.operators[id.index()]));
+            let mut range = Range { low: 0, high: 0 };
+            for (_, linear) in values {
+                let own = linear_range(&linear, ranges);
+                range = Range { low: range.low.min(own.low), high: range.high.max(own.high) };
+            }
+            let width = width(range.low, range.high).max(base.len()) + 2;
+            let sum = self.plus_quantities(step, base, &members, &own, group, width);
+            if let Some(sign) = sum.last() {
+                self.formula.add(Family::Numeric, [!group, !*sign]);
+            }
+        }
+    }
+
+    /// The numeric part of the goal.
+    pub(super) fn numeric_goal(&mut self, numbers: &[Bits]) {
+        let whole = Range { low: -(1 << 50), high: 1 << 50 };
+        let ranges: Vec<Range> = numbers
+            .iter()
+            .map(|bits| {
+                let limit = 1_i64 << (bits.len() - 1).min(50);
+                Range { low: whole.low.max(-limit), high: whole.high.min(limit) }
+            })
+            .collect();
+        for comparison in &self.task.goal.comparisons {
+            let base = self.weighted(&comparison.coefficients, numbers, &ranges);
+            let range = linear_range(comparison, &ranges);
+            let width = width(range.low, range.high).max(base.len()) + 2;
+            let constant = comparison.quantity.constant;
+            let mut arithmetic = Arithmetic { formula: &mut self.formula, family: Family::Goal };
+            let sum = arithmetic.add(&base, &Arithmetic::constant(constant, width), width);
+            if let Some(sign) = sum.last() {
+                self.formula.add(Family::Goal, [!*sign]);
+            }
+        }
+    }
+}
+
+/// The combinations of a table in the task's numbering, and its values.
+type TableKey = (Vec<Vec<(usize, usize)>>, Vec<i64>);
+
+fn linear_range(linear: &Linear<i64>, ranges: &[Range]) -> Range {
+    let (mut low, mut high) = (linear.quantity.minimum(), linear.quantity.maximum());
+    for (variable, factor) in &linear.coefficients {
+        let range = ranges[variable.index()];
+        let (a, b) = (factor * range.low, factor * range.high);
+        low += a.min(b);
+        high += a.max(b);
+    }
+    Range { low, high }
+}

@@ -1,0 +1,60 @@
+//! Selection of function designs, factored.
+//!
+//! With `g@t` for the operators that admit the same designs D of a slot: `g@t → ⋁_{d ∈ D} slot=d@t`, at most one design of a
+//! slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so that an idle slot stays empty. Combinations that only together do not
+//! suit are forbidden one by one: `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
+
+use crate::encode::Encoding;
+use crate::encode::formula::{Family, Formula};
+use crate::sat::Lit;
+use crate::task::SlotUse;
+
+impl Encoding<'_> {
+    /// Each function in use has exactly one design, and one that suits.
+    pub(super) fn selection(&mut self, step: usize) {
+        for slot in 0..self.task.slots.len() {
+            let uses = self.partition(step, |operator| {
+                let own = operator.slots.iter().filter(|usage| usage.slot.index() == slot);
+                own.map(|usage| usage.designs.clone()).collect()
+            });
+            let literals = self.designs[step][slot].clone();
+            let mut users: Vec<Vec<Lit>> = vec![Vec::new(); literals.len()];
+            for (designs, members) in uses {
+                let group = self.group(step, &members, Family::Selection);
+                let suitable = designs.iter().map(|design| literals[*design as usize]);
+                self.formula.add(Family::Selection, suitable.chain([!group]));
+                designs.iter().for_each(|design| users[*design as usize].push(group));
+            }
+            for (literal, users) in literals.iter().zip(users) {
+                self.formula.add(Family::Selection, users.into_iter().chain([!*literal]));
+            }
+            let falsum = !Formula::truth();
+            let possible: Vec<_> = literals.into_iter().filter(|literal| *literal != falsum).collect();
+            self.formula.at_most_one(Family::Selection, &possible);
+        }
+        self.forbidden(step);
+    }
+
+    fn forbidden(&mut self, step: usize) {
+        let parts = self.partition(step, |operator| {
+            let rules = operator.forbidden.iter().flat_map(|rule| {
+                rule.combinations.iter().map(|combination| {
+                    let pairs = rule.slots.iter().zip(combination);
+                    pairs.map(|(slot, design)| global(&operator.slots, *slot, *design)).collect::<Vec<_>>()
+                })
+            });
+            rules.collect()
+        });
+        for (combination, members) in parts {
+            let group = self.group(step, &members, Family::Selection);
+            let chosen: Vec<_> = combination.iter().map(|(slot, design)| !self.designs[step][*slot][*design]).collect();
+            self.formula.add(Family::Selection, chosen.into_iter().chain([!group]));
+        }
+    }
+}
+
+/// Slot and design in the task's numbering, from positions in an operator.
+pub(super) fn global(slots: &[SlotUse], slot: u16, design: u16) -> (usize, usize) {
+    let usage = &slots[slot as usize];
+    (usage.slot.index(), usage.designs[design as usize] as usize)
+}

@@ -1,0 +1,115 @@
+//! State variables: their domains at every step, and the frame axioms.
+//!
+//! - domain: `⋁_d v=d@t`, and at most one of them;
+//! - frame (explanatory, after Haas [1]): `v=d@t+1 → v=d@t ∨ ⋁ {o@t : o sets v to d}`. With the domain
+//!   constraints on both sides this also keeps what nothing changes.
+//!
+//! A value that no sequence of allowed operators can produce by a step gets no variable there.
+//!
+//! [1] A. Haas: The case for domain-specific frame axioms, The Frame Problem in AI, 1987.
+
+use crate::encode::Encoding;
+use crate::encode::formula::{Family, Formula, Meaning};
+use crate::task::{Fact, OperatorId, VariableId};
+
+impl Encoding<'_> {
+    /// Makes the variables for operators, values and designs.
+    pub(super) fn declare(&mut self, allowed: &[Vec<bool>]) {
+        let task = self.task;
+        let mut possible: Vec<Vec<bool>> = task.variables.iter().map(|v| vec![false; v.values.len()]).collect();
+        for (variable, value) in task.initial.values.iter().enumerate() {
+            possible[variable][*value as usize] = true;
+        }
+        self.declare_values(&possible, 0);
+        for (step, allowed) in allowed.iter().enumerate() {
+            let mut present = Vec::new();
+            for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+                let is_possible = |fact: &Fact| possible[fact.variable.index()][fact.value as usize];
+                if allowed[id.index()] && operator.condition.facts.iter().all(is_possible) {
+                    let meaning = Meaning::Operator { operator: id.0, step: step as u32 };
+                    present.push((id, self.formula.fresh(meaning)));
+                }
+            }
+            for (id, _) in &present {
+                for effect in &task.operators[id.index()].effects {
+                    possible[effect.variable.index()][effect.value as usize] = true;
+                }
+            }
+            self.operators.push(present);
+            self.declare_designs(step);
+            self.declare_values(&possible, step + 1);
+        }
+    }
+
+    fn declare_values(&mut self, possible: &[Vec<bool>], step: usize) {
+        let mut all = Vec::with_capacity(possible.len());
+        for (variable, values) in possible.iter().enumerate() {
+            let single = values.iter().filter(|possible| **possible).count() == 1;
+            let mut literals = Vec::with_capacity(values.len());
+            for (value, possible) in values.iter().enumerate() {
+                literals.push(match (possible, single) {
+                    (false, _) => !Formula::truth(),
+                    (true, true) => Formula::truth(),
+                    (true, false) => {
+                        let (variable, value, step) = (variable as u32, value as u32, step as u32);
+                        self.formula.fresh(Meaning::Value { variable, value, step })
+                    }
+                });
+            }
+            all.push(literals);
+        }
+        self.values.push(all);
+    }
+
+    fn declare_designs(&mut self, step: usize) {
+        let mut used: Vec<Vec<bool>> = self.task.slots.iter().map(|slot| vec![false; slot.designs.len()]).collect();
+        for slot in self.operators[step].iter().flat_map(|(id, _)| &self.task.operators[id.index()].slots) {
+            for design in &slot.designs {
+                used[slot.slot.index()][*design as usize] = true;
+            }
+        }
+        let mut all = Vec::with_capacity(used.len());
+        for (slot, used) in used.into_iter().enumerate() {
+            let mut literals = Vec::with_capacity(used.len());
+            for (design, used) in used.into_iter().enumerate() {
+                let meaning = Meaning::Design { slot: slot as u32, design: design as u16, step: step as u32 };
+                literals.push(if used { self.formula.fresh(meaning) } else { !Formula::truth() });
+            }
+            all.push(literals);
+        }
+        self.designs.push(all);
+    }
+
+    /// Every variable has exactly one value before the step.
+    pub(super) fn domain(&mut self, step: usize) {
+        for variable in 0..self.task.variables.len() {
+            let falsum = !Formula::truth();
+            let literals: Vec<_> = self.values[step][variable].iter().copied().filter(|l| *l != falsum).collect();
+            if literals.len() > 1 {
+                self.formula.add(Family::Domain, literals.iter().copied());
+                self.formula.at_most_one(Family::Domain, &literals);
+            }
+        }
+    }
+
+    /// A value that holds after the step held before it, or an operator at the step has brought it.
+    pub(super) fn frame(&mut self, step: usize) {
+        let mut producers: Vec<Vec<Vec<crate::sat::Lit>>> =
+            self.task.variables.iter().map(|variable| vec![Vec::new(); variable.values.len()]).collect();
+        for (id, literal) in &self.operators[step] {
+            for effect in &self.task.operators[id.index()].effects {
+                producers[effect.variable.index()][effect.value as usize].push(*literal);
+            }
+        }
+        for (variable, producers) in producers.iter().enumerate() {
+            for (value, producers) in producers.iter().enumerate() {
+                let fact = Fact { variable: VariableId(variable as u32), value: value as u32 };
+                let (before, after) = (self.fact(fact, step), self.fact(fact, step + 1));
+                if after != !Formula::truth() {
+                    let clause = [!after, before].into_iter().chain(producers.iter().copied());
+                    self.formula.add(Family::Frame, clause);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! What can go wrong between a checked PDDL task and its ground task, each cause with a stable code.
+
+use crate::pddl::ast::Span;
+
+/// Which of the two PDDL files a place lies in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum File {
+    /// The domain file.
+    Domain,
+    /// The problem file.
+    Problem,
+}
+
+/// A place in one of the two PDDL files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// The file.
+    pub file: File,
+    /// The region of its text.
+    pub span: Span,
+}
+
+/// Why a task cannot be grounded or encoded.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A construct that the planner does not handle (the parser and the validator may).
+    #[error("{construct} cannot be planned with: {instead}")]
+    Unsupported {
+        /// What the file uses.
+        construct: String,
+        /// What would be accepted.
+        instead: String,
+        /// Where.
+        place: Place,
+    },
+    /// A name that the checker would have refused.
+    #[error("unknown {kind} `{name}`")]
+    Unknown {
+        /// `predicate`, `function`, `object`, `type` or `variable`.
+        kind: &'static str,
+        /// The name.
+        name: String,
+        /// Where.
+        place: Place,
+    },
+    /// A product or quotient that is not linear in the fluents.
+    #[error("the expression is not linear in the fluents that actions change")]
+    NonLinear {
+        /// Where.
+        place: Place,
+    },
+    /// A number that does not fit the exact integer arithmetic of the encoder.
+    #[error("{what} needs more than 62 bits once all values are scaled to integers")]
+    Overflow {
+        /// The quantity.
+        what: String,
+    },
+    /// A rule of the relaxed reachability program that the rule engine refuses.
+    #[error("grounding: {0}")]
+    Rules(String),
+}
+
+impl Error {
+    /// The stable code of the cause.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Unsupported { .. } => "E301",
+            Self::Unknown { .. } => "E302",
+            Self::NonLinear { .. } => "E303",
+            Self::Overflow { .. } => "E304",
+            Self::Rules(_) => "E305",
+        }
+    }
+
+    /// Where the cause stands, if it stands in a file.
+    pub fn place(&self) -> Option<Place> {
+        match self {
+            Self::Unsupported { place, .. } | Self::Unknown { place, .. } | Self::NonLinear { place } => {
+                Some(*place)
+            }
+            Self::Overflow { .. } | Self::Rules(_) => None,
+        }
+    }
+}

@@ -1,0 +1,336 @@
+//! Conditions and expressions of a schema under a binding of its parameters.
+
+use indexmap::IndexMap;
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+
+use crate::configuration::{SlotParameter, slots_of_expression};
+use crate::error::{Error, Place};
+use crate::lifted::{Arguments, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term};
+use crate::pddl::ast::Comparison;
+use crate::quantity::{Linear, NumericId, Quantity, SlotSet, Table};
+
+/// A ground atom over a fluent predicate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct AtomId(pub(crate) u32);
+
+impl AtomId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+type AtomIndex<K> = IndexMap<(K, Arguments), (), FxBuildHasher>;
+
+/// The static facts and values of a task, and the fluent atoms and numeric variables met so far.
+pub(crate) struct World<'a> {
+    pub(crate) lifted: &'a Lifted,
+    facts: FxHashSet<(PredicateId, Arguments)>,
+    pub(crate) values: FxHashMap<(FunctionId, Arguments), Rational>,
+    reached: &'a FxHashSet<(PredicateId, Arguments)>,
+    pub(crate) atoms: AtomIndex<PredicateId>,
+    pub(crate) numerics: AtomIndex<FunctionId>,
+}
+
+/// What is left of a condition once everything static is decided.
+#[derive(Debug, Clone)]
+pub(crate) enum Residual {
+    True,
+    False,
+    And(Vec<Residual>),
+    Or(Vec<Residual>),
+    Literal { atom: AtomId, positive: bool },
+    /// The expression is ≥ 0, or > 0 if strict.
+    Compare { linear: Linear<Rational>, strict: bool, place: Place },
+}
+
+/// Why an expression has no value here.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// It reads a function that has no value, or divides by zero: the operator does not exist.
+    Undefined,
+    /// The planner cannot handle it.
+    Error(Error),
+}
+
+/// The objects that the parameters stand for; slots are open.
+pub(crate) type Binding = Vec<Option<ObjectId>>;
+
+/// The open slots of the schema at hand with the designs that are left for each.
+pub(crate) struct Slots<'a> {
+    pub(crate) parameters: &'a [SlotParameter],
+    pub(crate) designs: Vec<Vec<ObjectId>>,
+}
+
+impl<'a> World<'a> {
+    pub(crate) fn new(lifted: &'a Lifted, reached: &'a FxHashSet<(PredicateId, Arguments)>) -> Self {
+        Self {
+            lifted,
+            facts: lifted.facts.iter().cloned().collect(),
+            values: lifted.values.iter().map(|(f, args, value)| ((*f, args.clone()), *value)).collect(),
+            reached,
+            atoms: IndexMap::default(),
+            numerics: IndexMap::default(),
+        }
+    }
+
+    pub(crate) fn holds_initially(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
+        self.facts.contains(&(predicate, arguments.clone()))
+    }
+
+    pub(crate) fn atom(&mut self, predicate: PredicateId, arguments: Arguments) -> AtomId {
+        AtomId(self.atoms.insert_full((predicate, arguments), ()).0 as u32)
+    }
+
+    pub(crate) fn numeric(&mut self, function: FunctionId, arguments: Arguments) -> NumericId {
+        NumericId(self.numerics.insert_full((function, arguments), ()).0 as u32)
+    }
+
+    /// The arguments under a binding that covers them.
+    pub(crate) fn arguments(terms: &[Term], binding: &Binding) -> Arguments {
+        terms
+            .iter()
+            .filter_map(|term| match term {
+                Term::Object(object) => Some(*object),
+                Term::Parameter(parameter) => binding[*parameter as usize],
+            })
+            .collect()
+    }
+
+    /// Evaluates a condition that mentions no open slot.
+    pub(crate) fn residual(&mut self, formula: &Formula, binding: &Binding) -> Result<Residual, Failure> {
+        match formula {
+            Formula::And(parts) => self.junction(parts, binding, true),
+            Formula::Or(parts) => self.junction(parts, binding, false),
+            Formula::Equal { positive, left, right } => {
+                let same = Self::arguments(&[*left], binding) == Self::arguments(&[*right], binding);
+                Ok(truth(same == *positive))
+            }
+            Formula::Literal { positive, predicate, terms } => {
+                let arguments = Self::arguments(terms, binding);
+                if !self.lifted.predicates[predicate.index()].fluent {
+                    return Ok(truth(self.holds_initially(*predicate, &arguments) == *positive));
+                }
+                if !self.reached.contains(&(*predicate, arguments.clone())) {
+                    return Ok(truth(!positive));
+                }
+                Ok(Residual::Literal { atom: self.atom(*predicate, arguments), positive: *positive })
+            }
+            Formula::Compare(comparison, left, right, place) => {
+                let difference = match (self.ground(left, binding), self.ground(right, binding)) {
+                    (Ok(left), Ok(right)) => (left, right),
+                    // PDDL 2.1: a comparison with an undefined value does not hold.
+                    (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) => return Ok(Residual::False),
+                    (Err(failure), _) | (_, Err(failure)) => return Err(failure),
+                };
+                Ok(compare(*comparison, difference.0, difference.1, *place))
+            }
+        }
+    }
+
+    fn junction(&mut self, parts: &[Formula], binding: &Binding, conjunction: bool) -> Result<Residual, Failure> {
+        let mut kept = Vec::new();
+        for part in parts {
+            match (self.residual(part, binding)?, conjunction) {
+                (Residual::True, true) | (Residual::False, false) => {}
+                (Residual::False, true) => return Ok(Residual::False),
+                (Residual::True, false) => return Ok(Residual::True),
+                (Residual::And(more), true) | (Residual::Or(more), false) => kept.extend(more),
+                (other, _) => kept.push(other),
+            }
+        }
+        Ok(match (kept.len(), conjunction) {
+            (0, _) => truth(conjunction),
+            (1, _) => kept.swap_remove(0),
+            (_, true) => Residual::And(kept),
+            (_, false) => Residual::Or(kept),
+        })
+    }
+
+    /// Evaluates an expression that mentions no open slot.
+    pub(crate) fn ground(&mut self, expression: &Expression, binding: &Binding) -> Result<Linear<Rational>, Failure> {
+        match expression {
+            Expression::Number(number) => Ok(Linear::constant(*number)),
+            // Only the metric mentions it, and takes it apart before it comes here.
+            Expression::TotalTime => Err(Failure::Undefined),
+            Expression::Function(function, terms, _) => {
+                let arguments = Self::arguments(terms, binding);
+                if self.lifted.functions[function.index()].fluent {
+                    return Ok(Linear::variable(self.numeric(*function, arguments)));
+                }
+                self.values.get(&(*function, arguments)).map(|v| Linear::constant(*v)).ok_or(Failure::Undefined)
+            }
+            Expression::Sum(parts) => {
+                let mut sum = Linear::constant(Rational::from_integer(0));
+                for part in parts {
+                    sum.add(&self.ground(part, binding)?);
+                }
+                Ok(sum)
+            }
+            Expression::Negate(inner) => Ok(self.ground(inner, binding)?.negated()),
+            Expression::Product(parts, place) => {
+                let mut product = Linear::constant(Rational::from_integer(1));
+                for part in parts {
+                    let factor = self.ground(part, binding)?;
+                    product = multiply(product, factor, *place)?;
+                }
+                Ok(product)
+            }
+            Expression::Quotient(left, right, place) => {
+                let divisor = self.ground(right, binding)?;
+                if !divisor.coefficients.is_empty() {
+                    return Err(Failure::Error(Error::NonLinear { place: *place }));
+                }
+                let divisor = divisor.quantity.constant;
+                if divisor == Rational::from_integer(0) {
+                    return Err(Failure::Undefined);
+                }
+                let mut value = self.ground(left, binding)?;
+                value.scale(&divisor.recip());
+                Ok(value)
+            }
+        }
+    }
+
+    /// Evaluates an expression with open slots: sums fall apart into tables over few slots each. Combinations
+    /// for which it is undefined are handed to `undefined`, and count as 0.
+    pub(crate) fn open(
+        &mut self,
+        expression: &Expression,
+        binding: &mut Binding,
+        slots: &Slots<'_>,
+        undefined: &mut dyn FnMut(&SlotSet, SlotSet),
+    ) -> Result<Linear<Rational>, Failure> {
+        let mentioned = slots_of_expression(expression, slots.parameters);
+        if mentioned.is_empty() {
+            return self.ground(expression, binding);
+        }
+        match expression {
+            Expression::Sum(parts) => {
+                let mut sum = Linear::constant(Rational::from_integer(0));
+                for part in parts {
+                    sum.add(&self.open(part, binding, slots, undefined)?);
+                }
+                Ok(sum)
+            }
+            Expression::Negate(inner) => Ok(self.open(inner, binding, slots, undefined)?.negated()),
+            Expression::Product(parts, place) => {
+                let (open, closed): (Vec<_>, Vec<_>) =
+                    parts.iter().partition(|part| !slots_of_expression(part, slots.parameters).is_empty());
+                let [part] = open[..] else {
+                    return self.table(expression, mentioned, binding, slots, undefined);
+                };
+                let mut product = self.open(part, binding, slots, undefined)?;
+                for factor in closed {
+                    let factor = self.ground(factor, binding)?;
+                    if !factor.coefficients.is_empty() {
+                        return Err(Failure::Error(Error::NonLinear { place: *place }));
+                    }
+                    product.scale(&factor.quantity.constant);
+                }
+                Ok(product)
+            }
+            _ => self.table(expression, mentioned, binding, slots, undefined),
+        }
+    }
+
+    /// Evaluates an expression for each combination of designs.
+    fn table(
+        &mut self,
+        expression: &Expression,
+        mentioned: SlotSet,
+        binding: &mut Binding,
+        slots: &Slots<'_>,
+        undefined: &mut dyn FnMut(&SlotSet, SlotSet),
+    ) -> Result<Linear<Rational>, Failure> {
+        let mut values = Vec::new();
+        let mut failure = None;
+        for_each_combination(&mentioned, slots, binding, &mut |binding, combination| {
+            match self.ground(expression, binding) {
+                Ok(linear) => values.push(linear.quantity.constant),
+                Err(Failure::Undefined) => {
+                    values.push(Rational::from_integer(0));
+                    undefined(&mentioned, SlotSet::from_slice(combination));
+                }
+                Err(other) => failure = Some(other),
+            }
+        });
+        if let Some(failure) = failure {
+            return Err(failure);
+        }
+        let mut quantity = Quantity::constant(Rational::from_integer(0));
+        quantity.add_table(Table { slots: mentioned, values });
+        Ok(Linear { coefficients: Vec::new(), quantity })
+    }
+}
+
+/// Binds the mentioned slots to every combination of their designs, the last one fastest.
+pub(crate) fn for_each_combination(
+    mentioned: &[u16],
+    slots: &Slots<'_>,
+    binding: &mut Binding,
+    visit: &mut dyn FnMut(&Binding, &[u16]),
+) {
+    fn go(
+        mentioned: &[u16],
+        slots: &Slots<'_>,
+        binding: &mut Binding,
+        chosen: &mut Vec<u16>,
+        visit: &mut dyn FnMut(&Binding, &[u16]),
+    ) {
+        let Some((slot, rest)) = mentioned.split_first() else {
+            visit(binding, chosen);
+            return;
+        };
+        let parameter = slots.parameters[*slot as usize].parameter as usize;
+        for (design, index) in slots.designs[*slot as usize].iter().zip(0..) {
+            binding[parameter] = Some(*design);
+            chosen.push(index);
+            go(rest, slots, binding, chosen, visit);
+            chosen.pop();
+        }
+        binding[parameter] = None;
+    }
+    go(mentioned, slots, binding, &mut Vec::new(), visit);
+}
+
+fn multiply(left: Linear<Rational>, right: Linear<Rational>, place: Place) -> Result<Linear<Rational>, Failure> {
+    let (mut scaled, factor) = match (left.coefficients.is_empty(), right.coefficients.is_empty()) {
+        (_, true) => (left, right),
+        (true, false) => (right, left),
+        (false, false) => return Err(Failure::Error(Error::NonLinear { place })),
+    };
+    scaled.scale(&factor.quantity.constant);
+    Ok(scaled)
+}
+
+/// A comparison of two expressions as `difference ≥ 0` or `difference > 0`; decided if it is constant.
+pub(crate) fn compare(comparison: Comparison, left: Linear<Rational>, right: Linear<Rational>, place: Place) -> Residual {
+    match comparison {
+        Comparison::Less => at_least_zero(right, left, true, place),
+        Comparison::LessOrEqual => at_least_zero(right, left, false, place),
+        Comparison::Greater => at_least_zero(left, right, true, place),
+        Comparison::GreaterOrEqual => at_least_zero(left, right, false, place),
+        Comparison::Equal => {
+            let above = at_least_zero(left.clone(), right.clone(), false, place);
+            match (above, at_least_zero(right, left, false, place)) {
+                (Residual::False, _) | (_, Residual::False) => Residual::False,
+                (Residual::True, other) | (other, Residual::True) => other,
+                (above, below) => Residual::And(vec![above, below]),
+            }
+        }
+    }
+}
+
+fn at_least_zero(mut linear: Linear<Rational>, subtrahend: Linear<Rational>, strict: bool, place: Place) -> Residual {
+    linear.add(&subtrahend.negated());
+    if linear.coefficients.is_empty() && linear.quantity.tables.is_empty() {
+        let value = linear.quantity.constant;
+        let zero = Rational::from_integer(0);
+        return truth(if strict { value > zero } else { value >= zero });
+    }
+    Residual::Compare { linear, strict, place }
+}
+
+fn truth(value: bool) -> Residual {
+    if value { Residual::True } else { Residual::False }
+}

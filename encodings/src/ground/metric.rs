@@ -1,0 +1,150 @@
+//! The metric of the problem as a cost of each operator.
+//!
+//! A metric is linear in fluents and total time. Every fluent in it must be changed by sums that do not depend on
+//! the state, so that the metric of a plan is an offset plus the sum of its operators' costs. A metric to maximize is
+//! negated. Without a metric, plans of durative actions are measured by total time, others by their length.
+
+use num_traits::Zero;
+
+use crate::error::{Error, Place};
+use crate::ground::evaluate::{Failure, World};
+use crate::ground::instantiate::{GroundOperator, GroundTask};
+use crate::lifted::{Expression, Lifted, Rational};
+use crate::pddl::ast::Direction;
+use crate::quantity::{Linear, NumericId, Quantity};
+
+/// How operator costs relate to the metric.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct GroundObjective {
+    /// The metric of the initial state (negated if to be maximized).
+    pub(crate) offset: Rational,
+    pub(crate) maximize: bool,
+}
+
+/// Gives every operator its cost, and the task the rest of the metric.
+///
+/// # Errors
+/// A metric that is not linear, or over a fluent whose change depends on the state.
+pub(crate) fn attach_costs(lifted: &Lifted, task: &mut GroundTask<'_>) -> Result<(), Vec<Error>> {
+    let Some(metric) = &lifted.metric else {
+        let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
+        for operator in &mut task.operators {
+            let unit = Quantity::constant(Rational::from_integer(1));
+            operator.cost = if temporal { operator.duration.clone() } else { unit };
+        }
+        return Ok(());
+    };
+    let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place).map_err(|e| vec![e])?;
+    let maximize = metric.direction == Direction::Maximize;
+    if maximize {
+        linear = linear.negated();
+        time = -time;
+    }
+    let initial = linear.coefficients.iter().map(|(variable, factor)| initial_value(&task.world, *variable) * factor);
+    let offset = initial.fold(linear.quantity.constant, |sum, value| sum + value);
+    task.objective = GroundObjective { offset, maximize };
+
+    let mut errors = Vec::new();
+    for operator in &mut task.operators {
+        match cost(operator, &linear, time) {
+            Some(cost) => operator.cost = cost,
+            None if errors.is_empty() => errors.push(Error::Unsupported {
+                construct: format!(
+                    "a metric over a fluent that `{}` changes depending on the state",
+                    lifted.schemas[operator.schema as usize].name
+                ),
+                instead: "a metric over fluents that are only increased or decreased by constants".into(),
+                place: metric.place,
+            }),
+            None => {}
+        }
+    }
+    if errors.is_empty() { Ok(()) } else { Err(errors) }
+}
+
+/// The initial value of a numeric variable; 0 where the file gives none, as is usual for `total-cost`.
+pub(crate) fn initial_value(world: &World<'_>, variable: NumericId) -> Rational {
+    let key = world.numerics.get_index(variable.index()).map(|(key, ())| key);
+    key.and_then(|key| world.values.get(key)).copied().unwrap_or_else(Rational::zero)
+}
+
+/// The part of the metric over fluents, and the factor of total time.
+fn split(
+    world: &mut World<'_>,
+    expression: &Expression,
+    place: Place,
+) -> Result<(Linear<Rational>, Rational), Error> {
+    match expression {
+        Expression::TotalTime => Ok((Linear::constant(Rational::zero()), Rational::from_integer(1))),
+        Expression::Sum(parts) => {
+            let (mut sum, mut time) = (Linear::constant(Rational::zero()), Rational::zero());
+            for part in parts {
+                let (linear, more) = split(world, part, place)?;
+                sum.add(&linear);
+                time += more;
+            }
+            Ok((sum, time))
+        }
+        Expression::Negate(inner) => split(world, inner, place).map(|(linear, time)| (linear.negated(), -time)),
+        Expression::Product(parts, place) => {
+            let mut product = (Linear::constant(Rational::from_integer(1)), Rational::zero());
+            for part in parts {
+                let (linear, time) = split(world, part, *place)?;
+                product = multiply(product, (linear, time)).ok_or(Error::NonLinear { place: *place })?;
+            }
+            Ok(product)
+        }
+        Expression::Quotient(left, right, place) => {
+            let (mut linear, time) = split(world, left, *place)?;
+            let (divisor, divisor_time) = split(world, right, *place)?;
+            let constant = divisor.quantity.constant;
+            if !divisor.coefficients.is_empty() || !divisor_time.is_zero() || constant.is_zero() {
+                return Err(Error::NonLinear { place: *place });
+            }
+            linear.scale(&constant.recip());
+            Ok((linear, time / constant))
+        }
+        Expression::Number(_) | Expression::Function(..) => match world.ground(expression, &Vec::new()) {
+            Ok(linear) => Ok((linear, Rational::zero())),
+            Err(Failure::Error(error)) => Err(error),
+            Err(Failure::Undefined) => Err(Error::Unsupported {
+                construct: "a metric over a function without a value".into(),
+                instead: "a value for it in `:init`".into(),
+                place,
+            }),
+        },
+    }
+}
+
+fn multiply(
+    left: (Linear<Rational>, Rational),
+    right: (Linear<Rational>, Rational),
+) -> Option<(Linear<Rational>, Rational)> {
+    let constant = |(linear, time): &(Linear<Rational>, Rational)| linear.coefficients.is_empty() && time.is_zero();
+    let ((mut linear, time), (factor, _)) = if constant(&right) {
+        (left, right)
+    } else if constant(&left) {
+        (right, left)
+    } else {
+        return None;
+    };
+    linear.scale(&factor.quantity.constant);
+    Some((linear, time * factor.quantity.constant))
+}
+
+/// What one application adds to the metric; none if that depends on the state.
+fn cost(operator: &GroundOperator, metric: &Linear<Rational>, time: Rational) -> Option<Quantity<Rational>> {
+    let mut total = operator.duration.clone();
+    total.scale(&time);
+    for (variable, factor) in &metric.coefficients {
+        let Some(value) = operator.numeric_effects.get(variable) else { continue };
+        let unit = Rational::from_integer(1);
+        if value.coefficients[..] != [(*variable, unit)] {
+            return None;
+        }
+        let mut change = value.quantity.clone();
+        change.scale(factor);
+        total.add(&change);
+    }
+    Some(total)
+}

@@ -1,0 +1,52 @@
+//! Lifted task to ground task.
+//!
+//! Relaxed reachability (a Datalog program on the rule engine, after Helmert [1]) yields the instances of each
+//! schema, without its separable design parameters; each instance becomes one operator with slots; mutex groups become
+//! finite-domain variables; all numbers become exact integers.
+//!
+//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
+
+mod evaluate;
+mod finish;
+mod instantiate;
+mod metric;
+mod mutex;
+mod prune;
+mod reach;
+
+use crate::configuration::{design_parameters, slot_parameters};
+use crate::error::Error;
+use crate::normalize::normalize;
+use crate::pddl::ast::{Domain, Name, Problem};
+use crate::task::Task;
+
+/// How the domain's symbols are to be read.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
+    pub solves: Vec<Name>,
+}
+
+impl Default for Config {
+    /// The names of the Metaplan paper and of the files of kas-lab.
+    fn default() -> Self {
+        Self { solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec() }
+    }
+}
+
+/// Grounds a domain and a problem that have passed `pddl::check`.
+///
+/// # Errors
+/// Every construct that the planner does not handle, with its place.
+pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Vec<Error>> {
+    let lifted = normalize(domain, problem)?;
+    let designs: Vec<_> =
+        lifted.schemas.iter().map(|schema| design_parameters(&lifted, schema, &config.solves)).collect();
+    let slots: Vec<_> =
+        lifted.schemas.iter().zip(&designs).map(|(schema, designs)| slot_parameters(&lifted, schema, designs)).collect();
+    let reached = reach::reach(&lifted, &slots).map_err(|error| vec![error])?;
+    let mut ground = instantiate::instantiate(&lifted, &designs, &slots, &reached)?;
+    metric::attach_costs(&lifted, &mut ground)?;
+    let unreachable = prune::prune(&lifted, &mut ground);
+    finish::finish(&lifted, ground, unreachable).map_err(|error| vec![error])
+}

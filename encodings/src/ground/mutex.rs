@@ -1,0 +1,173 @@
+//! Groups of atoms of which at most one holds: what becomes a finite-domain variable.
+//!
+//! Invariant synthesis after Helmert [1]: a candidate is a set of predicates that share some arguments and count
+//! another; it is an invariant if no operator increases the number of true atoms of any instance. Candidates that
+//! an operator breaks are refined by a predicate that the same operator deletes. Checked on ground operators, so that
+//! statically impossible instances do no harm.
+//!
+//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009, section 5.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::ground::evaluate::AtomId;
+use crate::ground::instantiate::{GroundOperator, GroundTask};
+use crate::lifted::{ObjectId, PredicateId};
+
+/// One predicate of a candidate: argument positions that make up the key, in order; one more may be counted.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+struct Part {
+    predicate: PredicateId,
+    key: Vec<usize>,
+}
+
+type Candidate = Vec<Part>;
+type Key = Vec<ObjectId>;
+
+/// How many candidates are tried before the search gives up refining.
+const CANDIDATE_LIMIT: usize = 500;
+
+/// Disjoint groups of at least two atoms, at most one of each true at any time, largest first.
+pub(crate) fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Vec<Vec<AtomId>> {
+    let mut instances: Vec<Vec<AtomId>> = Vec::new();
+    for candidate in invariants(task, relevant) {
+        let mut by_key: BTreeMap<Key, (usize, Vec<AtomId>)> = BTreeMap::new();
+        for atom in sorted(relevant) {
+            if let Some(key) = key_of(task, &candidate, atom) {
+                let entry = by_key.entry(key).or_default();
+                entry.0 += usize::from(initially(task, atom));
+                entry.1.push(atom);
+            }
+        }
+        instances.extend(by_key.into_values().filter(|(weight, _)| *weight <= 1).map(|(_, atoms)| atoms));
+    }
+    cover(instances)
+}
+
+/// Greedy: the group that covers most uncovered atoms first; of equal ones the one that comes first.
+fn cover(mut instances: Vec<Vec<AtomId>>) -> Vec<Vec<AtomId>> {
+    let mut covered = FxHashSet::default();
+    let mut chosen = Vec::new();
+    loop {
+        for instance in &mut instances {
+            instance.retain(|atom| !covered.contains(atom));
+        }
+        instances.retain(|instance| instance.len() > 1);
+        let best = (0..instances.len()).max_by_key(|index| (instances[*index].len(), std::cmp::Reverse(*index)));
+        let Some(best) = best else { return chosen };
+        let group = instances.remove(best);
+        covered.extend(group.iter().copied());
+        chosen.push(group);
+    }
+}
+
+fn sorted(atoms: &FxHashSet<AtomId>) -> Vec<AtomId> {
+    let mut all: Vec<_> = atoms.iter().copied().collect();
+    all.sort_unstable();
+    all
+}
+
+fn initially(task: &GroundTask<'_>, atom: AtomId) -> bool {
+    let key = task.world.atoms.get_index(atom.index());
+    key.is_some_and(|((predicate, arguments), ())| task.world.holds_initially(*predicate, arguments))
+}
+
+/// The key of an atom under a candidate, if the candidate covers its predicate.
+fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<Key> {
+    let ((predicate, arguments), ()) = task.world.atoms.get_index(atom.index())?;
+    let part = candidate.iter().find(|part| part.predicate == *predicate)?;
+    Some(part.key.iter().map(|position| arguments[*position]).collect())
+}
+
+/// The candidates that hold up.
+fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Vec<Candidate> {
+    let mut arities: BTreeMap<PredicateId, usize> = BTreeMap::new();
+    for atom in relevant {
+        if let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index()) {
+            arities.insert(*predicate, arguments.len());
+        }
+    }
+    let mut open: Vec<Candidate> = Vec::new();
+    for (predicate, arity) in &arities {
+        let all: Vec<usize> = (0..*arity).collect();
+        open.push(vec![Part { predicate: *predicate, key: all.clone() }]);
+        for counted in &all {
+            let key = all.iter().copied().filter(|position| position != counted).collect();
+            open.push(vec![Part { predicate: *predicate, key }]);
+        }
+    }
+    let mut seen: FxHashSet<Candidate> = open.iter().cloned().collect();
+    let mut found = Vec::new();
+    let mut next = 0;
+    while next < open.len() && next < CANDIDATE_LIMIT {
+        let candidate = open[next].clone();
+        next += 1;
+        match task.operators.iter().find_map(|operator| broken_by(task, &candidate, operator)) {
+            None => found.push(candidate),
+            Some((operator, key)) => {
+                for refined in refinements(task, &candidate, operator, &key, &arities) {
+                    if seen.insert(refined.clone()) {
+                        open.push(refined);
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The operator itself and a key whose weight it may increase (or decrease without anybody knowing).
+fn broken_by<'o>(
+    task: &GroundTask<'_>,
+    candidate: &Candidate,
+    operator: &'o GroundOperator,
+) -> Option<(&'o GroundOperator, Key)> {
+    let required = |atom: &AtomId| operator.condition.literals.binary_search(&(*atom, true)).is_ok();
+    let mut balance: FxHashMap<Key, i32> = FxHashMap::default();
+    for atom in operator.adds.iter().filter(|atom| !required(atom)) {
+        if let Some(key) = key_of(task, candidate, *atom) {
+            *balance.entry(key).or_default() += 1;
+        }
+    }
+    for atom in &operator.deletes {
+        if let Some(key) = key_of(task, candidate, *atom) {
+            if !required(atom) {
+                return Some((operator, key));
+            }
+            *balance.entry(key).or_default() -= 1;
+        }
+    }
+    let mut heavy: Vec<_> = balance.into_iter().filter(|(_, weight)| *weight > 0).map(|(key, _)| key).collect();
+    heavy.sort_unstable();
+    heavy.into_iter().next().map(|key| (operator, key))
+}
+
+/// The candidate plus one predicate that the operator requires and deletes, its arguments matched to the key.
+fn refinements(
+    task: &GroundTask<'_>,
+    candidate: &Candidate,
+    operator: &GroundOperator,
+    key: &Key,
+    arities: &BTreeMap<PredicateId, usize>,
+) -> Vec<Candidate> {
+    let mut refined = Vec::new();
+    for atom in &operator.deletes {
+        let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index()) else { continue };
+        if candidate.iter().any(|part| part.predicate == *predicate) || !arities.contains_key(predicate) {
+            continue;
+        }
+        let mut positions = Vec::new();
+        for object in key {
+            let free = (0..arguments.len()).find(|p| arguments[*p] == *object && !positions.contains(p));
+            positions.extend(free);
+        }
+        if positions.len() == key.len() && arguments.len() <= key.len() + 1 {
+            let mut parts = candidate.clone();
+            parts.push(Part { predicate: *predicate, key: positions });
+            parts.sort_unstable();
+            refined.push(parts);
+        }
+    }
+    refined
+}

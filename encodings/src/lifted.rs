@@ -1,0 +1,148 @@
+//! The lifted task: PDDL with its names resolved to ids, quantifiers expanded and negation pushed inwards.
+//!
+//! Objects, predicates, functions and parameters are dense ids in the order of their declaration, so that
+//! nothing further on depends on how anything is named. A durative action keeps its two halves; `ground`
+//! composes them into one operator, because actions execute one after another.
+
+use num_rational::Ratio;
+
+use crate::error::Place;
+use crate::pddl::ast::{Assignment, Comparison, Direction, Name};
+
+/// An exact number.
+pub(crate) type Rational = Ratio<i128>;
+
+/// An object or constant, by order of declaration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct ObjectId(pub(crate) u32);
+
+/// A predicate, by order of declaration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct PredicateId(pub(crate) u32);
+
+/// A numeric function, by order of declaration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct FunctionId(pub(crate) u32);
+
+impl ObjectId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl PredicateId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl FunctionId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// The arguments of a ground atom.
+pub(crate) type Arguments = Box<[ObjectId]>;
+
+/// A lifted task.
+#[derive(Debug)]
+pub(crate) struct Lifted {
+    pub(crate) objects: Vec<Name>,
+    pub(crate) predicates: Vec<Predicate>,
+    pub(crate) functions: Vec<Function>,
+    pub(crate) schemas: Vec<Schema>,
+    /// Initial facts in the order of the file, without repetitions.
+    pub(crate) facts: Vec<(PredicateId, Arguments)>,
+    pub(crate) values: Vec<(FunctionId, Arguments, Rational)>,
+    pub(crate) goal: Formula,
+    pub(crate) metric: Option<Metric>,
+}
+
+/// A predicate; it is a fluent if an action adds or deletes it, else static.
+#[derive(Debug, Clone)]
+pub(crate) struct Predicate {
+    pub(crate) name: Name,
+    pub(crate) arity: usize,
+    pub(crate) fluent: bool,
+}
+
+/// A numeric function; it is a fluent if an action changes it, else static.
+#[derive(Debug, Clone)]
+pub(crate) struct Function {
+    pub(crate) name: Name,
+    pub(crate) fluent: bool,
+}
+
+/// An action schema with its parameters as `Term::Parameter` indices.
+#[derive(Debug, Clone)]
+pub(crate) struct Schema {
+    pub(crate) name: Name,
+    pub(crate) parameters: Vec<Parameter>,
+    /// Must hold before the action.
+    pub(crate) start_condition: Formula,
+    pub(crate) start_effects: Vec<Effect>,
+    /// Must hold after the start effects: `over all` and `at end` of a durative action.
+    pub(crate) middle_condition: Formula,
+    pub(crate) end_effects: Vec<Effect>,
+    /// Duration in the domain's time unit; none for an instantaneous action.
+    pub(crate) duration: Option<Expression>,
+}
+
+/// A parameter and the objects that its type admits, ascending.
+#[derive(Debug, Clone)]
+pub(crate) struct Parameter {
+    pub(crate) candidates: Vec<ObjectId>,
+}
+
+/// A schema parameter or an object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Term {
+    Parameter(u32),
+    Object(ObjectId),
+}
+
+/// A condition in negation normal form, without quantifiers.
+#[derive(Debug, Clone)]
+pub(crate) enum Formula {
+    And(Vec<Formula>),
+    Or(Vec<Formula>),
+    Literal { positive: bool, predicate: PredicateId, terms: Vec<Term> },
+    Equal { positive: bool, left: Term, right: Term },
+    Compare(Comparison, Expression, Expression, Place),
+}
+
+impl Formula {
+    /// The condition that always holds.
+    pub(crate) const fn truth() -> Self {
+        Self::And(Vec::new())
+    }
+}
+
+/// An effect without quantifiers.
+#[derive(Debug, Clone)]
+pub(crate) enum Effect {
+    Add(PredicateId, Vec<Term>),
+    Delete(PredicateId, Vec<Term>),
+    Assign { assignment: Assignment, function: FunctionId, terms: Vec<Term>, expression: Expression, place: Place },
+}
+
+/// A numeric expression.
+#[derive(Debug, Clone)]
+pub(crate) enum Expression {
+    Number(Rational),
+    Function(FunctionId, Vec<Term>, Place),
+    TotalTime,
+    Sum(Vec<Expression>),
+    Negate(Box<Expression>),
+    Product(Vec<Expression>, Place),
+    Quotient(Box<Expression>, Box<Expression>, Place),
+}
+
+/// What a plan is measured by.
+#[derive(Debug, Clone)]
+pub(crate) struct Metric {
+    pub(crate) direction: Direction,
+    pub(crate) expression: Expression,
+    pub(crate) place: Place,
+}

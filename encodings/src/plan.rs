@@ -1,0 +1,181 @@
+//! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
+
+use crate::lifted::ObjectId;
+use crate::task::{Argument, Operator, OperatorId, State, Task};
+
+/// One step of a plan over operators.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct GroundStep {
+    pub(crate) operator: OperatorId,
+    /// An index into `SlotUse::designs` for each slot of the operator.
+    pub(crate) choice: Vec<u16>,
+}
+
+/// A plan and the sum of its operators' costs, in the task's integer unit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct GroundPlan {
+    pub(crate) steps: Vec<GroundStep>,
+    pub(crate) cost: i64,
+}
+
+/// An exact decimal or fraction: `numerator / denominator`, in the units of the PDDL files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Exact {
+    /// Numerator.
+    pub numerator: i64,
+    /// Denominator, positive.
+    pub denominator: i64,
+}
+
+impl Exact {
+    pub(crate) fn scaled(value: i64, scale: i64) -> Self {
+        let divisor = num_integer::gcd(value, scale).max(1);
+        Self { numerator: value / divisor, denominator: scale / divisor }
+    }
+
+    /// The nearest double.
+    pub fn to_f64(self) -> f64 {
+        self.numerator as f64 / self.denominator as f64
+    }
+}
+
+/// Writes an exact decimal where there is one, else a fraction.
+impl std::fmt::Display for Exact {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (mut denominator, mut digits) = (self.denominator, 0_u32);
+        while denominator % 10 == 0 {
+            denominator /= 10;
+            digits += 1;
+        }
+        while denominator > 1 && digits < 18 {
+            if denominator % 2 == 0 {
+                denominator /= 2;
+            } else if denominator % 5 == 0 {
+                denominator /= 5;
+            } else {
+                return write!(f, "{}/{}", self.numerator, self.denominator);
+            }
+            digits += 1;
+        }
+        let shift = 10_i128.pow(digits);
+        let scaled = i128::from(self.numerator) * shift / i128::from(self.denominator);
+        let sign = if scaled < 0 { "-" } else { "" };
+        let (whole, rest) = (scaled.abs() / shift, scaled.abs() % shift);
+        if rest == 0 {
+            return write!(f, "{sign}{whole}");
+        }
+        let fraction = format!("{rest:0width$}", width = digits as usize);
+        write!(f, "{sign}{whole}.{}", fraction.trim_end_matches('0'))
+    }
+}
+
+/// One action of a plan as users see it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    /// The name of the action schema.
+    pub action: String,
+    /// All arguments in the order of the schema's parameters, designs among them.
+    pub arguments: Vec<String>,
+    /// The function and the design chosen for it, in the order of the parameters.
+    pub configuration: Vec<(String, String)>,
+    /// Functions whose design differs from the one that the last step with this function used.
+    pub reconfigured: Vec<String>,
+    /// When the action starts, in the domain's time unit, actions executing one after another.
+    pub start: Exact,
+    /// How long it takes; none for an instantaneous action.
+    pub duration: Exact,
+    /// What it adds to the metric.
+    pub cost: Exact,
+}
+
+/// A plan as users see it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Plan {
+    /// The actions, in order of execution.
+    pub steps: Vec<Step>,
+    /// The metric of the problem file.
+    pub cost: Exact,
+}
+
+/// The plan in the names of the task.
+pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
+    let mut steps = Vec::new();
+    let mut clock = 0;
+    let mut current: Vec<(String, String)> = Vec::new();
+    let sign = if task.objective.maximize { -1 } else { 1 };
+    for step in &plan.steps {
+        let operator = &task.operators[step.operator.index()];
+        let sizes = operator.sizes();
+        let duration = operator.duration.at(&step.choice, &sizes);
+        let configuration = configuration(task, operator, &step.choice);
+        let mut reconfigured = Vec::new();
+        for (function, design) in &configuration {
+            match current.iter_mut().find(|(known, _)| known == function) {
+                Some((_, known)) if known == design => {}
+                Some((_, known)) => {
+                    known.clone_from(design);
+                    reconfigured.push(function.clone());
+                }
+                None => current.push((function.clone(), design.clone())),
+            }
+        }
+        steps.push(Step {
+            action: task.schema_names[operator.schema as usize].clone(),
+            arguments: arguments(task, operator, &step.choice),
+            configuration,
+            reconfigured,
+            start: Exact::scaled(clock, task.time_scale),
+            duration: Exact::scaled(duration, task.time_scale),
+            cost: Exact::scaled(sign * operator.cost.at(&step.choice, &sizes), task.objective.scale),
+        });
+        clock += duration;
+    }
+    Plan { steps, cost: metric(task, plan.cost) }
+}
+
+/// The metric of the problem file for a sum of operator costs.
+pub(crate) fn metric(task: &Task, cost: i64) -> Exact {
+    let sign = if task.objective.maximize { -1 } else { 1 };
+    Exact::scaled(sign * (cost + task.objective.offset), task.objective.scale)
+}
+
+fn design(task: &Task, operator: &Operator, choice: &[u16], position: usize) -> String {
+    let slot = &operator.slots[position];
+    let design = slot.designs[choice[position] as usize] as usize;
+    task.object_names[task.slots[slot.slot.index()].designs[design].index()].clone()
+}
+
+fn argument(task: &Task, operator: &Operator, choice: &[u16], argument: Argument) -> String {
+    match argument {
+        Argument::Object(object) => task.object_names[object.index()].clone(),
+        Argument::Slot(position) => design(task, operator, choice, position as usize),
+    }
+}
+
+fn arguments(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<String> {
+    operator.arguments.iter().map(|a| argument(task, operator, choice, *a)).collect()
+}
+
+fn configuration(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<(String, String)> {
+    let name = |function: ObjectId| task.object_names[function.index()].clone();
+    let pairs = operator.configuration.iter();
+    pairs.map(|(function, design)| (name(*function), argument(task, operator, choice, *design))).collect()
+}
+
+/// The states that a plan passes through, the initial one first; none if a step is not applicable or the last
+/// state is not a goal state.
+pub(crate) fn replay(task: &Task, plan: &[GroundStep]) -> Option<(Vec<State>, i64)> {
+    let mut states = vec![task.initial.clone()];
+    let mut cost = 0;
+    for step in plan {
+        let operator = &task.operators[step.operator.index()];
+        let state = states.last()?;
+        if !operator.admits(&step.choice) || !task.applicable(state, operator, &step.choice) {
+            return None;
+        }
+        cost += operator.cost.at(&step.choice, &operator.sizes());
+        let next = task.successor(state, operator, &step.choice);
+        states.push(next);
+    }
+    task.is_goal(states.last()?).then_some((states, cost))
+}

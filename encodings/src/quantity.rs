@@ -1,0 +1,196 @@
+//! Quantities that depend on which function designs an operator runs with.
+//!
+//! A quantity is a constant plus tables over slots. The tables are what keeps the encoding factored: a sum over
+//! k functions of m designs each is k tables of m entries, not one of m^k.
+
+use smallvec::SmallVec;
+
+/// Positions in an operator's slot list, ascending.
+pub(crate) type SlotSet = SmallVec<[u16; 2]>;
+
+/// One value for each combination of the admitted designs of some slots.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Table<N> {
+    pub(crate) slots: SlotSet,
+    /// Row-major: the last slot varies fastest.
+    pub(crate) values: Vec<N>,
+}
+
+/// A constant plus tables; the sum of what the chosen designs contribute.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub(crate) struct Quantity<N> {
+    pub(crate) constant: N,
+    pub(crate) tables: Vec<Table<N>>,
+}
+
+/// A linear combination of numeric variables plus a quantity.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub(crate) struct Linear<N> {
+    /// Numeric variable and factor, ascending by variable, factors not zero.
+    pub(crate) coefficients: Vec<(NumericId, N)>,
+    pub(crate) quantity: Quantity<N>,
+}
+
+/// A numeric variable of a ground task.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NumericId(pub(crate) u32);
+
+impl NumericId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// The arithmetic that quantities need.
+pub(crate) trait Number:
+    Clone + PartialEq + Ord + num_traits::Zero + num_traits::One + std::ops::Neg<Output = Self> + std::ops::Mul<Output = Self>
+{
+}
+
+impl<N> Number for N where
+    N: Clone
+        + PartialEq
+        + Ord
+        + num_traits::Zero
+        + num_traits::One
+        + std::ops::Neg<Output = N>
+        + std::ops::Mul<Output = N>
+{
+}
+
+impl<N: Number> Quantity<N> {
+    pub(crate) fn constant(constant: N) -> Self {
+        Self { constant, tables: Vec::new() }
+    }
+
+    pub(crate) fn is_zero(&self) -> bool {
+        self.constant.is_zero() && self.tables.is_empty()
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.constant = self.constant.clone() + other.constant.clone();
+        for table in &other.tables {
+            self.add_table(table.clone());
+        }
+    }
+
+    /// Adds a table; one that is constant joins the constant, one over the same slots is merged.
+    pub(crate) fn add_table(&mut self, table: Table<N>) {
+        match self.tables.iter_mut().find(|present| present.slots == table.slots) {
+            Some(present) => {
+                for (value, more) in present.values.iter_mut().zip(table.values) {
+                    *value = value.clone() + more;
+                }
+            }
+            None => self.tables.push(table),
+        }
+        self.tables.sort_by(|a, b| a.slots.cmp(&b.slots));
+        self.fold_constant_tables();
+    }
+
+    fn fold_constant_tables(&mut self) {
+        let constant = &mut self.constant;
+        self.tables.retain(|table| {
+            let Some(first) = table.values.first() else { return false };
+            let uniform = table.values.iter().all(|value| value == first);
+            if uniform {
+                *constant = constant.clone() + first.clone();
+            }
+            !uniform
+        });
+    }
+
+    pub(crate) fn scale(&mut self, factor: &N) {
+        self.constant = self.constant.clone() * factor.clone();
+        for value in self.tables.iter_mut().flat_map(|table| &mut table.values) {
+            *value = value.clone() * factor.clone();
+        }
+        self.fold_constant_tables();
+    }
+
+    /// The value when the slot at position `i` has its `choice[i]`-th admitted design; `sizes` counts those designs.
+    pub(crate) fn at(&self, choice: &[u16], sizes: &[usize]) -> N {
+        let chosen = self.tables.iter().map(|table| table.values[table.index(choice, sizes)].clone());
+        chosen.fold(self.constant.clone(), |sum, value| sum + value)
+    }
+
+    /// All numbers that occur.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = &N> {
+        std::iter::once(&self.constant).chain(self.tables.iter().flat_map(|table| &table.values))
+    }
+
+    pub(crate) fn map<M>(&self, mut f: impl FnMut(&N) -> Option<M>) -> Option<Quantity<M>> {
+        let constant = f(&self.constant)?;
+        let tables = self
+            .tables
+            .iter()
+            .map(|table| Some(Table { slots: table.slots.clone(), values: table.values.iter().map(&mut f).collect::<Option<_>>()? }))
+            .collect::<Option<_>>()?;
+        Some(Quantity { constant, tables })
+    }
+}
+
+impl Quantity<i64> {
+    /// A lower bound that ignores that tables share slots; exact if no two do.
+    pub(crate) fn minimum(&self) -> i64 {
+        self.constant + self.tables.iter().map(|table| table.values.iter().min().copied().unwrap_or(0)).sum::<i64>()
+    }
+
+    /// An upper bound, as `minimum` is a lower one.
+    pub(crate) fn maximum(&self) -> i64 {
+        self.constant + self.tables.iter().map(|table| table.values.iter().max().copied().unwrap_or(0)).sum::<i64>()
+    }
+}
+
+impl<N> Table<N> {
+    fn index(&self, choice: &[u16], sizes: &[usize]) -> usize {
+        self.slots.iter().fold(0, |index, slot| index * sizes[*slot as usize] + choice[*slot as usize] as usize)
+    }
+}
+
+impl<N: Number> Linear<N> {
+    pub(crate) fn constant(constant: N) -> Self {
+        Self { coefficients: Vec::new(), quantity: Quantity::constant(constant) }
+    }
+
+    pub(crate) fn variable(variable: NumericId) -> Self {
+        Self { coefficients: vec![(variable, N::one())], quantity: Quantity::constant(N::zero()) }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        for (variable, factor) in &other.coefficients {
+            self.add_coefficient(*variable, factor.clone());
+        }
+        self.quantity.add(&other.quantity);
+    }
+
+    fn add_coefficient(&mut self, variable: NumericId, factor: N) {
+        match self.coefficients.binary_search_by_key(&variable, |(v, _)| *v) {
+            Ok(position) => {
+                let sum = self.coefficients[position].1.clone() + factor;
+                if sum.is_zero() {
+                    self.coefficients.remove(position);
+                } else {
+                    self.coefficients[position].1 = sum;
+                }
+            }
+            Err(position) => self.coefficients.insert(position, (variable, factor)),
+        }
+    }
+
+    pub(crate) fn scale(&mut self, factor: &N) {
+        if factor.is_zero() {
+            *self = Self::constant(N::zero());
+            return;
+        }
+        for (_, coefficient) in &mut self.coefficients {
+            *coefficient = coefficient.clone() * factor.clone();
+        }
+        self.quantity.scale(factor);
+    }
+
+    pub(crate) fn negated(mut self) -> Self {
+        self.scale(&-N::one());
+        self
+    }
+}

@@ -1,0 +1,142 @@
+//! The SAT solvers behind one trait, and Varisat, the default one.
+//!
+//! Varisat has no way to be interrupted. It streams its proof, though, and stops at once when the stream reports an
+//! error; so the proof goes to a sink that counts learnt clauses and fails when a limit is reached.
+
+use std::cell::Cell;
+use std::io;
+use std::rc::Rc;
+
+use varisat::ExtendFormula as _;
+
+use crate::limits::Limits;
+
+/// A literal: a variable, counted from 0, or its negation.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct Lit(u32);
+
+impl Lit {
+    /// The first variable, which formulas fix to true.
+    pub(crate) const TRUE: Self = Self(0);
+
+    pub(crate) fn positive(variable: u32) -> Self {
+        Self(variable << 1)
+    }
+
+    pub(crate) fn variable(self) -> u32 {
+        self.0 >> 1
+    }
+
+    pub(crate) fn is_positive(self) -> bool {
+        self.0 & 1 == 0
+    }
+}
+
+impl std::ops::Not for Lit {
+    type Output = Self;
+
+    fn not(self) -> Self {
+        Self(self.0 ^ 1)
+    }
+}
+
+/// What a solver says of its clauses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Answer {
+    Satisfiable,
+    Unsatisfiable,
+    /// A limit was reached; the solver is of no further use.
+    Interrupted,
+}
+
+/// A SAT solver for one formula.
+pub(crate) trait Solver {
+    /// Adds a clause; its variables need no declaration. Not after `solve`.
+    fn add_clause(&mut self, clause: &[Lit]);
+    /// Decides the clauses.
+    fn solve(&mut self) -> Answer;
+    /// The value of a variable in the assignment found last.
+    fn value(&self, variable: u32) -> bool;
+    /// Clauses learnt so far, one for each conflict.
+    fn conflicts(&self) -> u64;
+}
+
+/// Varisat [1].
+///
+/// [1] J. Harder: Varisat, <https://jix.github.io/varisat/>.
+pub(crate) struct Varisat {
+    solver: varisat::Solver<'static>,
+    conflicts: Rc<Cell<u64>>,
+    assignment: Vec<bool>,
+    buffer: Vec<varisat::Lit>,
+}
+
+impl Varisat {
+    pub(crate) fn new(limits: &Limits) -> Self {
+        let conflicts = Rc::new(Cell::new(0));
+        let sink = CountingSink { limits: limits.clone(), conflicts: Rc::clone(&conflicts), at_line_start: true };
+        let mut solver = varisat::Solver::new();
+        solver.write_proof(sink, varisat::ProofFormat::Drat);
+        Self { solver, conflicts, assignment: Vec::new(), buffer: Vec::new() }
+    }
+}
+
+impl Solver for Varisat {
+    fn add_clause(&mut self, clause: &[Lit]) {
+        self.buffer.clear();
+        self.buffer.extend(clause.iter().map(|l| varisat::Lit::from_index(l.variable() as usize, l.is_positive())));
+        self.solver.add_clause(&self.buffer);
+    }
+
+    fn solve(&mut self) -> Answer {
+        match self.solver.solve() {
+            Ok(true) => {
+                self.assignment.clear();
+                for literal in self.solver.model().unwrap_or_default() {
+                    let variable = literal.index();
+                    if self.assignment.len() <= variable {
+                        self.assignment.resize(variable + 1, false);
+                    }
+                    self.assignment[variable] = literal.is_positive();
+                }
+                Answer::Satisfiable
+            }
+            Ok(false) => Answer::Unsatisfiable,
+            Err(_) => Answer::Interrupted,
+        }
+    }
+
+    fn value(&self, variable: u32) -> bool {
+        self.assignment.get(variable as usize).copied().unwrap_or(false)
+    }
+
+    fn conflicts(&self) -> u64 {
+        self.conflicts.get()
+    }
+}
+
+/// Swallows a DRAT proof, counts the clauses that it adds, and fails when a limit is reached.
+struct CountingSink {
+    limits: Limits,
+    conflicts: Rc<Cell<u64>>,
+    at_line_start: bool,
+}
+
+impl io::Write for CountingSink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.limits.reached() {
+            return Err(io::Error::other("limit reached"));
+        }
+        let mut added = 0;
+        for byte in bytes {
+            added += u64::from(self.at_line_start && *byte != b'd');
+            self.at_line_start = *byte == b'\n';
+        }
+        self.conflicts.set(self.conflicts.get() + added);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

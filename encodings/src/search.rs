@@ -1,0 +1,209 @@
+//! A quick search for a first plan: A* with Pareto dominance over numeric variables.
+//!
+//! States that agree on all finite-domain variables are compared by cost and by numeric variables; where a higher value
+//! never hurts (a battery), a state that costs no less and has no more of anything is dropped. That is the label-setting
+//! search of resource-constrained shortest paths [1]. If it ends before its limits, its answer is exact.
+//!
+//! [1] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
+//! windows, INFOR 26(3), 1988.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::collections::hash_map::Entry;
+
+use rustc_hash::FxHashMap;
+
+use crate::bounds::Bounds;
+use crate::limits::Limits;
+use crate::plan::{GroundPlan, GroundStep};
+use crate::task::{Operator, OperatorId, State, Task};
+
+/// How many states are stored at most.
+const STATE_LIMIT: usize = 400_000;
+/// Operators with more combinations of designs than this are left to the SAT solver.
+const CHOICE_LIMIT: usize = 20_000;
+
+/// What the search found.
+#[derive(Debug)]
+pub(crate) enum Found {
+    /// A cheapest plan.
+    Optimal(GroundPlan),
+    /// There is no plan: every reachable state was visited.
+    None,
+    /// A limit was reached first.
+    Unknown,
+}
+
+struct Node {
+    state: State,
+    cost: i64,
+    parent: Option<(u32, OperatorId, u32)>,
+    dominated: bool,
+}
+
+struct Search<'a> {
+    task: &'a Task,
+    bounds: &'a Bounds,
+    /// For each operator its combinations of designs that no other one dominates, with their costs.
+    choices: Vec<Vec<(Vec<u16>, i64)>>,
+    /// Operators by a fact that they require, and those that require none.
+    by_fact: FxHashMap<(u32, u32), Vec<OperatorId>>,
+    always: Vec<OperatorId>,
+    nodes: Vec<Node>,
+    seen: FxHashMap<Box<[u32]>, Vec<u32>>,
+    open: BinaryHeap<Reverse<(i64, u32, u32)>>,
+    /// Whether more of any numeric variable never hurts.
+    monotone: bool,
+}
+
+/// Searches a task whose operators all cost at least 0.
+pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
+    let monotone = is_monotone(task);
+    let mut choices = Vec::with_capacity(task.operators.len());
+    for operator in &task.operators {
+        if operator.sizes().iter().product::<usize>() > CHOICE_LIMIT {
+            return Found::Unknown;
+        }
+        choices.push(undominated(operator, monotone));
+    }
+    let (by_fact, always) = index(task);
+    let mut search = Search {
+        task,
+        bounds,
+        choices,
+        by_fact,
+        always,
+        nodes: Vec::new(),
+        seen: FxHashMap::default(),
+        open: BinaryHeap::new(),
+        monotone,
+    };
+    search.push(task.initial.clone(), 0, 0, None);
+    search.run(limits)
+}
+
+impl Search<'_> {
+    fn run(&mut self, limits: &Limits) -> Found {
+        let mut expanded = 0_usize;
+        while let Some(Reverse((_, steps, id))) = self.open.pop() {
+            if self.nodes[id as usize].dominated {
+                continue;
+            }
+            if self.task.is_goal(&self.nodes[id as usize].state) {
+                return Found::Optimal(self.plan(id));
+            }
+            expanded += 1;
+            if self.nodes.len() > STATE_LIMIT || (expanded % 256 == 0 && limits.reached()) {
+                return Found::Unknown;
+            }
+            self.expand(id, steps);
+        }
+        Found::None
+    }
+
+    fn expand(&mut self, id: u32, steps: u32) {
+        let state = self.nodes[id as usize].state.clone();
+        let cost = self.nodes[id as usize].cost;
+        let mut candidates = self.always.clone();
+        for (variable, value) in state.values.iter().enumerate() {
+            candidates.extend(self.by_fact.get(&(variable as u32, *value)).into_iter().flatten());
+        }
+        candidates.sort_unstable();
+        for operator_id in candidates {
+            let operator = &self.task.operators[operator_id.index()];
+            if !operator.condition.holds_propositionally(&state.values) {
+                continue;
+            }
+            let sizes = operator.sizes();
+            for index in 0..self.choices[operator_id.index()].len() {
+                let (choice, step) = &self.choices[operator_id.index()][index];
+                if operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
+                    let next = self.task.successor(&state, operator, choice);
+                    self.push(next, cost + step, steps + 1, Some((id, operator_id, index as u32)));
+                }
+            }
+        }
+    }
+
+    fn push(&mut self, state: State, cost: i64, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
+        let Some(estimate) = self.bounds.estimate(&state) else { return };
+        let id = self.nodes.len() as u32;
+        match self.seen.entry(state.values.clone().into_boxed_slice()) {
+            Entry::Vacant(entry) => {
+                entry.insert(vec![id]);
+            }
+            Entry::Occupied(mut entry) => {
+                let (nodes, monotone) = (&mut self.nodes, self.monotone);
+                let at_least = |a: &[i64], b: &[i64]| if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b };
+                let known = |id: &u32| &nodes[*id as usize];
+                let front = entry.get_mut();
+                if front.iter().any(|id| known(id).cost <= cost && at_least(&known(id).state.numbers, &state.numbers)) {
+                    return;
+                }
+                front.retain(|id| {
+                    let node = &mut nodes[*id as usize];
+                    node.dominated = cost <= node.cost && at_least(&state.numbers, &node.state.numbers);
+                    !node.dominated
+                });
+                front.push(id);
+            }
+        }
+        self.nodes.push(Node { state, cost, parent, dominated: false });
+        self.open.push(Reverse((cost + estimate, steps, id)));
+    }
+
+    fn plan(&self, goal: u32) -> GroundPlan {
+        let mut steps = Vec::new();
+        let mut at = goal;
+        while let Some((parent, operator, choice)) = self.nodes[at as usize].parent {
+            let choice = self.choices[operator.index()][choice as usize].0.clone();
+            steps.push(GroundStep { operator, choice });
+            at = parent;
+        }
+        steps.reverse();
+        GroundPlan { steps, cost: self.nodes[goal as usize].cost }
+    }
+}
+
+/// Whether more of any numeric variable can only help: it enters conditions and effects with factors ≥ 0.
+fn is_monotone(task: &Task) -> bool {
+    let conditions = task.operators.iter().map(|operator| &operator.condition).chain([&task.goal]);
+    let comparisons = conditions.flat_map(|condition| &condition.comparisons);
+    let effects = task.operators.iter().flat_map(|operator| &operator.numeric_effects).map(|effect| &effect.value);
+    comparisons.chain(effects).all(|linear| linear.coefficients.iter().all(|(_, factor)| *factor >= 0))
+}
+
+fn undominated(operator: &Operator, monotone: bool) -> Vec<(Vec<u16>, i64)> {
+    let sizes = operator.sizes();
+    let profile = |choice: &[u16]| -> Vec<i64> {
+        let effects = operator.numeric_effects.iter().map(|effect| effect.value.quantity.at(choice, &sizes));
+        let conditions = operator.condition.comparisons.iter().map(|linear| linear.quantity.at(choice, &sizes));
+        effects.chain(conditions).collect()
+    };
+    let mut front: Vec<(Vec<u16>, i64, Vec<i64>)> = Vec::new();
+    let no_worse = |a: &[i64], b: &[i64]| if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b };
+    for choice in operator.choices() {
+        let (cost, profile) = (operator.cost.at(&choice, &sizes), profile(&choice));
+        if front.iter().any(|(_, other, numbers)| *other <= cost && no_worse(numbers, &profile)) {
+            continue;
+        }
+        front.retain(|(_, other, numbers)| !(cost <= *other && no_worse(&profile, numbers)));
+        front.push((choice, cost, profile));
+    }
+    front.into_iter().map(|(choice, cost, _)| (choice, cost)).collect()
+}
+
+type FactIndex = FxHashMap<(u32, u32), Vec<OperatorId>>;
+
+/// Operators by that fact of their condition whose variable has the most values.
+fn index(task: &Task) -> (FactIndex, Vec<OperatorId>) {
+    let (mut by_fact, mut always) = (FactIndex::default(), Vec::new());
+    for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+        let widest = operator.condition.facts.iter().max_by_key(|fact| task.variables[fact.variable.index()].values.len());
+        match widest {
+            Some(fact) => by_fact.entry((fact.variable.0, fact.value)).or_default().push(id),
+            None => always.push(id),
+        }
+    }
+    (by_fact, always)
+}

@@ -1,0 +1,274 @@
+//! The ground task: finite-domain and numeric variables, and operators whose function designs are still open.
+//!
+//! After Bäckström and Nebel's SAS+ [1], with two additions: numeric variables hold exact integers, and an
+//! operator has *slots*, each to be filled with one function design. Conditions, costs and consumptions that
+//! depend on the designs are tables over slots, so k functions of m designs cost k·m choices, not m^k operators.
+//!
+//! [1] C. Bäckström, B. Nebel: Complexity results for SAS+ planning, Computational Intelligence 11(4), 1995.
+
+use crate::lifted::ObjectId;
+pub use crate::quantity::NumericId;
+use crate::quantity::{Linear, Quantity, SlotSet};
+
+/// A finite-domain variable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct VariableId(pub(crate) u32);
+
+/// An operator: an action schema with its arguments, apart from the function designs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct OperatorId(pub(crate) u32);
+
+/// A function whose design is chosen anew at every step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SlotId(pub(crate) u32);
+
+impl VariableId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl OperatorId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl SlotId {
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A variable has a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Fact {
+    /// The variable.
+    pub(crate) variable: VariableId,
+    /// The index of the value in the variable's domain.
+    pub(crate) value: u32,
+}
+
+/// A fact or its negation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct Literal {
+    pub(crate) fact: Fact,
+    pub(crate) positive: bool,
+}
+
+/// What must hold: all facts, one literal of every clause, and every linear expression at least zero.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+pub(crate) struct Condition {
+    pub(crate) facts: Vec<Fact>,
+    pub(crate) clauses: Vec<Vec<Literal>>,
+    /// Each is ≥ 0.
+    pub(crate) comparisons: Vec<Linear<i64>>,
+}
+
+/// A finite-domain variable: at every moment exactly one of its values holds.
+#[derive(Debug, Clone)]
+pub(crate) struct Variable {
+    /// Ground atoms as written, or `none of these`.
+    pub(crate) values: Vec<String>,
+}
+
+/// A numeric variable.
+#[derive(Debug, Clone)]
+pub(crate) struct NumericVariable {
+    /// The ground function.
+    pub(crate) name: String,
+    /// The integers of the task are this many times the values of the files.
+    pub(crate) scale: i64,
+}
+
+/// A function and the designs that may solve it.
+#[derive(Debug, Clone)]
+pub(crate) struct Slot {
+    pub(crate) function: String,
+    pub(crate) designs: Vec<ObjectId>,
+}
+
+/// How an operator uses a slot.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct SlotUse {
+    pub(crate) slot: SlotId,
+    /// Indices into the slot's designs, ascending: those that suit this operator.
+    pub(crate) designs: Vec<u16>,
+}
+
+/// Combinations of designs that an operator must not run with.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Forbidden {
+    /// Positions in the operator's slot list.
+    pub(crate) slots: SlotSet,
+    /// Each an index into `SlotUse::designs` for every slot of `slots`.
+    pub(crate) combinations: Vec<SlotSet>,
+}
+
+/// What an operator does to a numeric variable: the variable becomes this.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct NumericEffect {
+    pub(crate) variable: NumericId,
+    pub(crate) value: Linear<i64>,
+}
+
+/// An argument of an action: fixed, or the design of a slot (by position in the operator's slot list).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Argument {
+    Object(ObjectId),
+    Slot(u16),
+}
+
+/// An operator.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Operator {
+    /// Index of the action schema in the domain.
+    pub(crate) schema: u32,
+    pub(crate) arguments: Vec<Argument>,
+    /// Each function that the action requires, with the argument that is its design.
+    pub(crate) configuration: Vec<(ObjectId, Argument)>,
+    pub(crate) slots: Vec<SlotUse>,
+    pub(crate) forbidden: Vec<Forbidden>,
+    pub(crate) condition: Condition,
+    /// At most one value for each variable, ascending by variable.
+    pub(crate) effects: Vec<Fact>,
+    pub(crate) numeric_effects: Vec<NumericEffect>,
+    /// In the task's cost unit; may be negative where the metric rewards.
+    pub(crate) cost: Quantity<i64>,
+    /// In the task's time unit.
+    pub(crate) duration: Quantity<i64>,
+}
+
+/// A state: a value for each variable.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct State {
+    pub(crate) values: Vec<u32>,
+    pub(crate) numbers: Vec<i64>,
+}
+
+/// How integer costs relate to the metric of the problem file.
+#[derive(Debug, Clone)]
+pub struct Objective {
+    /// Costs are this many times the metric.
+    pub(crate) scale: i64,
+    /// Added to the sum of operator costs (in scaled units).
+    pub(crate) offset: i64,
+    /// Whether the file asks to maximize; operator costs are negated then.
+    pub(crate) maximize: bool,
+}
+
+/// A ground task.
+#[derive(Debug, Clone)]
+pub struct Task {
+    pub(crate) object_names: Vec<String>,
+    pub(crate) schema_names: Vec<String>,
+    pub(crate) variables: Vec<Variable>,
+    pub(crate) numerics: Vec<NumericVariable>,
+    pub(crate) slots: Vec<Slot>,
+    pub(crate) operators: Vec<Operator>,
+    pub(crate) initial: State,
+    pub(crate) goal: Condition,
+    pub(crate) objective: Objective,
+    /// Durations are this many times the values of the files.
+    pub(crate) time_scale: i64,
+    /// Set if relaxed reachability shows that the goal cannot be reached: the reason.
+    pub(crate) unreachable: Option<String>,
+}
+
+impl Operator {
+    /// How many designs each slot admits.
+    pub(crate) fn sizes(&self) -> Vec<usize> {
+        self.slots.iter().map(|slot| slot.designs.len()).collect()
+    }
+
+    /// Whether the combination (an index into `SlotUse::designs` for each slot) is not forbidden.
+    pub(crate) fn admits(&self, choice: &[u16]) -> bool {
+        self.forbidden.iter().all(|rule| {
+            rule.combinations.iter().all(|bad| rule.slots.iter().zip(bad).any(|(slot, design)| choice[*slot as usize] != *design))
+        })
+    }
+
+    /// All admitted combinations of designs, in lexicographic order.
+    pub(crate) fn choices(&self) -> Choices<'_> {
+        let empty = self.slots.iter().any(|slot| slot.designs.is_empty());
+        Choices { operator: self, sizes: self.sizes(), next: (!empty).then(|| vec![0; self.slots.len()]) }
+    }
+}
+
+/// Iterator over the admitted combinations of an operator's designs.
+pub(crate) struct Choices<'a> {
+    operator: &'a Operator,
+    sizes: Vec<usize>,
+    next: Option<Vec<u16>>,
+}
+
+impl Iterator for Choices<'_> {
+    type Item = Vec<u16>;
+
+    fn next(&mut self) -> Option<Vec<u16>> {
+        loop {
+            let current = self.next.take()?;
+            let mut following = current.clone();
+            for position in (0..following.len()).rev() {
+                following[position] += 1;
+                if (following[position] as usize) < self.sizes[position] {
+                    self.next = Some(following);
+                    break;
+                }
+                following[position] = 0;
+            }
+            if self.operator.admits(&current) {
+                return Some(current);
+            }
+        }
+    }
+}
+
+impl Linear<i64> {
+    /// The value in a state, for a combination of designs.
+    pub(crate) fn value(&self, numbers: &[i64], choice: &[u16], sizes: &[usize]) -> i64 {
+        let state: i64 = self.coefficients.iter().map(|(v, factor)| factor * numbers[v.index()]).sum();
+        state + self.quantity.at(choice, sizes)
+    }
+}
+
+impl Condition {
+    /// Whether the propositional part holds.
+    pub(crate) fn holds_propositionally(&self, values: &[u32]) -> bool {
+        let is = |fact: &Fact| values[fact.variable.index()] == fact.value;
+        self.facts.iter().all(is) && self.clauses.iter().all(|clause| clause.iter().any(|l| is(&l.fact) == l.positive))
+    }
+
+    /// Whether the numeric part holds.
+    pub(crate) fn holds_numerically(&self, numbers: &[i64], choice: &[u16], sizes: &[usize]) -> bool {
+        self.comparisons.iter().all(|comparison| comparison.value(numbers, choice, sizes) >= 0)
+    }
+}
+
+impl Task {
+    /// The state after an operator that is applicable with this combination of designs.
+    pub(crate) fn successor(&self, state: &State, operator: &Operator, choice: &[u16]) -> State {
+        let mut next = state.clone();
+        for effect in &operator.effects {
+            next.values[effect.variable.index()] = effect.value;
+        }
+        if !operator.numeric_effects.is_empty() {
+            let sizes = operator.sizes();
+            for effect in &operator.numeric_effects {
+                next.numbers[effect.variable.index()] = effect.value.value(&state.numbers, choice, &sizes);
+            }
+        }
+        next
+    }
+
+    /// Whether an operator may be applied with this combination of designs.
+    pub(crate) fn applicable(&self, state: &State, operator: &Operator, choice: &[u16]) -> bool {
+        operator.condition.holds_propositionally(&state.values)
+            && operator.condition.holds_numerically(&state.numbers, choice, &operator.sizes())
+    }
+
+    /// Whether a state satisfies the goal.
+    pub(crate) fn is_goal(&self, state: &State) -> bool {
+        self.goal.holds_propositionally(&state.values) && self.goal.holds_numerically(&state.numbers, &[], &[])
+    }
+}
