@@ -166,18 +166,20 @@ impl Builder {
                 }
             })
         };
-        let Some(index) = text(ORIGIN).and_then(|index| index.parse().ok()) else { return };
         let (label, enabled) = (text(rdfs::LABEL), text(swrla::IS_RULE_ENABLED));
         let enabled = enabled.map(|value| !["false", "0"].contains(&&*value));
-        let annotations =
-            annotations.into_iter().filter(|annotation| &*annotation.property != ORIGIN).collect();
+        let (origins, annotations): (Vec<_>, Vec<_>) =
+            annotations.into_iter().partition(|annotation| &*annotation.property == ORIGIN);
         let body = rule.body.iter().filter_map(|atom| self.atom(atom)).collect();
         let head = rule.head.iter().filter_map(|atom| self.atom(atom)).collect();
         let ontology = self.iri("");
-        self.rules.push((
-            index,
-            Rule { ontology, position: 0, iri: None, label, enabled, annotations, body, head },
-        ));
+        let rule = Rule { ontology, position: 0, iri: None, label, enabled, annotations, body, head };
+        // Several origins where equal rules without variables were taken for one.
+        let indices = origins.into_iter().filter_map(|origin| match origin.value {
+            AnnotationValue::Literal(index) => index.lexical.parse().ok(),
+            AnnotationValue::Iri(_) => None,
+        });
+        self.rules.extend(indices.map(|index| (index, rule.clone())));
     }
 
     /// An atom, or `None` for the one that stands for an empty body or head.
@@ -225,7 +227,8 @@ impl Builder {
         if let Some(individual) = name.strip_prefix(INDIVIDUAL) {
             return Argument::Individual(self.iri(individual));
         }
-        Argument::Variable(self.iri(name.strip_prefix(VARIABLE).unwrap_or(name)))
+        let numbered = name.strip_prefix(VARIABLE).and_then(|rest| rest.split_once(':'));
+        Argument::Variable(self.iri(numbered.map_or(name, |(_, own)| own)))
     }
 
     fn named(&mut self, individual: &ho::Individual<RcStr>) -> Iri {

@@ -8,6 +8,7 @@
 //! - [1] OWL 2 Web Ontology Language, Structural Specification and Functional-Style Syntax, W3C 2012.
 //! - [2] SWRL: A Semantic Web Rule Language Combining OWL and RuleML, W3C Member Submission 2004.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::error::Warning;
@@ -286,6 +287,15 @@ impl Ontology {
     /// [`crate::lower`] keeps one of them.
     pub fn rules(&self) -> &[Rule] {
         &self.rules
+    }
+
+    /// The named individuals: those declared, and those with a type; sorted.
+    pub fn individuals(&self) -> BTreeSet<&Iri> {
+        let typed = self.axioms.iter().filter_map(|annotated| match &annotated.axiom {
+            Axiom::ClassAssertion(_, individual) if !individual.starts_with(ANONYMOUS) => Some(individual),
+            _ => None,
+        });
+        self.entities(EntityKind::NamedIndividual).chain(typed).collect()
     }
 
     /// The IRIs of one kind, sorted.

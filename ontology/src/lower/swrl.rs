@@ -1,8 +1,8 @@
 //! SWRL rules to the engine's rules, each once.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
-use rules::{BuiltIn, RuleIdentity, Term};
+use rules::{BuiltIn, RuleIdentity, Term, Variable};
 
 use super::class;
 use super::context::{Conjunction, Context, Variables};
@@ -28,8 +28,7 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
             context.warnings.push(Warning::UnusableRule { ontology, position: rule.position, label, reason });
             continue;
         }
-        let content: Vec<_> =
-            context.rules[position..].iter().map(|r| (r.body.clone(), r.head.clone())).collect();
+        let content: Vec<_> = context.rules[position..].iter().map(canonical).collect();
         if !seen.insert(content) {
             context.rules.truncate(position);
             duplicates += 1;
@@ -38,6 +37,43 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
         }
     }
     duplicates
+}
+
+/// Body and head with the atoms of the body sorted and variables numbered from there. Equal for rules that differ in
+/// the names of variables or the order of atoms, unless a body has several atoms of one predicate.
+fn canonical(rule: &rules::Rule) -> (Vec<rules::Atom>, Vec<rules::Atom>) {
+    let blind = |_: Variable| Term::Variable(Variable(0));
+    let mut body = rule.body.clone();
+    body.sort_by_cached_key(|atom| format!("{:?}", renamed(atom, &mut { blind })));
+    let mut numbers = HashMap::new();
+    let mut number = |variable: Variable| {
+        let next = Variable(numbers.len() as u16);
+        Term::Variable(*numbers.entry(variable).or_insert(next))
+    };
+    let body = body.iter().map(|atom| renamed(atom, &mut number)).collect();
+    (body, rule.head.iter().map(|atom| renamed(atom, &mut number)).collect())
+}
+
+/// The atom with other variables.
+fn renamed(atom: &rules::Atom, name: &mut dyn FnMut(Variable) -> Term) -> rules::Atom {
+    use rules::Atom as A;
+    let mut term = |term: Term| match term {
+        Term::Variable(variable) => name(variable),
+        Term::Constant(_) => term,
+    };
+    match atom.clone() {
+        A::Relation { predicate, arguments } => {
+            A::Relation { predicate, arguments: arguments.into_iter().map(term).collect() }
+        }
+        A::Not { predicate, arguments } => {
+            A::Not { predicate, arguments: arguments.into_iter().map(term).collect() }
+        }
+        A::BuiltIn { built_in, arguments } => {
+            A::BuiltIn { built_in, arguments: arguments.into_iter().map(term).collect() }
+        }
+        A::Same(left, right) => A::Same(term(left), term(right)),
+        A::Different(left, right) => A::Different(term(left), term(right)),
+    }
 }
 
 fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Result<(), String> {

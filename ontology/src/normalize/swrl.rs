@@ -14,7 +14,8 @@ use crate::graph::{Graph, subject_of};
 use crate::owl::{ANONYMOUS, Iri};
 use crate::vocab::{owl, rdf, swrl};
 
-/// What the IRIs of rule variables start with.
+/// What the IRIs of rule variables start with; the rule's index and a colon follow. Two rules never share a variable,
+/// or horned-owl would take equal rules of two ontologies for one and mix their annotations.
 pub(crate) const VARIABLE: &str = "urn:metaplan:variable:";
 /// What the IRI of a variable starts with that stands for an individual.
 pub(crate) const INDIVIDUAL: &str = "urn:metaplan:individual:";
@@ -36,6 +37,7 @@ pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut 
         };
         let origin = Origin { ontology: ontology.clone(), position: positions[part], iri };
         positions[part] += 1;
+        pass.rule = origins.len();
         match pass.read(graph, &node) {
             Ok((body, head)) => {
                 warnings.extend(pass.unknown.drain(..).map(|iri| Warning::UnknownArgument {
@@ -43,7 +45,7 @@ pub(crate) fn rewrite(graph: &mut Graph, parts: &[(usize, Iri)], warnings: &mut 
                     ontology: origin.ontology.to_string(),
                     position: origin.position,
                 }));
-                pass.write(graph, &node, origins.len(), &body, &head);
+                pass.write(graph, &node, &body, &head);
                 origins.push(origin);
             }
             Err(reason) => {
@@ -79,6 +81,8 @@ struct Pass {
     data_properties: HashSet<Term>,
     /// Triples that are replaced.
     rubbish: HashSet<usize>,
+    /// Index of the current rule.
+    rule: usize,
     /// Canonical variables used.
     used: Vec<NamedNode>,
     /// Arguments of the current rule that are neither variables nor known.
@@ -107,7 +111,7 @@ impl Pass {
                 known.insert(triple.object.clone());
             }
         }
-        Self { variables, known, data_properties, rubbish, used: Vec::new(), unknown: Vec::new() }
+        Self { variables, known, data_properties, rubbish, rule: 0, used: Vec::new(), unknown: Vec::new() }
     }
 
     fn read(&mut self, graph: &Graph, rule: &NamedOrBlankNode) -> Result<(Vec<Atom>, Vec<Atom>), String> {
@@ -223,7 +227,7 @@ impl Pass {
             Term::BlankNode(node) => node.as_str(),
             Term::Literal(literal) => literal.value(),
         };
-        self.canonical(format!("{VARIABLE}{name}"))
+        self.canonical(format!("{VARIABLE}{}:{name}", self.rule))
     }
 
     /// A data atom's subject: horned-owl has variables there, and no individuals.
@@ -243,14 +247,7 @@ impl Pass {
     }
 
     /// Adds the canonical form of a rule, with the annotations of `old`.
-    fn write(
-        &mut self,
-        graph: &mut Graph,
-        old: &NamedOrBlankNode,
-        index: usize,
-        body: &[Atom],
-        head: &[Atom],
-    ) {
+    fn write(&mut self, graph: &mut Graph, old: &NamedOrBlankNode, body: &[Atom], head: &[Atom]) {
         let rule = NamedOrBlankNode::from(graph.fresh());
         graph.state(&rule, rdf::TYPE, NamedNode::new_unchecked(swrl::IMP));
         for (part, atoms) in [(swrl::BODY, body), (swrl::HEAD, head)] {
@@ -262,7 +259,7 @@ impl Pass {
             let list = graph.add_list(nodes, Some(swrl::ATOM_LIST));
             graph.state(&rule, part, list);
         }
-        graph.state(&rule, ORIGIN, Literal::new_simple_literal(index.to_string()));
+        graph.state(&rule, ORIGIN, Literal::new_simple_literal(self.rule.to_string()));
         let annotations: Vec<_> = graph.of(old).map(|(index, triple)| (index, triple.clone())).collect();
         for (index, triple) in annotations {
             let predicate = triple.predicate.as_str();
