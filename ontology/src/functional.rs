@@ -1,12 +1,13 @@
-//! Axioms as text in functional-style syntax, with IRIs in full: for messages, and as labels of the rules that stand
-//! for axioms.
+//! Axioms as text in functional-style syntax, and rules in SWRL's human-readable syntax, with IRIs in full: for
+//! messages, and as labels of the rules that stand for axioms.
 
 use std::fmt::{Display, Formatter, Result};
 
 use crate::owl::{
-    Axiom, Bound, Characteristic, ClassExpression, DataRange, Iri, Literal, ObjectPropertyExpression,
+    Argument, Atom, Axiom, Bound, Characteristic, ClassExpression, DataRange, Iri, Literal,
+    ObjectPropertyExpression, Rule,
 };
-use crate::vocab::xsd;
+use crate::vocab::{local_name, xsd};
 
 /// `Name(argument argument …)`.
 fn call(f: &mut Formatter<'_>, name: &str, arguments: &[&dyn Display]) -> Result {
@@ -193,5 +194,39 @@ fn fmt_data_or_assertion(axiom: &Axiom, f: &mut Formatter<'_>) -> Result {
             call(f, "NegativeDataPropertyAssertion", &[&Angle(property), &Angle(from), to])
         }
         other => write!(f, "{other:?}"),
+    }
+}
+
+impl Display for Argument {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match self {
+            Self::Variable(iri) => write!(f, "?{}", local_name(iri)),
+            Self::Individual(iri) => Angle(iri).fmt(f),
+            Self::Literal(literal) => literal.fmt(f),
+        }
+    }
+}
+
+impl Display for Atom {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        match self {
+            Self::Class(class, x) => write!(f, "{class}({x})"),
+            Self::DataRange(range, x) => write!(f, "{range}({x})"),
+            Self::ObjectProperty(property, x, y) => write!(f, "{property}({x}, {y})"),
+            Self::DataProperty(property, x, y) => write!(f, "<{property}>({x}, {y})"),
+            Self::SameIndividual(x, y) => write!(f, "sameAs({x}, {y})"),
+            Self::DifferentIndividuals(x, y) => write!(f, "differentFrom({x}, {y})"),
+            Self::BuiltIn(built_in, arguments) => {
+                let arguments: Vec<_> = arguments.iter().map(ToString::to_string).collect();
+                write!(f, "<{built_in}>({})", arguments.join(", "))
+            }
+        }
+    }
+}
+
+impl Display for Rule {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let join = |atoms: &[Atom]| atoms.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ^ ");
+        write!(f, "{} -> {}", join(&self.body), join(&self.head))
     }
 }

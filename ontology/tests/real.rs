@@ -1,5 +1,7 @@
 //! Every real knowledge base loads, alone and with its imports, with the inventory recorded in `golden/README.md`.
 
+#![allow(clippy::print_stdout)] // a skipped test says so
+
 use std::path::{Path, PathBuf};
 
 use ontology::EntityKind::{AnnotationProperty, Class, DataProperty, ObjectProperty};

@@ -3,7 +3,7 @@
 //! OWL makes no unique-name assumption: two names may stand for one individual, and a functional property with two
 //! values says that they do. `sameAs` is then an equivalence (eq-sym, eq-trans) under which every relation is closed
 //! (eq-rep-s, eq-rep-o). Pairs of one name with itself are not derived; nothing needs them. `differentFrom` is what
-//! is stated, and what follows from disjoint classes and from unequal values of functional data properties; it is
+//! is stated, and what follows from disjoint classes and from different values of functional properties; it is
 //! derived only where some rule asks for it.
 //!
 //! The engine itself compares symbols. So under the unique-name assumption of [`Equality::UniqueNames`] no rule of
@@ -15,7 +15,7 @@ use rules::{Atom, Rule, RuleIdentity, Symbol, Term};
 
 use super::context::{Context, Variables};
 use super::{AXIOM_SOURCE, INTERNAL};
-use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression};
+use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression};
 use crate::vocab::owl;
 
 /// Whether two names can stand for one individual.
@@ -120,6 +120,16 @@ fn difference(axioms: &[AnnotatedAxiom], context: &mut Context) {
                         }
                     }
                 }
+            }
+            Axiom::ObjectPropertyCharacteristic(Characteristic::Functional, property) => {
+                let (first, second) = (context.property(property, x, p), context.property(property, y, q));
+                let body = vec![first, second, differ(context, p, q)];
+                context.rule(&identity, vec![forward.clone()], body, &variables);
+            }
+            Axiom::ObjectPropertyCharacteristic(Characteristic::InverseFunctional, property) => {
+                let (first, second) = (context.property(property, p, x), context.property(property, q, y));
+                let body = vec![first, second, differ(context, p, q)];
+                context.rule(&identity, vec![forward.clone()], body, &variables);
             }
             Axiom::FunctionalDataProperty(property) => {
                 let first = context.relation(property, [x, p]);
