@@ -353,7 +353,6 @@ impl Builder {
     }
 
     /// The axiom, or `None` for components that are none (ontology headers, annotation axioms).
-    #[allow(clippy::too_many_lines)] // one arm an axiom of the specification
     fn axiom(&mut self, component: &Component<RcStr>) -> Option<Axiom> {
         use Characteristic as C;
         let characteristic =
@@ -479,6 +478,10 @@ fn term(term: &Term<RcStr>) -> String {
         Term::RDF(word) => format!("<{}>", &***word),
         Term::RDFS(word) => format!("<{}>", &***word),
         Term::SWRL(word) => format!("<{}>", &***word),
-        other => format!("{other:?}"),
+        // The label of a blank node is private; its debug form shows it in quotes.
+        other => {
+            let text = format!("{other:?}");
+            text.split('"').nth(1).map_or_else(|| text.clone(), |label| format!("_:{label}"))
+        }
     }
 }

@@ -51,12 +51,15 @@ fn check_chains(graph: &mut Graph, warnings: &mut Vec<Warning>) {
         .map(|(index, triple)| (index, triple.object.clone(), triple.subject.to_string()))
         .collect();
     for (index, head, property) in chains {
-        let fault = match graph.list(&head) {
-            Ok(list) if list.items.len() < 2 => Some("a property chain has two members or more".to_owned()),
-            Ok(list) => list.items.iter().find_map(|item| chain_fault(graph, item)),
-            Err(reason) => Some(reason),
+        let (fault, spine) = match graph.list(&head) {
+            Ok(list) if list.items.len() < 2 => {
+                (Some("a property chain has two members or more".to_owned()), list.spine)
+            }
+            Ok(list) => (list.items.iter().find_map(|item| chain_fault(graph, item)), list.spine),
+            Err(reason) => (Some(reason), Vec::new()),
         };
         if let Some(reason) = fault {
+            take(graph, spine);
             warnings.push(Warning::Unread { statement: format!("property chain of {property}"), reason });
             graph.take(index);
         }

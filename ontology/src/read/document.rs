@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term, Triple};
 
-use super::syntax::Syntax;
+use super::syntax::{self, Syntax};
 use crate::error::{Error, Position};
 use crate::horned;
 use crate::vocab::{owl, rdf};
@@ -37,11 +37,11 @@ pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result
         Syntax::Turtle => parse_turtle(text, name, base)?,
         Syntax::RdfXml => parse_rdf_xml(text, name, base)?,
         Syntax::OwlXml | Syntax::Functional => {
-            let rdf_xml = horned::transcribe(text, syntax).map_err(|fault| {
+            let ntriples = horned::transcribe(text, syntax).map_err(|fault| {
                 let position = Position::of_offset(name, text, fault.offset);
                 vec![Error::Malformed { position, syntax, message: fault.message }]
             })?;
-            parse_rdf_xml(&rdf_xml, name, base)?
+            parse_turtle(&ntriples, name, base)?
         }
     };
     let triples = rename_blank_nodes(triples, prefix);
@@ -134,6 +134,12 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec
                 return Err(vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]);
             }
         }
+    }
+    // The parser takes the end of the text for the end of the document, wherever it is.
+    if let Some(root) = syntax::unclosed_root(text) {
+        let position = Position::of_offset(name, text, text.len());
+        let message = format!("the document ends before </{root}>");
+        return Err(vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]);
     }
     Ok(triples)
 }

@@ -36,7 +36,7 @@ impl Syntax {
         let head = skip_comments(text);
         if head.starts_with(b"<") && !is_iri_reference(head) {
             return match xml_root(head) {
-                Some(root) if root.ends_with(b"Ontology") && !root.starts_with(b"owl:") => Self::OwlXml,
+                Some((root, _)) if root.ends_with(b"Ontology") && !root.starts_with(b"owl:") => Self::OwlXml,
                 _ => Self::RdfXml,
             };
         }
@@ -68,8 +68,8 @@ fn is_iri_reference(text: &[u8]) -> bool {
         && !text[1..end].starts_with(b"!")
 }
 
-/// The name of the first element after the XML declaration, comments and document type.
-fn xml_root(mut text: &[u8]) -> Option<&[u8]> {
+/// The name of the first element after the XML declaration, comments and document type, and what follows the name.
+fn xml_root(mut text: &[u8]) -> Option<(&[u8], &[u8])> {
     loop {
         text = &text[text.iter().position(|&byte| byte == b'<')? + 1..];
         let end: &[u8] = match text.first()? {
@@ -80,11 +80,32 @@ fn xml_root(mut text: &[u8]) -> Option<&[u8]> {
             _ => {
                 let end =
                     text.iter().position(|&byte| byte.is_ascii_whitespace() || b"/>".contains(&byte))?;
-                return Some(&text[..end]);
+                return Some(text.split_at(end));
             }
         };
         text = &text[text.windows(end.len()).position(|window| window == end)? + end.len()..];
     }
+}
+
+/// The name of the root element, if nothing closes it.
+pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
+    let (root, rest) = xml_root(text)?;
+    let close = [b"</", root].concat();
+    if text.windows(close.len()).rev().any(|window| window == close) {
+        return None;
+    }
+    let (mut quote, mut previous) = (None, b' ');
+    for &byte in rest {
+        match (quote, byte) {
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(open), _) if open == byte => quote = None,
+            (None, b'>') if previous == b'/' => return None,
+            (None, b'>') => break,
+            _ => {}
+        }
+        previous = byte;
+    }
+    Some(String::from_utf8_lossy(root).into_owned())
 }
 
 /// Whether a `!DOCTYPE` has an internal subset, which contains `>` itself.

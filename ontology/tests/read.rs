@@ -1,0 +1,392 @@
+//! Reading: syntaxes, imports, repairs of what horned-owl would lose, and errors with their places.
+
+use std::path::{Path, PathBuf};
+
+use ontology::{Error, Ontology, ReadOptions, Syntax, read_files, read_text};
+
+const PREFIXES: &str = "@prefix : <http://e/#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix swrl: <http://www.w3.org/2003/11/swrl#> .
+@prefix swrlb: <http://www.w3.org/2003/11/swrlb#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+:C a owl:Class . :D a owl:Class . :p a owl:ObjectProperty . :q a owl:ObjectProperty . :d a owl:DatatypeProperty .
+:i a owl:NamedIndividual . :x a swrl:Variable . :y a swrl:Variable .
+";
+
+fn turtle(body: &str) -> Ontology {
+    read_text(&format!("{PREFIXES}{body}"), "test.ttl", &ReadOptions::default()).expect("well-formed")
+}
+
+/// Rules and logical axioms as text, with `http://e/#` taken out.
+fn shown(ontology: &Ontology) -> Vec<String> {
+    let rules = ontology.rules().iter().map(ToString::to_string);
+    let axioms = ontology.axioms.iter().map(|annotated| annotated.axiom.to_string());
+    rules.chain(axioms).map(|text| text.replace("<http://e/#", "<")).collect()
+}
+
+fn warnings(ontology: &Ontology) -> Vec<String> {
+    ontology.warnings.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn every_syntax_gives_the_same_ontology() {
+    let documents = [
+        (
+            Syntax::Turtle,
+            "@prefix : <http://e/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
+             <http://e/> a owl:Ontology . :C a owl:Class . :i a owl:NamedIndividual , :C .",
+        ),
+        (
+            Syntax::Turtle,
+            "<http://e/> <http://www.w3.org/1999/02/22-rdf-syntax-ns#type> <http://www.w3.org/2002/07/owl#Ontology> .\n\
+             <http://e/#C> <http://www.w3.org/1999/02/22-rdf-syntax-ns#type> <http://www.w3.org/2002/07/owl#Class> .\n\
+             <http://e/#i> <http://www.w3.org/1999/02/22-rdf-syntax-ns#type> \
+             <http://www.w3.org/2002/07/owl#NamedIndividual> .\n\
+             <http://e/#i> <http://www.w3.org/1999/02/22-rdf-syntax-ns#type> <http://e/#C> .",
+        ),
+        (
+            Syntax::RdfXml,
+            "<!DOCTYPE rdf:RDF [ <!ENTITY owl \"http://www.w3.org/2002/07/owl#\"> ]>\n\
+             <rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\" xmlns:owl=\"&owl;\" xmlns=\"http://e/#\">\n\
+             <owl:Ontology rdf:about=\"http://e/\"/><owl:Class rdf:about=\"http://e/#C\"/>\n\
+             <C rdf:about=\"http://e/#i\"><rdf:type rdf:resource=\"&owl;NamedIndividual\"/></C></rdf:RDF>",
+        ),
+        (
+            Syntax::OwlXml,
+            "<?xml version=\"1.0\"?>\n<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\" ontologyIRI=\"http://e/\">\n\
+             <Declaration><Class IRI=\"http://e/#C\"/></Declaration>\n\
+             <Declaration><NamedIndividual IRI=\"http://e/#i\"/></Declaration>\n\
+             <ClassAssertion><Class IRI=\"http://e/#C\"/><NamedIndividual IRI=\"http://e/#i\"/></ClassAssertion>\n\
+             </Ontology>",
+        ),
+        (
+            Syntax::Functional,
+            "Prefix(:=<http://e/#>)\nOntology(<http://e/>\nDeclaration(Class(:C))\nDeclaration(NamedIndividual(:i))\n\
+             ClassAssertion(:C :i)\n)",
+        ),
+    ];
+    for (syntax, text) in documents {
+        let ontology =
+            read_text(text, "document", &ReadOptions::default()).unwrap_or_else(|e| panic!("{e:?}"));
+        assert_eq!(ontology.sources[0].syntax, syntax);
+        assert_eq!(ontology.iri().map(|iri| &**iri), Some("http://e/"), "{syntax}");
+        assert_eq!(shown(&ontology), ["ClassAssertion(<C> <i>)"], "{syntax}");
+        assert_eq!(ontology.entities.len(), 2, "{syntax}");
+        assert_eq!(warnings(&ontology), [""; 0], "{syntax}");
+    }
+}
+
+/// What horned-owl loses in each of these, with the numbers of the list in the file `normalize/mod.rs` describes.
+#[test]
+fn rules_in_unusual_shapes_are_read() {
+    let atom = |class: &str, x: &str| {
+        format!("[ a swrl:ClassAtom ; swrl:classPredicate {class} ; swrl:argument1 {x} ]")
+    };
+    let data = |x: &str, v: &str| {
+        format!(
+            "[ a swrl:DatavaluedPropertyAtom ; swrl:propertyPredicate :d ; swrl:argument1 {x} ; swrl:argument2 {v} ]"
+        )
+    };
+    let rule = |body: &str, head: &str| format!("[] a swrl:Imp ; swrl:body {body} ; swrl:head {head} .");
+    let (c, d) = (atom(":C", ":x"), atom(":D", ":x"));
+    let cases = [
+        // A rule with an IRI, and lists without type.
+        (format!(":r a swrl:Imp ; swrl:body ( {c} ) ; swrl:head ( {d} ) ."), "<C>(?x) -> <D>(?x)"),
+        // A data atom about an individual, in the body and in the head.
+        (
+            rule(&format!("( {c} {} )", data(":i", ":y")), &format!("( {d} )")),
+            "<C>(?x) ^ <d>(<i>, ?y) -> <D>(?x)",
+        ),
+        (
+            rule(&format!("( {c} )"), &format!("( {} )", data(":i", "1"))),
+            "<C>(?x) -> <d>(<i>, \"1\"^^<xsd:integer>)",
+        ),
+        // Empty body, missing body, empty head.
+        (rule("rdf:nil", &format!("( {} )", atom(":C", ":i"))), " -> <C>(<i>)"),
+        (format!("[] a swrl:Imp ; swrl:head ( {} ) .", atom(":C", ":i")), " -> <C>(<i>)"),
+        (rule(&format!("( {c} {d} )"), "rdf:nil"), "<C>(?x) ^ <D>(?x) -> "),
+        // Atoms with an annotation or an IRI.
+        (
+            format!(
+                ":a rdfs:comment \"extra\" ; a swrl:ClassAtom , owl:Thing ; swrl:classPredicate :C ; swrl:argument1 :x . {}",
+                rule("( :a )", &format!("( {d} )"))
+            ),
+            "<C>(?x) -> <D>(?x)",
+        ),
+        // A list that is body of one rule and head of another.
+        (format!("{} _:l rdf:first {c} ; rdf:rest rdf:nil .", rule("_:l", "_:l")), "<C>(?x) -> <C>(?x)"),
+        // A blank node as individual and as variable.
+        (
+            format!(
+                "_:b a :C . _:v a swrl:Variable . {}",
+                rule(&format!("( {} )", atom(":C", "_:v")), &format!("( {} )", atom(":D", "_:b")))
+            ),
+            "<C>(?d0b1) -> <D>(<urn:metaplan:anonymous:d0b0>)",
+        ),
+        // A class expression.
+        (
+            rule(
+                &format!(
+                    "( {} )",
+                    atom("[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :D ]", ":x")
+                ),
+                &format!("( {c} )"),
+            ),
+            "ObjectSomeValuesFrom(<p> <D>)(?x) -> <C>(?x)",
+        ),
+        (
+            rule(
+                &format!(
+                    "( {} [ a swrl:BuiltinAtom ; swrl:builtin swrlb:lessThan ; swrl:arguments ( :y 2 ) ] )",
+                    data(":x", ":y")
+                ),
+                &format!("( {c} )"),
+            ),
+            "<d>(?x, ?y) ^ <swrlb:lessThan>(?y, \"2\"^^<xsd:integer>) -> <C>(?x)",
+        ),
+    ];
+    for (text, expected) in cases {
+        let ontology = turtle(&text);
+        let rules = ontology.rules().iter().map(ToString::to_string);
+        let rules: Vec<_> = rules
+            .map(|rule| {
+                rule.replace("<http://e/#", "<").replace("<http://www.w3.org/2001/XMLSchema#", "<xsd:")
+            })
+            .map(|rule| rule.replace("<http://www.w3.org/2003/11/swrlb#", "<swrlb:"))
+            .collect();
+        assert_eq!(rules, [expected], "{text}\n{:?}", warnings(&ontology));
+    }
+}
+
+#[test]
+fn axioms_in_unusual_shapes_are_read() {
+    for (text, expected) in [
+        (
+            "[] a owl:AllDisjointClasses ; owl:members ( :C :D :E ) . :E a owl:Class .",
+            &["DisjointClasses(<C> <D>)", "DisjointClasses(<C> <E>)", "DisjointClasses(<D> <E>)"][..],
+        ),
+        (
+            "[] a owl:AllDisjointProperties ; owl:members ( :p :q ) .",
+            &["DisjointObjectProperties(<p> <q>)"],
+        ),
+        ("_:b a :C ; :p :i .", &[
+            "ClassAssertion(<C> <urn:metaplan:anonymous:d0b0>)",
+            "ObjectPropertyAssertion(<p> <urn:metaplan:anonymous:d0b0> <i>)",
+        ]),
+        // One enumeration for two ranges.
+        (
+            ":e a owl:DatatypeProperty . :d rdfs:range _:r . :e rdfs:range [ a rdfs:Datatype ; owl:oneOf _:l ] .
+             _:r a rdfs:Datatype ; owl:oneOf _:l . _:l rdf:first \"A\" ; rdf:rest rdf:nil .",
+            &["DataPropertyRange(<d> DataOneOf(\"A\"))", "DataPropertyRange(<e> DataOneOf(\"A\"))"],
+        ),
+        (":r owl:propertyChainAxiom ( :p :q ) . :r a owl:ObjectProperty .", &[
+            "SubObjectPropertyOf(ObjectPropertyChain(<p> <q>) <r>)",
+        ]),
+    ] {
+        let ontology = turtle(text);
+        assert_eq!(shown(&ontology), expected, "{text}\n{:?}", warnings(&ontology));
+        assert_eq!(warnings(&ontology), [""; 0], "{text}");
+    }
+}
+
+#[test]
+fn what_is_not_read_as_written_is_a_warning() {
+    for (text, expected) in [
+        (
+            ":i :undeclared 1 .",
+            "warning[O201]: <http://e/#undeclared> is declared nowhere; read as a data property because of its use",
+        ),
+        (
+            ":i :undeclared :i .",
+            "warning[O201]: <http://e/#undeclared> is declared nowhere; read as an object property because of its use",
+        ),
+        (
+            ":i a :Undeclared .",
+            "warning[O201]: <http://e/#Undeclared> is declared nowhere; read as a class because of its use",
+        ),
+        (
+            ":C :undeclared 1 .",
+            "warning[O201]: <http://e/#undeclared> is declared nowhere; read as an annotation property because of its use",
+        ),
+        (
+            ":p owl:propertyChainAxiom ( :q 5 ) .",
+            "warning[O202]: not read: property chain of <http://e/#p> (\"5\"^^<http://www.w3.org/2001/XMLSchema#integer> is not a property)",
+        ),
+        (
+            ":i :p 5 .",
+            "warning[O202]: not read: <http://e/#i> <http://e/#p> \"5\" (part of no axiom or rule)",
+        ),
+        (
+            "[] rdfs:comment \"of nothing\" .",
+            "warning[O202]: not read: <http://www.w3.org/2000/01/rdf-schema#comment> of 1 blank nodes (nothing else is said of them)",
+        ),
+        (
+            "[] a swrl:Imp ; rdfs:label \"R\" ; swrl:body ( 5 ) ; swrl:head rdf:nil .",
+            "warning[O203]: rule <test.ttl>#0 (R) is left out: the literal \"5\"^^<http://www.w3.org/2001/XMLSchema#integer> stands where an atom should",
+        ),
+        (
+            "[] a swrl:Imp ; swrl:body _:l ; swrl:head rdf:nil . _:l rdf:first :a ; rdf:rest _:l .",
+            "warning[O203]: rule <test.ttl>#0 is left out: the list at _:d0b1 runs in a circle",
+        ),
+        (
+            "[] a swrl:Imp ; swrl:body ( [ a swrl:ClassAtom ; swrl:classPredicate :C ; swrl:argument1 :z ] ) ; swrl:head rdf:nil .",
+            "warning[O204]: <http://e/#z> in rule <test.ttl>#0 is neither a declared variable nor an individual of the knowledge base; read as an individual",
+        ),
+    ] {
+        let warnings = warnings(&turtle(text));
+        assert_eq!(warnings.last().map(String::as_str), Some(expected), "{text}\n{warnings:#?}");
+    }
+}
+
+#[test]
+fn malformed_documents_are_errors_with_a_place() {
+    let rdf = "<rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\">\n";
+    for (text, expected) in [
+        ("@prefix : <http://e/#> .\n:a :b owl:Class .", &["f:2:7: error[O102]: not well-formed Turtle"][..]),
+        (":a :b", &["f:1:1: error[O102]: not well-formed Turtle"]),
+        ("not an ontology at all", &["f:1:1: error[O102]: not well-formed Turtle"]),
+        (
+            &format!("{rdf}<owl:Class rdf:about=\"x\"/></rdf:RDF>"),
+            &["f:2:27: error[O102]: not well-formed RDF/XML"],
+        ),
+        (&format!("{rdf}<rdf:Description></rdf:RDF>"), &["f:2:28: error[O102]: not well-formed RDF/XML"]),
+        (rdf, &["f:2:1: error[O102]: not well-formed RDF/XML"]),
+        (
+            "Prefix(:=<http://e/#>)\nOntology(<http://e/>\nClassAssertion(:C))",
+            &["f:3:18: error[O102]: not well-formed functional"],
+        ),
+        (
+            "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\"><Declaration>",
+            &["f:1:63: error[O102]: not well-formed OWL/XML"],
+        ),
+    ] {
+        let errors = read_text(text, "f", &ReadOptions::default()).expect_err(text);
+        let errors: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        for (error, expected) in errors.iter().zip(expected) {
+            assert!(error.starts_with(expected), "{text}\n{errors:#?}");
+        }
+    }
+}
+
+#[test]
+fn a_missing_file_is_an_error() {
+    let errors =
+        read_files(&[Path::new("/nonexistent/kb.owl")], &ReadOptions::default()).expect_err("missing");
+    assert!(matches!(&errors[..], [Error::Unreadable { .. }]), "{errors:?}");
+}
+
+/// Files by name in a new directory.
+fn directory(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    for (name, text) in files {
+        let path = directory.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("parent")).expect("directory");
+        std::fs::write(path, text).expect("written");
+    }
+    directory
+}
+
+fn importing(iri: &str, imports: &[&str]) -> String {
+    let imports: Vec<_> = imports.iter().map(|import| format!(" ; owl:imports <{import}>")).collect();
+    format!("@prefix owl: <http://www.w3.org/2002/07/owl#> .\n<{iri}> a owl:Ontology{} .", imports.concat())
+}
+
+#[test]
+fn imports_are_found_on_this_machine() {
+    let tomasys = importing("http://metacontrol.example/tomasys", &[]);
+    let url = "https://raw.example/acme/mc_mdl/ros2/owl/tomasys.owl";
+    let catalog = format!(
+        "<catalog xmlns=\"urn:oasis:names:tc:entity:xmlns:xml:catalog\"><uri name=\"{url}\" uri=\"x/t.ttl\"/></catalog>"
+    );
+    let root = |import: &str| importing("http://e/root", &[import]);
+    // Files, whether `lib` is searched, whether `c.xml` is given as a catalog, file that must be found.
+    let cases = [
+        (vec![("a.ttl", root("b.ttl")), ("b.ttl", tomasys.clone())], false, false, Some("b.ttl")),
+        (
+            vec![("a.ttl", root("http://metacontrol.example/tomasys")), ("b.owl", tomasys.clone())],
+            false,
+            false,
+            Some("b.owl"),
+        ),
+        (vec![("a.ttl", root(url)), ("tomasys.owl", tomasys.clone())], false, false, Some("tomasys.owl")),
+        (
+            vec![
+                ("a.ttl", root(url)),
+                ("lib/mc_mdl/tomasys.owl", tomasys.clone()),
+                ("lib/a/tomasys.owl", importing("http://other/", &[])),
+            ],
+            true,
+            false,
+            Some("lib/mc_mdl/tomasys.owl"),
+        ),
+        (
+            vec![("a.ttl", root(url)), ("x/t.ttl", tomasys.clone()), ("catalog-v001.xml", catalog.clone())],
+            false,
+            false,
+            Some("x/t.ttl"),
+        ),
+        (
+            vec![("a.ttl", root(url)), ("x/t.ttl", tomasys.clone()), ("c.xml", catalog.clone())],
+            false,
+            true,
+            Some("x/t.ttl"),
+        ),
+        (vec![("a.ttl", root(url)), ("lib/other.owl", tomasys)], true, false, None),
+    ];
+    for (files, search, with_catalog, expected) in cases {
+        let files: Vec<_> = files.iter().map(|(name, text)| (*name, text.as_str())).collect();
+        let directory = directory(&files);
+        let options = ReadOptions {
+            catalogs: if with_catalog { vec![directory.path().join("c.xml")] } else { Vec::new() },
+            directories: if search { vec![directory.path().join("lib")] } else { Vec::new() },
+            ..ReadOptions::default()
+        };
+        let result = read_files(&[directory.path().join("a.ttl")], &options);
+        if let Some(file) = expected {
+            let ontology = result.unwrap_or_else(|errors| panic!("{file}: {errors:?}"));
+            assert_eq!(ontology.sources.len(), 2, "{file}");
+            assert!(ontology.sources[1].name.ends_with(file), "{}", ontology.sources[1].name);
+        } else {
+            let errors = result.expect_err("unresolved");
+            let [error @ Error::UnresolvedImport { import, .. }] = &errors[..] else { panic!("{errors:?}") };
+            assert_eq!(import, url);
+            assert!(error.to_string().contains("name a directory that contains it, or a catalog"), "{error}");
+        }
+    }
+}
+
+#[test]
+fn our_tomasys_is_found_without_any_file() {
+    let text = importing("http://e/root", &["http://metacontrol.org/tomasys"]);
+    let ontology = read_text(&text, "root", &ReadOptions::default()).expect("embedded");
+    assert_eq!(ontology.sources[1].name, "http://metacontrol.org/tomasys");
+}
+
+#[test]
+fn circles_and_repetitions_of_imports_end() {
+    let (a, b) =
+        (importing("http://e/a", &["b.ttl"]), importing("http://e/b", &["a.ttl", "http://e/a", "b.ttl"]));
+    let directory = directory(&[("a.ttl", &a), ("b.ttl", &b)]);
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(directory.path(), directory.path().join("loop")).expect("link");
+    let files: Vec<PathBuf> =
+        ["a.ttl", "b.ttl", "a.ttl"].iter().map(|name| directory.path().join(name)).collect();
+    let options = ReadOptions { directories: vec![directory.path().to_owned()], ..ReadOptions::default() };
+    let ontology = read_files(&files, &options).expect("finite");
+    assert_eq!(ontology.sources.len(), 2);
+}
+
+#[test]
+fn one_ontology_iri_twice_is_reported() {
+    let text =
+        |comment: &str| format!("{}\n<http://e/a#x> a owl:Class . # {comment}", importing("http://e/a", &[]));
+    let directory = directory(&[("a.ttl", &text("one")), ("b.ttl", &text("two")), ("c.ttl", &text("two"))]);
+    let files: Vec<PathBuf> =
+        ["a.ttl", "b.ttl", "c.ttl"].iter().map(|name| directory.path().join(name)).collect();
+    let ontology = read_files(&files, &ReadOptions::default()).expect("readable");
+    assert_eq!(ontology.sources.len(), 2, "equal texts are one document");
+    let [warning] = &warnings(&ontology)[..] else { panic!("{:?}", ontology.warnings) };
+    assert!(warning.contains("both declare the ontology <http://e/a>; both are read"), "{warning}");
+}
