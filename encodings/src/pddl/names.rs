@@ -3,7 +3,10 @@
 /// The known name that is most like `written`, if one is like it at all; of equally near ones the first.
 pub(crate) fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     let written = written.to_ascii_lowercase();
-    let limit = (written.chars().count() / 3).clamp(1, 3);
+    let limit = match written.chars().count() {
+        0 | 1 => 0,
+        length => (length / 3).clamp(1, 3),
+    };
     let mut best: Option<(usize, &str)> = None;
     for name in known {
         let distance = distance(&written, &name.to_ascii_lowercase());
@@ -44,6 +47,7 @@ mod tests {
             ("FD_SOLVE_F", Some("fd_solves_f")),
             ("ta", Some("at")),
             ("zz", None),
+            ("a", None),
             ("battery", None),
         ];
         for (written, expected) in cases {
