@@ -1,4 +1,5 @@
 //! What follows: SWRL and Datalog rules over interned facts, maintained incrementally.
+#![doc = include_str!("../README.md")]
 
 mod builtin;
 mod cost;
@@ -17,6 +18,7 @@ mod store;
 mod strata;
 mod swrl;
 mod symbol;
+mod why_not;
 
 pub use builtin::{BuiltIn, SWRLB};
 pub use engine::{DEFAULT_STEP_BUDGET, Delta, Engine};
@@ -27,6 +29,7 @@ pub use literal::{Decimal, Duration, Literal, Moment, MomentKind};
 pub use rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
 pub use swrl::{Prefixes, parse_rules, print_rules};
 pub use symbol::{Symbol, Symbols, Value};
+pub use why_not::{NearMiss, Obstacle};
 
 /// The status rules of the `TOMASys` metamodel as rule text, written for retraction; the names are those of
 /// `http://metacontrol.org/tomasys#`.

@@ -1,42 +1,9 @@
 //! What follows from small rule texts, before and after changes.
 
-use metaplan_rules as rules;
-use metaplan_rules::{
-    COADAPTATION_RULES, Delta, Engine, Error, Fact, Literal, Prefixes, Symbols, TOMASYS_RULES, parse_rules,
-};
+mod text;
 
-/// A fact as text, `p(a, "x", 1)`, read by the rule parser as the head of a rule without body.
-fn fact(engine: &mut Engine, text: &str) -> Fact {
-    facts(engine.symbols_mut(), text).remove(0)
-}
-
-fn prefixes() -> Prefixes {
-    Prefixes::new().with("t", "http://metacontrol.org/tomasys#").with("mros", "http://ros/mros#")
-}
-
-fn facts(symbols: &mut Symbols, text: &str) -> Vec<Fact> {
-    let text = format!("-> {text} .");
-    let program = parse_rules(&text, "facts", symbols, &prefixes()).expect("facts");
-    let atoms = program.rules.into_iter().flat_map(|rule| rule.head);
-    let ground = |term| match term {
-        rules::Term::Constant(symbol) => symbol,
-        rules::Term::Variable(_) => panic!("a fact has no variables"),
-    };
-    let fact = |atom| match atom {
-        rules::Atom::Relation { predicate, arguments } => {
-            Fact::new(predicate, arguments.into_iter().map(ground))
-        }
-        other => panic!("{other:?} is no fact"),
-    };
-    atoms.map(fact).collect()
-}
-
-fn engine(rules: &str, stated: &str) -> Result<Engine, Vec<Error>> {
-    let mut symbols = Symbols::new();
-    let program = parse_rules(rules, "test", &mut symbols, &prefixes())?;
-    let facts = if stated.is_empty() { Vec::new() } else { facts(&mut symbols, stated) };
-    Engine::new(symbols, program, facts)
-}
+use metaplan_rules::{COADAPTATION_RULES, Delta, Engine, Prefixes, Symbols, TOMASYS_RULES, parse_rules};
+use text::{engine, fact, facts, show_violation};
 
 /// Each script line is `+fact`, `-fact`, `?fact` (must hold) or `!fact` (must not).
 fn check(rules: &str, stated: &str, script: &[&str]) {
@@ -94,15 +61,6 @@ fn negation_and_built_ins() {
         "?available(b, true)",
     ];
     check(rules, stated, &script);
-}
-
-#[test]
-fn literals_are_equal_by_value() {
-    let decimal = |text| Literal::parse(text, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
-    assert_eq!(decimal("1.50"), decimal("1.5"));
-    assert_eq!(decimal("5.0"), Literal::integer(5));
-    assert_eq!(decimal("1e-05"), decimal("0.00001"));
-    assert!(decimal("inf").is_ill_typed());
 }
 
 #[test]
@@ -169,4 +127,60 @@ fn statuses_follow_their_causes() {
         "!t:o_status(o, \"IN_ERROR_NFR\")",
     ];
     check(TOMASYS_RULES, stated, &script);
+}
+
+#[test]
+fn constraints_and_ill_typed_literals_are_violations() {
+    let rules = "[disjoint] p(?x) ^ q(?x) -> . ready(?x) -> p(?x)";
+    let mut engine = engine(rules, "q(a), p(b), q(c), p(c)").expect("rules");
+    let shown = |engine: &Engine| {
+        engine.violations().iter().map(|violation| show_violation(engine, violation)).collect::<Vec<_>>()
+    };
+    assert_eq!(shown(&engine), ["<p>(<c>) and <q>(<c>)"]);
+    let change = facts(engine.symbols_mut(), "ready(a), v(a, \"False\"^^xsd:boolean)");
+    let delete = vec![fact(&mut engine, "q(c)")];
+    engine.apply(Delta { insert: change, delete }).expect("no budget needed");
+    let ill_typed = "<v>(<a>, \"False\"^^<http://www.w3.org/2001/XMLSchema#boolean>)";
+    assert_eq!(shown(&engine), ["<p>(<a>) and <q>(<a>)", ill_typed]);
+}
+
+#[test]
+fn runaway_rules_end_in_an_error_that_names_them() {
+    let rules = "[count] n(?x) ^ swrlb:add(?y, ?x, 1) -> n(?y) . go(?x) -> n(?x) . n(?x) -> seen(?x)";
+    let mut symbols = Symbols::new();
+    let program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
+    let mut engine =
+        Engine::with_step_budget(symbols, program.clone(), [], 10_000).expect("nothing to count");
+    let start = facts(engine.symbols_mut(), "go(1), calm(1)");
+    engine.apply(Delta { insert: vec![start[1].clone()], delete: vec![] }).expect("nothing to count");
+    let change = Delta { insert: vec![start[0].clone()], delete: vec![start[1].clone()] };
+    let error = engine.apply(change).expect_err("it never ends");
+    assert_eq!(error.to_string(), "R301 step budget of 10000 used up, last in rule test#0 (count)");
+    assert_eq!(engine.facts().collect::<Vec<_>>(), [start[1].clone()]);
+    assert!(Engine::with_step_budget(engine.symbols().clone(), program, [start[0].clone()], 10_000).is_err());
+}
+
+#[test]
+fn a_clone_answers_what_if() {
+    let mut engine = engine("p(?x) -> q(?x)", "p(a)").expect("rules");
+    let mut copy = engine.clone();
+    let insert = vec![fact(&mut copy, "p(b)")];
+    let change = copy.apply(Delta { insert, delete: vec![] }).expect("no budget needed");
+    assert_eq!(change.insert.len(), 2);
+    let derived = fact(&mut engine, "q(b)");
+    assert!(copy.holds(&derived) && !engine.holds(&derived));
+}
+
+#[test]
+fn joins_are_planned_anew_as_facts_grow() {
+    let rules = "e(?x, ?y) ^ e(?y, ?z) ^ mark(?z) -> near(?x) . near(?x) ^ not off(?x) -> on(?x)";
+    let mut engine = engine(rules, "").expect("rules");
+    for number in 0..300 {
+        let text = format!("e(n{number}, n{}), mark(n{number})", number + 1);
+        let insert = facts(engine.symbols_mut(), &text);
+        engine.apply(Delta { insert, delete: vec![] }).expect("no budget needed");
+    }
+    assert_eq!(engine.facts().count(), 600 + 2 * 298);
+    let delete = facts(engine.symbols_mut(), "e(n7, n8)");
+    assert_eq!(engine.apply(Delta { insert: vec![], delete }).expect("no budget needed").delete.len(), 5);
 }

@@ -1,0 +1,82 @@
+//! Rule text: what is read prints and reads back the same; what is wrong is reported with its position.
+
+mod text;
+
+use metaplan_rules::{COADAPTATION_RULES, Symbols, TOMASYS_RULES, parse_rules, print_rules};
+use text::{engine, prefixes};
+
+#[test]
+fn printed_rules_read_back_the_same() {
+    let odd = r#"
+        prefix ex: <http://example.org/>
+        [as Protégé writes it] ex:A(?x) ^ swrlb:greaterThanOrEqual(?x, -0.5) ^ sameAs(?x, ?y) -> ex:B(?y)
+        ex:p(?x.1, "a \"b\"\n"@en-GB) ∧ differentFrom(?x, ex:i) ∧ ex:r() → <urn:x y>(?x), sameAs(?x, ex:i) .
+        ex:p(?x, 1e3) , not ex:q(?x, true, "5"^^xsd:byte, "FALSE") -> .
+        -> ex:A(ex:a.b), not(ex:c) .
+        # the end
+    "#;
+    let odd = odd.replace("?x.1", "?x");
+    for text in [TOMASYS_RULES, COADAPTATION_RULES, &odd] {
+        let mut symbols = Symbols::new();
+        let program = parse_rules(text, "test", &mut symbols, &prefixes()).expect("rules");
+        assert!(program.rules.len() > 3);
+        let printed = print_rules(&program, &symbols, &prefixes());
+        let again = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
+        assert_eq!(program, again, "{printed}");
+    }
+}
+
+fn check(rules: &str, expected: &[&str]) {
+    let errors = engine(rules, "").expect_err(rules);
+    let shown: Vec<String> = errors.iter().map(ToString::to_string).collect();
+    assert_eq!(shown, expected);
+}
+
+#[test]
+fn errors_have_codes_and_positions() {
+    check("p(?x) ^ -> q(?x) .", &["test:1:9: R101 expected a name, found `->`"]);
+    check(
+        "p(?x -> q(?x) .\n\n  q(?x) -> r(?x) . s(é, $) -> t(?x) .",
+        &[
+            "test:3:25: R101 unexpected character `$`",
+            "test:1:6: R101 expected `,` or `)`, found `->`",
+            "test:3:26: R101 expected a variable, name or literal, found `)`",
+        ],
+    );
+    check(
+        "a:p(?x) -> q(?x) . b:p(?x) -> q(?x)",
+        &["test:1:1: R102 undeclared prefix `a:`", "test:1:20: R102 undeclared prefix `b:`"],
+    );
+    check(
+        "p(?x) ^ swrlb:listConcat(?x, ?x) -> q(?x)",
+        &["test:1:9: R103 unknown or unsupported built-in `listConcat`"],
+    );
+    check(
+        "p(?x) -> q(\"open",
+        &[
+            "test:1:12: R101 the closing `\"` of a string is missing",
+            "test:1:17: R101 expected a variable, name or literal, found the end of the text",
+        ],
+    );
+}
+
+#[test]
+fn unsafe_rules_are_refused_all_at_once() {
+    check(
+        "[a] p(?x) -> q(?y) . [b] p(?x) ^ not q(?z, ?x) -> r(?x) . [c] swrlb:lessThan(?x, 3) -> r(?x)",
+        &[
+            "R202 rule test#0 (a): variable ?y in the head is not bound by the body",
+            "R203 rule test#1 (b): variable ?z is only tested, never bound",
+            "R203 rule test#2 (c): variable ?x is only tested, never bound",
+        ],
+    );
+    check(
+        "p(?x) ^ swrlb:add(?y, ?x) -> q(?y)",
+        &["R204 rule test#0: built-in add does not take 2 arguments"],
+    );
+    check("p(?x) -> swrlb:lessThan(?x, 3)", &["R205 rule test#0: a head may not contain a built-in"]);
+    check(
+        "p(?x) ^ not q(?x) -> r(?x) . r(?x) -> q(?x)",
+        &["R206 rule test#0: `not <q>` depends on its own conclusion, so the rules have no stratification"],
+    );
+}

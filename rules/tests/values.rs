@@ -1,0 +1,192 @@
+//! Literals by value, and built-ins on them.
+
+mod text;
+
+use metaplan_rules::{BuiltIn, Literal};
+use text::literal;
+
+/// `=`: one value; `<`, `>`: ordered; `~`: compare equal, though in different value spaces; `#`: incomparable.
+fn check(left: &str, relation: &str, right: &str) {
+    let (a, b) = (literal(left), literal(right));
+    let order = a.compare(&b);
+    let found = match order {
+        Some(std::cmp::Ordering::Less) => "<",
+        Some(std::cmp::Ordering::Greater) => ">",
+        Some(std::cmp::Ordering::Equal) if a == b => "=",
+        Some(std::cmp::Ordering::Equal) => "~",
+        None => "#",
+    };
+    assert_eq!(found, relation, "{left} {relation} {right}");
+    assert_eq!(b.compare(&a), order.map(std::cmp::Ordering::reverse), "{left} {relation} {right}");
+}
+
+#[test]
+fn values_compare_as_xsd_says() {
+    for (left, relation, right) in [
+        ("1.50", "=", "\"1.5\"^^xsd:decimal"),
+        ("5", "=", "\"5.0\"^^xsd:decimal"),
+        ("\"5\"^^xsd:unsignedByte", "=", "\"+05\"^^xsd:long"),
+        ("\"1e-05\"^^xsd:decimal", "=", "0.00001"),
+        ("0.1000000000000000000001", "<", "0.1000000000000000000002"),
+        ("-7", "<", "0.5"),
+        ("99999999999999999999", ">", "1.5"),
+        ("\"0.1\"^^xsd:float", ">", "\"0.1\"^^xsd:double"),
+        ("0.1", "~", "\"0.1\"^^xsd:float"),
+        ("2", "~", "2e0"),
+        ("2.5e0", ">", "2"),
+        ("\"INF\"^^xsd:double", ">", "1e308"),
+        ("\"NaN\"^^xsd:double", "#", "\"NaN\"^^xsd:double"),
+        ("\"-0.0\"^^xsd:double", "=", "0e0"),
+        ("\"a\"", "=", "\"a\"^^xsd:string"),
+        ("\"a\"", "=", "\"a@\"^^rdf:PlainLiteral"),
+        ("\"a\"@EN", "=", "\"a@en\"^^rdf:PlainLiteral"),
+        ("\"a\"@en", "#", "\"a\""),
+        ("\"10\"", "<", "\"9\""),
+        ("\"10\"", "#", "9"),
+        ("\"0\"^^xsd:boolean", "=", "false"),
+        ("false", "#", "\"false\""),
+        ("false", "<", "true"),
+        ("\"x\"^^<urn:d>", "=", "\"x\"^^<urn:d>"),
+        ("\"x\"^^<urn:d>", "#", "\"y\"^^<urn:d>"),
+        ("\"inf\"^^xsd:decimal", "#", "\"inf\"^^xsd:decimal"),
+        ("\"2026-01-31T12:00:00Z\"^^xsd:dateTime", "=", "\"2026-01-31T14:00:00+02:00\"^^xsd:dateTime"),
+        ("\"2026-01-31T12:00:00Z\"^^xsd:dateTime", "#", "\"2026-01-31T12:00:00\"^^xsd:dateTime"),
+        ("\"2026-01-31T12:00:00Z\"^^xsd:dateTime", "<", "\"2026-02-02T12:00:00\"^^xsd:dateTime"),
+        ("\"2024-02-29\"^^xsd:date", "<", "\"2024-03-01\"^^xsd:date"),
+        ("\"-0001-12-31\"^^xsd:date", "<", "\"0001-01-01\"^^xsd:date"),
+        ("\"23:59:59.5\"^^xsd:time", ">", "\"23:59:59\"^^xsd:time"),
+        ("\"P1Y\"^^xsd:duration", "=", "\"P12M\"^^xsd:yearMonthDuration"),
+        ("\"P1D\"^^xsd:duration", "=", "\"PT24H\"^^xsd:dayTimeDuration"),
+        ("\"-P1M\"^^xsd:duration", "<", "\"PT1.5S\"^^xsd:duration"),
+    ] {
+        check(left, relation, right);
+    }
+}
+
+#[test]
+fn forbidden_lexical_forms_are_ill_typed() {
+    for text in [
+        "\"False\"^^xsd:boolean",
+        "\"None\"^^xsd:decimal",
+        "\"1.0\"^^xsd:integer",
+        "\"256\"^^xsd:unsignedByte",
+        "\"-1\"^^xsd:nonNegativeInteger",
+        "\"1e999999999\"^^xsd:decimal",
+        "\"\"^^xsd:decimal",
+        "\"-\"^^xsd:integer",
+        "\"inf\"^^xsd:double",
+        "\"2023-02-29\"^^xsd:date",
+        "\"25:00:00\"^^xsd:time",
+        "\"P\"^^xsd:duration",
+        "\"2026-01-01T00:00:00é\"^^xsd:dateTime",
+        "\"P1M\"^^xsd:dayTimeDuration",
+        "\"+15:00\"^^xsd:time",
+    ] {
+        assert!(literal(text).is_ill_typed(), "{text}");
+    }
+}
+
+#[test]
+fn canonical_forms_read_back() {
+    for text in [
+        "1.50",
+        "-0.05",
+        "12345678901234567890.5",
+        "\"1e22\"^^xsd:decimal",
+        "1.5e-7",
+        "\"INF\"^^xsd:float",
+        "true",
+        "\"a\\\"\\n\\\\\"",
+        "\"x\"@en",
+        "\"2026-01-31T23:30:00.25-01:00\"^^xsd:dateTime",
+        "\"0004-02-29\"^^xsd:date",
+        "\"-P1Y2M\"^^xsd:duration",
+        "\"P1DT2H3M4.5S\"^^xsd:duration",
+        "\"-PT0.5S\"^^xsd:duration",
+        "\"u:x\"^^xsd:anyURI",
+    ] {
+        assert_eq!(literal(&literal(text).to_string()), literal(text), "{text}");
+    }
+    assert_eq!(literal("2.50").to_string(), "\"2.5\"^^<http://www.w3.org/2001/XMLSchema#decimal>");
+    assert_eq!(literal("2.0").to_string(), "\"2\"^^<http://www.w3.org/2001/XMLSchema#integer>");
+    assert_eq!(literal("25e0").to_string(), "\"2.5E1\"^^<http://www.w3.org/2001/XMLSchema#double>");
+}
+
+fn values(arguments: &str) -> Vec<Literal> {
+    arguments.split(' ').filter(|text| !text.is_empty()).map(literal).collect()
+}
+
+#[test]
+fn functions_compute() {
+    for (name, arguments, expected) in [
+        ("add", "1.5 2 0.25", Some("3.75")),
+        ("add", "0.1 0.2e0", Some("\"0.30000000000000004\"^^xsd:double")),
+        ("subtract", "1 1.5", Some("-0.5")),
+        ("multiply", "0.5 0.5", Some("0.25")),
+        ("divide", "1 4", Some("0.25")),
+        ("divide", "1 3", Some("0.3333333333333333333333333333333333")),
+        ("divide", "1 0", None),
+        ("divide", "1e0 0", Some("\"INF\"^^xsd:double")),
+        ("integerDivide", "-7 2", Some("-3")),
+        ("mod", "-7 2", Some("-1")),
+        ("mod", "1.5 0.4", Some("0.3")),
+        ("pow", "2 10", Some("1024")),
+        ("pow", "2 -1", Some("0.5")),
+        ("pow", "2 1000000000", None),
+        ("pow", "4 0.5", Some("2e0")),
+        ("unaryMinus", "3", Some("-3")),
+        ("abs", "-3.5", Some("3.5")),
+        ("ceiling", "-1.5", Some("-1")),
+        ("floor", "-1.5", Some("-2")),
+        ("round", "2.5", Some("3")),
+        ("round", "-2.5", Some("-2")),
+        ("roundHalfToEven", "2.5", Some("2")),
+        ("roundHalfToEven", "1.005 2", Some("1")),
+        ("roundHalfToEven", "150 -2", Some("200")),
+        ("sin", "0", Some("0e0")),
+        ("booleanNot", "true", Some("false")),
+        ("booleanNot", "\"true\"", None),
+        ("add", "1 \"a\"", None),
+        ("stringConcat", "\"a\" \"b\" 1", Some("\"ab1\"")),
+        ("substring", "\"motör\" 4", Some("\"ör\"")),
+        ("substring", "\"12345\" 0 3", Some("\"12\"")),
+        ("stringLength", "\"motör\"", Some("5")),
+        ("upperCase", "\"aé\"", Some("\"AÉ\"")),
+        ("lowerCase", "\"AÉ\"", Some("\"aé\"")),
+        ("translate", "\"bar\" \"abc\" \"AB\"", Some("\"BAr\"")),
+        ("substringBefore", "\"a=b\" \"=\"", Some("\"a\"")),
+        ("substringAfter", "\"a=b\" \"=\"", Some("\"b\"")),
+        ("substringAfter", "\"ab\" \"=\"", Some("\"\"")),
+    ] {
+        let arguments = values(arguments);
+        let built_in = BuiltIn::from_name(name).expect(name);
+        let result = built_in.compute(&arguments.iter().collect::<Vec<_>>());
+        assert_eq!(result, expected.map(literal), "{name} {arguments:?}");
+    }
+}
+
+#[test]
+fn tests_hold_or_do_not() {
+    for (name, arguments, expected) in [
+        ("equal", "2 2e0", true),
+        ("equal", "2 \"2\"", false),
+        ("notEqual", "2 3", true),
+        ("notEqual", "2 \"2\"", false),
+        ("lessThan", "0.5 0.5", false),
+        ("lessThanOrEqual", "0.5 0.50", true),
+        ("greaterThan", "\"b\" \"a\"", true),
+        ("greaterThanOrEqual", "\"NaN\"^^xsd:double 0", false),
+        ("startsWith", "\"ab\" \"a\"", true),
+        ("endsWith", "\"ab\" \"a\"", false),
+        ("containsIgnoreCase", "\"aBc\" \"Bc\"", true),
+        ("contains", "\"aBc\" \"bc\"", false),
+        ("stringEqualIgnoreCase", "\"FALSE\" \"false\"", true),
+        ("add", "3 1 2", true),
+        ("add", "3 1 1", false),
+        ("lessThan", "1", false),
+    ] {
+        let arguments = values(arguments);
+        let built_in = BuiltIn::from_name(name).expect(name);
+        assert_eq!(built_in.holds(&arguments.iter().collect::<Vec<_>>()), expected, "{name} {arguments:?}");
+    }
+}
