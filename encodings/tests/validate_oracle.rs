@@ -83,11 +83,11 @@ impl Term {
 type Truth = Option<bool>;
 
 fn all_of(parts: impl Iterator<Item = Truth>) -> Truth {
-    parts.fold(Some(true), |left, right| match (left, right) {
-        (Some(false), _) | (_, Some(false)) => Some(false),
-        (Some(true), Some(true)) => Some(true),
-        _ => None,
-    })
+    let parts: Vec<_> = parts.collect();
+    if parts.contains(&Some(false)) {
+        return Some(false);
+    }
+    if parts.contains(&None) { None } else { Some(true) }
 }
 
 fn any_of(parts: impl Iterator<Item = Truth>) -> Truth {

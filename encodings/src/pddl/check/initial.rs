@@ -3,6 +3,7 @@
 use num_rational::BigRational;
 use num_traits::Signed;
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 use crate::pddl::ast::{Atom, Condition, Expression, InitialElement, Metric, Name, Span, Term};
 
@@ -10,7 +11,7 @@ use super::condition::Kind;
 use super::{Checker, Scope};
 
 /// An atom without its places.
-type Key<'a> = (&'a Name, Vec<&'a Name>);
+type Key<'a> = (&'a Name, SmallVec<[&'a Name; 4]>);
 
 fn key(atom: &Atom) -> Key<'_> {
     let arguments = atom.arguments.iter().map(|term| match term {
@@ -24,6 +25,10 @@ impl<'a> Checker<'a> {
         let scope = Scope::new();
         let mut facts: FxHashMap<Key<'a>, (Span, bool)> = FxHashMap::default();
         let mut values: FxHashMap<Key<'a>, (Span, &BigRational)> = FxHashMap::default();
+        let values_in = |element: &&InitialElement| matches!(element, InitialElement::Value(..));
+        let count = init.iter().filter(values_in).count();
+        values.reserve(count);
+        facts.reserve(init.len() - count);
         for element in init {
             match element {
                 InitialElement::Fact(atom) | InitialElement::NegatedFact(atom) => {
