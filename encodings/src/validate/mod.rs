@@ -56,7 +56,7 @@ impl Default for Options {
     }
 }
 
-/// Executes a plan. Domain and problem must have passed [`crate::pddl::check`]; names that are declared
+/// Executes a plan. Domain and problem must have passed [`check`](crate::pddl::check()); names that are declared
 /// nowhere hold for nothing.
 pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &Options) -> Verdict {
     let world = World::new(domain, problem);
