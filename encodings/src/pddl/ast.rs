@@ -1,9 +1,9 @@
 //! The syntax tree of PDDL: what the parser makes of a file, before names are resolved.
 //!
 //! The tree keeps the source position of everything that a message may have to point at. Names keep
-//! the spelling of the file and compare without regard to case, as PDDL wants it [1].
+//! the spelling of the file and compare without regard to case, as PDDL wants it \[1\].
 //!
-//! [1] M. Fox, D. Long: PDDL2.1, an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
+//! \[1\] M. Fox, D. Long: PDDL2.1, an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
 
 use std::fmt;
 use std::hash::{Hash, Hasher};

@@ -1,11 +1,11 @@
-//! A plan to a verdict: executes it by the definition of PDDL 2.1 [1], with exact numbers.
+//! A plan to a verdict: executes it by the definition of PDDL 2.1 \[1\], with exact numbers.
 //!
 //! Nothing here is shared with grounding and encoding: conditions are evaluated on the syntax tree.
-//! Derived predicates are the least fixpoint of their axioms, layer by layer [2]. Without
+//! Derived predicates are the least fixpoint of their axioms, layer by layer \[2\]. Without
 //! [`Options::concurrent`], durative actions are executed one after another, which is how a robot with one
 //! executive does it, and `total-time` is the sum of their durations.
 //!
-//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003. [2] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL
+//! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003. \[2\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL
 //! axioms, AIJ 168, 2005.
 
 mod concurrent;
