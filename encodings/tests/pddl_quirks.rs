@@ -73,6 +73,46 @@ fn one_domain_with_all_quirks_is_accepted() {
 }
 
 #[test]
+fn types_decide_which_objects_fit() {
+    // The type of an object, that of a parameter, and whether the one can stand for the other.
+    let cases = [
+        ("robot", "robot", true),
+        ("robot", "object", true),
+        ("robot", "machine", true),
+        ("machine", "robot", false),
+        ("robot", "place", false),
+        ("robot", "(either place machine)", true),
+        ("robot", "(either place dock)", false),
+        ("dock", "(either machine place)", true),
+        ("both", "place", true),
+        ("both", "machine", true),
+        // An object without a type is accepted with a warning.
+        ("object", "place", true),
+        // A type that is declared nowhere restricts nothing.
+        ("robot", "ghost", true),
+        // A supertype need not be declared itself.
+        ("station", "building", true),
+    ];
+    for (object, parameter, fits) in cases {
+        let domain = Source::new(
+            "domain",
+            format!(
+                "(define (domain d) (:types robot - machine machine place - object dock - place both - (either place machine)
+                 station - building) (:predicates (p ?x - {parameter})))"
+            ),
+        );
+        let problem =
+            format!("(define (problem p) (:domain d) (:objects a - {object}) (:init (p a)) (:goal (p a)))");
+        let errors = match read(&domain, &Source::new("problem", problem)) {
+            Ok(_) => Vec::new(),
+            Err(found) => found.iter().map(|error| error.code).collect(),
+        };
+        let expected: &[&str] = if fits { &[] } else { &["P126", "P126"] };
+        assert_eq!(errors, expected, "{object} for {parameter}");
+    }
+}
+
+#[test]
 fn minimal_pairs_are_accepted_but_true_errors() {
     let folder = folder("quirks");
     let Some(()) = script("pddl_quirks.py", &[&folder.to_string_lossy()]) else { return };

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 
 use metaplan_encodings::pddl::{Source, read, render};
-use metaplan_encodings::validate::{Options, PlanText, validate};
+use metaplan_encodings::validate::{Options, PlanText, Verdict, validate};
 
 const OBJECTS: usize = 3;
 
@@ -316,6 +316,13 @@ fn check(task: &Task) {
     };
     let plan_tree = PlanText::parse(&Source::new("plan", plan.clone())).expect("the plan can be read");
     let verdict = validate(&domain_tree, &problem_tree, &plan_tree, &Options::default());
+    // With a time between them, the actions do the same when they may overlap.
+    let timed: Vec<_> = plan.lines().enumerate().map(|(index, step)| format!("{index}: {step}\n")).collect();
+    let timed = PlanText::parse(&Source::new("timed plan", timed.concat())).expect("the plan can be read");
+    let options = Options { concurrent: true, ..Options::default() };
+    let concurrent = validate(&domain_tree, &problem_tree, &timed, &options);
+    let what = |verdict: &Verdict| verdict.violation.as_ref().map(|found| (found.step, found.kind));
+    assert_eq!((what(&concurrent), &concurrent.values), (what(&verdict), &verdict.values));
     let found = match &verdict.violation {
         None => Ok(()),
         Some(violation) => Err(violation.step.unwrap_or(0)),

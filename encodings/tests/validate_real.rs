@@ -27,13 +27,10 @@ fn check(domain: &str, problem: &str, plan: &str, concurrent: bool, expected: &s
     };
     let plan = PlanText::parse(&Source::new("plan", plan)).expect("the plan can be read");
     let verdict = validate(&domain_tree, &problem_tree, &plan, &Options { concurrent, ..Options::default() });
-    let found = match &verdict.violation {
-        Some(violation) => format!("{} {}", violation.step.unwrap_or(0), violation.kind.as_str()),
-        None => {
-            let metric = verdict.metric.map_or("-".to_owned(), |metric| metric.to_string());
-            format!("{} {metric}", verdict.total_time)
-        }
-    };
+    let metric = verdict.metric.map_or("-".to_owned(), |metric| metric.to_string());
+    let found = verdict.violation.as_ref().map_or(format!("{} {metric}", verdict.total_time), |violation| {
+        format!("{} {}", violation.step.unwrap_or(0), violation.kind.as_str())
+    });
     assert_eq!(found, expected, "{:?}", verdict.violation);
 }
 

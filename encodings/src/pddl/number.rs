@@ -4,8 +4,8 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Pow, Signed, Zero};
 
-/// The most digits of a literal, and the largest exponent: nobody measures finer, and a short text cannot
-/// ask for a number that fills the memory.
+/// The most digits of a number when it is written without exponent: nobody measures finer, and a short
+/// text cannot ask for a number that fills the memory.
 const DIGITS_LIMIT: usize = 400;
 
 /// What a symbol is, read as a number.
@@ -35,15 +35,19 @@ pub(crate) fn literal(text: &str) -> Literal {
     if !is_number {
         return Literal::Name;
     }
+    let digits = whole.len() + fraction.len();
     let exponent = exponent.map_or(Some(0), |exponent| exponent.parse::<i32>().ok());
-    let Some(exponent) = exponent.filter(|exponent| exponent.unsigned_abs() as usize <= DIGITS_LIMIT) else {
-        return Literal::TooLong;
-    };
-    if whole.len() + fraction.len() > DIGITS_LIMIT {
-        return Literal::TooLong;
-    }
+    let exponent = exponent.filter(|exponent| written_out(digits, fraction.len(), *exponent) <= DIGITS_LIMIT);
+    let Some(exponent) = exponent else { return Literal::TooLong };
     let value = decimal(whole, fraction, exponent);
     Literal::Number(if text.starts_with('-') { -value } else { value })
+}
+
+/// How many digits a number has without its exponent.
+fn written_out(digits: usize, fraction: usize, exponent: i32) -> usize {
+    let shift = i64::from(exponent) - fraction as i64;
+    let shift_length = shift.unsigned_abs() as usize;
+    if shift >= 0 { digits + shift_length } else { digits.max(shift_length + 1) }
 }
 
 fn all_digits(text: &str) -> bool {
@@ -125,7 +129,7 @@ mod tests {
 
     #[test]
     fn short_texts_cannot_ask_for_huge_numbers() {
-        for text in ["1e999999999", "1e-401", "1e99999999999999999999", &"9".repeat(401)] {
+        for text in ["1e999999999", "1e-400", "11e399", "1e99999999999999999999", &"9".repeat(401)] {
             assert_eq!(literal(text), Literal::TooLong, "{text}");
         }
     }

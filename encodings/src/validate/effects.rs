@@ -8,7 +8,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::pddl::ast::{Arithmetic, Assignment, Effect, TypedName};
 
 use super::evaluate::{Bindings, Evaluator, Undefined, apply};
-use super::world::{Arguments, State, Symbol};
+use super::world::{Arguments, State, Symbol, World};
 
 /// A fact or a function with its arguments.
 pub(super) type Ground = (Symbol, Arguments);
@@ -142,13 +142,13 @@ impl Changes {
         other.numeric.into_iter().try_for_each(|(target, change)| self.record(target, change))
     }
 
-    /// Changes the state.
-    pub(super) fn apply(self, evaluator: Evaluator<'_, '_>, state: &mut State) -> Result<(), EffectError> {
+    /// Changes the state; on an error it stays as it is.
+    pub(super) fn apply(self, world: &World<'_>, state: &mut State) -> Result<(), EffectError> {
         let mut values = Vec::new();
         for (target, change) in self.numeric {
             let before = || {
-                let show = || Undefined::Function(evaluator.world.show(target.0, &target.1));
-                evaluator.state.values.get(&target).ok_or_else(show)
+                let show = || Undefined::Function(world.show(target.0, &target.1));
+                state.values.get(&target).ok_or_else(show)
             };
             let after = match &change {
                 Change::Assign(value) => value.clone(),

@@ -261,11 +261,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         if changes.is_empty() {
             return Ok(());
         }
-        let mut after = self.state.clone();
-        changes
-            .apply(self.evaluator(None), &mut after)
-            .map_err(|error| self.effect_violation(step, time, &error))?;
-        self.state = after;
+        let applied = changes.apply(self.world, &mut self.state);
+        applied.map_err(|error| self.effect_violation(step, time, &error))?;
         close(self.world, &mut self.state);
         Ok(())
     }

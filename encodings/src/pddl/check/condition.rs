@@ -170,13 +170,22 @@ impl<'a> Checker<'a> {
             Term::Variable(identifier) => (identifier.span, format!("?{}", identifier.name)),
             Term::Constant(identifier) => (identifier.span, identifier.name.to_string()),
         };
+        // Files without types, generated ones above all, use such objects everywhere.
+        let is_untyped = match given {
+            Given::Variable(_) => false,
+            Given::Object(types) => types.iter().all(|r#type| is_object(r#type)),
+        };
         let given = match given {
             Given::Variable(r#type) => describe(r#type),
             Given::Object(types) => types.first().map_or_else(String::new, |r#type| describe(r#type)),
         };
         let (name, wanted) = (&atom.predicate.name, describe(&wanted.r#type));
         let message = format!("argument {} of `{name}` is {wanted}, but `{shown}` is {given}", index + 1);
-        self.sink.error("P126", span, message);
+        if is_untyped {
+            self.sink.warning("P126", span, message).help("give it a type in `:objects` or `:constants`");
+        } else {
+            self.sink.error("P126", span, message);
+        }
     }
 
     /// The type of a term, if it is declared.
@@ -222,6 +231,11 @@ pub(super) enum Given<'a> {
     Variable(&'a TypeExpression),
     /// An object with the types of all its declarations.
     Object(&'a [&'a TypeExpression]),
+}
+
+/// Whether a type leaves everything open.
+fn is_object(r#type: &TypeExpression) -> bool {
+    r#type.alternatives.iter().all(|one| one.name.as_str().eq_ignore_ascii_case("object"))
 }
 
 /// A type for people.
