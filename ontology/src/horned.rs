@@ -20,7 +20,7 @@ use crate::owl::{
     ANONYMOUS, AnnotatedAxiom, Annotation, AnnotationValue, Argument, Atom, Axiom, Bound, Characteristic,
     ClassExpression, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Rule,
 };
-use crate::read::Syntax;
+use crate::read::{Parts, Syntax};
 use crate::vocab::{rdfs, swrla};
 
 /// Why a document cannot be transcribed.
@@ -59,18 +59,8 @@ pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> 
     catch_unwind(AssertUnwindSafe(transcription)).map_err(panicked)?.map_err(fault)
 }
 
-/// The contents of an ontology, sorted.
-#[derive(Debug, Default)]
-pub(crate) struct Parts {
-    pub entities: Vec<(EntityKind, Iri)>,
-    pub axioms: Vec<AnnotatedAxiom>,
-    pub annotations: Vec<(Iri, Annotation)>,
-    pub rules: Vec<Rule>,
-    pub warnings: Vec<Warning>,
-}
-
-/// Reads a normalised N-Triples document; `origins` says where each rule comes from.
-pub(crate) fn build(ntriples: &[u8], origins: &[Origin]) -> Result<Parts, String> {
+/// Reads a normalised N-Triples document about the ontology `about`; `origins` says where each rule comes from.
+pub(crate) fn build(ntriples: &[u8], about: &str, origins: &[Origin]) -> Result<Parts, String> {
     let reading = || {
         let build = ho::Build::new_rc();
         let mut text = ntriples;
@@ -85,7 +75,8 @@ pub(crate) fn build(ntriples: &[u8], origins: &[Origin]) -> Result<Parts, String
     let (ontology, rest) = catch_unwind(AssertUnwindSafe(reading))
         .map_err(|_| "the OWL reader failed on it".to_owned())?
         .map_err(|error| error.to_string())?;
-    let mut builder = Builder { names: HashMap::new(), parts: Parts::default(), rules: Vec::new() };
+    let mut builder =
+        Builder { ontology: about.into(), names: HashMap::new(), parts: Parts::default(), rules: Vec::new() };
     for annotated in ontology {
         builder.component(annotated.component, annotated.ann);
     }
@@ -109,6 +100,8 @@ fn located(rule: Rule, origin: &Origin) -> Rule {
 
 /// Converts components, sharing the text of each IRI.
 struct Builder {
+    /// The IRI of the first document, or nothing.
+    ontology: Iri,
     names: HashMap<String, Iri>,
     parts: Parts,
     /// Rules with their index among the origins.
@@ -146,6 +139,14 @@ impl Builder {
                 let annotation = self.annotation(&assertion.ann);
                 self.parts.annotations.push((subject, annotation));
             }
+            Component::OntologyAnnotation(about) => {
+                let annotation = self.annotation(&about.0);
+                let subject = self.ontology.clone();
+                self.parts.annotations.push((subject, annotation));
+            }
+            Component::SubAnnotationPropertyOf(a) => self.annotate(&a.sub, rdfs::SUB_PROPERTY_OF, &a.sup),
+            Component::AnnotationPropertyDomain(a) => self.annotate(&a.ap, rdfs::DOMAIN, &a.iri),
+            Component::AnnotationPropertyRange(a) => self.annotate(&a.ap, rdfs::RANGE, &a.iri),
             component => {
                 if let Some((kind, iri)) = entity(&component) {
                     let iri = self.iri(iri);
@@ -155,6 +156,13 @@ impl Builder {
                 }
             }
         }
+    }
+
+    /// An axiom about annotation properties, which says nothing about individuals.
+    fn annotate(&mut self, subject: &str, property: &str, value: &str) {
+        let (subject, property) = (self.iri(subject), self.iri(property));
+        let value = AnnotationValue::Iri(self.iri(value));
+        self.parts.annotations.push((subject, Annotation { property, value }));
     }
 
     fn rule(&mut self, rule: &ho::Rule<RcStr>, annotations: Vec<Annotation>) {

@@ -16,11 +16,12 @@ use crate::vocab::owl;
 /// What keeps (a part of) an axiom from becoming rules.
 type Outside = Result<(), &'static str>;
 
-pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) {
+/// Adds the rules of all axioms that are not plain assertions.
+pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
     let definitions = definitions(axioms);
     for (position, annotated) in axioms.iter().enumerate() {
         let axiom = &annotated.axiom;
-        if assertion(context, axiom) {
+        if is_assertion(axiom) {
             continue;
         }
         let mut lowering =
@@ -29,6 +30,26 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) {
             context.outside(axiom, reason);
         }
     }
+}
+
+/// Adds the facts of the plain assertions.
+pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], context: &mut Context) {
+    for annotated in axioms {
+        assertion(context, &annotated.axiom);
+    }
+}
+
+/// Whether an axiom states facts about named classes and properties (or only names a data range).
+fn is_assertion(axiom: &Axiom) -> bool {
+    matches!(
+        axiom,
+        Axiom::ClassAssertion(ClassExpression::Class(_), _)
+            | Axiom::ObjectPropertyAssertion(..)
+            | Axiom::DataPropertyAssertion(..)
+            | Axiom::SameIndividual(_)
+            | Axiom::DifferentIndividuals(_)
+            | Axiom::DatatypeDefinition(..)
+    )
 }
 
 /// Named data ranges.
@@ -40,8 +61,8 @@ fn definitions(axioms: &[AnnotatedAxiom]) -> HashMap<Iri, DataRange> {
     defined.collect()
 }
 
-/// Adds the facts of an assertion about named classes and properties; false for any other axiom.
-fn assertion(context: &mut Context, axiom: &Axiom) -> bool {
+/// Adds the facts of an assertion about named classes and properties; nothing for any other axiom.
+fn assertion(context: &mut Context, axiom: &Axiom) {
     match axiom {
         Axiom::ClassAssertion(ClassExpression::Class(class), individual) => {
             if &**class != owl::THING {
@@ -82,10 +103,8 @@ fn assertion(context: &mut Context, axiom: &Axiom) -> bool {
                 }
             }
         }
-        Axiom::DatatypeDefinition(..) => {}
-        _ => return false,
+        _ => {}
     }
-    true
 }
 
 /// One axiom on its way.

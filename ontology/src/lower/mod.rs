@@ -54,8 +54,9 @@ pub fn lower(ontology: &Ontology, symbols: &mut Symbols) -> Lowered {
 pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols) -> Lowered {
     let mut context = Context::new(symbols, equality);
     let duplicates = swrl::lower(&ontology.rules, &mut context);
+    axiom::lower_rules(&ontology.axioms, &mut context);
     context.drop_unusable();
-    axiom::lower(&ontology.axioms, &mut context);
+    axiom::lower_assertions(&ontology.axioms, &mut context);
     if equality == Equality::Owl {
         equality::lower(&ontology.axioms, &mut context);
     }

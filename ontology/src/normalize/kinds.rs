@@ -14,6 +14,9 @@ use crate::graph::{Graph, is_type};
 use crate::owl::ANONYMOUS;
 use crate::vocab::{owl, rdf, rdfs, swrl, swrla, xsd};
 
+/// How far a kind spreads between undeclared properties.
+const SPREADS: usize = 16;
+
 /// How an undeclared property is used.
 #[derive(Clone, Copy, Debug, Default)]
 #[allow(clippy::struct_excessive_bools)] // independent observations
@@ -34,6 +37,8 @@ pub(crate) fn declare(graph: &mut Graph, warnings: &mut Vec<Warning>) {
         record_classes(triple, &declared, &mut classes);
         record_property(graph, triple, &declared, &mut properties);
     }
+    let kinds = Kinds { declared: &declared, uses: properties };
+    let properties = kinds.between_properties(graph, warnings);
     for class in classes {
         state(graph, &class, owl::CLASS);
         warnings.push(Warning::Undeclared { iri: class, kind: "a class" });
@@ -49,6 +54,72 @@ pub(crate) fn declare(graph: &mut Graph, warnings: &mut Vec<Warning>) {
         state(graph, enabled, owl::ANNOTATION_PROPERTY);
     }
     state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
+}
+
+/// What is known of properties: their declarations and their uses.
+struct Kinds<'a> {
+    declared: &'a Declared,
+    uses: BTreeMap<String, Use>,
+}
+
+impl Kinds<'_> {
+    /// The kind of a property, as the class that declares it; `None` while nothing is known.
+    fn of(&self, property: &str) -> Option<&'static str> {
+        if self.declared.object_properties.contains(property) {
+            Some(owl::OBJECT_PROPERTY)
+        } else if self.declared.annotation_properties.contains(property) {
+            Some(owl::ANNOTATION_PROPERTY)
+        } else if self.declared.properties.contains(property) {
+            Some(owl::DATATYPE_PROPERTY)
+        } else {
+            self.uses.get(property).map(|used| kind_of(*used).0)
+        }
+    }
+
+    /// Properties that are said to be equivalent, disjoint or one below the other have one kind: a known one spreads,
+    /// an axiom between two kinds is taken away (horned-owl rejects the whole document for it).
+    fn between_properties(mut self, graph: &mut Graph, warnings: &mut Vec<Warning>) -> BTreeMap<String, Use> {
+        let relations = [owl::EQUIVALENT_PROPERTY, owl::PROPERTY_DISJOINT_WITH, rdfs::SUB_PROPERTY_OF];
+        let pairs: Vec<_> = graph
+            .iter()
+            .filter(|(_, triple)| relations.contains(&triple.predicate.as_str()))
+            .filter_map(|(index, triple)| {
+                let (first, second) = (named(&triple.subject)?, crate::read::iri_of(&triple.object)?);
+                Some((index, first.to_owned(), second.to_owned()))
+            })
+            .filter(|(_, first, second)| !is_reserved(first) && !is_reserved(second))
+            .collect();
+        // As often as kinds can spread along a path of pairs.
+        for _ in 0..pairs.len().min(SPREADS) {
+            for (_, first, second) in &pairs {
+                match (self.of(first), self.of(second)) {
+                    (Some(kind), None) => self.assume(second, kind),
+                    (None, Some(kind)) => self.assume(first, kind),
+                    _ => {}
+                }
+            }
+        }
+        for (index, first, second) in pairs {
+            let kinds = [&first, &second].map(|property| self.of(property).unwrap_or(owl::OBJECT_PROPERTY));
+            if kinds[0] == kinds[1] {
+                self.assume(&first, kinds[0]);
+                self.assume(&second, kinds[0]);
+            } else if let Some(triple) = graph.take(index) {
+                let reason = "properties of different kinds".to_owned();
+                warnings.push(Warning::Unread { statement: triple.to_string(), reason });
+            }
+        }
+        self.uses
+    }
+
+    fn assume(&mut self, property: &str, kind: &str) {
+        if !self.declared.properties.contains(property) {
+            let used = self.uses.entry(property.to_owned()).or_default();
+            used.object |= kind == owl::OBJECT_PROPERTY;
+            used.data |= kind == owl::DATATYPE_PROPERTY;
+            used.entity |= kind == owl::ANNOTATION_PROPERTY;
+        }
+    }
 }
 
 fn kind_of(used: Use) -> (&'static str, &'static str) {
@@ -129,7 +200,7 @@ fn named(node: &NamedOrBlankNode) -> Option<&str> {
 /// Notes the undeclared classes that a triple names.
 fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<String>) {
     let mut note = |iri: Option<&str>| {
-        if let Some(iri) = iri.filter(|iri| !is_reserved(iri) && !iri.starts_with(xsd::NS))
+        if let Some(iri) = iri.filter(|iri| !is_reserved(iri))
             && !declared.classes.contains(iri)
             && !declared.datatypes.contains(iri)
         {
@@ -172,7 +243,17 @@ fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &m
                 note(property, &|used| if data { used.data = true } else { used.object = true });
             }
         }
-        rdfs::DOMAIN => drop(named(&triple.subject).map(|property| note(property, &|_| ()))),
+        rdfs::DOMAIN | owl::ON_PROPERTY => {
+            let property = if predicate == rdfs::DOMAIN { named(&triple.subject) } else { object };
+            if let Some(property) = property {
+                note(property, &|_| ());
+            }
+        }
+        owl::INVERSE_OF => {
+            for property in [named(&triple.subject), object].into_iter().flatten() {
+                note(property, &|used| used.object = true);
+            }
+        }
         rdfs::RANGE => {
             let data = object.is_some_and(|range| declared.is_datatype(range));
             let class = object.is_some_and(|range| declared.classes.contains(range));

@@ -23,7 +23,7 @@ use crate::error::Warning;
 use crate::graph::{Graph, is_type};
 use crate::owl::Iri;
 use crate::read::Document;
-use crate::vocab::{owl, rdf};
+use crate::vocab::{self, owl, rdf, rdfs, xsd};
 
 /// What normalisation yields.
 #[derive(Debug)]
@@ -69,7 +69,7 @@ pub(crate) fn normalize(documents: Vec<Document>) -> Normal {
     Normal { ntriples: graph.to_ntriples(), rules, warnings }
 }
 
-/// Whether an IRI belongs to the vocabularies of RDF, RDFS, OWL or SWRL itself.
+/// Whether an IRI belongs to the vocabularies of RDF, RDFS, OWL, SWRL or XML Schema itself.
 pub(crate) fn is_reserved(iri: &str) -> bool {
-    [rdf::NS, crate::vocab::rdfs::NS, owl::NS, crate::vocab::swrl::NS].iter().any(|ns| iri.starts_with(ns))
+    [rdf::NS, rdfs::NS, owl::NS, vocab::swrl::NS, xsd::NS].iter().any(|ns| iri.starts_with(ns))
 }

@@ -16,6 +16,9 @@ use crate::vocab::{owl, rdf};
 /// After so many syntax errors in one document its parser is stopped.
 const MOST_ERRORS: usize = 10;
 
+/// Messages of parsers are cut after so many characters.
+const LONGEST_MESSAGE: usize = 300;
+
 /// The triples of one document and what they say about the document.
 #[derive(Debug)]
 pub(crate) struct Document {
@@ -39,7 +42,7 @@ pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result
         Syntax::OwlXml | Syntax::Functional => {
             let ntriples = horned::transcribe(text, syntax).map_err(|fault| {
                 let position = Position::of_offset(name, text, fault.offset);
-                vec![Error::Malformed { position, syntax, message: fault.message }]
+                vec![Error::Malformed { position, syntax, message: shortened(&fault.message) }]
             })?;
             parse_turtle(&ntriples, name, base)?
         }
@@ -106,7 +109,7 @@ fn parse_turtle(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<
                 let start = error.location().start;
                 let position =
                     Position { file: name.to_owned(), line: start.line + 1, column: start.column + 1 };
-                let message = error.message().to_owned();
+                let message = shortened(error.message());
                 errors.push(Error::Malformed { position, syntax: Syntax::Turtle, message });
                 if errors.len() == MOST_ERRORS {
                     break;
@@ -130,7 +133,7 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec
             Err(error) => {
                 let offset = usize::try_from(parser.buffer_position()).unwrap_or(usize::MAX);
                 let position = Position::of_offset(name, text, offset);
-                let message = error.to_string();
+                let message = shortened(&error.to_string());
                 return Err(vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]);
             }
         }
@@ -142,6 +145,14 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec
         return Err(vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]);
     }
     Ok(triples)
+}
+
+/// Parsers quote what they cannot read, which may be the whole document.
+fn shortened(message: &str) -> String {
+    match message.char_indices().nth(LONGEST_MESSAGE) {
+        Some((end, _)) => format!("{}…", &message[..end]),
+        None => message.to_owned(),
+    }
 }
 
 /// Numbers blank nodes in order of appearance: parsers give anonymous ones random names, and two documents may use

@@ -17,7 +17,7 @@ use std::collections::{HashSet, VecDeque};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Warning};
-use crate::owl::{Iri, Ontology, Source};
+use crate::owl::{AnnotatedAxiom, Annotation, EntityKind, Iri, Ontology, Rule, Source};
 use crate::{horned, normalize};
 use imports::{Resolution, Resolver};
 
@@ -59,12 +59,23 @@ enum Pending {
     Text(String, Vec<u8>),
 }
 
+/// The contents of an ontology, each list sorted but the rules, which are in document order.
+#[derive(Debug, Default)]
+pub(crate) struct Parts {
+    pub entities: Vec<(EntityKind, Iri)>,
+    pub axioms: Vec<AnnotatedAxiom>,
+    pub annotations: Vec<(Iri, Annotation)>,
+    pub rules: Vec<Rule>,
+    pub warnings: Vec<Warning>,
+}
+
 fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
     let (documents, mut warnings) = closure(roots, options)?;
-    let sources = documents.iter().map(source).collect();
+    let sources: Vec<Source> = documents.iter().map(source).collect();
+    let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
     let normal = normalize::normalize(documents);
     warnings.extend(normal.warnings);
-    let parts = horned::build(&normal.ntriples, &normal.rules)
+    let parts = horned::build(&normal.ntriples, &about, &normal.rules)
         .map_err(|reason| vec![Error::NotAnOntology { reason }])?;
     warnings.extend(parts.warnings);
     warnings.sort();

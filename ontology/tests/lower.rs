@@ -1,0 +1,225 @@
+//! Axioms as rules: what follows from each kind, what contradicts it, and what is reported as left out.
+
+use std::collections::BTreeSet;
+
+use ontology::{AXIOM_SOURCE, Equality, ReadOptions, lower, lower_with, ntriples, read_text};
+use rules::{Engine, Fact, Symbols};
+
+const PREFIXES: &str = "@prefix : <http://e/#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+:A a owl:Class . :B a owl:Class . :C a owl:Class .
+:p a owl:ObjectProperty . :q a owl:ObjectProperty . :r a owl:ObjectProperty .
+:d a owl:DatatypeProperty . :e a owl:DatatypeProperty .
+";
+
+fn engine(text: &str) -> (Engine, Vec<String>) {
+    let ontology =
+        read_text(&format!("{PREFIXES}{text}"), "t", &ReadOptions::default()).expect("well-formed");
+    assert_eq!(ontology.warnings, [], "{text}");
+    let mut symbols = Symbols::new();
+    let lowered = lower(&ontology, &mut symbols);
+    let warnings = lowered.warnings.iter().map(ToString::to_string).collect();
+    (Engine::new(symbols, lowered.program, lowered.facts).expect("safe"), warnings)
+}
+
+/// What is derived and not stated, in short.
+fn derived(engine: &Engine) -> BTreeSet<String> {
+    let facts: Vec<Fact> = engine.facts().filter(|fact| !engine.is_asserted(fact)).collect();
+    let text = ntriples(engine.symbols(), &facts);
+    let short =
+        text.replace("http://www.w3.org/1999/02/22-rdf-syntax-ns#type", "a").replace("http://e/#", "");
+    let short = short.replace("http://www.w3.org/2002/07/owl#", "owl:");
+    short.lines().map(|line| line.trim_end_matches(" .").replace(['<', '>'], "")).collect()
+}
+
+/// Each text must give exactly these conclusions, consistently and without warnings.
+#[test]
+fn axioms_conclude() {
+    for (text, expected) in [
+        (":A rdfs:subClassOf :B . :B rdfs:subClassOf :C . :i a :A .", &["i a B", "i a C"][..]),
+        (":A owl:equivalentClass :B . :i a :A . :j a :B .", &["i a B", "j a A"]),
+        (
+            ":A rdfs:subClassOf [ a owl:Class ; owl:intersectionOf ( :B :C ) ] . :i a :A .",
+            &["i a B", "i a C"],
+        ),
+        (
+            "[ a owl:Class ; owl:intersectionOf ( :B :C ) ] rdfs:subClassOf :A . :i a :B , :C . :j a :B .",
+            &["i a A"],
+        ),
+        (
+            "[ a owl:Class ; owl:unionOf ( :B :C ) ] rdfs:subClassOf :A . :i a :B . :j a :C .",
+            &["i a A", "j a A"],
+        ),
+        (
+            "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :B ] rdfs:subClassOf :A . :i :p :j . :j a :B .",
+            &["i a A"],
+        ),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:allValuesFrom :B ] . :i a :A ; :p :j .",
+            &["j a B"],
+        ),
+        (
+            ":A owl:equivalentClass [ a owl:Restriction ; owl:onProperty :p ; owl:hasValue :j ] . :i a :A . :k :p :j .",
+            &["i p j", "k a A"],
+        ),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :d ; owl:hasValue 1 ] . :i a :A .",
+            &["i d \"1\"^^http://www.w3.org/2001/XMLSchema#integer"],
+        ),
+        (
+            "[ a owl:Class ; owl:oneOf ( :i :j ) ] rdfs:subClassOf :A . :i a owl:NamedIndividual .",
+            &["i a A", "j a A"],
+        ),
+        (":i a [ a owl:Restriction ; owl:onProperty :p ; owl:hasValue :j ] .", &["i p j"]),
+        (":p rdfs:subPropertyOf :q . :i :p :j .", &["i q j"]),
+        (":p rdfs:subPropertyOf owl:topObjectProperty . :i :p :j .", &[]),
+        (":d rdfs:subPropertyOf :e . :i :d \"v\" .", &["i e \"v\""]),
+        (":p owl:equivalentProperty :q . :i :p :j . :j :q :i .", &["i q j", "j p i"]),
+        (":p owl:inverseOf :q . :i :p :j .", &["j q i"]),
+        (":p a owl:SymmetricProperty . :i :p :j .", &["j p i"]),
+        (":p a owl:TransitiveProperty . :i :p :j . :j :p :k .", &["i p k"]),
+        (":r owl:propertyChainAxiom ( :p :q ) . :i :p :j . :j :q :k .", &["i r k"]),
+        (":p rdfs:domain :A ; rdfs:range :B . :i :p :j .", &["i a A", "j a B"]),
+        (":d rdfs:domain :A . :i :d 1 .", &["i a A"]),
+        (
+            ":p a owl:FunctionalProperty . :i :p :j , :k . :j a :A .",
+            &["j owl:sameAs k", "k a A", "k owl:sameAs j"],
+        ),
+        (
+            ":p a owl:InverseFunctionalProperty . :i :p :k . :j :p :k . :j :d 1 .",
+            &["i d \"1\"^^http://www.w3.org/2001/XMLSchema#integer", "i owl:sameAs j", "j owl:sameAs i"],
+        ),
+        (":i owl:sameAs :j . :i a :A .", &["j a A", "j owl:sameAs i"]),
+        (
+            ":A owl:hasKey ( :d ) . :i a :A ; :d 1 . :j a :A ; :d 1.0 . :k a :A ; :d 2 .",
+            &["i owl:sameAs j", "j owl:sameAs i"],
+        ),
+    ] {
+        let (engine, warnings) = engine(text);
+        assert_eq!(engine.violations(), [], "{text}");
+        assert_eq!(warnings, [""; 0], "{text}");
+        assert_eq!(derived(&engine), expected.iter().map(ToString::to_string).collect(), "{text}");
+    }
+}
+
+#[test]
+fn axioms_forbid() {
+    let restricted = |range: &str| format!(":d rdfs:range {range} . :i :d ");
+    let bounded =
+        "[ a rdfs:Datatype ; owl:onDatatype xsd:integer ; owl:withRestrictions ( [ xsd:minInclusive 2 ] ) ]";
+    for (axioms, consistent, inconsistent) in [
+        (":A owl:disjointWith :B . :i a :A . ", ":i a :C .", ":i a :B ."),
+        ("[] a owl:AllDisjointClasses ; owl:members ( :A :B :C ) . :i a :A . ", "", ":i a :C ."),
+        (":A rdfs:subClassOf [ a owl:Class ; owl:complementOf :B ] . :i a :A . ", "", ":i a :B ."),
+        (":A rdfs:subClassOf owl:Nothing . ", ":i a :B .", ":i a :A ."),
+        (":p owl:propertyDisjointWith :q . :i :p :j . ", ":j :q :i .", ":i :q :j ."),
+        (":p a owl:IrreflexiveProperty . ", ":i :p :j .", ":i :p :i ."),
+        (":p a owl:AsymmetricProperty . :i :p :j . ", ":j :p :k .", ":j :p :i ."),
+        (
+            "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :i ; owl:assertionProperty :p ; owl:targetIndividual :j . ",
+            ":j :p :i .",
+            ":i :p :j .",
+        ),
+        (
+            "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :i ; owl:assertionProperty :d ; owl:targetValue 1 . ",
+            ":i :d 2 .",
+            ":i :d 1.0 .",
+        ),
+        (":d a owl:FunctionalProperty . :i :d 1 . ", ":i :d 1.0 .", ":i :d 2 ."),
+        (":d a owl:FunctionalProperty . :i :d 0.2 . ", ":j :d 5 .", ":i :d 5.0 ."),
+        (":i owl:differentFrom :j . :p a owl:FunctionalProperty . :k :p :i . ", "", ":k :p :j ."),
+        ("[] a owl:AllDifferent ; owl:distinctMembers ( :i :j :k ) . ", "", ":k owl:sameAs :i ."),
+        (&restricted("xsd:decimal"), "2 .", "\"2\" ."),
+        (&restricted("xsd:decimal"), "2.5 .", "\"2\"^^xsd:float ."),
+        (&restricted("xsd:integer"), "2.0 .", "2.5 ."),
+        (&restricted("xsd:nonNegativeInteger"), "0 .", "-1 ."),
+        (&restricted("xsd:boolean"), "\"0\"^^xsd:boolean .", "\"false\" ."),
+        (&restricted("xsd:string"), "\"x\"^^xsd:string .", "true ."),
+        (&restricted("[ a rdfs:Datatype ; owl:oneOf ( \"OK\" \"ERROR\" ) ]"), "\"OK\" .", "\"ok\" ."),
+        (&restricted(bounded), "2 .", "1 ."),
+        (&restricted("[ a rdfs:Datatype ; owl:unionOf ( xsd:integer xsd:string ) ]"), "\"x\" .", "true ."),
+        (":d rdfs:range xsd:boolean . :i :d ", "true .", "\"False\"^^xsd:boolean ."),
+    ] {
+        for (more, expected) in [(consistent, true), (inconsistent, false)] {
+            let (engine, warnings) = engine(&format!("{axioms}{more}"));
+            assert_eq!(engine.violations().is_empty(), expected, "{axioms}{more}");
+            assert_eq!(warnings, [""; 0], "{axioms}");
+        }
+    }
+}
+
+#[test]
+fn what_has_no_rule_form_is_reported_once() {
+    for (text, expected) in [
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :B ] .",
+            "SubClassOf(<http://e/#A> ObjectSomeValuesFrom(<http://e/#p> <http://e/#B>)) is left out \
+             (an existential restriction as a conclusion)",
+        ),
+        (
+            ":p a owl:ReflexiveProperty .",
+            "ReflexiveObjectProperty(<http://e/#p>) is left out (a statement about all individuals)",
+        ),
+        (
+            ":d rdfs:range xsd:dateTime .",
+            "DataPropertyRange(<http://e/#d> <http://www.w3.org/2001/XMLSchema#dateTime>) is left out (a datatype that is not tested)",
+        ),
+        (
+            ":A owl:disjointUnionOf ( :B :C ) .",
+            "DisjointUnion(<http://e/#A> <http://e/#B> <http://e/#C>) is left out (that the parts cover the class)",
+        ),
+    ] {
+        let (_, warnings) = engine(text);
+        let [warning] = &warnings[..] else { panic!("{text}: {warnings:?}") };
+        assert!(warning.starts_with(&format!("warning[O301]: {expected}")), "{warning}");
+    }
+}
+
+#[test]
+fn unusable_rules_are_reported_and_the_others_kept() {
+    let prefixes = "@prefix swrl: <http://www.w3.org/2003/11/swrl#> . @prefix swrlb: <http://www.w3.org/2003/11/swrlb#> .
+        :x a swrl:Variable . :y a swrl:Variable . :i a :A . ";
+    let class = |class: &str, x: &str| {
+        format!("[ a swrl:ClassAtom ; swrl:classPredicate {class} ; swrl:argument1 {x} ]")
+    };
+    let built_in =
+        |name: &str| format!("[ a swrl:BuiltinAtom ; swrl:builtin {name} ; swrl:arguments ( :y 2 ) ]");
+    let rule =
+        |body: &str, head: &str| format!("[] a swrl:Imp ; swrl:body ( {body} ) ; swrl:head ( {head} ) . ");
+    let (a, b) = (class(":A", ":x"), class(":B", ":x"));
+    let good = rule(&a, &b);
+    for (bad, reason) in [
+        (rule(&a, &class(":B", ":y")), "is left out: R202"),
+        (rule(&format!("{a} {}", built_in("swrlb:lessThan")), &b), "is left out: R203"),
+        (
+            rule(&format!("{a} {}", built_in("<http://custom/#f>")), &b),
+            "is left out: the built-in <http://custom/#f> is not known",
+        ),
+    ] {
+        let (engine, warnings) = engine(&format!("{prefixes}{bad}{good}"));
+        assert_eq!(derived(&engine), BTreeSet::from(["i a B".to_owned()]));
+        let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+        assert!(warning.starts_with("warning[O302]: rule <t>#0 ") && warning.contains(reason), "{warning}");
+    }
+}
+
+#[test]
+fn rules_for_axioms_are_labelled_with_the_axiom() {
+    let (engine, _) = engine(":A rdfs:subClassOf :B . :i a :A .");
+    let identity = &engine.program().rules[0].identity;
+    assert_eq!(&*identity.source, AXIOM_SOURCE);
+    assert_eq!(identity.label.as_deref(), Some("SubClassOf(<http://e/#A> <http://e/#B>)"));
+}
+
+#[test]
+fn unique_names_do_not_merge() {
+    let text = format!("{PREFIXES}:p a owl:FunctionalProperty . :i :p :j , :k . :j a :A .");
+    let ontology = read_text(&text, "t", &ReadOptions::default()).expect("well-formed");
+    let mut symbols = Symbols::new();
+    let lowered = lower_with(&ontology, Equality::UniqueNames, &mut symbols);
+    let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe");
+    assert_eq!(derived(&engine), BTreeSet::new());
+}
