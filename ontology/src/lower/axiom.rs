@@ -64,11 +64,9 @@ fn definitions(axioms: &[AnnotatedAxiom]) -> HashMap<Iri, DataRange> {
 /// Adds the facts of an assertion about named classes and properties; nothing for any other axiom.
 fn assertion(context: &mut Context, axiom: &Axiom) {
     match axiom {
-        Axiom::ClassAssertion(ClassExpression::Class(class), individual) => {
-            if &**class != owl::THING {
-                let (class, individual) = (context.name(class), context.name(individual));
-                context.state(class, [individual]);
-            }
+        Axiom::ClassAssertion(ClassExpression::Class(class), individual) if &**class != owl::THING => {
+            let (class, individual) = (context.name(class), context.name(individual));
+            context.state(class, [individual]);
         }
         Axiom::ObjectPropertyAssertion(property, from, to) => {
             let (from, to) = (context.name(from), context.name(to));

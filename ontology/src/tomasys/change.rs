@@ -3,7 +3,7 @@
 //! A functional value is replaced in one [`Delta`], so that no engine ever sees two of them. Retraction does the
 //! rest: a status that was concluded from the old value goes with it.
 
-use rules::{Atom, Delta, Engine, Fact, Literal, Symbol, Term as Argument};
+use rules::{Atom, Delta, Engine, Fact, Literal, Symbol, Symbols, Term as Argument};
 
 use super::terms::{self, Term, beside};
 use super::{Individual, View};
@@ -60,28 +60,35 @@ pub fn clear_component_status(engine: &mut Engine, component: &str) -> Result<De
 
 /// The update that sets the measured value of a quality attribute, named by the IRI or local name of its type.
 ///
-/// Where nothing holds measurements of that type yet, an individual `obs_<type>` is made, and linked to the groundings
-/// whose design has an estimation of the type.
+/// Where nothing holds measurements of that type yet, an individual `obs_<type>` is made. Groundings whose design has
+/// an estimation of the type are linked to what holds the measurement, as the rules of MROS expect.
 ///
 /// # Errors
 /// [`Error::Unknown`] where the knowledge base has no such attribute type.
 pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> Result<Delta, Error> {
     let (kind, class) = find(engine, "quality attribute type", terms::ATTRIBUTE_TYPE, attribute)?;
-    let observations: Vec<Individual> = {
-        let measurements = View::new(engine).measurements().into_iter();
-        measurements.filter(|found| found.attribute == kind.name).map(|found| found.individual).collect()
-    };
-    let property = engine.symbols_mut().name(beside(terms::HAS_VALUE, class));
-    let value = engine.symbols_mut().literal(value);
+    let groundings = groundings(engine, &kind);
+    let measurements = View::new(engine).measurements().into_iter();
+    let mut holders: Vec<Individual> = measurements
+        .filter(|measurement| measurement.attribute == kind.name)
+        .map(|measurement| measurement.individual)
+        .collect();
     let mut delta = Delta::default();
-    if observations.is_empty() {
-        let iri = format!("{}obs_{}", &kind.iri[..kind.iri.len() - kind.name.len()], kind.name);
-        let subject = engine.symbols_mut().name(&iri);
-        delta.insert = observation(engine, subject, &kind, class);
-        delta.insert.push(Fact::new(property, [subject, value]));
+    if holders.is_empty() {
+        let holder =
+            Individual::new(&format!("{}obs_{}", &kind.iri[..kind.iri.len() - kind.name.len()], kind.name));
+        delta.insert = observation(engine.symbols_mut(), &holder, &kind, class);
+        holders.push(holder);
     }
-    for found in observations {
-        let subject = engine.symbols_mut().name(&found.iri);
+    let symbols = engine.symbols_mut();
+    let property = symbols.name(beside(terms::HAS_VALUE, class));
+    let (link, value) = (symbols.name(terms::HAS_QA_VALUE[0]), symbols.literal(value));
+    for holder in holders {
+        let subject = engine.symbols_mut().name(&holder.iri);
+        for grounding in &groundings {
+            let grounding = engine.symbols_mut().name(&grounding.iri);
+            delta.insert.push(Fact::new(link, [grounding, subject]));
+        }
         let change = replace(engine, property, subject, Some(value));
         delta.insert.extend(change.insert);
         delta.delete.extend(change.delete);
@@ -89,11 +96,9 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
     Ok(delta)
 }
 
-/// The facts that make `subject` hold measurements of a type.
-fn observation(engine: &mut Engine, subject: Symbol, kind: &Individual, class: &str) -> Vec<Fact> {
-    let groundings = groundings(engine, kind);
-    let symbols = engine.symbols_mut();
-    let kind = symbols.name(&kind.iri);
+/// The facts that make `holder` hold measurements of a type.
+fn observation(symbols: &mut Symbols, holder: &Individual, kind: &Individual, class: &str) -> Vec<Fact> {
+    let (subject, kind) = (symbols.name(&holder.iri), symbols.name(&kind.iri));
     let mut facts = vec![
         Fact::new(symbols.name(beside(terms::QA_VALUE, class)), [subject]),
         Fact::new(symbols.name(beside(terms::IS_TYPE, class)), [subject, kind]),
@@ -101,11 +106,6 @@ fn observation(engine: &mut Engine, subject: Symbol, kind: &Individual, class: &
     if let Some(measured) = symbols.find_name(terms::IS_MEASURED[0]) {
         let truth = symbols.literal(Literal::Boolean(true));
         facts.push(Fact::new(measured, [subject, truth]));
-    }
-    let link = symbols.name(terms::HAS_QA_VALUE[0]);
-    for grounding in groundings {
-        let grounding = symbols.name(&grounding.iri);
-        facts.push(Fact::new(link, [grounding, subject]));
     }
     facts
 }
