@@ -305,7 +305,7 @@ fn nesting_is_limited() {
 #[test]
 fn nesting_up_to_the_limit_works() {
     for (open, close) in [("(not ", ")"), ("(and (p) ", ")"), ("(exists (?x) ", ")"), ("(imply (p) ", ")")] {
-        let body = format!("{}(p){}", open.repeat(490), close.repeat(490));
+        let body = format!("{}(p){}", open.repeat(190), close.repeat(190));
         let text = format!(
             "(define (domain d) (:predicates (p)) (:derived (q) {body}) (:action a :parameters () :precondition {body} :effect (p)))"
         );
@@ -315,12 +315,12 @@ fn nesting_up_to_the_limit_works() {
         let (Ok((_, _, found)) | Err(found)) = read(&Source::new("deep", text), &problem);
         assert!(!found.is_empty(), "`q` is not declared");
     }
-    let sum = format!("{}1{}", "(+ 1 ".repeat(490), ")".repeat(490));
+    let sum = format!("{}1{}", "(+ 1 ".repeat(190), ")".repeat(190));
     let text = format!(
         "(define (domain d) (:functions (f)) (:action a :parameters () :effect (increase (f) {sum})))"
     );
     parse_and_print_domain(&text);
-    let effect = format!("{}(p){}", "(when (p) ".repeat(490), ")".repeat(490));
+    let effect = format!("{}(p){}", "(when (p) ".repeat(190), ")".repeat(190));
     parse_and_print_domain(&format!(
         "(define (domain d) (:predicates (p)) (:action a :parameters () :effect {effect}))"
     ));

@@ -109,6 +109,28 @@ fn numbers_do_not_grow_without_limit() {
     assert!(summary(&verdict).ends_with("undefined"), "{}", summary(&verdict));
 }
 
+#[test]
+fn deep_conditions_are_evaluated() {
+    let cases = [
+        ("(not (not ", "))", 95),
+        ("(and (p) ", ")", 190),
+        ("(or (q) ", ")", 190),
+        ("(imply (p) ", ")", 190),
+        ("(exists (?x) ", ")", 190),
+        ("(forall (?x) ", ")", 190),
+    ];
+    for (open, close, depth) in cases {
+        let deep = format!("{}(p){}", open.repeat(depth), close.repeat(depth));
+        let domain = format!(
+            "(define (domain d) (:predicates (p) (q) (r)) (:derived (r) {deep})
+             (:action a :parameters () :precondition {deep} :effect (when {deep} (q))))"
+        );
+        let problem =
+            format!("(define (problem p) (:domain d) (:objects o) (:init (p)) (:goal (and (r) {deep} (q))))");
+        check(&parse(&domain, &problem), &[("(a)", "valid time=0"), ("", "- goal (q)")]);
+    }
+}
+
 fn temporal() -> (ast::Domain, ast::Problem) {
     parse(
         "(define (domain d) (:predicates (idle) (busy) (warm) (done) (day) (lit))

@@ -131,7 +131,7 @@ impl Parser<'_> {
         let expression = self.expression(item)?;
         let value = evaluate(&expression);
         if value.is_none() {
-            self.sink.error("P106", at_start(item), "the initial value is not a number");
+            self.sink.error("P106", at_start(item), "the initial value is not a number, or too long a one");
         }
         value
     }
@@ -153,8 +153,8 @@ fn evaluate(expression: &Expression) -> Option<BigRational> {
     }
 }
 
-/// The most bits of a number that is computed while reading.
-const BITS_LIMIT: u64 = 10_000;
+/// The most bits of a number that is computed while reading: it can still be written as a literal.
+const BITS_LIMIT: u64 = 300;
 
 fn apply(operation: Arithmetic, left: &BigRational, right: &BigRational) -> Option<BigRational> {
     let value = match operation {

@@ -45,6 +45,10 @@ impl Parser<'_> {
 
     /// The type behind a dash; `glued` is what follows it without a space.
     fn type_after_dash(&mut self, dash: Item<'_>, glued: &str, items: &mut Items<'_>) -> TypeExpression {
+        if glued.starts_with(['?', ':']) {
+            self.sink.error("P106", dash.span(), format!("`{glued}` is not a type"));
+            return TypeExpression::default();
+        }
         if !glued.is_empty() {
             let span = Span { start: dash.span().start + 1, ..dash.span() };
             self.sink
