@@ -131,3 +131,23 @@ fn unknown_names_are_reported_with_those_that_exist() {
         "error[O106]: the knowledge base has no component `c_radar`; it has c_camera, c_flashlight, c_kinect, c_lidar"
     );
 }
+
+/// The rule texts that are evaluated together with a knowledge base agree with the rules in it.
+#[test]
+fn rule_texts_can_be_added() {
+    for (text, name, unavailable) in [(kb::UGV, "ugv.ttl", 2), (kb::UUV, "uuv.ttl", 3)] {
+        let ontology = read_text(text, name, &ReadOptions::default()).expect("well-formed");
+        let mut symbols = Symbols::new();
+        let mut lowered = lower(&ontology, &mut symbols);
+        for rules in [rules::TOMASYS_RULES, rules::COADAPTATION_RULES] {
+            let program = rules::parse_rules(rules, "rules", &mut symbols, &rules::Prefixes::default());
+            lowered.program.rules.extend(program.expect("rules").rules);
+        }
+        let mut engine = Engine::new(symbols, lowered.program, lowered.facts).expect("stratified");
+        let all = available(&engine).len();
+        let delta = change::component_status(&mut engine, "c_camera", change::Status::Failed).expect("known");
+        engine.apply(delta).expect("applied");
+        assert_eq!(all - available(&engine).len(), unavailable, "{name}");
+        assert_eq!(engine.violations(), [], "{name}");
+    }
+}

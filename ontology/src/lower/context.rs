@@ -4,7 +4,7 @@ use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term, Variable};
 
 use super::{AXIOM_SOURCE, Equality, INTERNAL};
 use crate::error::Warning;
-use crate::owl::{Axiom, Iri, Literal, ObjectPropertyExpression};
+use crate::owl::{Axiom, DataRange, Iri, Literal, ObjectPropertyExpression};
 use crate::vocab::{local_name, owl};
 
 /// Atoms that must all hold.
@@ -17,8 +17,6 @@ pub(crate) struct Context<'a> {
     pub facts: Vec<Fact>,
     pub warnings: Vec<Warning>,
     pub equality: Equality,
-    /// Internal relations in use.
-    relations: usize,
 }
 
 /// The variables of one rule.
@@ -60,7 +58,7 @@ pub(crate) fn identity(axiom: &Axiom, position: usize) -> RuleIdentity {
 
 impl<'a> Context<'a> {
     pub(crate) fn new(symbols: &'a mut Symbols, equality: Equality) -> Self {
-        Self { symbols, rules: Vec::new(), facts: Vec::new(), warnings: Vec::new(), equality, relations: 0 }
+        Self { symbols, rules: Vec::new(), facts: Vec::new(), warnings: Vec::new(), equality }
     }
 
     pub(crate) fn name(&mut self, iri: &str) -> Symbol {
@@ -118,10 +116,10 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// A relation that serves this crate only.
-    pub(crate) fn internal(&mut self) -> Symbol {
-        self.relations += 1;
-        self.symbols.name(&format!("{INTERNAL}relation:{}", self.relations))
+    /// The relation that holds the members of a data range. It goes by the text of the range, so that two ontologies
+    /// lowered into the same symbols share it where they should, and only there.
+    pub(crate) fn members_of(&mut self, range: &DataRange) -> Symbol {
+        self.symbols.name(&format!("{INTERNAL}range:{range}"))
     }
 
     /// Adds a fact.

@@ -19,7 +19,7 @@ pub(crate) fn condition(
     Ok(match range {
         DataRange::Datatype(iri) => datatype(context, iri, value)?,
         DataRange::OneOf(literals) => {
-            let relation = context.internal();
+            let relation = context.members_of(range);
             for literal in literals {
                 let member = context.literal(literal);
                 context.state(relation, [member]);
@@ -86,7 +86,7 @@ fn datatype(context: &mut Context, iri: &str, value: Term) -> Result<Vec<Conjunc
             vec![vec![test(BuiltIn::StringConcat, vec![value, value, constant(Literal::string(""))])]]
         }
         Some("boolean") => {
-            let relation = context.internal();
+            let relation = context.members_of(&DataRange::Datatype(iri.into()));
             for truth in [Literal::Boolean(true), Literal::Boolean(false)] {
                 let member = context.symbols.literal(truth);
                 context.state(relation, [member]);
@@ -111,8 +111,9 @@ pub(crate) fn violations(
     let predicate = match &inside[..] {
         [only] if let [Atom::Relation { predicate, .. }] = &only[..] => *predicate,
         _ => {
-            let relation = context.internal();
-            let identity = RuleIdentity::new(super::AXIOM_SOURCE, relation.index() as u32);
+            let relation = context.members_of(range);
+            let label = Some(range.to_string().into());
+            let identity = RuleIdentity { source: super::AXIOM_SOURCE.into(), label, position: 0 };
             for tests in inside {
                 let body = edges.iter().cloned().chain(tests).collect();
                 context.rule(&identity, vec![Atom::relation(relation, [value])], body, &Variables::default());
