@@ -20,17 +20,26 @@ use crate::symbol::{Symbol, Symbols};
 /// A position in the plans of a round.
 pub(crate) type PlanId = u32;
 
-/// A range of the changed rows from which a plan starts.
-#[derive(Clone, Copy, Debug)]
+/// Where the evaluation of a plan starts.
+#[derive(Clone, Debug)]
 pub(crate) struct Seed {
     pub plan: PlanId,
-    /// The relation of the rows; `None` starts from one empty match.
-    pub relation: Option<RelationId>,
-    /// First position in [`Round::rows`].
-    pub from: u32,
-    /// One past the last.
-    pub to: u32,
+    pub start: Start,
 }
+
+/// What a plan starts from.
+#[derive(Clone, Debug)]
+pub(crate) enum Start {
+    /// One empty match.
+    Nothing,
+    /// Changed rows of a relation: a range of [`Round::rows`].
+    Rows { relation: RelationId, from: u32, to: u32 },
+    /// Partial matches that an earlier run put off.
+    Matches { step: u32, bindings: Vec<Symbol> },
+}
+
+/// Partial matches that one step of one block may produce before the rest of the block is put off.
+const BLOCK_MATCHES: usize = 1 << 16;
 
 /// Complete matches of a plan, side by side.
 #[derive(Debug)]
@@ -52,6 +61,8 @@ pub(crate) struct Round<'a> {
     pub retracting: bool,
     pub budget: &'a Budget,
     pub blocks: RefCell<Vec<Vec<Symbol>>>,
+    /// What was put off to bound memory, to be evaluated by later runs.
+    pub deferred: RefCell<Vec<Seed>>,
 }
 
 /// Steps left, and the rule that used up the last.
@@ -74,14 +85,14 @@ mod program {
         @input
         pub struct Reads<'a>(pub Handle<'a>);
         @input
-        pub struct Delta(pub u32, pub PlanId);
+        pub struct Delta(pub u32, pub PlanId, pub u32);
 
         struct Match(PlanId, u32, BlockId);
 
         @output
         pub struct Head(pub PlanId, pub BlockId);
 
-        Match(plan, 0, block) <- Delta(seed, plan), Reads(round), let Some(block) = round.seed(seed);
+        Match(plan, step, block) <- Delta(seed, plan, step), Reads(round), let Some(block) = round.seed(seed);
         Match(plan, step + 1, longer) <-
             Match(plan, step, block), Reads(round), let Some(longer) = round.extend(plan, step, block);
         Head(plan, block) <- Match(plan, step, block), Reads(round), (round.is_complete(plan, step));
@@ -135,7 +146,9 @@ pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     let seeded = Seeded { round, seeds };
     let mut runtime = program::Crepe::new();
     runtime.extend([program::Reads(Handle(&seeded))]);
-    runtime.extend(seeds.iter().enumerate().map(|(number, seed)| program::Delta(number as u32, seed.plan)));
+    let first = |seed: &Seed| if let Start::Matches { step, .. } = seed.start { step } else { 0 };
+    let delta = |(number, seed): (usize, &Seed)| program::Delta(number as u32, seed.plan, first(seed));
+    runtime.extend(seeds.iter().enumerate().map(delta));
     let (heads,) = runtime.run_with_hasher::<BuildHasherDefault<FxHasher>>();
     let mut heads: Vec<(PlanId, BlockId)> = heads.into_iter().map(|head| (head.0, head.1)).collect();
     heads.sort_unstable();
@@ -193,18 +206,24 @@ impl Round<'_> {
     fn seed(&self, seed: &Seed) -> Option<BlockId> {
         let plan = &self.plans[seed.plan as usize];
         let empty = vec![Symbol(0); self.width(plan)];
-        let Some(relation) = seed.relation else { return self.put(empty) };
-        let relation = self.store.get(relation);
-        let mut block = Vec::with_capacity(self.width(plan) * (seed.to - seed.from) as usize);
-        for &row in &self.rows[seed.from as usize..seed.to as usize] {
-            extend_match(&mut block, &empty, relation.row(row), &plan.seed);
+        match &seed.start {
+            Start::Nothing => self.put(empty),
+            Start::Matches { bindings, .. } => self.put(bindings.clone()),
+            Start::Rows { relation, from, to } => {
+                let relation = self.store.get(*relation);
+                let mut block = Vec::with_capacity(self.width(plan) * (to - from) as usize);
+                for &row in &self.rows[*from as usize..*to as usize] {
+                    extend_match(&mut block, &empty, relation.row(row), &plan.seed);
+                }
+                self.put(block)
+            }
         }
-        self.put(block)
     }
 
     fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId> {
-        let plan = &self.plans[plan as usize];
-        let step = plan.steps.get(step as usize)?;
+        let (id, number) = (plan, step);
+        let plan = &self.plans[id as usize];
+        let step = plan.steps.get(number as usize)?;
         let block = self.take(block);
         let width = self.width(plan);
         if !self.spend((block.len() / width) as u64, plan.rule) {
@@ -214,7 +233,12 @@ impl Round<'_> {
             Step::Join { relation, skip, index, key, pattern } => {
                 let lookup =
                     Lookup { relation: self.store.get(*relation), skip: *skip, index: *index, key, pattern };
-                self.join(&lookup, &block, width, plan.rule)
+                let (longer, done) = self.join(&lookup, &block, width, plan.rule);
+                if done < block.len() {
+                    let start = Start::Matches { step: number, bindings: block[done..].to_vec() };
+                    self.deferred.borrow_mut().push(Seed { plan: id, start });
+                }
+                longer
             }
             Step::Contains { relation, skip, key } => {
                 let (relation, skip) = (self.store.get(*relation), self.visibility(*skip));
@@ -257,11 +281,15 @@ impl Round<'_> {
         if self.retracting { state::FREE } else { skip }
     }
 
-    fn join(&self, lookup: &Lookup, block: &[Symbol], width: usize, rule: u32) -> Vec<Symbol> {
+    /// Extends matches by the rows that fit them, up to about [`BLOCK_MATCHES`]; also how much of the block that took.
+    fn join(&self, lookup: &Lookup, block: &[Symbol], width: usize, rule: u32) -> (Vec<Symbol>, usize) {
         let (relation, skip) = (lookup.relation, self.visibility(lookup.skip));
         let mut longer = Vec::with_capacity(block.len());
         let mut key = [Symbol(0); 32];
-        for bound in block.chunks_exact(width) {
+        for (position, bound) in block.chunks_exact(width).enumerate() {
+            if longer.len() > BLOCK_MATCHES * width {
+                return (longer, position * width);
+            }
             let before = longer.len();
             let mut visit = |row: Row| {
                 if relation.state(row) & skip == 0 {
@@ -277,10 +305,10 @@ impl Round<'_> {
                 (0..relation.bound()).for_each(&mut visit);
             }
             if !self.spend(((longer.len() - before) / width) as u64, rule) {
-                return Vec::new();
+                return (Vec::new(), block.len());
             }
         }
-        longer
+        (longer, block.len())
     }
 
     fn compute(

@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::Fact;
-use crate::fixpoint::{Budget, Matches, PlanId, Round, Seed, resolve, run};
+use crate::fixpoint::{Budget, Matches, PlanId, Round, Seed, Start, resolve, run};
 use crate::network::{Network, Stratum};
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::Symbol;
@@ -107,7 +107,7 @@ impl<'a> Maintenance<'a> {
                         self.engine.store.get(relation).scan().map(|row| (relation, row)).collect();
                     self.run(&rows, |_| Some(std::slice::from_ref(&plan)), false)?;
                 } else {
-                    self.run_chunk(&[Seed { plan, relation: None, from: 0, to: 1 }], &[], false)?;
+                    self.run_chunk(&[Seed { plan, start: Start::Nothing }], &[], false)?;
                 }
             }
             self.saturate(stratum)?;
@@ -245,9 +245,12 @@ impl<'a> Maintenance<'a> {
             for (position, &(plan, relation, _)) in chunk.iter().enumerate() {
                 let position = position as u32;
                 match seeds.last_mut() {
-                    Some(seed) if seed.plan == plan => seed.to = position + 1,
+                    Some(Seed { plan: last, start: Start::Rows { to, .. } }) if *last == plan => {
+                        *to = position + 1;
+                    }
                     _ => {
-                        seeds.push(Seed { plan, relation: Some(relation), from: position, to: position + 1 });
+                        let start = Start::Rows { relation, from: position, to: position + 1 };
+                        seeds.push(Seed { plan, start });
                     }
                 }
             }
@@ -256,7 +259,17 @@ impl<'a> Maintenance<'a> {
         Ok(())
     }
 
+    /// Runs seeds, then, last first, what was put off to bound memory.
     fn run_chunk(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<(), Error> {
+        let mut deferred = self.run_once(seeds, rows, retracting)?;
+        while let Some(seed) = deferred.pop() {
+            deferred.extend(self.run_once(&[seed], rows, retracting)?);
+        }
+        Ok(())
+    }
+
+    /// Runs seeds and acts on the complete matches; returns what was put off.
+    fn run_once(&mut self, seeds: &[Seed], rows: &[Row], retracting: bool) -> Result<Vec<Seed>, Error> {
         let round = Round {
             store: &self.engine.store,
             plans: &self.network.plans,
@@ -266,8 +279,10 @@ impl<'a> Maintenance<'a> {
             retracting,
             budget: &self.budget,
             blocks: RefCell::default(),
+            deferred: RefCell::default(),
         };
         let matches = run(&round, seeds);
+        let deferred = round.deferred.into_inner();
         if let Some(rule) = self.budget.exhausted_by.get() {
             let rule = &self.engine.program.rules[self.network.rules[rule as usize].rule];
             return Err(Error::BudgetExhausted { rule: rule.identity.clone(), budget: self.engine.budget });
@@ -275,7 +290,7 @@ impl<'a> Maintenance<'a> {
         for matches in matches {
             if retracting { self.retract(&matches) } else { self.conclude(&matches) }
         }
-        Ok(())
+        Ok(deferred)
     }
 
     /// Adds the heads of complete matches that do not hold yet.

@@ -184,3 +184,15 @@ fn joins_are_planned_anew_as_facts_grow() {
     let delete = facts(engine.symbols_mut(), "e(n7, n8)");
     assert_eq!(engine.apply(Delta { insert: vec![], delete }).expect("no budget needed").delete.len(), 5);
 }
+
+#[test]
+fn large_cartesian_products_are_evaluated_piecemeal() {
+    let side = 45_usize;
+    let stated: Vec<String> = (0..side).map(|number| format!("p({number})")).collect();
+    let rules = "p(?x) ^ p(?y) ^ p(?z) -> cube(?x, ?y, ?z)";
+    let mut engine = engine(rules, &stated.join(", ")).expect("rules");
+    assert_eq!(engine.facts().count(), side + side.pow(3));
+    let delete = facts(engine.symbols_mut(), "p(7)");
+    let change = engine.apply(Delta { insert: vec![], delete }).expect("no budget needed");
+    assert_eq!(change.delete.len(), 1 + side.pow(3) - (side - 1).pow(3));
+}

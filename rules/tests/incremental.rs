@@ -12,16 +12,22 @@ use metaplan_rules::{
 use oracle::{Binding, ground, holds, matches, naive, value};
 use proptest::prelude::*;
 
-const PREDICATES: u8 = 6;
+const PREDICATES: u8 = 9;
+/// Predicates of one level, with one, two and three arguments.
+const PER_LEVEL: u8 = 3;
 const VARIABLES: u8 = 4;
 const CONSTANTS: u8 = 6;
 
 /// An atom before it is made safe: kind, predicate, arguments.
 type RawAtom = (u8, u8, [u8; 3]);
-/// A rule before it is made safe: head predicate and arguments, body.
-type RawRule = ((u8, [u8; 2]), Vec<RawAtom>);
+/// A rule before it is made safe: head predicates and arguments, body.
+type RawRule = (Vec<(u8, [u8; 3])>, Vec<RawAtom>);
 /// A change: whether it inserts, predicate, arguments.
-type RawChange = (bool, u8, [u8; 2]);
+type RawChange = (bool, u8, [u8; 3]);
+
+fn arity(predicate: u8) -> usize {
+    1 + usize::from(predicate % PER_LEVEL)
+}
 
 struct World {
     symbols: Symbols,
@@ -38,14 +44,16 @@ impl World {
         Self { symbols, predicates, constants: names.into_iter().chain(numbers).collect() }
     }
 
-    /// Predicates come in pairs of a level: a unary and a binary one.
     fn level(&self, predicate: Symbol) -> usize {
-        self.predicates.iter().position(|&known| known == predicate).map_or(0, |position| position / 2)
+        self.predicates
+            .iter()
+            .position(|&known| known == predicate)
+            .map_or(0, |position| position / usize::from(PER_LEVEL))
     }
 
-    fn fact(&self, predicate: u8, arguments: [u8; 2]) -> Fact {
+    fn fact(&self, predicate: u8, arguments: [u8; 3]) -> Fact {
         let predicate = predicate % PREDICATES;
-        let arguments = arguments.iter().take(1 + usize::from(predicate % 2));
+        let arguments = arguments.iter().take(arity(predicate));
         let constant = |&number: &u8| self.constants[usize::from(number % CONSTANTS)];
         Fact::new(self.predicates[usize::from(predicate)], arguments.map(constant))
     }
@@ -58,19 +66,21 @@ impl World {
     }
 
     fn relation(&self, predicate: u8, arguments: &[u8]) -> Atom {
-        let arity = 1 + usize::from(predicate % 2);
-        let arguments = arguments.iter().take(arity).map(|&number| self.term(number));
+        let arguments = arguments.iter().take(arity(predicate)).map(|&number| self.term(number));
         Atom::relation(self.predicates[usize::from(predicate)], arguments)
     }
 
     /// Levels make negation stratified; terms that nothing binds become constants.
     fn rule(&self, position: usize, raw: &RawRule) -> Rule {
-        let ((head, head_arguments), body) = raw;
-        let constraint = head % 9 == 8;
-        let head = if constraint { PREDICATES - 1 } else { head % PREDICATES };
-        let level = head / 2;
+        let (heads, body) = raw;
+        let constraint = heads[0].0 % 9 == 8;
+        let heads =
+            heads.iter().map(|(head, arguments)| (if constraint { 8 } else { head % PREDICATES }, arguments));
+        let heads: Vec<(u8, &[u8; 3])> = heads.collect();
+        let level = heads.iter().map(|(head, _)| head / PER_LEVEL).min().unwrap_or(0);
         let positive = body.iter().filter(|(kind, ..)| kind % 10 < 6 || level == 0 && kind % 10 == 6);
-        let relations = positive.map(|(_, p, arguments)| self.relation(p % (2 * (level + 1)), arguments));
+        let relations =
+            positive.map(|(_, p, arguments)| self.relation(p % (PER_LEVEL * (level + 1)), arguments));
         let mut atoms: Vec<Atom> = relations.collect();
         let mut bound: BTreeSet<Term> = atoms.iter().flat_map(Atom::terms).collect();
         let safe = |term: Term, bound: &BTreeSet<Term>| match term {
@@ -81,8 +91,8 @@ impl World {
             let [left, right] = [a, b].map(|number| safe(self.term(number), &bound));
             match kind % 10 {
                 6 if level > 0 => {
-                    let p = p % (2 * level);
-                    let arguments = [left, right].into_iter().take(1 + usize::from(p % 2)).collect();
+                    let p = p % (PER_LEVEL * level);
+                    let arguments = [left, right].into_iter().chain([left]).take(arity(p)).collect();
                     atoms.push(Atom::Not { predicate: self.predicates[usize::from(p)], arguments });
                 }
                 7 => atoms.push(Atom::BuiltIn {
@@ -104,17 +114,17 @@ impl World {
                 _ => {}
             }
         }
-        let has_result = bound.contains(&Term::Variable(Variable(u16::from(VARIABLES))));
-        let first = if has_result {
-            Term::Variable(Variable(u16::from(VARIABLES)))
-        } else {
-            self.term(head_arguments[0])
+        let computed = Term::Variable(Variable(u16::from(VARIABLES)));
+        let head = |&(head, arguments): &(u8, &[u8; 3])| {
+            let mut terms = arguments.map(|number| safe(self.term(number), &bound));
+            if bound.contains(&computed) {
+                terms[0] = computed;
+            }
+            Atom::relation(self.predicates[usize::from(head)], terms.into_iter().take(arity(head)))
         };
-        let head_terms = [first, self.term(head_arguments[1])].map(|term| safe(term, &bound));
-        let arguments = head_terms.into_iter().take(1 + usize::from(head % 2));
-        let head = Atom::relation(self.predicates[usize::from(head)], arguments);
+        let heads: Vec<Atom> = heads.iter().map(head).collect();
         let identity = RuleIdentity::new("random", position as u32);
-        Rule::new(identity, if constraint { vec![] } else { vec![head] }, atoms)
+        Rule::new(identity, if constraint { vec![] } else { heads }, atoms)
     }
 
     fn is_below(&self, atom: &Atom, level: u8) -> bool {
@@ -186,9 +196,9 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
             fact.arguments.iter().enumerate().map(|(at, &symbol)| (at != 1).then_some(symbol)).collect();
         assert!(engine.matching(fact.predicate, &pattern).any(|row| row == fact.arguments.as_slice()));
     }
-    for (predicate, constant) in (0..PREDICATES).step_by(2).flat_map(|p| (0..CONSTANTS).map(move |c| (p, c)))
+    for (predicate, constant) in (0..PREDICATES).step_by(3).flat_map(|p| (0..CONSTANTS).map(move |c| (p, c)))
     {
-        let fact = world.fact(predicate, [constant, 0]);
+        let fact = world.fact(predicate, [constant; 3]);
         let misses = engine.why_not(&fact);
         assert!(misses.iter().all(|miss| !miss.obstacles.is_empty()), "{fact:?} {misses:?}");
         assert!(misses.is_empty() || !facts.contains(&fact));
@@ -246,8 +256,9 @@ fn renumber(program: Program) -> Program {
 
 fn case() -> impl Strategy<Value = (Vec<RawRule>, Vec<RawChange>, Vec<Vec<RawChange>>)> {
     let atom = (any::<u8>(), any::<u8>(), any::<[u8; 3]>());
-    let rule = ((any::<u8>(), any::<[u8; 2]>()), prop::collection::vec(atom, 1..5));
-    let change = || (any::<bool>(), any::<u8>(), any::<[u8; 2]>());
+    let heads = prop::collection::vec((any::<u8>(), any::<[u8; 3]>()), 1..3);
+    let rule = (heads, prop::collection::vec(atom, 1..5));
+    let change = || (any::<bool>(), any::<u8>(), any::<[u8; 3]>());
     let start = prop::collection::vec(change(), 0..12);
     let step = prop::collection::vec(change(), 1..4);
     (prop::collection::vec(rule, 1..7), start, prop::collection::vec(step, 1..20))

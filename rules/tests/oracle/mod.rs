@@ -17,15 +17,14 @@ pub fn naive(
     level: impl Fn(Symbol) -> usize,
 ) -> BTreeSet<Fact> {
     let mut facts = stated.clone();
-    let head_level = |rule: &Rule| rule.head.iter().map(|atom| level(predicate(atom))).max();
-    let levels: BTreeSet<usize> = program.rules.iter().filter_map(head_level).collect();
-    for wanted in levels {
+    let heads = program.rules.iter().flat_map(|rule| rule.head.iter().map(move |head| (rule, head)));
+    let heads: Vec<(usize, &Rule, &Atom)> =
+        heads.map(|(rule, head)| (level(predicate(head)), rule, head)).collect();
+    for wanted in heads.iter().map(|&(level, ..)| level).collect::<BTreeSet<_>>() {
         loop {
             let mut new = BTreeSet::new();
-            for rule in program.rules.iter().filter(|rule| head_level(rule) == Some(wanted)) {
-                for binding in matches(rule, symbols, &facts) {
-                    new.extend(rule.head.iter().map(|atom| ground(atom, &binding)));
-                }
+            for (_, rule, head) in heads.iter().filter(|(level, ..)| *level == wanted) {
+                new.extend(matches(rule, symbols, &facts).iter().map(|binding| ground(head, binding)));
             }
             let before = facts.len();
             facts.append(&mut new);
