@@ -159,6 +159,10 @@ fn temporal_plans_one_after_another() {
             ("0.000: (prepare)\n0.001: (work) [3.333]", "valid time=10/3 metric=50/3 (level)=20/3"),
             // The order is that of the times, not of the lines.
             ("1: (work) [3.333]\n0: (prepare) [0.001]", "valid time=10/3 metric=50/3 (level)=20/3"),
+            (
+                "0.0: (PREPARE) ; [\n0.001: (WORK) [D:3.333; C:0.1]",
+                "valid time=10/3 metric=50/3 (level)=20/3",
+            ),
             ("0: (prepare)\n1: (work) [3.4]", "2 duration"),
             ("0: (prepare)\n0: (wait) [-1]", "2 duration"),
             ("(prepare)\n(wait)", "2 duration"),

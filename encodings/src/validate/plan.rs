@@ -45,7 +45,7 @@ impl PlanText {
         let mut steps = Vec::new();
         let mut at = begin;
         for line in text[begin..].split_inclusive('\n') {
-            let content = line.split(';').next().unwrap_or_default();
+            let content = without_comment(line);
             let trimmed = content.trim();
             let start = (at + content.len() - content.trim_start().len()) as u32;
             at += line.len();
@@ -63,6 +63,16 @@ impl PlanText {
         }
         if sink.has_errors() { Err(sink.finish()) } else { Ok(Self { steps }) }
     }
+}
+
+/// A line up to its comment; LPG writes a semicolon inside the brackets, `[D:5.00; C:0.10]`.
+fn without_comment(line: &str) -> &str {
+    let mut in_brackets = false;
+    let end = line.find(|character| {
+        in_brackets = (in_brackets || character == '[') && character != ']';
+        character == ';' && !in_brackets
+    });
+    &line[..end.unwrap_or(line.len())]
 }
 
 fn looks_like_step(line: &str) -> bool {
