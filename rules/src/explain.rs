@@ -1,5 +1,7 @@
 //! Why a fact holds, from the derivations that the engine recorded; and which integrity constraints are violated.
 
+use std::fmt;
+
 use rustc_hash::FxHashMap;
 
 use crate::engine::Engine;
@@ -8,7 +10,7 @@ use crate::fixpoint::resolve;
 use crate::plan::{Condition, Source};
 use crate::rule::{Rule, RuleIdentity, Variable};
 use crate::store::{Record, RelationId, Row, state};
-use crate::symbol::Symbol;
+use crate::symbol::{Symbol, Symbols};
 
 /// A derivation: each fact that it rests on once, so that its size is that of the facts involved, not of the tree
 /// that repeats them.
@@ -62,6 +64,44 @@ pub enum Cause {
     Constraint(RuleIdentity),
     /// A literal whose lexical form its datatype forbids.
     IllTyped(Symbol),
+}
+
+impl Derivation {
+    /// Prints the derivation as an indented tree, a fact a line with its reason; what was printed before is not
+    /// explained again.
+    pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
+        DisplayDerivation { derivation: self, symbols }
+    }
+}
+
+struct DisplayDerivation<'a> {
+    derivation: &'a Derivation,
+    symbols: &'a Symbols,
+}
+
+impl fmt::Display for DisplayDerivation<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut printed = vec![false; self.derivation.steps.len()];
+        let mut stack = vec![(0, 0)];
+        while let Some((position, depth)) = stack.pop() {
+            let step = &self.derivation.steps[position];
+            write!(f, "{:indent$}{}", "", step.fact.display(self.symbols), indent = 2 * depth)?;
+            let repeated = std::mem::replace(&mut printed[position], true);
+            match &step.reason {
+                Reason::Asserted => writeln!(f, " is stated")?,
+                Reason::Rule { .. } if repeated => writeln!(f, ", as above")?,
+                Reason::Rule { identity, supports, absent, .. } => {
+                    writeln!(f, " by rule {identity}")?;
+                    for fact in absent {
+                        let fact = fact.display(self.symbols);
+                        writeln!(f, "{:indent$}not {fact}", "", indent = 2 * depth + 2)?;
+                    }
+                    stack.extend(supports.iter().rev().map(|&support| (support, depth + 1)));
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Engine {

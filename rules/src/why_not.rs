@@ -4,16 +4,19 @@
 //! than failed tests), and among those the one whose failing comparisons miss by the least; the search gives up on
 //! improving after a fixed number of nodes.
 
+use std::fmt;
+
 use num_rational::BigRational;
 use num_traits::{Signed, ToPrimitive};
 
 use crate::builtin::BuiltIn;
 use crate::engine::Engine;
 use crate::fact::Fact;
+use crate::literal::Decimal;
 use crate::plan::{Condition, Lowered, Source};
 use crate::rule::{RuleIdentity, Variable};
 use crate::store::RelationId;
-use crate::symbol::Symbol;
+use crate::symbol::{Symbol, Symbols};
 
 /// Nodes visited per rule before the best binding so far is taken.
 const SEARCH_LIMIT: usize = 20_000;
@@ -64,6 +67,50 @@ pub enum Obstacle {
         /// Whether they would have to be the same.
         wanted: bool,
     },
+}
+
+impl Obstacle {
+    /// Prints what is missing or wrong, in a line without its end.
+    pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
+        DisplayObstacle { obstacle: self, symbols }
+    }
+}
+
+struct DisplayObstacle<'a> {
+    obstacle: &'a Obstacle,
+    symbols: &'a Symbols,
+}
+
+impl DisplayObstacle<'_> {
+    fn arguments(&self, arguments: &[Option<Symbol>]) -> String {
+        let name = |symbol: &Option<Symbol>| match symbol {
+            Some(symbol) => self.symbols.value(*symbol).to_string(),
+            None => "?".to_string(),
+        };
+        arguments.iter().map(name).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl fmt::Display for DisplayObstacle<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.obstacle {
+            Obstacle::Missing { predicate, arguments } => {
+                write!(f, "missing {}({})", self.symbols.value(*predicate), self.arguments(arguments))
+            }
+            Obstacle::Present(fact) => write!(f, "but {}", fact.display(self.symbols)),
+            Obstacle::False { built_in, arguments, gap } => {
+                write!(f, "{}({}) is false", built_in.name(), self.arguments(arguments))?;
+                match gap {
+                    Some(gap) => write!(f, ", by {}", Decimal::from_rational(gap)),
+                    None => Ok(()),
+                }
+            }
+            Obstacle::Equality { left, right, wanted } => {
+                let verb = if *wanted { "is not" } else { "is the same as" };
+                write!(f, "{} {verb} {}", self.symbols.value(*left), self.symbols.value(*right))
+            }
+        }
+    }
 }
 
 impl Engine {
