@@ -176,7 +176,7 @@ impl Search<'_> {
     fn visit(&mut self, mut state: State) {
         self.visited += 1;
         let hopeless = self.best.as_ref().is_some_and(|best| !state.is_better_than(best));
-        if hopeless || (self.best.is_some() && self.visited > SEARCH_LIMIT) {
+        if hopeless || self.is_over() {
             return;
         }
         let Some(at) = self.next(&state) else {
@@ -191,6 +191,10 @@ impl Search<'_> {
                 self.visit(state);
             }
         }
+    }
+
+    fn is_over(&self) -> bool {
+        self.best.is_some() && self.visited > SEARCH_LIMIT
     }
 
     /// The next condition: a test whose values are known, then the relation with the most columns known, then what is
@@ -222,6 +226,9 @@ impl Search<'_> {
         let mut rows: Vec<&[Symbol]> = self.engine.matching(predicate, &arguments).collect();
         rows.sort_unstable();
         for row in rows {
+            if self.is_over() {
+                break;
+            }
             let mut longer = state.clone();
             if unify(sources, row, &mut longer.bound) {
                 longer.supports.push(Fact::new(predicate, row.iter().copied()));

@@ -26,6 +26,25 @@ fn printed_rules_read_back_the_same() {
     }
 }
 
+#[test]
+fn names_that_the_syntax_has_no_room_for_are_replaced() {
+    let mut symbols = Symbols::new();
+    let text = "[a] p(?x, ?y) ^ q(?z) -> r(?x, ?y, ?z) .";
+    let mut program = parse_rules(text, "test", &mut symbols, &prefixes()).expect("rules");
+    program.rules[0].variables = ["x", "http://e/#y", "x"].map(Into::into).to_vec();
+    program.rules[0].identity.label = Some("two\nlines [1]".into());
+    let printed = print_rules(&program, &symbols, &prefixes());
+    assert!(
+        printed.ends_with("[two lines [1)] <p>(?_0, ?_1) ^ <q>(?_2) -> <r>(?_0, ?_1, ?_2) .\n"),
+        "{printed}"
+    );
+    let again = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
+    assert_eq!(
+        (&program.rules[0].head, &program.rules[0].body),
+        (&again.rules[0].head, &again.rules[0].body)
+    );
+}
+
 fn check(rules: &str, expected: &[&str]) {
     let errors = engine(rules, "").expect_err(rules);
     let shown: Vec<String> = errors.iter().map(ToString::to_string).collect();

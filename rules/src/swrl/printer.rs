@@ -1,10 +1,11 @@
-//! Rules to text that [`super::parse_rules`] reads back as the same rules.
+//! Rules to text that [`super::parse_rules`] reads back as the same rules, up to names of variables and labels that
+//! the syntax has no room for.
 
 use std::fmt::Write;
 
 use super::parser::Prefixes;
 use crate::builtin::SWRLB;
-use crate::rule::{Atom, Program, Rule, Term};
+use crate::rule::{Atom, Program, Rule, Term, Variable};
 use crate::symbol::{Symbol, Symbols, Value};
 
 /// Prints rules one a line, with labels and names abbreviated by the prefixes, whose declarations come first.
@@ -29,7 +30,9 @@ struct Printer<'a> {
 
 impl Printer<'_> {
     fn rule(&self, rule: &Rule) -> String {
-        let label = rule.identity.label.as_ref().map(|label| format!("[{label}] ")).unwrap_or_default();
+        let clean = |label: &str| label.replace(['\n', '\r'], " ").replace(']', ")");
+        let label =
+            rule.identity.label.as_ref().map(|label| format!("[{}] ", clean(label))).unwrap_or_default();
         let (body, head) = (self.atoms(rule, &rule.body), self.atoms(rule, &rule.head));
         let space = |text: &str| if text.is_empty() { "" } else { " " };
         format!("{label}{body}{}->{}{head} .", space(&body), space(&head))
@@ -53,7 +56,7 @@ impl Printer<'_> {
 
     fn term(&self, rule: &Rule, term: Term) -> String {
         match term {
-            Term::Variable(variable) => format!("?{}", rule.variable_name(variable)),
+            Term::Variable(variable) => format!("?{}", variable_name(rule, variable)),
             Term::Constant(symbol) => self.constant(symbol),
         }
     }
@@ -77,4 +80,13 @@ impl Printer<'_> {
             None => format!("<{iri}>"),
         }
     }
+}
+
+/// The name of a variable where it can be read back as that variable alone, else its number.
+fn variable_name(rule: &Rule, variable: Variable) -> String {
+    let name = rule.variable_name(variable);
+    let readable = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
+    let number = usize::from(variable.0);
+    let unique = !rule.variables.iter().enumerate().any(|(other, taken)| other != number && **taken == *name);
+    if readable && unique { name } else { format!("_{number}") }
 }
