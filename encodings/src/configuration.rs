@@ -27,7 +27,9 @@ pub(crate) fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name
             && solves.contains(&lifted.predicates[predicate.index()].name)
             && let [Term::Parameter(parameter), function] = terms[..]
             && function != Term::Parameter(parameter)
-            && designs.iter().all(|slot| slot.parameter != parameter && Term::Parameter(slot.parameter) != function)
+            && designs
+                .iter()
+                .all(|slot| slot.parameter != parameter && Term::Parameter(slot.parameter) != function)
         {
             designs.push(SlotParameter { parameter, function });
         }
@@ -37,7 +39,11 @@ pub(crate) fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name
 }
 
 /// Those design parameters that are separable.
-pub(crate) fn slot_parameters(lifted: &Lifted, schema: &Schema, designs: &[SlotParameter]) -> Vec<SlotParameter> {
+pub(crate) fn slot_parameters(
+    lifted: &Lifted,
+    schema: &Schema,
+    designs: &[SlotParameter],
+) -> Vec<SlotParameter> {
     designs.iter().filter(|design| is_separable(lifted, schema, design.parameter)).copied().collect()
 }
 
@@ -50,7 +56,8 @@ pub(crate) fn conjuncts(formula: &Formula) -> Vec<&Formula> {
 }
 
 fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
-    let conditions = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
+    let conditions =
+        conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
     let effects = schema.start_effects.iter().chain(&schema.end_effects);
     let is = |term: &Term| *term == Term::Parameter(parameter);
     conditions.into_iter().all(|conjunct| match conjunct {
@@ -81,7 +88,9 @@ pub(crate) fn is_static(lifted: &Lifted, formula: &Formula) -> bool {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().all(|part| is_static(lifted, part)),
         Formula::Literal { predicate, .. } => !lifted.predicates[predicate.index()].fluent,
         Formula::Equal { .. } => true,
-        Formula::Compare(_, left, right, _) => is_static_expression(lifted, left) && is_static_expression(lifted, right),
+        Formula::Compare(_, left, right, _) => {
+            is_static_expression(lifted, left) && is_static_expression(lifted, right)
+        }
     }
 }
 
@@ -93,7 +102,9 @@ fn is_static_expression(lifted: &Lifted, expression: &Expression) -> bool {
         Expression::Sum(parts) | Expression::Product(parts, _) => {
             parts.iter().all(|part| is_static_expression(lifted, part))
         }
-        Expression::Quotient(left, right, _) => is_static_expression(lifted, left) && is_static_expression(lifted, right),
+        Expression::Quotient(left, right, _) => {
+            is_static_expression(lifted, left) && is_static_expression(lifted, right)
+        }
     }
 }
 
@@ -134,9 +145,16 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
 
 fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
     match formula {
-        Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| formula_terms(part, visit)),
+        Formula::And(parts) | Formula::Or(parts) => {
+            for part in parts {
+                formula_terms(part, visit);
+            }
+        }
         Formula::Literal { terms, .. } => terms.iter().for_each(|term| visit(*term)),
-        Formula::Equal { left, right, .. } => [left, right].into_iter().for_each(|term| visit(*term)),
+        Formula::Equal { left, right, .. } => {
+            visit(*left);
+            visit(*right);
+        }
         Formula::Compare(_, left, right, _) => {
             expression_terms(left, visit);
             expression_terms(right, visit);
@@ -150,7 +168,9 @@ fn expression_terms(expression: &Expression, visit: &mut dyn FnMut(Term)) {
         Expression::Function(_, terms, _) => terms.iter().for_each(|term| visit(*term)),
         Expression::Negate(inner) => expression_terms(inner, visit),
         Expression::Sum(parts) | Expression::Product(parts, _) => {
-            parts.iter().for_each(|part| expression_terms(part, visit));
+            for part in parts {
+                expression_terms(part, visit);
+            }
         }
         Expression::Quotient(left, right, _) => {
             expression_terms(left, visit);

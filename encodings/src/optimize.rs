@@ -18,6 +18,8 @@ use crate::task::Task;
 
 /// Formulas with more operator variables than this are not built.
 const FORMULA_LIMIT: usize = 30_000_000;
+/// Formulas with at most this many operator variables are solved once more without the help of bounds.
+const CONFIRM_LIMIT: usize = 400;
 
 /// What the user asks of the optimizer.
 #[derive(Debug, Clone)]
@@ -59,6 +61,8 @@ pub enum Proof {
         /// No plan with more steps can be cheaper.
         step_bound: usize,
     },
+    /// The cost of the plan equals a lower bound on the cost of all plans, by the cost to go in a projection.
+    Bound,
     /// A* with an admissible estimate ended; all that it left out is dominated.
     Search,
     /// Relaxed or projected, the goal is out of reach: the reason in words.
@@ -180,13 +184,18 @@ impl Run<'_> {
         let started = Instant::now();
         let bounds = Bounds::new(self.task);
         let Some(lower) = bounds.estimate(&self.task.initial) else {
-            let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
+            let reason =
+                "no path leads to the goal in a projection of the task to one or two of its variables";
             return self.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.into())));
         };
-        let found =
-            if self.config.quick_search { search(self.task, &bounds, &self.config.limits) } else { Found::Unknown };
+        let found = if self.config.quick_search {
+            search(self.task, &bounds, &self.config.limits)
+        } else {
+            Found::Unknown
+        };
         self.statistics.search = started.elapsed();
-        let within = |plan: &GroundPlan| self.config.horizon.is_none_or(|horizon| plan.steps.len() <= horizon);
+        let within =
+            |plan: &GroundPlan| self.config.horizon.is_none_or(|horizon| plan.steps.len() <= horizon);
         let (incumbent, exact) = match found {
             Found::None => return self.finish(Status::Unsolvable, None, None, 0, Some(Proof::Search)),
             Found::Optimal(plan) if within(&plan) => (Some(plan), true),
@@ -209,6 +218,10 @@ impl Run<'_> {
             return self.finish(Status::Feasible, Some(&incumbent), None, 0, None);
         };
         self.announce(&incumbent, lower, incumbent.steps.len());
+        if incumbent.cost <= lower {
+            let proof = self.confirm(&incumbent).unwrap_or(Proof::Bound);
+            return self.conclude(&incumbent, lower, 0, Some(proof));
+        }
         let window = bounds.window(self.task, Some(incumbent.cost - 1), self.config.horizon);
         let bound = window.steps;
         let allowed = if bound.is_some() {
@@ -233,22 +246,53 @@ impl Run<'_> {
         self.conclude(&incumbent, lower, horizon, proof)
     }
 
+    /// That a plan's cost equals a lower bound is proof enough. On small tasks the SAT solver has to find the same on
+    /// a formula that knows nothing of bounds, with as many steps as the cheapest operator allows.
+    fn confirm(&mut self, incumbent: &GroundPlan) -> Option<Proof> {
+        let cheapest =
+            self.task.operators.iter().map(|operator| operator.cost.minimum()).min().filter(|c| *c > 0)?;
+        let limit = incumbent.cost - 1;
+        let steps = usize::try_from(limit / cheapest).ok()?;
+        if steps.saturating_mul(self.task.operators.len()) > CONFIRM_LIMIT {
+            return None;
+        }
+        let started = Instant::now();
+        let allowed = vec![vec![true; self.task.operators.len()]; steps];
+        let bounds = Bounds::trivial(self.task);
+        let encoding = Encoding::new(self.task, &allowed, Some(CostLimit { limit, bounds: &bounds }));
+        self.statistics.encode += started.elapsed();
+        let (answer, _) = self.call(&encoding);
+        debug_assert_ne!(answer, Answer::Satisfiable, "a plan is cheaper than the lower bound");
+        (answer == Answer::Unsatisfiable).then_some(Proof::Sat { step_bound: steps })
+    }
+
     fn conclude(self, incumbent: &GroundPlan, lower: i64, horizon: usize, proof: Option<Proof>) -> Solution {
         let horizon = horizon.max(incumbent.steps.len());
         match proof {
-            Some(proof) => self.finish(Status::Optimal, Some(incumbent), Some(incumbent.cost), horizon, Some(proof)),
+            Some(proof) => {
+                self.finish(Status::Optimal, Some(incumbent), Some(incumbent.cost), horizon, Some(proof))
+            }
             None => self.finish(Status::Feasible, Some(incumbent), Some(lower), horizon, None),
         }
     }
 
     fn announce(&mut self, plan: &GroundPlan, lower: i64, horizon: usize) {
-        let improvement =
-            Improvement { cost: metric(self.task, plan.cost), lower_bound: metric(self.task, lower), horizon };
+        let improvement = Improvement {
+            cost: metric(self.task, plan.cost),
+            lower_bound: metric(self.task, lower),
+            horizon,
+        };
         (self.report)(improvement);
     }
 
     /// Asks for cheaper and cheaper plans until there is none.
-    fn tighten(&mut self, bounds: &Bounds, allowed: &[Vec<bool>], incumbent: &mut GroundPlan, lower: i64) -> Tightened {
+    fn tighten(
+        &mut self,
+        bounds: &Bounds,
+        allowed: &[Vec<bool>],
+        incumbent: &mut GroundPlan,
+        lower: i64,
+    ) -> Tightened {
         let started = Instant::now();
         let limit = CostLimit { limit: incumbent.cost - 1, bounds };
         let mut encoding = Encoding::new(self.task, allowed, Some(limit));
@@ -315,7 +359,11 @@ impl Run<'_> {
                 (Answer::Unsatisfiable, None) => {
                     let bounded = self.states().is_some_and(|states| horizon + 1 >= states);
                     let solution = if bounded {
-                        self.without_plan(Status::Unsolvable, horizon, Some(Proof::Sat { step_bound: horizon }))
+                        self.without_plan(
+                            Status::Unsolvable,
+                            horizon,
+                            Some(Proof::Sat { step_bound: horizon }),
+                        )
                     } else {
                         self.without_plan(Status::UnsolvableWithinHorizon, horizon, None)
                     };
@@ -367,7 +415,13 @@ impl Run<'_> {
             cost
         });
         let config = Config { horizon: Some(steps), ..self.config.clone() };
-        let mut run = Run { task: &shifted, config: &config, report: &mut silent, statistics: self.statistics, bounds: None };
+        let mut run = Run {
+            task: &shifted,
+            config: &config,
+            report: &mut silent,
+            statistics: self.statistics,
+            bounds: None,
+        };
         let bounds = Bounds::new(&shifted);
         let mut plan = match run.first_plan(&bounds) {
             Ok(plan) => plan,
@@ -380,7 +434,8 @@ impl Run<'_> {
         let proof = matches!(tightened, Tightened::Exhausted).then_some(Proof::Sat { step_bound: steps });
         let statistics = run.statistics;
         plan.cost += lowest * steps as i64;
-        let unbounded = if self.task.can_repeat_reward(&plan.steps) { Unbounded::Proved } else { Unbounded::Suspected };
+        let unbounded =
+            if self.task.can_repeat_reward(&plan.steps) { Unbounded::Proved } else { Unbounded::Suspected };
         Solution {
             status: Status::Feasible,
             plan: Some(decode(self.task, &plan)),
@@ -411,8 +466,8 @@ impl Task {
             self.operators.iter().filter(|operator| operator.cost.minimum() < 0).any(|operator| {
                 operator.choices().any(|choice| {
                     operator.cost.at(&choice, &operator.sizes()) < 0
-                        && self.applicable(state, operator, &choice)
-                        && self.successor(state, operator, &choice) == *state
+                        && operator.applicable(state, &choice)
+                        && operator.successor(state, &choice) == *state
                 })
             })
         })

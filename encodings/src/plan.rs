@@ -170,11 +170,11 @@ pub(crate) fn replay(task: &Task, plan: &[GroundStep]) -> Option<(Vec<State>, i6
     for step in plan {
         let operator = &task.operators[step.operator.index()];
         let state = states.last()?;
-        if !operator.admits(&step.choice) || !task.applicable(state, operator, &step.choice) {
+        if !operator.admits(&step.choice) || !operator.applicable(state, &step.choice) {
             return None;
         }
         cost += operator.cost.at(&step.choice, &operator.sizes());
-        let next = task.successor(state, operator, &step.choice);
+        let next = operator.successor(state, &step.choice);
         states.push(next);
     }
     task.is_goal(states.last()?).then_some((states, cost))

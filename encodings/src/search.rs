@@ -93,7 +93,7 @@ impl Search<'_> {
                 return Found::Optimal(self.plan(id));
             }
             expanded += 1;
-            if self.nodes.len() > STATE_LIMIT || (expanded % 256 == 0 && limits.reached()) {
+            if self.nodes.len() > STATE_LIMIT || (expanded.is_multiple_of(256) && limits.reached()) {
                 return Found::Unknown;
             }
             self.expand(id, steps);
@@ -118,7 +118,7 @@ impl Search<'_> {
             for index in 0..self.choices[operator_id.index()].len() {
                 let (choice, step) = &self.choices[operator_id.index()][index];
                 if operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
-                    let next = self.task.successor(&state, operator, choice);
+                    let next = operator.successor(&state, choice);
                     self.push(next, cost + step, steps + 1, Some((id, operator_id, index as u32)));
                 }
             }
@@ -134,10 +134,15 @@ impl Search<'_> {
             }
             Entry::Occupied(mut entry) => {
                 let (nodes, monotone) = (&mut self.nodes, self.monotone);
-                let at_least = |a: &[i64], b: &[i64]| if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b };
+                let at_least = |a: &[i64], b: &[i64]| {
+                    if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b }
+                };
                 let known = |id: &u32| &nodes[*id as usize];
                 let front = entry.get_mut();
-                if front.iter().any(|id| known(id).cost <= cost && at_least(&known(id).state.numbers, &state.numbers)) {
+                if front
+                    .iter()
+                    .any(|id| known(id).cost <= cost && at_least(&known(id).state.numbers, &state.numbers))
+                {
                     return;
                 }
                 front.retain(|id| {
@@ -169,7 +174,8 @@ impl Search<'_> {
 fn is_monotone(task: &Task) -> bool {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain([&task.goal]);
     let comparisons = conditions.flat_map(|condition| &condition.comparisons);
-    let effects = task.operators.iter().flat_map(|operator| &operator.numeric_effects).map(|effect| &effect.value);
+    let effects =
+        task.operators.iter().flat_map(|operator| &operator.numeric_effects).map(|effect| &effect.value);
     comparisons.chain(effects).all(|linear| linear.coefficients.iter().all(|(_, factor)| *factor >= 0))
 }
 
@@ -177,11 +183,13 @@ fn undominated(operator: &Operator, monotone: bool) -> Vec<(Vec<u16>, i64)> {
     let sizes = operator.sizes();
     let profile = |choice: &[u16]| -> Vec<i64> {
         let effects = operator.numeric_effects.iter().map(|effect| effect.value.quantity.at(choice, &sizes));
-        let conditions = operator.condition.comparisons.iter().map(|linear| linear.quantity.at(choice, &sizes));
+        let conditions =
+            operator.condition.comparisons.iter().map(|linear| linear.quantity.at(choice, &sizes));
         effects.chain(conditions).collect()
     };
     let mut front: Vec<(Vec<u16>, i64, Vec<i64>)> = Vec::new();
-    let no_worse = |a: &[i64], b: &[i64]| if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b };
+    let no_worse =
+        |a: &[i64], b: &[i64]| if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b };
     for choice in operator.choices() {
         let (cost, profile) = (operator.cost.at(&choice, &sizes), profile(&choice));
         if front.iter().any(|(_, other, numbers)| *other <= cost && no_worse(numbers, &profile)) {
@@ -199,7 +207,11 @@ type FactIndex = FxHashMap<(u32, u32), Vec<OperatorId>>;
 fn index(task: &Task) -> (FactIndex, Vec<OperatorId>) {
     let (mut by_fact, mut always) = (FactIndex::default(), Vec::new());
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
-        let widest = operator.condition.facts.iter().max_by_key(|fact| task.variables[fact.variable.index()].values.len());
+        let widest = operator
+            .condition
+            .facts
+            .iter()
+            .max_by_key(|fact| task.variables[fact.variable.index()].values.len());
         match widest {
             Some(fact) => by_fact.entry((fact.variable.0, fact.value)).or_default().push(id),
             None => always.push(id),

@@ -75,8 +75,6 @@ pub(crate) struct Variable {
 /// A numeric variable.
 #[derive(Debug, Clone)]
 pub(crate) struct NumericVariable {
-    /// The ground function.
-    pub(crate) name: String,
     /// The integers of the task are this many times the values of the files.
     pub(crate) scale: i64,
 }
@@ -84,7 +82,6 @@ pub(crate) struct NumericVariable {
 /// A function and the designs that may solve it.
 #[derive(Debug, Clone)]
 pub(crate) struct Slot {
-    pub(crate) function: String,
     pub(crate) designs: Vec<ObjectId>,
 }
 
@@ -184,7 +181,9 @@ impl Operator {
     /// Whether the combination (an index into `SlotUse::designs` for each slot) is not forbidden.
     pub(crate) fn admits(&self, choice: &[u16]) -> bool {
         self.forbidden.iter().all(|rule| {
-            rule.combinations.iter().all(|bad| rule.slots.iter().zip(bad).any(|(slot, design)| choice[*slot as usize] != *design))
+            rule.combinations
+                .iter()
+                .all(|bad| rule.slots.iter().zip(bad).any(|(slot, design)| choice[*slot as usize] != *design))
         })
     }
 
@@ -236,7 +235,8 @@ impl Condition {
     /// Whether the propositional part holds.
     pub(crate) fn holds_propositionally(&self, values: &[u32]) -> bool {
         let is = |fact: &Fact| values[fact.variable.index()] == fact.value;
-        self.facts.iter().all(is) && self.clauses.iter().all(|clause| clause.iter().any(|l| is(&l.fact) == l.positive))
+        self.facts.iter().all(is)
+            && self.clauses.iter().all(|clause| clause.iter().any(|l| is(&l.fact) == l.positive))
     }
 
     /// Whether the numeric part holds.
@@ -245,30 +245,33 @@ impl Condition {
     }
 }
 
-impl Task {
-    /// The state after an operator that is applicable with this combination of designs.
-    pub(crate) fn successor(&self, state: &State, operator: &Operator, choice: &[u16]) -> State {
+impl Operator {
+    /// The state after this operator, which must be applicable with this combination of designs.
+    pub(crate) fn successor(&self, state: &State, choice: &[u16]) -> State {
         let mut next = state.clone();
-        for effect in &operator.effects {
+        for effect in &self.effects {
             next.values[effect.variable.index()] = effect.value;
         }
-        if !operator.numeric_effects.is_empty() {
-            let sizes = operator.sizes();
-            for effect in &operator.numeric_effects {
+        if !self.numeric_effects.is_empty() {
+            let sizes = self.sizes();
+            for effect in &self.numeric_effects {
                 next.numbers[effect.variable.index()] = effect.value.value(&state.numbers, choice, &sizes);
             }
         }
         next
     }
 
-    /// Whether an operator may be applied with this combination of designs.
-    pub(crate) fn applicable(&self, state: &State, operator: &Operator, choice: &[u16]) -> bool {
-        operator.condition.holds_propositionally(&state.values)
-            && operator.condition.holds_numerically(&state.numbers, choice, &operator.sizes())
+    /// Whether the operator may be applied with this combination of designs.
+    pub(crate) fn applicable(&self, state: &State, choice: &[u16]) -> bool {
+        self.condition.holds_propositionally(&state.values)
+            && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())
     }
+}
 
+impl Task {
     /// Whether a state satisfies the goal.
     pub(crate) fn is_goal(&self, state: &State) -> bool {
-        self.goal.holds_propositionally(&state.values) && self.goal.holds_numerically(&state.numbers, &[], &[])
+        self.goal.holds_propositionally(&state.values)
+            && self.goal.holds_numerically(&state.numbers, &[], &[])
     }
 }

@@ -40,8 +40,10 @@ impl Bounds {
         others.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
         for other in &others {
             for goal in &goal_variables {
-                let size = task.variables[goal.index()].values.len() * task.variables[other.index()].values.len();
-                if goal != other && size <= STATE_LIMIT && patterns.len() < goal_variables.len() + PAIR_LIMIT {
+                let size =
+                    task.variables[goal.index()].values.len() * task.variables[other.index()].values.len();
+                if goal != other && size <= STATE_LIMIT && patterns.len() < goal_variables.len() + PAIR_LIMIT
+                {
                     patterns.push(vec![*goal.min(other), *goal.max(other)]);
                 }
             }
@@ -51,11 +53,17 @@ impl Bounds {
         if patterns.is_empty() {
             patterns.push(Vec::new());
         }
-        let mut projections: Vec<_> = patterns.into_iter().map(|pattern| Projection::new(task, pattern)).collect();
+        let mut projections: Vec<_> =
+            patterns.into_iter().map(|pattern| Projection::new(task, pattern)).collect();
         projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
         // Beyond the best few, projections cost more time than they save steps.
         projections.truncate(12);
         Self { projections }
+    }
+
+    /// Bounds that say nothing: the projection to no variable at all.
+    pub(crate) fn trivial(task: &Task) -> Self {
+        Self { projections: vec![Projection::new(task, Vec::new())] }
     }
 
     /// A lower bound on the cost from a state to the goal; none if the goal cannot be reached.

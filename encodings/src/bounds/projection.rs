@@ -29,7 +29,8 @@ pub(crate) struct Projection {
 
 impl Projection {
     pub(crate) fn new(task: &Task, pattern: Vec<VariableId>) -> Self {
-        let sizes: Vec<_> = pattern.iter().map(|variable| task.variables[variable.index()].values.len()).collect();
+        let sizes: Vec<_> =
+            pattern.iter().map(|variable| task.variables[variable.index()].values.len()).collect();
         let mut projection = Self {
             pattern,
             sizes,
@@ -98,7 +99,10 @@ impl Projection {
         let mut states = vec![0_u32];
         for (size, value) in self.sizes.iter().zip(required) {
             let range = value.map_or(0..*size as u32, |value| value..value + 1);
-            states = states.iter().flat_map(|s| range.clone().map(move |value| s * *size as u32 + value)).collect();
+            states = states
+                .iter()
+                .flat_map(|s| range.clone().map(move |value| s * *size as u32 + value))
+                .collect();
         }
         states
     }
@@ -148,7 +152,8 @@ impl Projection {
 
     /// Least cost of reaching each abstract state in exactly one more step.
     fn advance(&self, costs: &[Option<i64>]) -> Vec<Option<i64>> {
-        let improve = |slot: &mut Option<i64>, cost: i64| *slot = Some(slot.map_or(cost, |known| known.min(cost)));
+        let improve =
+            |slot: &mut Option<i64>, cost: i64| *slot = Some(slot.map_or(cost, |known| known.min(cost)));
         let mut next = vec![None; costs.len()];
         if let Some(idle) = self.idle_cost {
             for (slot, cost) in next.iter_mut().zip(costs) {
@@ -207,7 +212,8 @@ impl Projection {
                         cheapest.is_some_and(|known| within(known + cost))
                     } else {
                         transitions.iter().any(|transition| {
-                            let through = (&costs[transition.source as usize], &self.to_go[transition.target as usize]);
+                            let through =
+                                (&costs[transition.source as usize], &self.to_go[transition.target as usize]);
                             matches!(through, (Some(c), Some(h)) if within(c + cost + h))
                         })
                     };

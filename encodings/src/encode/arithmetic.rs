@@ -8,7 +8,9 @@ pub(crate) type Bits = Vec<Lit>;
 
 /// How many bits a number needs, sign included.
 pub(crate) fn width(low: i64, high: i64) -> usize {
-    let bits = |number: i64| 65 - if number < 0 { (!number).leading_zeros() } else { number.leading_zeros() } as usize;
+    let bits = |number: i64| {
+        65 - if number < 0 { (!number).leading_zeros() } else { number.leading_zeros() } as usize
+    };
     bits(low).max(bits(high))
 }
 
@@ -25,7 +27,8 @@ impl Arithmetic<'_> {
     }
 
     pub(crate) fn constant(value: i64, width: usize) -> Bits {
-        let bit = |index: usize| if value >> index.min(63) & 1 == 1 { Formula::truth() } else { !Formula::truth() };
+        let bit =
+            |index: usize| if value >> index.min(63) & 1 == 1 { Formula::truth() } else { !Formula::truth() };
         (0..width).map(bit).collect()
     }
 
@@ -121,8 +124,10 @@ impl Arithmetic<'_> {
         }
         let mut sum = Self::constant(0, width);
         for shift in (0..63).filter(|shift| factor.unsigned_abs() >> shift & 1 == 1) {
-            let shifted: Bits =
-                std::iter::repeat_n(!Formula::truth(), shift).chain(Self::extend(bits, width)).take(width).collect();
+            let shifted: Bits = std::iter::repeat_n(!Formula::truth(), shift)
+                .chain(Self::extend(bits, width))
+                .take(width)
+                .collect();
             sum = self.add(&sum, &shifted, width);
         }
         if factor < 0 {
@@ -169,8 +174,12 @@ impl Arithmetic<'_> {
         let bits = Self::extend(bits, width);
         let Some((sign, magnitude)) = bits.split_last() else { return };
         // Two's complement order is that of the magnitudes with the sign inverted as the highest bit.
-        let order: Vec<(Lit, bool)> =
-            magnitude.iter().enumerate().map(|(i, bit)| (*bit, limit >> i & 1 == 1)).chain([(!*sign, limit >= 0)]).collect();
+        let order: Vec<(Lit, bool)> = magnitude
+            .iter()
+            .enumerate()
+            .map(|(i, bit)| (*bit, limit >> i & 1 == 1))
+            .chain([(!*sign, limit >= 0)])
+            .collect();
         for (index, (bit, set)) in order.iter().enumerate() {
             if !set {
                 let above = order[index + 1..].iter().filter(|(_, set)| *set).map(|(bit, _)| !*bit);
@@ -240,7 +249,9 @@ mod tests {
 
     #[test]
     fn widths_hold_their_numbers() {
-        for (low, high, expected) in [(0, 0, 1), (0, 1, 2), (-1, 0, 1), (-2, 1, 2), (0, 7, 4), (-8, 7, 4), (-9, 7, 5)] {
+        for (low, high, expected) in
+            [(0, 0, 1), (0, 1, 2), (-1, 0, 1), (-2, 1, 2), (0, 7, 4), (-8, 7, 4), (-9, 7, 5)]
+        {
             assert_eq!(width(low, high), expected, "{low}..={high}");
         }
     }

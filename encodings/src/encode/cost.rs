@@ -102,7 +102,14 @@ impl Encoding<'_> {
     }
 
     /// The reduced cost of an operator with its cheapest designs, by abstract state where that matters.
-    fn reduced(&mut self, step: usize, id: OperatorId, literal: Lit, cost: &CostLimit<'_>, out: &mut Increments) {
+    fn reduced(
+        &mut self,
+        step: usize,
+        id: OperatorId,
+        literal: Lit,
+        cost: &CostLimit<'_>,
+        out: &mut Increments,
+    ) {
         let potential = &cost.bounds.projections[0];
         let operator = &self.task.operators[id.index()];
         let least = operator.cost.minimum();
@@ -171,7 +178,8 @@ impl Encoding<'_> {
         if increments.is_empty() {
             return spent.clone();
         }
-        let amounts: BTreeSet<i64> = next_amounts(&spent.keys().copied().collect(), increments.keys().copied(), gap);
+        let amounts: BTreeSet<i64> =
+            next_amounts(&spent.keys().copied().collect(), increments.keys().copied(), gap);
         let mut after: BTreeMap<i64, Lit> = BTreeMap::new();
         for amount in amounts {
             let literal = self.formula.fresh(Meaning::CostAtLeast { amount, step: step + 1, stage });

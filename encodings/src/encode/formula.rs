@@ -193,6 +193,7 @@ impl Formula {
         Family::ALL.iter().map(|family| (family.name(), count(*family))).collect()
     }
 
+    #[cfg(test)]
     pub(crate) fn meaning(&self, variable: u32) -> Meaning {
         self.meanings[variable as usize]
     }

@@ -3,10 +3,12 @@
 //! `o@t → g@t` for each member, and `g@t → ⋁ o@t`. Groups make clauses about designs, costs and consumptions independent of
 //! how many operators share them.
 
+use std::collections::BTreeMap;
+
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::sat::Lit;
-use crate::task::OperatorId;
+use crate::task::{Operator, OperatorId};
 
 impl Encoding<'_> {
     /// The variable of a group of operators at a step; members that cannot be at the step are left out.
@@ -39,9 +41,9 @@ impl Encoding<'_> {
     pub(super) fn partition<K: Ord>(
         &self,
         step: usize,
-        property: impl Fn(&crate::task::Operator) -> Vec<K>,
-    ) -> std::collections::BTreeMap<K, Vec<OperatorId>> {
-        let mut parts: std::collections::BTreeMap<K, Vec<OperatorId>> = Default::default();
+        property: impl Fn(&Operator) -> Vec<K>,
+    ) -> BTreeMap<K, Vec<OperatorId>> {
+        let mut parts: BTreeMap<K, Vec<OperatorId>> = BTreeMap::new();
         for (id, _) in &self.operators[step] {
             for key in property(&self.task.operators[id.index()]) {
                 parts.entry(key).or_default().push(*id);

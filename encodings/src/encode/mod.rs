@@ -13,6 +13,8 @@ mod groups;
 mod numeric;
 mod operators;
 mod selection;
+#[cfg(test)]
+mod tests;
 mod state;
 
 use rustc_hash::FxHashMap;
@@ -115,7 +117,9 @@ impl<'a> Encoding<'a> {
 
     /// The plan of the assignment that the solver found.
     pub(crate) fn decode(&self, solver: &dyn Solver) -> Vec<GroundStep> {
-        let holds = |literal: Lit| literal == Formula::truth() || solver.value(literal.variable()) == literal.is_positive();
+        let holds = |literal: Lit| {
+            literal == Formula::truth() || solver.value(literal.variable()) == literal.is_positive()
+        };
         let mut steps = Vec::new();
         for (step, candidates) in self.operators.iter().enumerate() {
             let Some((id, _)) = candidates.iter().find(|(_, literal)| holds(*literal)) else { continue };

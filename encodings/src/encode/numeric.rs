@@ -11,9 +11,12 @@ use crate::encode::Encoding;
 use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::cost::combinations;
 use crate::encode::formula::{Family, Formula};
+use crate::quantity::{Linear, Quantity};
 use crate::sat::Lit;
 use crate::task::{NumericId, Operator, OperatorId};
-use crate::quantity::{Linear, Quantity};
+
+/// Conjunctions, each with the number that it stands for.
+type Premises = Vec<(Vec<Lit>, i64)>;
 
 /// Factors of numeric variables.
 type Shape = Vec<(NumericId, i64)>;
@@ -29,14 +32,15 @@ impl Encoding<'_> {
     /// Encodes all numeric variables; returns their values after the last step.
     pub(super) fn numeric(&mut self) -> Vec<Bits> {
         let task = self.task;
-        let mut ranges: Vec<Range> = task.initial.numbers.iter().map(|n| Range { low: *n, high: *n }).collect();
+        let mut ranges: Vec<Range> =
+            task.initial.numbers.iter().map(|n| Range { low: *n, high: *n }).collect();
         let mut numbers: Vec<Bits> =
             task.initial.numbers.iter().map(|n| Arithmetic::constant(*n, width(*n, *n))).collect();
         for step in 0..self.horizon {
             let next_ranges = self.next_ranges(step, &ranges);
             let mut next = Vec::with_capacity(numbers.len());
-            for variable in 0..numbers.len() {
-                next.push(self.next_number(step, NumericId(variable as u32), &numbers, next_ranges[variable], &ranges));
+            for (range, variable) in next_ranges.iter().zip((0..).map(NumericId)) {
+                next.push(self.next_number(step, variable, &numbers, *range, &ranges));
             }
             self.comparisons(step, &numbers, &next, &ranges);
             (numbers, ranges) = (next, next_ranges);
@@ -68,7 +72,8 @@ impl Encoding<'_> {
             let effects = operator.numeric_effects.iter().filter(|effect| effect.variable == variable);
             effects.map(|effect| effect.value.clone()).collect()
         };
-        let shapes = self.partition(step, |operator| own(operator).into_iter().map(|value| value.coefficients).collect());
+        let shapes = self
+            .partition(step, |operator| own(operator).into_iter().map(|value| value.coefficients).collect());
         let current = numbers[variable.index()].clone();
         if shapes.is_empty() {
             return current;
@@ -118,7 +123,8 @@ impl Encoding<'_> {
         }
         let unchanged = self.formula.fresh(crate::encode::formula::Meaning::Ladder);
         self.formula.add(Family::Numeric, changing.into_iter().chain([unchanged]));
-        Arithmetic { formula: &mut self.formula, family: Family::Numeric }.equal_if(unchanged, &base, current);
+        Arithmetic { formula: &mut self.formula, family: Family::Numeric }
+            .equal_if(unchanged, &base, current);
         base
     }
 
@@ -161,16 +167,17 @@ impl Encoding<'_> {
                 }
             }
         }
-        let mut sources: Vec<Vec<(Vec<Lit>, i64)>> = Vec::new();
-        let mut own = Vec::new();
+        let mut own = Premises::new();
         for (constant, members) in constants {
             own.push((vec![self.group(step, &members, Family::Numeric)], constant));
         }
-        sources.push(own);
-        let mut by_slots: BTreeMap<Vec<usize>, (Vec<Lit>, Vec<(Vec<Lit>, i64)>)> = BTreeMap::new();
+        let mut by_slots: BTreeMap<Vec<usize>, (Vec<Lit>, Premises)> = BTreeMap::new();
         for ((entries, values), members) in tables {
             let group = self.group(step, &members, Family::Numeric);
-            let slots = entries.first().map(|entry| entry.iter().map(|(slot, _)| *slot).collect()).unwrap_or_default();
+            let slots = entries
+                .first()
+                .map(|entry| entry.iter().map(|(slot, _)| *slot).collect())
+                .unwrap_or_default();
             let (groups, premises) = by_slots.entry(slots).or_default();
             groups.push(group);
             for (entry, value) in entries.iter().zip(values) {
@@ -178,7 +185,7 @@ impl Encoding<'_> {
                 premises.push((designs.chain([group]).collect(), value));
             }
         }
-        let mut sum = self.add_source(base, &sources[0], active, width);
+        let mut sum = self.add_source(base, &own, active, width);
         for (groups, premises) in by_slots.into_values() {
             let meaning = crate::encode::formula::Meaning::Ladder;
             let any = self.formula.any(Family::Numeric, meaning, &groups);
@@ -205,7 +212,8 @@ impl Encoding<'_> {
             let (id, literal) = self.operators[step][index];
             let operator = &self.task.operators[id.index()];
             for comparison in &operator.condition.comparisons {
-                if let Some(effect) = operator.numeric_effects.iter().find(|effect| effect.value == *comparison)
+                if let Some(effect) =
+                    operator.numeric_effects.iter().find(|effect| effect.value == *comparison)
                     && let Some(sign) = next[effect.variable.index()].last()
                 {
                     self.formula.add(Family::Numeric, [!literal, !*sign]);
@@ -213,17 +221,23 @@ impl Encoding<'_> {
             }
         }
         let remaining = |operator: &Operator| -> Vec<(usize, Linear<i64>)> {
-            let assigned = |c: &&Linear<i64>| operator.numeric_effects.iter().any(|effect| effect.value == **c);
+            let assigned =
+                |c: &&Linear<i64>| operator.numeric_effects.iter().any(|effect| effect.value == **c);
             operator.condition.comparisons.iter().filter(|c| !assigned(c)).cloned().enumerate().collect()
         };
         let shapes = self.partition(step, |operator| {
-            remaining(operator).into_iter().map(|(position, linear)| (linear.coefficients, position)).collect()
+            remaining(operator)
+                .into_iter()
+                .map(|(position, linear)| (linear.coefficients, position))
+                .collect()
         });
         for ((shape, position), members) in shapes {
             let group = self.group(step, &members, Family::Numeric);
             let base = self.weighted(&shape, numbers, ranges);
             let own = |operator: &Operator| -> Vec<Quantity<i64>> {
-                let matching = remaining(operator).into_iter().filter(|(p, l)| *p == position && l.coefficients == shape);
+                let matching = remaining(operator)
+                    .into_iter()
+                    .filter(|(p, l)| *p == position && l.coefficients == shape);
                 matching.map(|(_, linear)| linear.quantity).collect()
             };
             let values = members.iter().flat_map(|id| remaining(&self.task.operators[id.index()]));

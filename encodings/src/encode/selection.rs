@@ -23,7 +23,9 @@ impl Encoding<'_> {
                 let group = self.group(step, &members, Family::Selection);
                 let suitable = designs.iter().map(|design| literals[*design as usize]);
                 self.formula.add(Family::Selection, suitable.chain([!group]));
-                designs.iter().for_each(|design| users[*design as usize].push(group));
+                for design in &designs {
+                    users[*design as usize].push(group);
+                }
             }
             for (literal, users) in literals.iter().zip(users) {
                 self.formula.add(Family::Selection, users.into_iter().chain([!*literal]));
@@ -47,7 +49,8 @@ impl Encoding<'_> {
         });
         for (combination, members) in parts {
             let group = self.group(step, &members, Family::Selection);
-            let chosen: Vec<_> = combination.iter().map(|(slot, design)| !self.designs[step][*slot][*design]).collect();
+            let chosen: Vec<_> =
+                combination.iter().map(|(slot, design)| !self.designs[step][*slot][*design]).collect();
             self.formula.add(Family::Selection, chosen.into_iter().chain([!group]));
         }
     }

@@ -16,7 +16,8 @@ impl Encoding<'_> {
     /// Makes the variables for operators, values and designs.
     pub(super) fn declare(&mut self, allowed: &[Vec<bool>]) {
         let task = self.task;
-        let mut possible: Vec<Vec<bool>> = task.variables.iter().map(|v| vec![false; v.values.len()]).collect();
+        let mut possible: Vec<Vec<bool>> =
+            task.variables.iter().map(|v| vec![false; v.values.len()]).collect();
         for (variable, value) in task.initial.values.iter().enumerate() {
             possible[variable][*value as usize] = true;
         }
@@ -62,7 +63,8 @@ impl Encoding<'_> {
     }
 
     fn declare_designs(&mut self, step: usize) {
-        let mut used: Vec<Vec<bool>> = self.task.slots.iter().map(|slot| vec![false; slot.designs.len()]).collect();
+        let mut used: Vec<Vec<bool>> =
+            self.task.slots.iter().map(|slot| vec![false; slot.designs.len()]).collect();
         for slot in self.operators[step].iter().flat_map(|(id, _)| &self.task.operators[id.index()].slots) {
             for design in &slot.designs {
                 used[slot.slot.index()][*design as usize] = true;
@@ -84,7 +86,8 @@ impl Encoding<'_> {
     pub(super) fn domain(&mut self, step: usize) {
         for variable in 0..self.task.variables.len() {
             let falsum = !Formula::truth();
-            let literals: Vec<_> = self.values[step][variable].iter().copied().filter(|l| *l != falsum).collect();
+            let literals: Vec<_> =
+                self.values[step][variable].iter().copied().filter(|l| *l != falsum).collect();
             if literals.len() > 1 {
                 self.formula.add(Family::Domain, literals.iter().copied());
                 self.formula.at_most_one(Family::Domain, &literals);

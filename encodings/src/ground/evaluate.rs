@@ -5,7 +5,9 @@ use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 
 use crate::configuration::{SlotParameter, slots_of_expression};
 use crate::error::{Error, Place};
-use crate::lifted::{Arguments, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term};
+use crate::lifted::{
+    Arguments, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term,
+};
 use crate::pddl::ast::Comparison;
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet, Table};
 
@@ -38,9 +40,16 @@ pub(crate) enum Residual {
     False,
     And(Vec<Residual>),
     Or(Vec<Residual>),
-    Literal { atom: AtomId, positive: bool },
+    Literal {
+        atom: AtomId,
+        positive: bool,
+    },
     /// The expression is ≥ 0, or > 0 if strict.
-    Compare { linear: Linear<Rational>, strict: bool, place: Place },
+    Compare {
+        linear: Linear<Rational>,
+        strict: bool,
+        place: Place,
+    },
 }
 
 /// Why an expression has no value here.
@@ -75,6 +84,11 @@ impl<'a> World<'a> {
 
     pub(crate) fn holds_initially(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
         self.facts.contains(&(predicate, arguments.clone()))
+    }
+
+    /// Whether an atom holds in some state of the delete relaxation.
+    pub(crate) fn can_hold(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
+        self.holds_initially(predicate, arguments) || self.reached.contains(&(predicate, arguments.clone()))
     }
 
     pub(crate) fn atom(&mut self, predicate: PredicateId, arguments: Arguments) -> AtomId {
@@ -119,7 +133,9 @@ impl<'a> World<'a> {
                 let difference = match (self.ground(left, binding), self.ground(right, binding)) {
                     (Ok(left), Ok(right)) => (left, right),
                     // PDDL 2.1: a comparison with an undefined value does not hold.
-                    (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) => return Ok(Residual::False),
+                    (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) => {
+                        return Ok(Residual::False);
+                    }
                     (Err(failure), _) | (_, Err(failure)) => return Err(failure),
                 };
                 Ok(compare(*comparison, difference.0, difference.1, *place))
@@ -127,7 +143,12 @@ impl<'a> World<'a> {
         }
     }
 
-    fn junction(&mut self, parts: &[Formula], binding: &Binding, conjunction: bool) -> Result<Residual, Failure> {
+    fn junction(
+        &mut self,
+        parts: &[Formula],
+        binding: &Binding,
+        conjunction: bool,
+    ) -> Result<Residual, Failure> {
         let mut kept = Vec::new();
         for part in parts {
             match (self.residual(part, binding)?, conjunction) {
@@ -147,7 +168,11 @@ impl<'a> World<'a> {
     }
 
     /// Evaluates an expression that mentions no open slot.
-    pub(crate) fn ground(&mut self, expression: &Expression, binding: &Binding) -> Result<Linear<Rational>, Failure> {
+    pub(crate) fn ground(
+        &mut self,
+        expression: &Expression,
+        binding: &Binding,
+    ) -> Result<Linear<Rational>, Failure> {
         match expression {
             Expression::Number(number) => Ok(Linear::constant(*number)),
             // Only the metric mentions it, and takes it apart before it comes here.
@@ -157,7 +182,10 @@ impl<'a> World<'a> {
                 if self.lifted.functions[function.index()].fluent {
                     return Ok(Linear::variable(self.numeric(*function, arguments)));
                 }
-                self.values.get(&(*function, arguments)).map(|v| Linear::constant(*v)).ok_or(Failure::Undefined)
+                self.values
+                    .get(&(*function, arguments))
+                    .map(|v| Linear::constant(*v))
+                    .ok_or(Failure::Undefined)
             }
             Expression::Sum(parts) => {
                 let mut sum = Linear::constant(Rational::from_integer(0));
@@ -244,15 +272,15 @@ impl<'a> World<'a> {
     ) -> Result<Linear<Rational>, Failure> {
         let mut values = Vec::new();
         let mut failure = None;
-        for_each_combination(&mentioned, slots, binding, &mut |binding, combination| {
-            match self.ground(expression, binding) {
-                Ok(linear) => values.push(linear.quantity.constant),
-                Err(Failure::Undefined) => {
-                    values.push(Rational::from_integer(0));
-                    undefined(&mentioned, SlotSet::from_slice(combination));
-                }
-                Err(other) => failure = Some(other),
+        for_each_combination(&mentioned, slots, binding, &mut |binding, combination| match self
+            .ground(expression, binding)
+        {
+            Ok(linear) => values.push(linear.quantity.constant),
+            Err(Failure::Undefined) => {
+                values.push(Rational::from_integer(0));
+                undefined(&mentioned, SlotSet::from_slice(combination));
             }
+            Err(other) => failure = Some(other),
         });
         if let Some(failure) = failure {
             return Err(failure);
@@ -293,7 +321,11 @@ pub(crate) fn for_each_combination(
     go(mentioned, slots, binding, &mut Vec::new(), visit);
 }
 
-fn multiply(left: Linear<Rational>, right: Linear<Rational>, place: Place) -> Result<Linear<Rational>, Failure> {
+fn multiply(
+    left: Linear<Rational>,
+    right: Linear<Rational>,
+    place: Place,
+) -> Result<Linear<Rational>, Failure> {
     let (mut scaled, factor) = match (left.coefficients.is_empty(), right.coefficients.is_empty()) {
         (_, true) => (left, right),
         (true, false) => (right, left),
@@ -304,7 +336,12 @@ fn multiply(left: Linear<Rational>, right: Linear<Rational>, place: Place) -> Re
 }
 
 /// A comparison of two expressions as `difference ≥ 0` or `difference > 0`; decided if it is constant.
-pub(crate) fn compare(comparison: Comparison, left: Linear<Rational>, right: Linear<Rational>, place: Place) -> Residual {
+pub(crate) fn compare(
+    comparison: Comparison,
+    left: Linear<Rational>,
+    right: Linear<Rational>,
+    place: Place,
+) -> Residual {
     match comparison {
         Comparison::Less => at_least_zero(right, left, true, place),
         Comparison::LessOrEqual => at_least_zero(right, left, false, place),
@@ -321,7 +358,12 @@ pub(crate) fn compare(comparison: Comparison, left: Linear<Rational>, right: Lin
     }
 }
 
-fn at_least_zero(mut linear: Linear<Rational>, subtrahend: Linear<Rational>, strict: bool, place: Place) -> Residual {
+fn at_least_zero(
+    mut linear: Linear<Rational>,
+    subtrahend: Linear<Rational>,
+    strict: bool,
+    place: Place,
+) -> Residual {
     linear.add(&subtrahend.negated());
     if linear.coefficients.is_empty() && linear.quantity.tables.is_empty() {
         let value = linear.quantity.constant;

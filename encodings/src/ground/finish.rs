@@ -1,20 +1,23 @@
 //! Atoms to finite-domain variables, rationals to integers: the last step of grounding.
 
+use std::collections::BTreeMap;
+
 use num_integer::Integer;
 use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::error::Error;
 use crate::ground::evaluate::AtomId;
-use crate::ground::instantiate::{GroundCondition, GroundOperator, GroundTask};
+use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::metric::initial_value;
+use crate::ground::mutex;
+use crate::ground::normal_form::GroundCondition;
 use crate::ground::prune::atom_name;
 use crate::lifted::{Lifted, ObjectId, Rational};
-use crate::ground::mutex;
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
-    Condition, Fact, Literal, NumericEffect, NumericVariable, Objective, Operator, Slot, SlotId, SlotUse, State, Task,
-    Variable, VariableId,
+    Condition, Fact, Literal, NumericEffect, NumericVariable, Objective, Operator, Slot, SlotId, SlotUse,
+    State, Task, Variable, VariableId,
 };
 
 /// Integers of a task stay below this, so that sums over a plan fit 64 bits.
@@ -24,15 +27,20 @@ const LIMIT: i64 = 1 << 46;
 ///
 /// # Errors
 /// `Error::Overflow` if exact integers would not fit.
-pub(crate) fn finish(lifted: &Lifted, task: GroundTask<'_>, unreachable: Option<String>) -> Result<Task, Error> {
-    let atoms = Atoms::new(lifted, &task);
-    let mut numbers = Numbers::new(lifted, &task)?;
+pub(crate) fn finish(
+    lifted: &Lifted,
+    task: &GroundTask<'_>,
+    unreachable: Option<String>,
+) -> Result<Task, Error> {
+    let atoms = Atoms::new(lifted, task);
+    let mut numbers = Numbers::new(task)?;
     let cost_scale = common_denominator(
         task.operators.iter().flat_map(|o| o.cost.numbers()).chain([&task.objective.offset]),
         "the metric",
     )?;
-    let time_scale = common_denominator(task.operators.iter().flat_map(|o| o.duration.numbers()), "durations")?;
-    let (slots, slot_ids) = slots(lifted, &task.operators);
+    let time_scale =
+        common_denominator(task.operators.iter().flat_map(|o| o.duration.numbers()), "durations")?;
+    let (slots, slot_ids) = slots(&task.operators);
 
     let mut operators = Vec::with_capacity(task.operators.len());
     let mut seen = FxHashSet::default();
@@ -57,7 +65,8 @@ pub(crate) fn finish(lifted: &Lifted, task: GroundTask<'_>, unreachable: Option<
         Some(goal) => condition(goal, &atoms, &numbers)?,
         None => Condition::default(),
     };
-    let exclusive = || contradictory(&goal).then(|| "the goal asks for atoms that exclude each other".to_owned());
+    let exclusive =
+        || contradictory(&goal).then(|| "the goal asks for atoms that exclude each other".to_owned());
     let unreachable = unreachable.or_else(exclusive);
     Ok(Task {
         object_names: lifted.objects.iter().map(ToString::to_string).collect(),
@@ -91,13 +100,20 @@ impl Atoms {
     fn new(lifted: &Lifted, task: &GroundTask<'_>) -> Self {
         let mut relevant = FxHashSet::default();
         for condition in task.operators.iter().map(|operator| &operator.condition).chain(&task.goal) {
-            relevant.extend(condition.literals.iter().chain(condition.clauses.iter().flatten()).map(|(atom, _)| *atom));
+            relevant.extend(
+                condition.literals.iter().chain(condition.clauses.iter().flatten()).map(|(atom, _)| *atom),
+            );
         }
         let mut groups = mutex::groups(task, &relevant);
         let grouped: FxHashSet<AtomId> = groups.iter().flatten().copied().collect();
         groups.extend(relevant.iter().filter(|atom| !grouped.contains(atom)).map(|atom| vec![*atom]));
         groups.sort_unstable();
-        let mut atoms = Self { variables: Vec::new(), initial: Vec::new(), facts: FxHashMap::default(), none: Vec::new() };
+        let mut atoms = Self {
+            variables: Vec::new(),
+            initial: Vec::new(),
+            facts: FxHashMap::default(),
+            none: Vec::new(),
+        };
         for group in groups {
             let variable = VariableId(atoms.variables.len() as u32);
             let mut values: Vec<String> = group.iter().map(|atom| atom_name(lifted, task, *atom)).collect();
@@ -136,9 +152,14 @@ impl Atoms {
             }
         }
         let known = |fact: &Fact| {
-            operator.condition.literals.iter().any(|(atom, positive)| *positive && self.facts.get(atom) == Some(fact))
+            operator
+                .condition
+                .literals
+                .iter()
+                .any(|(atom, positive)| *positive && self.facts.get(atom) == Some(fact))
         };
-        let mut effects: Vec<_> = effects.into_iter().map(|(variable, value)| Fact { variable, value }).collect();
+        let mut effects: Vec<_> =
+            effects.into_iter().map(|(variable, value)| Fact { variable, value }).collect();
         effects.retain(|fact| !known(fact));
         effects.sort_unstable();
         effects
@@ -153,7 +174,7 @@ struct Numbers {
 }
 
 impl Numbers {
-    fn new(lifted: &Lifted, task: &GroundTask<'_>) -> Result<Self, Error> {
+    fn new(task: &GroundTask<'_>) -> Result<Self, Error> {
         let mut used = FxHashSet::default();
         let mut rationals: Vec<Rational> = Vec::new();
         let mut note = |linear: &Linear<Rational>| {
@@ -172,15 +193,8 @@ impl Numbers {
         let scale = common_denominator(rationals.iter().chain(&initial), "numeric fluents")?;
         let mut numbers = Self { variables: Vec::new(), initial: Vec::new(), ids: FxHashMap::default() };
         for (variable, initial) in used.iter().zip(&initial) {
-            let Some(((function, arguments), ())) = task.world.numerics.get_index(variable.index()) else { continue };
-            let mut name = format!("({}", lifted.functions[function.index()].name);
-            for object in arguments {
-                name.push(' ');
-                name.push_str(lifted.objects[object.index()].as_str());
-            }
-            name.push(')');
             numbers.ids.insert(*variable, NumericId(numbers.variables.len() as u32));
-            numbers.variables.push(NumericVariable { name, scale });
+            numbers.variables.push(NumericVariable { scale });
             numbers.initial.push(integer(initial, scale, "numeric fluents")?);
         }
         Ok(numbers)
@@ -202,7 +216,11 @@ impl Numbers {
 
     fn effects(&self, operator: &GroundOperator) -> Result<Vec<NumericEffect>, Error> {
         let effects = operator.numeric_effects.iter().filter(|(variable, _)| self.ids.contains_key(variable));
-        effects.map(|(variable, value)| Ok(NumericEffect { variable: self.ids[variable], value: self.linear(value)? })).collect()
+        effects
+            .map(|(variable, value)| {
+                Ok(NumericEffect { variable: self.ids[variable], value: self.linear(value)? })
+            })
+            .collect()
     }
 }
 
@@ -255,8 +273,8 @@ fn slot_keys(operator: &GroundOperator) -> impl Iterator<Item = (SlotKey, &Vec<O
 }
 
 /// All functions whose design some operator leaves open, in the order of the objects, with all their designs.
-fn slots(lifted: &Lifted, operators: &[GroundOperator]) -> (Vec<Slot>, FxHashMap<SlotKey, SlotId>) {
-    let mut designs: std::collections::BTreeMap<SlotKey, Vec<ObjectId>> = Default::default();
+fn slots(operators: &[GroundOperator]) -> (Vec<Slot>, FxHashMap<SlotKey, SlotId>) {
+    let mut designs: BTreeMap<SlotKey, Vec<ObjectId>> = BTreeMap::new();
     for (key, suitable) in operators.iter().flat_map(slot_keys) {
         designs.entry(key).or_default().extend(suitable);
     }
@@ -265,7 +283,7 @@ fn slots(lifted: &Lifted, operators: &[GroundOperator]) -> (Vec<Slot>, FxHashMap
         designs.sort_unstable();
         designs.dedup();
         ids.insert(key, SlotId(slots.len() as u32));
-        slots.push(Slot { function: lifted.objects[key.0.index()].to_string(), designs });
+        slots.push(Slot { designs });
     }
     (slots, ids)
 }
@@ -275,7 +293,8 @@ fn slot_uses(slots: &[Slot], ids: &FxHashMap<SlotKey, SlotId>, operator: &Ground
     for (key, suitable) in slot_keys(operator) {
         let slot = ids[&key];
         let all = &slots[slot.index()].designs;
-        let designs = suitable.iter().filter_map(|design| all.binary_search(design).ok()).map(|i| i as u16).collect();
+        let designs =
+            suitable.iter().filter_map(|design| all.binary_search(design).ok()).map(|i| i as u16).collect();
         uses.push(SlotUse { slot, designs });
     }
     uses
@@ -301,5 +320,7 @@ fn integer(number: &Rational, scale: i64, what: &str) -> Result<i64, Error> {
 }
 
 fn integers(quantity: &Quantity<Rational>, scale: i64, what: &str) -> Result<Quantity<i64>, Error> {
-    quantity.map(|number| integer(number, scale, what).ok()).ok_or_else(|| Error::Overflow { what: what.into() })
+    quantity
+        .map(|number| integer(number, scale, what).ok())
+        .ok_or_else(|| Error::Overflow { what: what.into() })
 }

@@ -7,11 +7,15 @@
 use std::collections::BTreeMap;
 
 use crate::configuration::{SlotParameter, conjuncts, slots_of_expression, slots_of_formula};
-use crate::error::{Error, Place};
-use crate::ground::evaluate::{AtomId, Binding, Failure, Residual, Slots, World, compare, for_each_combination};
+use crate::error::{Error, File, Place};
+use crate::ground::evaluate::{
+    AtomId, Binding, Failure, Residual, Slots, World, compare, for_each_combination,
+};
+use crate::ground::metric::GroundObjective;
+use crate::ground::normal_form::{GroundCondition, condition};
 use crate::ground::reach::Reached;
 use crate::lifted::{Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
-use crate::pddl::ast::Assignment;
+use crate::pddl::ast::{Assignment, Span};
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet};
 use crate::task::{Argument, Forbidden};
 
@@ -33,21 +37,13 @@ pub(crate) struct GroundOperator {
     pub(crate) duration: Quantity<Rational>,
 }
 
-/// A conjunction of literals, clauses and comparisons.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct GroundCondition {
-    pub(crate) literals: Vec<(AtomId, bool)>,
-    pub(crate) clauses: Vec<Vec<(AtomId, bool)>>,
-    pub(crate) comparisons: Vec<(Linear<Rational>, bool)>,
-}
-
 /// The task over atoms.
 pub(crate) struct GroundTask<'a> {
     pub(crate) world: World<'a>,
     pub(crate) operators: Vec<GroundOperator>,
     /// None if the goal is false whatever happens.
     pub(crate) goal: Option<GroundCondition>,
-    pub(crate) objective: crate::ground::metric::GroundObjective,
+    pub(crate) objective: GroundObjective,
 }
 
 /// Turns every reached instance into an operator.
@@ -62,11 +58,14 @@ pub(crate) fn instantiate<'a>(
 ) -> Result<GroundTask<'a>, Vec<Error>> {
     let mut world = World::new(lifted, &reached.atoms);
     let (mut operators, mut errors) = (Vec::new(), Vec::new());
-    for (((schema, slots), instances), index) in lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0..) {
+    for (((schema, slots), instances), index) in
+        lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0..)
+    {
         for binding in instances {
             match operator(&mut world, schema, index, slots, binding) {
                 Ok(mut operator) => {
-                    operator.configuration = configuration(&operator.arguments, &designs[index as usize], binding);
+                    operator.configuration =
+                        configuration(&operator.arguments, &designs[index as usize], binding);
                     operators.push(operator);
                 }
                 Err(Failure::Undefined) => {}
@@ -85,7 +84,11 @@ pub(crate) fn instantiate<'a>(
             None
         }
     };
-    if errors.is_empty() { Ok(GroundTask { world, operators, goal, objective: Default::default() }) } else { Err(errors) }
+    if errors.is_empty() {
+        Ok(GroundTask { world, operators, goal, objective: GroundObjective::default() })
+    } else {
+        Err(errors)
+    }
 }
 
 /// One instance. `Failure::Undefined` says that it can never be applied.
@@ -148,9 +151,16 @@ fn operator(
     })
 }
 
-fn configuration(arguments: &[Argument], designs: &[SlotParameter], core: &Binding) -> Vec<(ObjectId, Argument)> {
+fn configuration(
+    arguments: &[Argument],
+    designs: &[SlotParameter],
+    core: &Binding,
+) -> Vec<(ObjectId, Argument)> {
     let function = |term: Term| World::arguments(&[term], core).first().copied();
-    designs.iter().filter_map(|design| Some((function(design.function)?, arguments[design.parameter as usize]))).collect()
+    designs
+        .iter()
+        .filter_map(|design| Some((function(design.function)?, arguments[design.parameter as usize])))
+        .collect()
 }
 
 /// The candidates of one slot for which everything that depends on this slot alone is true and defined.
@@ -321,7 +331,11 @@ impl Build<'_, '_> {
         Ok(changed)
     }
 
-    fn static_quantity(&mut self, expression: &Expression, schema: &Schema) -> Result<Quantity<Rational>, Failure> {
+    fn static_quantity(
+        &mut self,
+        expression: &Expression,
+        schema: &Schema,
+    ) -> Result<Quantity<Rational>, Failure> {
         let linear = self.open(expression)?;
         if linear.coefficients.is_empty() {
             return Ok(linear.quantity);
@@ -334,7 +348,8 @@ impl Build<'_, '_> {
     }
 
     fn arguments(&self) -> Vec<Argument> {
-        let slot = |parameter: usize| self.slots.parameters.iter().position(|s| s.parameter as usize == parameter);
+        let slot =
+            |parameter: usize| self.slots.parameters.iter().position(|s| s.parameter as usize == parameter);
         self.binding
             .iter()
             .enumerate()
@@ -348,7 +363,9 @@ impl Build<'_, '_> {
     fn functions(&self) -> Result<Vec<(ObjectId, Vec<ObjectId>)>, Failure> {
         let function = |term: Term| World::arguments(&[term], &self.binding).first().copied();
         let pairs = self.slots.parameters.iter().zip(&self.slots.designs);
-        pairs.map(|(slot, designs)| Ok((function(slot.function).ok_or(Failure::Undefined)?, designs.clone()))).collect()
+        pairs
+            .map(|(slot, designs)| Ok((function(slot.function).ok_or(Failure::Undefined)?, designs.clone())))
+            .collect()
     }
 }
 
@@ -403,7 +420,9 @@ fn after_start(
     deletes: &[AtomId],
     numeric: &BTreeMap<NumericId, Linear<Rational>>,
 ) -> Residual {
-    let recur = |parts: Vec<Residual>| parts.into_iter().map(|part| after_start(part, adds, deletes, numeric)).collect();
+    let recur = |parts: Vec<Residual>| {
+        parts.into_iter().map(|part| after_start(part, adds, deletes, numeric)).collect()
+    };
     match residual {
         Residual::And(parts) => Residual::And(recur(parts)),
         Residual::Or(parts) => Residual::Or(recur(parts)),
@@ -418,99 +437,15 @@ fn after_start(
     }
 }
 
-/// Conjunctive normal form; `Failure::Undefined` if the condition is false.
-fn condition(parts: &[Residual]) -> Result<GroundCondition, Failure> {
-    let mut condition = GroundCondition::default();
-    for part in parts {
-        conjoin(part, &mut condition)?;
-    }
-    condition.literals.sort_unstable();
-    condition.literals.dedup();
-    condition.clauses.sort_unstable();
-    condition.clauses.dedup();
-    let contradictory = condition.literals.windows(2).any(|pair| pair[0].0 == pair[1].0);
-    if contradictory { Err(Failure::Undefined) } else { Ok(condition) }
-}
-
-fn conjoin(residual: &Residual, condition: &mut GroundCondition) -> Result<(), Failure> {
-    match residual {
-        Residual::True => {}
-        Residual::False => return Err(Failure::Undefined),
-        Residual::And(parts) => {
-            for part in parts {
-                conjoin(part, condition)?;
-            }
-        }
-        Residual::Literal { atom, positive } => condition.literals.push((*atom, *positive)),
-        Residual::Compare { linear, strict, .. } => condition.comparisons.push((linear.clone(), *strict)),
-        Residual::Or(_) => {
-            for clause in clauses(residual)? {
-                match clause[..] {
-                    [] => return Err(Failure::Undefined),
-                    [literal] => condition.literals.push(literal),
-                    _ => condition.clauses.push(clause),
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// The clauses of a condition, by distribution; tautologies are left out.
-fn clauses(residual: &Residual) -> Result<Vec<Vec<(AtomId, bool)>>, Failure> {
-    const LIMIT: usize = 10_000;
-    match residual {
-        Residual::True => Ok(Vec::new()),
-        Residual::False => Ok(vec![Vec::new()]),
-        Residual::Literal { atom, positive } => Ok(vec![vec![(*atom, *positive)]]),
-        Residual::And(parts) => {
-            let mut all = Vec::new();
-            for part in parts {
-                all.extend(clauses(part)?);
-            }
-            Ok(all)
-        }
-        Residual::Or(parts) => {
-            let mut product: Vec<Vec<(AtomId, bool)>> = vec![Vec::new()];
-            for part in parts {
-                let more = clauses(part)?;
-                let pairs = product.iter().flat_map(|left| more.iter().map(move |right| (left, right)));
-                let mut next = Vec::new();
-                for (left, right) in pairs {
-                    let mut clause: Vec<_> = left.iter().chain(right).copied().collect();
-                    clause.sort_unstable();
-                    clause.dedup();
-                    if clause.windows(2).all(|pair| pair[0].0 != pair[1].0) {
-                        next.push(clause);
-                    }
-                    if next.len() > LIMIT {
-                        return Err(Failure::Error(unsupported_disjunction(None)));
-                    }
-                }
-                product = next;
-            }
-            Ok(product)
-        }
-        Residual::Compare { place, .. } => Err(Failure::Error(unsupported_disjunction(Some(*place)))),
-    }
-}
-
-fn unsupported_disjunction(place: Option<Place>) -> Error {
-    let nowhere = Place { file: crate::error::File::Domain, span: Default::default() };
-    Error::Unsupported {
-        construct: "a numeric comparison (or thousands of alternatives) inside a disjunction".into(),
-        instead: "one action for each alternative".into(),
-        place: place.unwrap_or(nowhere),
-    }
-}
-
 fn expression_place(expression: &Expression) -> Place {
     match expression {
-        Expression::Function(_, _, place) | Expression::Product(_, place) | Expression::Quotient(_, _, place) => *place,
+        Expression::Function(_, _, place)
+        | Expression::Product(_, place)
+        | Expression::Quotient(_, _, place) => *place,
         Expression::Negate(inner) => expression_place(inner),
         Expression::Sum(parts) if !parts.is_empty() => expression_place(&parts[0]),
         Expression::Sum(_) | Expression::Number(_) | Expression::TotalTime => {
-            Place { file: crate::error::File::Domain, span: Default::default() }
+            Place { file: File::Domain, span: Span::default() }
         }
     }
 }

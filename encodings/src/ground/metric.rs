@@ -34,13 +34,15 @@ pub(crate) fn attach_costs(lifted: &Lifted, task: &mut GroundTask<'_>) -> Result
         }
         return Ok(());
     };
-    let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place).map_err(|e| vec![e])?;
+    let (mut linear, mut time) =
+        split(&mut task.world, &metric.expression, metric.place).map_err(|e| vec![e])?;
     let maximize = metric.direction == Direction::Maximize;
     if maximize {
         linear = linear.negated();
         time = -time;
     }
-    let initial = linear.coefficients.iter().map(|(variable, factor)| initial_value(&task.world, *variable) * factor);
+    let initial =
+        linear.coefficients.iter().map(|(variable, factor)| initial_value(&task.world, *variable) * factor);
     let offset = initial.fold(linear.quantity.constant, |sum, value| sum + value);
     task.objective = GroundObjective { offset, maximize };
 
@@ -85,7 +87,9 @@ fn split(
             }
             Ok((sum, time))
         }
-        Expression::Negate(inner) => split(world, inner, place).map(|(linear, time)| (linear.negated(), -time)),
+        Expression::Negate(inner) => {
+            split(world, inner, place).map(|(linear, time)| (linear.negated(), -time))
+        }
         Expression::Product(parts, place) => {
             let mut product = (Linear::constant(Rational::from_integer(1)), Rational::zero());
             for part in parts {
@@ -120,7 +124,8 @@ fn multiply(
     left: (Linear<Rational>, Rational),
     right: (Linear<Rational>, Rational),
 ) -> Option<(Linear<Rational>, Rational)> {
-    let constant = |(linear, time): &(Linear<Rational>, Rational)| linear.coefficients.is_empty() && time.is_zero();
+    let constant =
+        |(linear, time): &(Linear<Rational>, Rational)| linear.coefficients.is_empty() && time.is_zero();
     let ((mut linear, time), (factor, _)) = if constant(&right) {
         (left, right)
     } else if constant(&left) {

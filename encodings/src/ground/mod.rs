@@ -11,6 +11,7 @@ mod finish;
 mod instantiate;
 mod metric;
 mod mutex;
+mod normal_form;
 mod prune;
 mod reach;
 
@@ -42,11 +43,15 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Tas
     let lifted = normalize(domain, problem)?;
     let designs: Vec<_> =
         lifted.schemas.iter().map(|schema| design_parameters(&lifted, schema, &config.solves)).collect();
-    let slots: Vec<_> =
-        lifted.schemas.iter().zip(&designs).map(|(schema, designs)| slot_parameters(&lifted, schema, designs)).collect();
+    let slots: Vec<_> = lifted
+        .schemas
+        .iter()
+        .zip(&designs)
+        .map(|(schema, designs)| slot_parameters(&lifted, schema, designs))
+        .collect();
     let reached = reach::reach(&lifted, &slots).map_err(|error| vec![error])?;
     let mut ground = instantiate::instantiate(&lifted, &designs, &slots, &reached)?;
     metric::attach_costs(&lifted, &mut ground)?;
     let unreachable = prune::prune(&lifted, &mut ground);
-    finish::finish(&lifted, ground, unreachable).map_err(|error| vec![error])
+    finish::finish(&lifted, &ground, unreachable).map_err(|error| vec![error])
 }

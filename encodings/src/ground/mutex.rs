@@ -54,7 +54,8 @@ fn cover(mut instances: Vec<Vec<AtomId>>) -> Vec<Vec<AtomId>> {
             instance.retain(|atom| !covered.contains(atom));
         }
         instances.retain(|instance| instance.len() > 1);
-        let best = (0..instances.len()).max_by_key(|index| (instances[*index].len(), std::cmp::Reverse(*index)));
+        let best =
+            (0..instances.len()).max_by_key(|index| (instances[*index].len(), std::cmp::Reverse(*index)));
         let Some(best) = best else { return chosen };
         let group = instances.remove(best);
         covered.extend(group.iter().copied());
@@ -138,7 +139,8 @@ fn broken_by<'o>(
             *balance.entry(key).or_default() -= 1;
         }
     }
-    let mut heavy: Vec<_> = balance.into_iter().filter(|(_, weight)| *weight > 0).map(|(key, _)| key).collect();
+    let mut heavy: Vec<_> =
+        balance.into_iter().filter(|(_, weight)| *weight > 0).map(|(key, _)| key).collect();
     heavy.sort_unstable();
     heavy.into_iter().next().map(|key| (operator, key))
 }

@@ -5,32 +5,58 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::ground::evaluate::AtomId;
-use crate::ground::instantiate::{GroundCondition, GroundOperator, GroundTask};
-use crate::lifted::{Lifted, Rational};
+use crate::configuration::conjuncts;
+use crate::ground::evaluate::{AtomId, World};
+use crate::ground::instantiate::{GroundOperator, GroundTask};
+use crate::ground::normal_form::GroundCondition;
+use crate::lifted::{Arguments, Formula, Lifted, PredicateId, Rational};
 use crate::quantity::NumericId;
 
 /// Prunes the task in place; returns a reason if the goal cannot be reached even if nothing is ever deleted.
 pub(crate) fn prune(lifted: &Lifted, task: &mut GroundTask<'_>) -> Option<String> {
-    let initially: Vec<bool> =
-        task.world.atoms.keys().map(|(predicate, arguments)| task.world.holds_initially(*predicate, arguments)).collect();
+    let initially: Vec<bool> = task
+        .world
+        .atoms
+        .keys()
+        .map(|(predicate, arguments)| task.world.holds_initially(*predicate, arguments))
+        .collect();
     let reached = forward(task, &initially);
     let goal_atoms: Vec<AtomId> = match &task.goal {
-        None => return Some("the goal contradicts what never changes".into()),
+        None => return Some(why_goal_is_false(lifted, task)),
         Some(goal) => goal.literals.iter().filter(|(_, positive)| *positive).map(|(atom, _)| *atom).collect(),
     };
     if let Some(atom) = goal_atoms.into_iter().find(|atom| !reached[atom.index()]) {
-        let name = atom_name(lifted, task, atom);
-        return Some(format!("no action can make {name} true, even if nothing is ever deleted"));
+        return Some(never_true(&atom_name(lifted, task, atom)));
     }
     drop_unread_numerics(task);
     backward(task);
     None
 }
 
-/// `predicate(arguments)` as PDDL writes it.
+fn never_true(atom: &str) -> String {
+    format!("no action can make {atom} true, even if nothing is ever deleted")
+}
+
+/// A sentence about a goal that is false whatever happens: the first atom in it that can never hold.
+fn why_goal_is_false(lifted: &Lifted, task: &GroundTask<'_>) -> String {
+    for conjunct in conjuncts(&lifted.goal) {
+        if let Formula::Literal { positive: true, predicate, terms } = conjunct {
+            let arguments = World::arguments(terms, &Vec::new());
+            if !task.world.can_hold(*predicate, &arguments) {
+                return never_true(&name(lifted, *predicate, &arguments));
+            }
+        }
+    }
+    "the goal contradicts what never changes".into()
+}
+
+/// `(predicate arguments)` as PDDL writes it.
 pub(crate) fn atom_name(lifted: &Lifted, task: &GroundTask<'_>, atom: AtomId) -> String {
-    let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index()) else { return String::new() };
+    let found = task.world.atoms.get_index(atom.index());
+    found.map_or_else(String::new, |((predicate, arguments), ())| name(lifted, *predicate, arguments))
+}
+
+fn name(lifted: &Lifted, predicate: PredicateId, arguments: &Arguments) -> String {
     let mut text = format!("({}", lifted.predicates[predicate.index()].name);
     for object in arguments {
         text.push(' ');
@@ -47,7 +73,8 @@ fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
     let mut reached = initially.to_vec();
     let mut open: Vec<usize> = Vec::new();
     for (index, operator) in task.operators.iter().enumerate() {
-        let needs = operator.condition.literals.iter().filter(|(atom, positive)| *positive && !reached[atom.index()]);
+        let needs =
+            operator.condition.literals.iter().filter(|(atom, positive)| *positive && !reached[atom.index()]);
         let count = needs.map(|(atom, _)| readers.entry(*atom).or_default().push(index)).count();
         missing.push(count);
         if count == 0 {
@@ -69,8 +96,9 @@ fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
     }
     let mut keep = missing.iter().map(|count| *count == 0);
     task.operators.retain(|_| keep.next().unwrap_or(true));
-    let possible = |&(atom, positive): &(AtomId, bool)| positive && reached[atom.index()] || !positive;
-    task.operators.retain(|operator| operator.condition.clauses.iter().all(|clause| clause.iter().any(possible)));
+    let possible = |&(atom, positive): &(AtomId, bool)| !positive || reached[atom.index()];
+    task.operators
+        .retain(|operator| operator.condition.clauses.iter().all(|clause| clause.iter().any(possible)));
     for operator in &mut task.operators {
         operator.deletes.retain(|atom| reached[atom.index()]);
     }
@@ -81,8 +109,9 @@ fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
 fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
     let comparisons = conditions.flat_map(|condition| &condition.comparisons);
-    let mut open: Vec<NumericId> =
-        comparisons.flat_map(|(linear, _)| linear.coefficients.iter().map(|(variable, _)| *variable)).collect();
+    let mut open: Vec<NumericId> = comparisons
+        .flat_map(|(linear, _)| linear.coefficients.iter().map(|(variable, _)| *variable))
+        .collect();
     let mut read: FxHashSet<NumericId> = open.iter().copied().collect();
     while let Some(variable) = open.pop() {
         let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(&variable));

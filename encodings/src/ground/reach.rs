@@ -28,13 +28,22 @@ pub(crate) struct Reached {
 /// `Error::Rules` if the rule engine refuses the program.
 pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Reached, Error> {
     let mut builder = Builder::new(lifted);
-    let applicable: Vec<_> =
-        lifted.schemas.iter().zip(slots).map(|(schema, slots)| builder.schema(lifted, schema, slots)).collect();
+    let applicable: Vec<_> = lifted
+        .schemas
+        .iter()
+        .zip(slots)
+        .map(|(schema, slots)| builder.schema(lifted, schema, slots))
+        .collect();
     let predicates = builder.predicates.clone();
-    let objects: FxHashMap<Symbol, ObjectId> = builder.objects.iter().copied().zip((0..).map(ObjectId)).collect();
-    let engine = Engine::new(builder.symbols, Program { rules: builder.rules }, builder.facts)
-        .map_err(|errors| Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")))?;
-    let read = |row: &[Symbol]| -> Arguments { row.iter().filter_map(|symbol| objects.get(symbol)).copied().collect() };
+    let objects: FxHashMap<Symbol, ObjectId> =
+        builder.objects.iter().copied().zip((0..).map(ObjectId)).collect();
+    let engine =
+        Engine::new(builder.symbols, Program { rules: builder.rules }, builder.facts).map_err(|errors| {
+            Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+        })?;
+    let read = |row: &[Symbol]| -> Arguments {
+        row.iter().filter_map(|symbol| objects.get(symbol)).copied().collect()
+    };
 
     let mut atoms = FxHashSet::default();
     for (predicate, id) in lifted.predicates.iter().zip((0..).map(PredicateId)).filter(|(p, _)| p.fluent) {
@@ -73,8 +82,10 @@ struct Builder {
 impl Builder {
     fn new(lifted: &Lifted) -> Self {
         let mut symbols = Symbols::new();
-        let objects: Vec<_> = (0..lifted.objects.len()).map(|i| symbols.name(&format!("object {i}"))).collect();
-        let predicates: Vec<_> = (0..lifted.predicates.len()).map(|i| symbols.name(&format!("predicate {i}"))).collect();
+        let objects: Vec<_> =
+            (0..lifted.objects.len()).map(|i| symbols.name(&format!("object {i}"))).collect();
+        let predicates: Vec<_> =
+            (0..lifted.predicates.len()).map(|i| symbols.name(&format!("predicate {i}"))).collect();
         let facts = lifted
             .facts
             .iter()
@@ -127,20 +138,29 @@ impl Builder {
         let is_slot = |parameter: &u32| slots.iter().any(|slot| slot.parameter == *parameter);
         let core: Vec<u32> = (0..schema.parameters.len() as u32).filter(|p| !is_slot(p)).collect();
         let literals = positive_literals(lifted, schema);
-        let mentions = |terms: &[Term], slot: &SlotParameter| terms.contains(&Term::Parameter(slot.parameter));
+        let mentions =
+            |terms: &[Term], slot: &SlotParameter| terms.contains(&Term::Parameter(slot.parameter));
 
         let mut body = Vec::new();
         for (slot, position) in slots.iter().zip(0..) {
             let own: Vec<_> = literals
                 .iter()
-                .filter(|(_, terms)| mentions(terms, slot) && slots.iter().filter(|s| mentions(terms, s)).count() == 1)
+                .filter(|(_, terms)| {
+                    mentions(terms, slot) && slots.iter().filter(|s| mentions(terms, s)).count() == 1
+                })
                 .collect();
-            let mut others: Vec<u32> =
-                own.iter().flat_map(|(_, terms)| terms.iter()).filter_map(parameter).filter(|p| !is_slot(p)).collect();
+            let mut others: Vec<u32> = own
+                .iter()
+                .flat_map(|(_, terms)| terms.iter())
+                .copied()
+                .filter_map(parameter)
+                .filter(|p| !is_slot(p))
+                .collect();
             others.sort_unstable();
             others.dedup();
             let relation = self.symbols.name(&format!("slot {position} of {number}"));
-            let mut fits: Vec<_> = own.iter().map(|(predicate, terms)| self.atom(*predicate, terms)).collect();
+            let mut fits: Vec<_> =
+                own.iter().map(|(predicate, terms)| self.atom(*predicate, terms)).collect();
             let candidates = self.candidates(&schema.parameters[slot.parameter as usize].candidates);
             fits.push(Self::relation(candidates, &[slot.parameter]));
             body.push(Self::relation(relation, &others));
@@ -161,7 +181,9 @@ impl Builder {
             .start_effects
             .iter()
             .chain(&schema.end_effects)
-            .filter_map(|e| if let Effect::Add(predicate, terms) = e { Some(self.atom(*predicate, terms)) } else { None })
+            .filter_map(|e| {
+                if let Effect::Add(predicate, terms) = e { Some(self.atom(*predicate, terms)) } else { None }
+            })
             .collect();
         if !added.is_empty() {
             self.rule(added, vec![Self::relation(applicable, &core)]);
@@ -170,8 +192,8 @@ impl Builder {
     }
 }
 
-fn parameter(term: &Term) -> Option<u32> {
-    if let Term::Parameter(parameter) = term { Some(*parameter) } else { None }
+fn parameter(term: Term) -> Option<u32> {
+    if let Term::Parameter(parameter) = term { Some(parameter) } else { None }
 }
 
 /// The atoms that every instance needs before it starts: positive conjuncts, apart from those of the middle
@@ -186,9 +208,9 @@ fn positive_literals<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<(PredicateI
         Formula::Literal { positive: true, predicate, terms } => Some((*predicate, terms.as_slice())),
         _ => None,
     };
-    let middle = conjuncts(&schema.middle_condition)
-        .into_iter()
-        .filter_map(literal)
-        .filter(|(predicate, _)| !lifted.predicates[predicate.index()].fluent || !provided.contains(predicate));
+    let middle =
+        conjuncts(&schema.middle_condition).into_iter().filter_map(literal).filter(|(predicate, _)| {
+            !lifted.predicates[predicate.index()].fluent || !provided.contains(predicate)
+        });
     conjuncts(&schema.start_condition).into_iter().filter_map(literal).chain(middle).collect()
 }

@@ -4,16 +4,18 @@
 //! The files have passed `pddl::check`; what the planner does not handle yet (conditional effects, derived
 //! predicates, timed initial literals, duration inequalities) is refused here, with its place.
 
+mod objects;
+
 use num_rational::BigRational;
 use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::error::{Error, File, Place};
 use crate::lifted::{
-    Effect, Expression, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter, Predicate, PredicateId,
-    Rational, Schema, Term,
+    Effect, Expression, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter, Predicate,
+    PredicateId, Rational, Schema, Term,
 };
-use crate::pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypeExpression, TypedName};
+use crate::pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypedName};
 
 /// Resolves and simplifies a domain and a problem.
 ///
@@ -56,7 +58,9 @@ pub(crate) fn normalize(domain: &ast::Domain, problem: &ast::Problem) -> Result<
 
 /// A predicate or function is a fluent if some action changes it.
 fn mark_fluents(lifted: &mut Lifted) {
-    for effect in lifted.schemas.iter().flat_map(|schema| schema.start_effects.iter().chain(&schema.end_effects)) {
+    for effect in
+        lifted.schemas.iter().flat_map(|schema| schema.start_effects.iter().chain(&schema.end_effects))
+    {
         match effect {
             Effect::Add(predicate, _) | Effect::Delete(predicate, _) => {
                 lifted.predicates[predicate.index()].fluent = true;
@@ -98,16 +102,28 @@ struct Normalizer {
 
 impl Normalizer {
     fn new(domain: &ast::Domain, problem: &ast::Problem) -> Self {
-        let predicates: Vec<_> =
-            domain.predicates.iter().map(|declared| Predicate { name: declared.identifier.name.clone(), arity: declared.parameters.len(), fluent: false }).collect();
-        let mut functions: Vec<_> =
-            domain.functions.iter().map(|declared| Function { name: declared.identifier.name.clone(), fluent: false }).collect();
+        let predicates: Vec<_> = domain
+            .predicates
+            .iter()
+            .map(|declared| Predicate {
+                name: declared.identifier.name.clone(),
+                arity: declared.parameters.len(),
+                fluent: false,
+            })
+            .collect();
+        let mut functions: Vec<_> = domain
+            .functions
+            .iter()
+            .map(|declared| Function { name: declared.identifier.name.clone(), fluent: false })
+            .collect();
         let total_cost = Name::new("total-cost");
         if functions.iter().all(|function| function.name != total_cost) {
             functions.push(Function { name: total_cost, fluent: false });
         }
-        let predicate_ids = predicates.iter().zip(0..).map(|(p, id)| (p.name.clone(), PredicateId(id))).collect();
-        let function_ids = functions.iter().zip(0..).map(|(f, id)| (f.name.clone(), FunctionId(id))).collect();
+        let predicate_ids =
+            predicates.iter().zip(0..).map(|(p, id)| (p.name.clone(), PredicateId(id))).collect();
+        let function_ids =
+            functions.iter().zip(0..).map(|(f, id)| (f.name.clone(), FunctionId(id))).collect();
         let mut normalizer = Self {
             objects: Vec::new(),
             object_ids: FxHashMap::default(),
@@ -120,45 +136,6 @@ impl Normalizer {
         };
         normalizer.declare_objects(domain, problem);
         normalizer
-    }
-
-    fn declare_objects(&mut self, domain: &ast::Domain, problem: &ast::Problem) {
-        let mut parents: FxHashMap<Name, Vec<Name>> = FxHashMap::default();
-        for entry in &domain.types {
-            let above = entry.r#type.alternatives.iter().map(|parent| parent.name.clone());
-            parents.entry(entry.identifier.name.clone()).or_default().extend(above);
-        }
-        for entry in domain.constants.iter().chain(&problem.objects) {
-            let name = &entry.identifier.name;
-            let id = *self.object_ids.entry(name.clone()).or_insert_with(|| {
-                self.objects.push(name.clone());
-                ObjectId(self.objects.len() as u32 - 1)
-            });
-            let mut open: Vec<Name> = entry.r#type.alternatives.iter().map(|t| t.name.clone()).collect();
-            open.push(Name::new("object"));
-            let mut seen = FxHashSet::default();
-            while let Some(name) = open.pop() {
-                if seen.insert(name.clone()) {
-                    open.extend(parents.get(&name).into_iter().flatten().cloned());
-                    self.members.entry(name).or_default().push(id);
-                }
-            }
-        }
-        for members in self.members.values_mut() {
-            members.sort_unstable();
-            members.dedup();
-        }
-    }
-
-    fn candidates(&self, expression: &TypeExpression) -> Vec<ObjectId> {
-        let object = Identifier { name: Name::new("object"), span: Span::default() };
-        let alternatives =
-            if expression.alternatives.is_empty() { std::slice::from_ref(&object) } else { &expression.alternatives };
-        let mut all: Vec<_> =
-            alternatives.iter().filter_map(|t| self.members.get(&t.name)).flatten().copied().collect();
-        all.sort_unstable();
-        all.dedup();
-        all
     }
 
     fn unsupported(&mut self, construct: &str, instead: &str, file: File, span: Span) {
@@ -203,7 +180,8 @@ impl Normalizer {
                     let formula = self.condition(condition, true, &mut scope);
                     if *time == ConditionTime::AtStart { &mut start } else { &mut middle }.push(formula);
                 }
-                (schema.start_condition, schema.middle_condition) = (Formula::And(start), Formula::And(middle));
+                (schema.start_condition, schema.middle_condition) =
+                    (Formula::And(start), Formula::And(middle));
                 for (time, effect) in effects {
                     let target = match time {
                         EffectTime::AtStart => &mut schema.start_effects,
@@ -216,7 +194,12 @@ impl Normalizer {
         schema
     }
 
-    fn duration(&mut self, bounds: &[ast::DurationConstraint], action: &ast::Action, scope: &mut Scope) -> Expression {
+    fn duration(
+        &mut self,
+        bounds: &[ast::DurationConstraint],
+        action: &ast::Action,
+        scope: &mut Scope,
+    ) -> Expression {
         if let [bound] = bounds
             && bound.operator == ast::Comparison::Equal
             && bound.time == EffectTime::AtStart
@@ -224,7 +207,12 @@ impl Normalizer {
             return self.expression(&bound.expression, scope);
         }
         let span = bounds.first().map_or(action.span, |bound| bound.span);
-        self.unsupported("a duration that is not fixed at the start", "one `(= ?duration …)`", File::Domain, span);
+        self.unsupported(
+            "a duration that is not fixed at the start",
+            "one `(= ?duration …)`",
+            File::Domain,
+            span,
+        );
         Expression::Number(Rational::from_integer(0))
     }
 
@@ -236,9 +224,10 @@ impl Normalizer {
             C::And(parts) => all(parts.iter().map(|part| self.condition(part, positive, scope)).collect()),
             C::Or(parts) => any(parts.iter().map(|part| self.condition(part, positive, scope)).collect()),
             C::Not(inner) => self.condition(inner, !positive, scope),
-            C::Imply(premise, conclusion) => {
-                any(vec![self.condition(premise, !positive, scope), self.condition(conclusion, positive, scope)])
-            }
+            C::Imply(premise, conclusion) => any(vec![
+                self.condition(premise, !positive, scope),
+                self.condition(conclusion, positive, scope),
+            ]),
             C::ForAll(variables, body) => {
                 all(self.expand(variables, scope, &mut |this, scope| this.condition(body, positive, scope)))
             }
@@ -252,7 +241,9 @@ impl Normalizer {
             C::Equal(left, right, _) => {
                 Formula::Equal { positive, left: self.term(left, scope), right: self.term(right, scope) }
             }
-            C::Compare(comparison, left, right, span) => self.comparison(*comparison, left, right, *span, positive, scope),
+            C::Compare(comparison, left, right, span) => {
+                self.comparison(*comparison, left, right, *span, positive, scope)
+            }
         }
     }
 
@@ -328,7 +319,13 @@ impl Normalizer {
                 let function = self.function(atom, scope.file);
                 let terms = self.terms(atom, scope);
                 let expression = self.expression(expression, scope);
-                out.push(Effect::Assign { assignment: *assignment, function, terms, expression, place: scope.place(*span) });
+                out.push(Effect::Assign {
+                    assignment: *assignment,
+                    function,
+                    terms,
+                    expression,
+                    place: scope.place(*span),
+                });
             }
         }
     }
@@ -336,25 +333,34 @@ impl Normalizer {
     fn expression(&mut self, expression: &ast::Expression, scope: &mut Scope) -> Expression {
         use ast::Arithmetic as Op;
         match expression {
-            ast::Expression::Number(number, span) => Expression::Number(self.number(number, scope.place(*span))),
+            ast::Expression::Number(number, span) => {
+                Expression::Number(self.number(number, scope.place(*span)))
+            }
             ast::Expression::Fluent(atom) => {
                 let function = self.function(atom, scope.file);
                 Expression::Function(function, self.terms(atom, scope), scope.place(atom.span))
             }
             ast::Expression::Duration(span) => scope.duration.clone().unwrap_or_else(|| {
-                self.unsupported("`?duration`", "a number: the action has no duration here", scope.file, *span);
+                self.unsupported(
+                    "`?duration`",
+                    "a number: the action has no duration here",
+                    scope.file,
+                    *span,
+                );
                 Expression::Number(Rational::from_integer(0))
             }),
             ast::Expression::TotalTime(_) => Expression::TotalTime,
             ast::Expression::Operation(op, operands, span) => {
                 let place = scope.place(*span);
-                let mut operands: Vec<_> = operands.iter().map(|operand| self.expression(operand, scope)).collect();
+                let mut operands: Vec<_> =
+                    operands.iter().map(|operand| self.expression(operand, scope)).collect();
                 match op {
                     Op::Add => Expression::Sum(operands),
                     Op::Multiply => Expression::Product(operands, place),
                     Op::Subtract => {
                         let negated = operands.split_off(usize::from(operands.len() > 1));
-                        operands.extend(negated.into_iter().map(|operand| Expression::Negate(Box::new(operand))));
+                        operands
+                            .extend(negated.into_iter().map(|operand| Expression::Negate(Box::new(operand))));
                         Expression::Sum(operands)
                     }
                     Op::Divide => operands
@@ -367,13 +373,11 @@ impl Normalizer {
     }
 
     fn number(&mut self, number: &BigRational, place: Place) -> Rational {
-        match (number.numer().to_i128(), number.denom().to_i128()) {
-            (Some(numerator), Some(denominator)) => Rational::new(numerator, denominator),
-            _ => {
-                self.unsupported("a number of more than 38 digits", "a shorter one", place.file, place.span);
-                Rational::from_integer(0)
-            }
+        if let (Some(numerator), Some(denominator)) = (number.numer().to_i128(), number.denom().to_i128()) {
+            return Rational::new(numerator, denominator);
         }
+        self.unsupported("a number of more than 38 digits", "a shorter one", place.file, place.span);
+        Rational::from_integer(0)
     }
 
     fn predicate(&mut self, atom: &ast::Atom, file: File) -> PredicateId {
@@ -432,7 +436,12 @@ impl Normalizer {
                     values.push((self.function(atom, File::Problem), self.objects(atom), number));
                 }
                 ast::InitialElement::Timed(_, _, _, span) => {
-                    self.unsupported("a timed initial literal", "a fact that holds from the start", File::Problem, *span);
+                    self.unsupported(
+                        "a timed initial literal",
+                        "a fact that holds from the start",
+                        File::Problem,
+                        *span,
+                    );
                 }
             }
         }
@@ -441,7 +450,10 @@ impl Normalizer {
 
     fn objects(&mut self, atom: &ast::Atom) -> Box<[ObjectId]> {
         let terms = self.terms(atom, &mut Scope::new(File::Problem));
-        terms.iter().filter_map(|term| if let Term::Object(object) = term { Some(*object) } else { None }).collect()
+        terms
+            .iter()
+            .filter_map(|term| if let Term::Object(object) = term { Some(*object) } else { None })
+            .collect()
     }
 }
 

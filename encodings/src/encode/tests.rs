@@ -1,0 +1,132 @@
+//! The clauses of a small task, symbolic and sorted, by family.
+
+use std::fmt::Write as _;
+
+use insta::assert_snapshot;
+
+use crate::bounds::Bounds;
+use crate::encode::formula::{Family, Meaning};
+use crate::encode::{CostLimit, Encoding};
+use crate::ground::{Config, ground};
+use crate::pddl::{Source, read};
+use crate::sat::Lit;
+use crate::task::{Argument, Task};
+
+const DOMAIN: &str = "(define (domain d)
+  (:types place function design)
+  (:predicates (at ?p - place) (way ?a ?b - place) (solves ?d - design ?f - function))
+  (:functions (total-cost) (battery) (usage ?d - design) (price ?d - design))
+  (:action go :parameters (?a ?b - place ?f - function ?d - design)
+    :precondition (and (at ?a) (way ?a ?b) (solves ?d ?f) (>= (battery) (usage ?d)))
+    :effect (and (not (at ?a)) (at ?b) (decrease (battery) (usage ?d)) (increase (total-cost) (price ?d)))))";
+
+const PROBLEM: &str = "(define (problem p) (:domain d)
+  (:objects a b - place f - function slow fast - design)
+  (:init (at a) (way a b) (way b a) (solves slow f) (solves fast f)
+    (= (battery) 2) (= (usage slow) 1) (= (usage fast) 2) (= (price slow) 5) (= (price fast) 3) (= (total-cost) 0))
+  (:goal (at b)) (:metric minimize (total-cost)))";
+
+fn task() -> Task {
+    let (domain, problem, _) =
+        read(&Source::new("domain", DOMAIN), &Source::new("problem", PROBLEM)).expect("PDDL");
+    let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")] };
+    ground(&domain, &problem, &config).expect("a task")
+}
+
+fn name(task: &Task, meaning: Meaning) -> String {
+    match meaning {
+        Meaning::True => "true".into(),
+        Meaning::Operator { operator, step } => {
+            let operator = &task.operators[operator as usize];
+            let mut text = task.schema_names[operator.schema as usize].clone();
+            for argument in &operator.arguments {
+                if let Argument::Object(object) = argument {
+                    let _ = write!(text, " {}", task.object_names[object.index()]);
+                }
+            }
+            format!("({text})@{step}")
+        }
+        Meaning::Busy { step } => format!("busy@{step}"),
+        Meaning::Value { variable, value, step } => {
+            let text = &task.variables[variable as usize].values[value as usize];
+            format!(
+                "{text}{}@{step}",
+                if text.starts_with('(') { String::new() } else { format!(" {variable}") }
+            )
+        }
+        Meaning::Design { slot, design, step } => {
+            let design = task.slots[slot as usize].designs[design as usize];
+            format!("slot{slot}={}@{step}", task.object_names[design.index()])
+        }
+        Meaning::Group { group, step } => format!("group{group}@{step}"),
+        Meaning::CostAtLeast { amount, step, stage } => format!("spent≥{amount}@{step}.{stage}"),
+        Meaning::Increment { amount, step, stage } => format!("add≥{amount}@{step}.{stage}"),
+        Meaning::Bit { bit } => format!("bit{bit}"),
+        Meaning::Ladder => "ladder".into(),
+    }
+}
+
+fn clauses(encoding: &Encoding<'_>, family: Family) -> String {
+    let literal = |literal: &Lit| {
+        let name = name(encoding.task, encoding.formula.meaning(literal.variable()));
+        if literal.is_positive() { name } else { format!("¬{name}") }
+    };
+    let own = encoding.formula.clauses().filter(|(own, _)| *own == family);
+    let mut lines: Vec<String> = own
+        .map(|(_, clause)| {
+            let mut literals: Vec<String> = clause.iter().map(literal).collect();
+            literals.sort();
+            literals.join(" ∨ ")
+        })
+        .collect();
+    lines.sort();
+    lines.join("\n")
+}
+
+fn check(family: Family) -> String {
+    let task = task();
+    let bounds = Bounds::new(&task);
+    let allowed = vec![vec![true; task.operators.len()]; 2];
+    let encoding = Encoding::new(&task, &allowed, Some(CostLimit { limit: 6, bounds: &bounds }));
+    clauses(&encoding, family)
+}
+
+#[test]
+fn domain() {
+    assert_snapshot!(check(Family::Domain));
+}
+
+#[test]
+fn sequence() {
+    assert_snapshot!(check(Family::Sequence));
+}
+
+#[test]
+fn condition() {
+    assert_snapshot!(check(Family::Condition));
+}
+
+#[test]
+fn effect() {
+    assert_snapshot!(check(Family::Effect));
+}
+
+#[test]
+fn frame() {
+    assert_snapshot!(check(Family::Frame));
+}
+
+#[test]
+fn selection() {
+    assert_snapshot!(check(Family::Selection));
+}
+
+#[test]
+fn cost() {
+    assert_snapshot!(check(Family::Cost));
+}
+
+#[test]
+fn goal() {
+    assert_snapshot!(check(Family::Goal));
+}

@@ -1,0 +1,97 @@
+//! Writing: answers, messages, tables, files that are either whole or not there.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use comfy_table::{ContentArrangement, Table, TableStyle};
+use encodings::Exact;
+use metaplan::message::Message;
+use serde_json::{Value, json};
+
+use crate::cli::{Common, Failure, Format};
+
+/// Writes to standard output; a reader that has gone away is no fault.
+pub fn answer(text: &str) {
+    let mut stdout = std::io::stdout().lock();
+    let _ = stdout.write_all(text.as_bytes());
+    let _ = stdout.flush();
+}
+
+/// Writes a JSON value to standard output.
+pub fn json_answer(value: &Value) {
+    answer(&pretty(value));
+}
+
+/// A JSON value as text, with a line break at its end.
+pub fn pretty(value: &Value) -> String {
+    format!("{value:#}\n")
+}
+
+/// Warnings, on standard error unless asked to be quiet.
+pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Message>) {
+    if !common.quiet {
+        let mut stderr = std::io::stderr().lock();
+        for message in messages {
+            let _ = stderr.write_all(message.text().as_bytes());
+        }
+    }
+}
+
+/// Errors: text on standard error, or a JSON object as the answer.
+pub fn failure(common: &Common, messages: &[Message]) {
+    if common.format == Format::Json {
+        json_answer(&json!({ "format": "metaplan-error/1", "messages": messages }));
+        return;
+    }
+    let mut stderr = std::io::stderr().lock();
+    for message in messages.iter().filter(|message| message.is_error() || !common.quiet) {
+        let _ = stderr.write_all(message.text().as_bytes());
+    }
+}
+
+/// Writes a file so that it is either whole or untouched.
+pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let written = tempfile::NamedTempFile::new_in(directory).and_then(|mut file| {
+        file.write_all(text.as_bytes())?;
+        file.as_file().sync_all()?;
+        file.persist(path).map_err(|error| error.error)
+    });
+    match written {
+        Ok(_) => Ok(()),
+        Err(error) => {
+            Err(Message::at("M109", &path.display().to_string(), None, format!("cannot be written: {error}"))
+                .into())
+        }
+    }
+}
+
+/// A table without borders.
+pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut table = Table::new();
+    table
+        .load_style(TableStyle::new())
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(header);
+    table.add_rows(rows);
+    table.lines().fold(String::new(), |text, line| {
+        text + line.trim_end()
+            + "
+"
+    })
+}
+
+/// An exact number as a JSON number; a fraction that is no decimal, rounded to a double.
+pub fn number(exact: Exact) -> Value {
+    let text = exact.to_string();
+    match text.parse::<serde_json::Number>() {
+        Ok(number) => Value::Number(number),
+        Err(_) => json!(exact.to_f64()),
+    }
+}
+
+/// As [`number`], for numbers of any size.
+pub fn decimal_number(value: &num_rational::BigRational) -> Value {
+    let text = rules::Decimal::from_rational(value).to_string();
+    text.parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
+}

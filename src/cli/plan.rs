@@ -1,0 +1,325 @@
+//! `metaplan plan`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use encodings::{Config, Improvement, Limits, Plan, Proof, Solution, Status, Step, Unbounded, optimize};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+
+/// Arguments of `plan`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission's manifest, or a PDDL domain and a PDDL problem; `-` is standard input.
+    #[arg(required = true, num_args = 1..=2, value_name = "MISSION | DOMAIN PROBLEM")]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    situation: Situation,
+    /// Only plans with at most this many steps.
+    #[arg(long, value_name = "N")]
+    horizon: Option<usize>,
+    /// Stop after this many seconds with the best plan so far.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    time_limit: Option<Duration>,
+    /// Only the plan, in a format that other tools read.
+    #[arg(long, value_enum)]
+    plan_format: Option<PlanFormat>,
+    /// Write the answer to a file.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PlanFormat {
+    /// Lines `(action arguments)`, or `start: (action arguments) [duration]`.
+    Ipc,
+    /// What the POPF plugin of `PlanSys2` parses.
+    Plansys2,
+    /// As `--format json`.
+    Json,
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is no number of seconds"))?;
+    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
+}
+
+/// Milliseconds spent before the optimizer runs.
+struct Stages {
+    read: Duration,
+    ground: Duration,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let started = Instant::now();
+    let mut limits = Limits::none();
+    if let Some(time) = arguments.time_limit {
+        limits = limits.with_time(time);
+    }
+    let interrupt = limits.interrupt();
+    // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual.
+    let _ = ctrlc::set_handler(move || interrupt.store(true, Ordering::Relaxed));
+
+    let mission = arguments.situation.mission(&arguments.inputs)?;
+    let (problem, warnings) = mission.filled()?;
+    output::warnings(common, mission.warnings().chain(&warnings));
+    let read = started.elapsed();
+    let task = mission.ground(&problem)?;
+    let stages = Stages { read, ground: started.elapsed().saturating_sub(read) };
+
+    let config = Config { horizon: arguments.horizon, limits, ..Config::default() };
+    let progress = progress(common);
+    let mut report = |improvement: Improvement| {
+        progress.set_message(format!(
+            "cost {}, lower bound {}, up to {} steps",
+            improvement.cost, improvement.lower_bound, improvement.horizon
+        ));
+    };
+    let solution = optimize(&task, &config, &mut report);
+    progress.finish_and_clear();
+
+    let text = match (arguments.plan_format, common.format) {
+        (Some(PlanFormat::Json), _) | (None, Format::Json) => {
+            output::pretty(&json(&mission.name, &solution, &stages))
+        }
+        (None, _) => text(&mission.name, &solution, common.verbose, &stages),
+        (Some(format), _) => match &solution.plan {
+            Some(plan) => plan_text(plan, format),
+            None => String::new(),
+        },
+    };
+    match &arguments.output {
+        Some(file) => output::write_file(file, &text)?,
+        None => output::answer(&text),
+    }
+    if solution.plan.is_none() && !text.is_empty() && arguments.output.is_some() {
+        output::answer(&verdict(&solution));
+    }
+    Ok(exit(solution.status))
+}
+
+fn exit(status: Status) -> Exit {
+    match status {
+        Status::Optimal => Exit::Done,
+        Status::Feasible => Exit::NotProved,
+        Status::Unsolvable => Exit::Unsolvable,
+        Status::UnsolvableWithinHorizon => Exit::UnsolvableWithinHorizon,
+        Status::Unknown => Exit::NothingFound,
+    }
+}
+
+fn progress(common: &Common) -> ProgressBar {
+    if common.quiet {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} planning {elapsed} {msg}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+/// The status in a word, as JSON has it.
+fn status_word(status: Status) -> &'static str {
+    match status {
+        Status::Optimal => "optimal",
+        Status::Feasible => "feasible",
+        Status::Unsolvable => "unsolvable",
+        Status::UnsolvableWithinHorizon => "unsolvable_within_horizon",
+        Status::Unknown => "unknown",
+    }
+}
+
+/// The answer in a sentence: what is claimed, and whether it is proved.
+fn verdict(solution: &Solution) -> String {
+    let horizon = solution.horizon;
+    match (solution.status, &solution.proof, solution.unbounded) {
+        (Status::Optimal, Some(Proof::Sat { step_bound }), _) => format!(
+            "optimal, proved: no cheaper plan has up to {step_bound} steps (unsatisfiable), and none with more can be cheaper\n"
+        ),
+        (Status::Optimal, Some(Proof::Bound), _) => {
+            "optimal, proved: the cost equals a lower bound on the cost of all plans\n".to_owned()
+        }
+        (Status::Optimal, _, _) => {
+            "optimal, proved: the search left out only states that are dominated or too dear\n".to_owned()
+        }
+        (Status::Feasible, proof, Some(unbounded)) => {
+            let why = match unbounded {
+                Unbounded::Proved => {
+                    "the metric has no best value: an action that improves it can be repeated for ever"
+                }
+                Unbounded::Suspected => "the metric may have no best value: actions improve it",
+            };
+            let reading = if proof.is_some() { "proved best" } else { "best found" };
+            format!(
+                "{why}\nbounded reading: fewest steps first, then the metric; {reading} among plans of {horizon} steps\n"
+            )
+        }
+        (Status::Feasible, _, None) => {
+            format!("a plan, not proved optimal (plans of up to {horizon} steps considered)\n")
+        }
+        (Status::Unsolvable, Some(Proof::Relaxation(reason)), _) => {
+            format!("no plan exists, proved: {reason}\n")
+        }
+        (Status::Unsolvable, Some(Proof::Sat { step_bound }), _) => format!(
+            "no plan exists, proved: none has up to {step_bound} steps (unsatisfiable), and a shortest one has no more\n"
+        ),
+        (Status::Unsolvable, _, _) => {
+            "no plan exists, proved: every reachable state was visited\n".to_owned()
+        }
+        (Status::UnsolvableWithinHorizon, _, _) => {
+            format!("no plan with up to {horizon} steps, proved; longer ones were not considered\n")
+        }
+        (Status::Unknown, _, _) => {
+            "a limit was reached before a plan was found; nothing is proved\n".to_owned()
+        }
+    }
+}
+
+fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> String {
+    let mut text = String::new();
+    if let Some(plan) = &solution.plan {
+        let rows = plan.steps.iter().enumerate().map(|(index, step)| {
+            let configuration: Vec<_> =
+                step.configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
+            let changed = if step.reconfigured.is_empty() { "" } else { " (changed)" };
+            vec![
+                (index + 1).to_string(),
+                step.start.to_string(),
+                step.duration.to_string(),
+                format!("{} {}", step.action, route(step).join(" ")).trim_end().to_owned(),
+                configuration.join(", ") + changed,
+                step.cost.to_string(),
+            ]
+        });
+        text += &output::table(&["step", "start", "duration", "action", "configuration", "cost"], rows);
+        let _ = write!(
+            text,
+            "\n{}cost {}",
+            if name.is_empty() { String::new() } else { format!("{name}: ") },
+            plan.cost
+        );
+        if let Some(bound) = solution.lower_bound.filter(|_| solution.status != Status::Optimal) {
+            let _ = write!(text, ", lower bound {bound}");
+        }
+        text += ": ";
+    }
+    text += &verdict(solution);
+    if verbose {
+        text += &statistics_text(solution, stages);
+    }
+    text
+}
+
+/// The arguments of a step apart from functions and their designs.
+fn route(step: &Step) -> Vec<&str> {
+    let configured =
+        |argument: &String| step.configuration.iter().any(|(f, design)| f == argument || design == argument);
+    step.arguments.iter().filter(|argument| !configured(argument)).map(String::as_str).collect()
+}
+
+fn milliseconds(duration: Duration) -> f64 {
+    (duration.as_secs_f64() * 1e6).round() / 1e3
+}
+
+fn statistics_text(solution: &Solution, stages: &Stages) -> String {
+    let statistics = &solution.statistics;
+    let families: Vec<_> =
+        statistics.families.iter().map(|(family, count)| format!("{family} {count}")).collect();
+    format!(
+        "{} operators; {} variables, {} clauses ({}); {} conflicts in {} solver calls\n\
+         read {} ms, ground {} ms, search {} ms, encode {} ms, solve {} ms\n",
+        statistics.operators,
+        statistics.variables,
+        statistics.clauses,
+        families.join(", "),
+        statistics.conflicts,
+        statistics.calls,
+        milliseconds(stages.read),
+        milliseconds(stages.ground),
+        milliseconds(statistics.search),
+        milliseconds(statistics.encode),
+        milliseconds(statistics.solve),
+    )
+}
+
+fn json(name: &str, solution: &Solution, stages: &Stages) -> Value {
+    let step = |step: &Step| {
+        let configuration: serde_json::Map<String, Value> =
+            step.configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect();
+        json!({
+            "action": step.action,
+            "arguments": step.arguments,
+            "configuration": configuration,
+            "start": output::number(step.start),
+            "duration": output::number(step.duration),
+            "cost": output::number(step.cost),
+            "reconfigured": step.reconfigured,
+        })
+    };
+    let statistics = &solution.statistics;
+    let families: serde_json::Map<String, Value> =
+        statistics.families.iter().map(|(family, count)| ((*family).to_owned(), json!(count))).collect();
+    let proof = match &solution.proof {
+        None => Value::Null,
+        Some(Proof::Sat { step_bound }) => json!({ "by": "sat", "step_bound": step_bound }),
+        Some(Proof::Bound) => json!({ "by": "bound" }),
+        Some(Proof::Search) => json!({ "by": "search" }),
+        Some(Proof::Relaxation(reason)) => json!({ "by": "relaxation", "reason": reason }),
+    };
+    let unbounded = solution.unbounded.map(|unbounded| match unbounded {
+        Unbounded::Proved => "proved",
+        Unbounded::Suspected => "suspected",
+    });
+    json!({
+        "format": "metaplan-plan/1",
+        "mission": name,
+        "status": status_word(solution.status),
+        "cost": solution.plan.as_ref().map(|plan| output::number(plan.cost)),
+        "lower_bound": solution.lower_bound.map(output::number),
+        "horizon": solution.horizon,
+        "proof": proof,
+        "unbounded": unbounded,
+        "steps": solution.plan.as_ref().map(|plan| plan.steps.iter().map(step).collect::<Vec<_>>()).unwrap_or_default(),
+        "statistics": {
+            "operators": statistics.operators,
+            "variables": statistics.variables,
+            "clauses": statistics.clauses,
+            "families": families,
+            "conflicts": statistics.conflicts,
+            "solver_calls": statistics.calls,
+            "milliseconds": {
+                "read": milliseconds(stages.read),
+                "ground": milliseconds(stages.ground),
+                "search": milliseconds(statistics.search),
+                "encode": milliseconds(statistics.encode),
+                "solve": milliseconds(statistics.solve),
+            },
+        },
+    })
+}
+
+/// The plan in the formats of the planning competitions and of `PlanSys2`.
+fn plan_text(plan: &Plan, format: PlanFormat) -> String {
+    let temporal =
+        plan.steps.iter().any(|step| step.duration.numerator != 0) || format == PlanFormat::Plansys2;
+    let mut text = if format == PlanFormat::Plansys2 { "Solution Found\n".to_owned() } else { String::new() };
+    for step in &plan.steps {
+        let call: Vec<&str> =
+            std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
+        if temporal {
+            let (start, duration) = (step.start.to_f64(), step.duration.to_f64());
+            let _ = writeln!(text, "{start:.3}: ({})  [{duration:.3}]", call.join(" "));
+        } else {
+            let _ = writeln!(text, "({})", call.join(" "));
+        }
+    }
+    text
+}

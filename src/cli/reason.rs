@@ -1,0 +1,180 @@
+//! `metaplan reason`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use metaplan::knowledge::{Contradiction, Knowledge, Sources};
+use metaplan::mission::source;
+use rules::{Delta, Value};
+use serde_json::json;
+
+use crate::cli::{Common, Exit, Failure, Format, Imports, output, setting};
+
+/// Arguments of `reason`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Knowledge bases (OWL in RDF/XML, Turtle, N-Triples, OWL/XML or functional syntax); `-` is standard input.
+    #[arg(required = true, value_name = "KB")]
+    documents: Vec<PathBuf>,
+    /// Further rules: a file, `coadaptation` or `tomasys` (repeatable).
+    #[arg(long = "rules", value_name = "FILE")]
+    rules: Vec<String>,
+    #[command(flatten)]
+    imports: Imports,
+    /// Assertions to add (a document; repeatable).
+    #[arg(long, value_name = "FILE")]
+    assert: Vec<PathBuf>,
+    /// Assertions to take away (a document; repeatable).
+    #[arg(long, value_name = "FILE")]
+    retract: Vec<PathBuf>,
+    /// A measured attribute and its value (repeatable).
+    #[arg(long = "set", value_name = "ATTRIBUTE=VALUE", value_parser = setting)]
+    set: Vec<(String, String)>,
+    /// A component that has failed (repeatable).
+    #[arg(long, value_name = "COMPONENT")]
+    fail: Vec<String>,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let mut knowledge = read(arguments)?;
+    output::warnings(common, knowledge.warnings());
+    let mut delta = Delta::default();
+    for file in &arguments.assert {
+        delta.insert.extend(knowledge.assertions(file)?);
+    }
+    for file in &arguments.retract {
+        delta.delete.extend(knowledge.assertions(file)?);
+    }
+    knowledge.apply(delta)?;
+    for component in &arguments.fail {
+        knowledge.fail(component).map_err(Failure::usage)?;
+    }
+    for (attribute, value) in &arguments.set {
+        knowledge.measure(attribute, value).map_err(Failure::usage)?;
+    }
+    let contradictions = knowledge.contradictions();
+    match common.format {
+        Format::Ntriples => {
+            output::answer(&ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred()));
+        }
+        Format::Json => output::json_answer(&json(&knowledge, &contradictions)),
+        Format::Text => output::answer(&text(&knowledge, &contradictions)),
+    }
+    if !contradictions.is_empty() && common.format == Format::Ntriples {
+        return crate::cli::consistent(Some(&knowledge)).map(|()| Exit::Done);
+    }
+    Ok(if contradictions.is_empty() { Exit::Done } else { Exit::Inconsistent })
+}
+
+fn read(arguments: &Arguments) -> Result<Knowledge, Failure> {
+    let options = arguments.imports.options();
+    match &arguments.documents[..] {
+        [only] if only.as_os_str() == "-" => {
+            let text = source(only)?;
+            Ok(Knowledge::read_text(text.text(), "-", &arguments.rules, &options)?)
+        }
+        documents => {
+            let (documents, rules) = (documents.to_vec(), arguments.rules.clone());
+            Ok(Knowledge::read(&Sources { documents, rules, options })?)
+        }
+    }
+}
+
+/// Individuals with a property whose local name is given, and its values: `o_status` of objectives.
+fn statuses(knowledge: &Knowledge, property: &str) -> Vec<(String, String)> {
+    let symbols = knowledge.engine().symbols();
+    let mut found: Vec<_> = knowledge
+        .engine()
+        .facts()
+        .filter(|fact| match symbols.value(fact.predicate) {
+            Value::Name(iri) => fact.arguments.len() == 2 && ontology::vocab::local_name(iri) == property,
+            Value::Literal(_) => false,
+        })
+        .map(|fact| {
+            let subject = symbols.value(fact.arguments[0]).to_string();
+            let value = match symbols.value(fact.arguments[1]) {
+                Value::Literal(literal) => literal.lexical(),
+                Value::Name(name) => name.to_string(),
+            };
+            (ontology::vocab::local_name(subject.trim_matches(['<', '>'])).to_owned(), value)
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+fn json(knowledge: &Knowledge, contradictions: &[Contradiction]) -> serde_json::Value {
+    let view = knowledge.view();
+    let names =
+        |all: &[ontology::tomasys::Individual]| all.iter().map(|i| i.name.clone()).collect::<Vec<_>>();
+    let designs: Vec<_> = view
+        .function_designs()
+        .iter()
+        .map(|design| {
+            json!({
+                "name": design.individual.name,
+                "iri": design.individual.iri,
+                "solves": names(&design.solves),
+                "components": names(&design.components),
+                "available": design.available,
+            })
+        })
+        .collect();
+    let objectives: Vec<_> = statuses(knowledge, "o_status")
+        .iter()
+        .map(|(o, status)| json!({ "objective": o, "status": status }))
+        .collect();
+    let contradictions: Vec<_> =
+        contradictions.iter().map(|c| json!({ "violated": c.violated, "facts": c.facts })).collect();
+    let triples = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
+    json!({
+        "format": "metaplan-reason/1",
+        "consistent": contradictions.is_empty(),
+        "rules": knowledge.rule_count(),
+        "inferred": triples.lines().collect::<Vec<_>>(),
+        "designs": designs,
+        "objectives": objectives,
+        "contradictions": contradictions,
+    })
+}
+
+fn text(knowledge: &Knowledge, contradictions: &[Contradiction]) -> String {
+    let mut text = String::new();
+    for contradiction in contradictions {
+        let _ = writeln!(text, "inconsistent: {}", contradiction.violated);
+        for fact in &contradiction.facts {
+            let _ = writeln!(text, "    {fact}");
+        }
+    }
+    let inferred = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
+    let _ =
+        writeln!(text, "{} rules, {} inferred assertions", knowledge.rule_count(), inferred.lines().count());
+    text += &inferred;
+    let view = knowledge.view();
+    let designs = view.function_designs();
+    if !designs.is_empty() {
+        let rows = designs.iter().map(|design| {
+            let list = |all: &[ontology::tomasys::Individual]| {
+                all.iter().map(|i| i.name.as_str()).collect::<Vec<_>>().join(", ")
+            };
+            let available = if design.available { "available" } else { "not available" };
+            vec![
+                list(&design.solves),
+                design.individual.name.clone(),
+                available.to_owned(),
+                list(&design.components),
+            ]
+        });
+        text.push('\n');
+        text += &output::table(&["function", "design", "", "components"], rows);
+    }
+    let objectives = statuses(knowledge, "o_status");
+    if !objectives.is_empty() {
+        text.push('\n');
+        let rows = objectives.into_iter().map(|(objective, status)| vec![objective, status]);
+        text += &output::table(&["objective", "status"], rows);
+    }
+    text
+}

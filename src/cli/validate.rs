@@ -1,0 +1,147 @@
+//! `metaplan validate`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use encodings::pddl::Source;
+use encodings::pddl::ast::Name;
+use encodings::validate::{Options, PlanStep, PlanText, Verdict, validate};
+use metaplan::message::Message;
+use metaplan::mission::source;
+use num_rational::BigRational;
+use num_traits::Num as _;
+use serde_json::{Value, json};
+
+use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+
+/// Arguments of `validate`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission's manifest, or a PDDL domain and a PDDL problem, and then the plan: lines `(action arguments)` or
+    /// `start: (action arguments) [duration]`, or the JSON of `metaplan plan`; `-` is standard input.
+    #[arg(required = true, num_args = 2..=3, value_name = "MISSION PLAN | DOMAIN PROBLEM PLAN")]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    situation: Situation,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let Some((plan, mission)) = arguments.inputs.split_last() else {
+        return Err(Failure::usage(Message::error("M107", "give a plan")));
+    };
+    let mission = arguments.situation.mission(mission)?;
+    let (problem, warnings) = mission.filled()?;
+    output::warnings(common, mission.warnings().chain(&warnings));
+    let plan = read_plan(&source(plan)?)?;
+    let verdict = validate(mission.domain(), &problem, &plan, &Options::default());
+    match common.format {
+        Format::Json => output::json_answer(&json(&verdict)),
+        _ => output::answer(&text(&verdict)),
+    }
+    Ok(if verdict.valid { Exit::Done } else { Exit::Invalid })
+}
+
+fn read_plan(source: &Source) -> Result<PlanText, Failure> {
+    if source.text().trim_start().starts_with('{') {
+        return json_plan(source);
+    }
+    PlanText::parse(source).map_err(|diagnostics| Message::from_pddl(&diagnostics, &[source]).into())
+}
+
+/// The steps of a `metaplan-plan/1` document.
+fn json_plan(source: &Source) -> Result<PlanText, Failure> {
+    let bad = |place, text: &str| Message::at("M111", source.name(), place, text.to_owned());
+    let document: Value = serde_json::from_str(source.text())
+        .map_err(|error| bad(Some((error.line(), error.column())), &format!("not JSON: {error}")))?;
+    let steps =
+        document["steps"].as_array().ok_or_else(|| bad(None, "no `steps`: not a plan of `metaplan plan`"))?;
+    let mut plan = PlanText::default();
+    for (index, step) in steps.iter().enumerate() {
+        let name = |value: &Value| value.as_str().map(Name::new);
+        let arguments =
+            step["arguments"].as_array().map(|all| all.iter().map(name).collect::<Option<Vec<_>>>());
+        let (Some(action), Some(Some(arguments))) = (name(&step["action"]), arguments) else {
+            let text = format!("step {} has no `action` with `arguments`", index + 1);
+            return Err(bad(None, &text).into());
+        };
+        let (start, duration) = (decimal(&step["start"]), decimal(&step["duration"]));
+        plan.steps.push(PlanStep { action, arguments, start, duration, line: 0 });
+    }
+    Ok(plan)
+}
+
+fn decimal(value: &Value) -> Option<BigRational> {
+    let text = value.as_number()?.to_string();
+    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
+    BigRational::from_str_radix(&format!("{whole}{fraction}/1{}", "0".repeat(fraction.len())), 10).ok()
+}
+
+fn number(number: &BigRational) -> Value {
+    output::decimal_number(number)
+}
+
+fn json(verdict: &Verdict) -> Value {
+    let violation = verdict.violation.as_ref().map(|violation| {
+        let unmet: Vec<_> = violation
+            .unmet
+            .iter()
+            .map(|unmet| {
+                let values: serde_json::Map<String, Value> = unmet
+                    .values
+                    .iter()
+                    .map(|(name, value)| (name.clone(), value.as_ref().map_or(Value::Null, number)))
+                    .collect();
+                json!({ "condition": unmet.condition, "values": values })
+            })
+            .collect();
+        json!({
+            "step": violation.step,
+            "action": violation.action,
+            "time": number(&violation.time),
+            "kind": violation.kind.as_str(),
+            "message": violation.message,
+            "unmet": unmet,
+        })
+    });
+    let values: serde_json::Map<String, Value> =
+        verdict.values.iter().map(|(name, value)| (name.clone(), number(value))).collect();
+    json!({
+        "format": "metaplan-verdict/1",
+        "valid": verdict.valid,
+        "metric": verdict.metric.as_ref().map(number),
+        "total_time": number(&verdict.total_time),
+        "values": values,
+        "violation": violation,
+    })
+}
+
+fn text(verdict: &Verdict) -> String {
+    let mut text = String::new();
+    match &verdict.violation {
+        None => {
+            let _ = write!(text, "valid");
+            if let Some(metric) = &verdict.metric {
+                let _ = write!(text, ", metric {}", number(metric));
+            }
+            let _ = writeln!(text, ", total time {}", number(&verdict.total_time));
+        }
+        Some(violation) => {
+            let _ = write!(text, "invalid: ");
+            if let (Some(step), Some(action)) = (violation.step, &violation.action) {
+                let _ = write!(text, "step {step}, {action}: ");
+            }
+            let _ = writeln!(text, "{}", violation.message);
+            for unmet in &violation.unmet {
+                let _ = writeln!(text, "    {}", unmet.condition);
+                for (name, value) in &unmet.values {
+                    let value =
+                        value.as_ref().map_or("undefined".to_owned(), |value| number(value).to_string());
+                    let _ = writeln!(text, "        {name} = {value}");
+                }
+            }
+        }
+    }
+    text
+}

@@ -1,0 +1,190 @@
+//! What went wrong or is questionable, from whatever room it came, in one form for people and programs.
+
+use std::fmt::Write as _;
+
+use encodings::pddl::{self, Diagnostic, Severity, Source};
+use serde::Serialize;
+
+/// A message about an input.
+#[derive(Debug, Clone, Serialize)]
+#[serde(transparent)]
+pub struct Message(Box<Details>);
+
+impl std::ops::Deref for Message {
+    type Target = Details;
+
+    fn deref(&self) -> &Details {
+        &self.0
+    }
+}
+
+/// What a message says.
+#[derive(Debug, Clone, Serialize)]
+pub struct Details {
+    /// `error` or `warning`.
+    pub severity: &'static str,
+    /// The stable code of the cause.
+    pub code: String,
+    /// One sentence.
+    pub message: String,
+    /// The file, where it is about one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Line, from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
+    /// Column, from 1, in characters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column: Option<usize>,
+    /// What would be right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub help: Option<String>,
+    /// The message as a terminal shows it, with its source line where there is one.
+    #[serde(skip)]
+    text: String,
+}
+
+impl Message {
+    /// An error that is about no place in a file.
+    pub fn error(code: &str, message: impl Into<String>) -> Self {
+        Self::plain("error", code, message.into(), None)
+    }
+
+    /// A warning that is about no place in a file.
+    pub fn warning(code: &str, message: impl Into<String>) -> Self {
+        Self::plain("warning", code, message.into(), None)
+    }
+
+    /// An error about a file as a whole, or about a line and column in it.
+    pub fn at(code: &str, file: &str, place: Option<(usize, usize)>, message: impl Into<String>) -> Self {
+        Self::plain("error", code, message.into(), Some((file.to_owned(), place)))
+    }
+
+    fn plain(
+        severity: &'static str,
+        code: &str,
+        message: String,
+        place: Option<(String, Option<(usize, usize)>)>,
+    ) -> Self {
+        let mut text = String::new();
+        let (file, line, column) = match place {
+            Some((file, Some((line, column)))) => {
+                let _ = write!(text, "{file}:{line}:{column}: ");
+                (Some(file), Some(line), Some(column))
+            }
+            Some((file, None)) => {
+                let _ = write!(text, "{file}: ");
+                (Some(file), None, None)
+            }
+            None => (None, None, None),
+        };
+        let _ = writeln!(text, "{severity}[{code}]: {message}");
+        Self(Box::new(Details {
+            severity,
+            code: code.to_owned(),
+            message,
+            file,
+            line,
+            column,
+            help: None,
+            text,
+        }))
+    }
+
+    /// Messages of the PDDL front end, with the source lines that they are about.
+    pub fn from_pddl(diagnostics: &[Diagnostic], sources: &[&Source]) -> Vec<Self> {
+        let details = |diagnostic: &Diagnostic| Details {
+            severity: if diagnostic.severity == Severity::Error { "error" } else { "warning" },
+            code: diagnostic.code.to_owned(),
+            message: diagnostic.message.clone(),
+            file: Some(diagnostic.file.clone()),
+            line: Some(diagnostic.line),
+            column: Some(diagnostic.column),
+            help: diagnostic.help.clone(),
+            text: pddl::render(std::slice::from_ref(diagnostic), sources, false),
+        };
+        diagnostics.iter().map(|diagnostic| Self(Box::new(details(diagnostic)))).collect()
+    }
+
+    /// Errors of grounding and encoding.
+    pub fn from_encodings(errors: &[encodings::Error], domain: &Source, problem: &Source) -> Vec<Self> {
+        let message = |error: &encodings::Error| match error.place() {
+            Some(place) => {
+                let source = if place.file == encodings::File::Domain { domain } else { problem };
+                let diagnostic =
+                    Diagnostic::new(source, place.span, Severity::Error, error.code(), error.to_string());
+                Self::from_pddl(&[diagnostic], &[domain, problem]).swap_remove(0)
+            }
+            None => Self::error(error.code(), error.to_string()),
+        };
+        errors.iter().map(message).collect()
+    }
+
+    /// An error of reading a knowledge base.
+    pub fn from_ontology(error: &ontology::Error) -> Self {
+        let (file, line, column) = match error.position() {
+            Some(place) => (Some(place.file.clone()), Some(place.line as usize), Some(place.column as usize)),
+            None => (None, None, None),
+        };
+        let text = format!("{error}\n");
+        let code = error.code().to_owned();
+        Self(Box::new(Details {
+            severity: "error",
+            code,
+            message: error.to_string(),
+            file,
+            line,
+            column,
+            help: None,
+            text,
+        }))
+    }
+
+    /// A warning of reading or lowering a knowledge base.
+    pub fn from_ontology_warning(warning: &ontology::Warning) -> Self {
+        let text = format!("{warning}\n");
+        let code = warning.code().to_owned();
+        let message = warning.to_string();
+        Self(Box::new(Details {
+            severity: "warning",
+            code,
+            message,
+            file: None,
+            line: None,
+            column: None,
+            help: None,
+            text,
+        }))
+    }
+
+    /// An error in rules.
+    pub fn from_rules(error: &rules::Error) -> Self {
+        let text = format!("{error}\n");
+        let message = error.to_string();
+        let code = message
+            .split_whitespace()
+            .find(|word| word.len() == 4 && word.starts_with('R'))
+            .unwrap_or("R100");
+        let code = code.to_owned();
+        Self(Box::new(Details {
+            severity: "error",
+            code,
+            message,
+            file: None,
+            line: None,
+            column: None,
+            help: None,
+            text,
+        }))
+    }
+
+    /// Whether it is an error.
+    pub fn is_error(&self) -> bool {
+        self.severity == "error"
+    }
+
+    /// As a terminal shows it, with a line break at its end.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+}

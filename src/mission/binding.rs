@@ -1,0 +1,282 @@
+//! Bindings: which PDDL symbol stands for what in the knowledge base, and a problem filled with it.
+//!
+//! The defaults fit the names of the Metaplan paper and of the files of kas-lab. A type stands for a class, a predicate for a
+//! relation between designs, functions and actions, a numeric function for an estimated or measured attribute.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use encodings::pddl::ast::{
+    Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
+    TypedName,
+};
+use num_rational::BigRational;
+use ontology::tomasys::{FunctionDesign, Individual, View};
+
+use crate::message::Message;
+
+/// What a PDDL symbol stands for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Query {
+    /// A type: the individuals of a class, by local name or IRI.
+    Class(String),
+    /// A predicate `(p DESIGN FUNCTION)`.
+    Solves,
+    /// A predicate `(p DESIGN)`.
+    Available,
+    /// A predicate `(p ACTION FUNCTION…)`; for one action only if it is named.
+    Requires(Option<String>),
+    /// A numeric function of a design: the estimated value of an attribute.
+    Estimation(String),
+    /// A numeric function without parameters: the measured value of an attribute.
+    Measured(String),
+}
+
+/// PDDL symbols and what they stand for.
+#[derive(Debug, Clone, Default)]
+pub struct Bindings {
+    own: BTreeMap<Name, Query>,
+}
+
+const SOLVES: [&str; 2] = ["fd_solve_f", "fd_solves_f"];
+
+impl Bindings {
+    /// The defaults, and on top of them the given ones.
+    ///
+    /// # Errors
+    /// A sentence about the first query that is none.
+    pub fn with(own: &BTreeMap<String, String>) -> Result<Self, String> {
+        let parse =
+            |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
+        Ok(Self { own: own.iter().map(parse).collect::<Result<_, String>>()? })
+    }
+
+    /// The predicates that say which design solves which function.
+    pub fn solves(&self) -> Vec<Name> {
+        let own = self.own.iter().filter(|(_, query)| **query == Query::Solves).map(|(name, _)| name.clone());
+        own.chain(SOLVES.map(Name::new)).collect()
+    }
+
+    fn r#type(&self, name: &Name) -> Option<Query> {
+        self.own.get(name).cloned().or_else(|| {
+            let class = match name.as_str().to_ascii_lowercase().as_str() {
+                "function" => "Function",
+                "functiondesign" | "function_design" | "function-design" => "FunctionDesign",
+                "action" => "Action",
+                "component" => "Component",
+                _ => return None,
+            };
+            Some(Query::Class(class.to_owned()))
+        })
+    }
+
+    fn predicate(&self, name: &Name) -> Option<Query> {
+        self.own.get(name).cloned().or_else(|| {
+            let name = name.as_str().to_ascii_lowercase();
+            match name.as_str() {
+                "fd_available" => Some(Query::Available),
+                "a_req_f" => Some(Query::Requires(None)),
+                other if SOLVES.contains(&other) => Some(Query::Solves),
+                other => {
+                    other.strip_suffix("_requires_f").map(|action| Query::Requires(Some(action.to_owned())))
+                }
+            }
+        })
+    }
+
+    fn function(&self, declared: &Declaration) -> Query {
+        let name = &declared.identifier.name;
+        self.own.get(name).cloned().unwrap_or_else(|| {
+            let name = name.as_str().to_owned();
+            if declared.parameters.is_empty() { Query::Measured(name) } else { Query::Estimation(name) }
+        })
+    }
+}
+
+fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
+    let (kind, name) = query.split_once(':').unwrap_or((query, ""));
+    match (kind, name) {
+        ("class", name) if !name.is_empty() => Ok(Query::Class(name.to_owned())),
+        ("estimation", name) if !name.is_empty() => Ok(Query::Estimation(name.to_owned())),
+        ("measured", name) if !name.is_empty() => Ok(Query::Measured(name.to_owned())),
+        ("requires", "") => Ok(Query::Requires(None)),
+        ("requires", name) => Ok(Query::Requires(Some(name.to_owned()))),
+        ("solves", "") => Ok(Query::Solves),
+        ("available", "") => Ok(Query::Available),
+        _ => Err(format!(
+            "`{symbol}` is bound to `{query}`, which is no query; queries are `class:NAME`, `solves`, `available`, \
+             `requires`, `requires:ACTION`, `estimation:ATTRIBUTE` and `measured:ATTRIBUTE`"
+        )),
+    }
+}
+
+/// Adds to a problem the objects, facts and values that the knowledge base has for the domain's symbols. What
+/// the problem says of availability itself is dropped, with a warning; values that it states stay.
+pub(super) fn fill(
+    domain: &Domain,
+    problem: &mut Problem,
+    view: &View<'_>,
+    bindings: &Bindings,
+) -> Vec<Message> {
+    let mut fill = Fill { problem, view, designs: view.function_designs(), warnings: Vec::new() };
+    for declared in &domain.types {
+        let name = &declared.identifier.name;
+        if let Some(Query::Class(class)) = bindings.r#type(name) {
+            fill.objects(domain, name, &class);
+        }
+    }
+    for declared in &domain.predicates {
+        match bindings.predicate(&declared.identifier.name) {
+            Some(Query::Solves) if declared.parameters.len() == 2 => fill.solves(&declared.identifier.name),
+            Some(Query::Available) if declared.parameters.len() == 1 => {
+                fill.available(&declared.identifier.name);
+            }
+            Some(Query::Requires(action)) => fill.requires(declared, action.as_deref()),
+            _ => {}
+        }
+    }
+    for declared in &domain.functions {
+        fill.values(declared, &bindings.function(declared));
+    }
+    fill.warnings
+}
+
+struct Fill<'a> {
+    problem: &'a mut Problem,
+    view: &'a View<'a>,
+    designs: Vec<FunctionDesign>,
+    warnings: Vec<Message>,
+}
+
+impl Fill<'_> {
+    fn objects(&mut self, domain: &Domain, r#type: &Name, class: &str) {
+        let members = if class.contains(':') {
+            self.view.individuals_of(class)
+        } else {
+            self.view.individuals_of_class_named(class)
+        };
+        let present = domain.constants.iter().chain(&self.problem.objects);
+        let mut known: BTreeSet<Name> = present.map(|object| object.identifier.name.clone()).collect();
+        for Individual { iri, name } in members {
+            let spelled = Name::new(&name);
+            if !is_pddl_name(&name) {
+                let text = format!("<{iri}> is left out: `{name}` is no PDDL name");
+                self.warnings.push(Message::warning("M201", text));
+            } else if known.insert(spelled.clone()) {
+                let alternatives = vec![identifier(r#type)];
+                let r#type = TypeExpression { alternatives };
+                self.problem.objects.push(TypedName { identifier: identifier(&spelled), r#type });
+            }
+        }
+    }
+
+    fn fact(&mut self, predicate: &Name, arguments: &[&str]) {
+        self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
+    }
+
+    fn solves(&mut self, predicate: &Name) {
+        for design in self.designs.clone() {
+            for function in &design.solves {
+                self.fact(predicate, &[&design.individual.name, &function.name]);
+            }
+        }
+    }
+
+    fn available(&mut self, predicate: &Name) {
+        let own = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate);
+        if self.problem.init.iter().any(own) {
+            self.problem.init.retain(|element| !own(element));
+            let text =
+                format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides");
+            self.warnings.push(Message::warning("M202", text));
+        }
+        for design in self.designs.clone().iter().filter(|design| design.available) {
+            self.fact(predicate, &[&design.individual.name]);
+        }
+    }
+
+    /// One atom for each action: the action (where the predicate has a place for it) and all its functions.
+    fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
+        for action in self.view.actions() {
+            if only.is_some_and(|only| !only.eq_ignore_ascii_case(&action.individual.name)) {
+                continue;
+            }
+            let functions: Vec<&str> =
+                action.requires.iter().map(|function| function.name.as_str()).collect();
+            let all: Vec<&str> = std::iter::once(action.individual.name.as_str()).chain(functions).collect();
+            if all.len() == declared.parameters.len() {
+                self.fact(&declared.identifier.name, &all);
+            } else {
+                let text = format!(
+                    "`{}` has {} parameters, but {} requires {} functions; the action is left out",
+                    declared.identifier.name,
+                    declared.parameters.len(),
+                    action.individual.name,
+                    action.requires.len()
+                );
+                self.warnings.push(Message::warning("M203", text));
+            }
+        }
+    }
+
+    fn values(&mut self, declared: &Declaration, query: &Query) {
+        let name = &declared.identifier.name;
+        let stated: BTreeSet<Vec<Name>> = self
+            .problem
+            .init
+            .iter()
+            .filter_map(|element| match element {
+                InitialElement::Value(atom, _, _) if atom.predicate.name == *name => {
+                    Some(names(&atom.arguments))
+                }
+                _ => None,
+            })
+            .collect();
+        let mut values: Vec<(Vec<String>, BigRational)> = Vec::new();
+        match query {
+            Query::Estimation(attribute) if declared.parameters.len() == 1 => {
+                let plain = attribute.strip_prefix("fd_").unwrap_or(attribute);
+                for design in &self.designs {
+                    let value = design.estimations.get(attribute).or_else(|| design.estimations.get(plain));
+                    values.extend(value.map(|value| (vec![design.individual.name.clone()], value.clone())));
+                }
+            }
+            Query::Measured(attribute) if declared.parameters.is_empty() => {
+                let measured = self.view.measurements().into_iter().find(|m| m.attribute == *attribute);
+                values.extend(measured.and_then(|m| m.value).map(|value| (Vec::new(), value)));
+            }
+            _ => {}
+        }
+        for (arguments, value) in values {
+            let key: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
+            if !stated.contains(&key) {
+                let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+                self.problem.init.push(InitialElement::Value(atom(name, &arguments), value, Span::default()));
+            }
+        }
+    }
+}
+
+fn names(terms: &[Term]) -> Vec<Name> {
+    let name = |term: &Term| match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.clone(),
+    };
+    terms.iter().map(name).collect()
+}
+
+pub(super) fn identifier(name: &Name) -> Identifier {
+    Identifier { name: name.clone(), span: Span::default() }
+}
+
+pub(super) fn atom(predicate: &Name, arguments: &[&str]) -> Atom {
+    let constant = |argument: &&str| Term::Constant(identifier(&Name::new(argument)));
+    Atom {
+        predicate: identifier(predicate),
+        arguments: arguments.iter().map(constant).collect(),
+        span: Span::default(),
+    }
+}
+
+fn is_pddl_name(name: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    !name.is_empty() && name.chars().all(allowed)
+}

@@ -1,0 +1,139 @@
+//! The manifest of a mission: which files it is made of, how symbols are bound, and its scenarios.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use ontology::ReadOptions;
+use serde::Deserialize;
+
+use crate::knowledge::{COADAPTATION, Sources, TOMASYS};
+use crate::message::Message;
+use crate::mission::binding::Bindings;
+
+/// A manifest; paths in it are relative to the manifest.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// The mission's name.
+    pub name: String,
+    /// What it is about, in a sentence.
+    #[serde(default)]
+    pub description: String,
+    knowledge: KnowledgeSection,
+    planning: PlanningSection,
+    /// PDDL symbol to query, beyond the defaults.
+    #[serde(default)]
+    bindings: BTreeMap<String, String>,
+    /// Situations by name.
+    #[serde(default)]
+    pub scenarios: BTreeMap<String, Scenario>,
+    #[serde(skip)]
+    directory: PathBuf,
+    #[serde(skip)]
+    file: String,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KnowledgeSection {
+    files: Vec<PathBuf>,
+    #[serde(default = "shipped_rules")]
+    rules: Vec<String>,
+    #[serde(default)]
+    catalogs: Vec<PathBuf>,
+    #[serde(default)]
+    directories: Vec<PathBuf>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlanningSection {
+    domain: PathBuf,
+    problem: PathBuf,
+}
+
+/// A situation: what has failed, and what has changed.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// What happens, in a sentence.
+    #[serde(default)]
+    pub description: String,
+    /// Components that have failed.
+    #[serde(default)]
+    pub fail: Vec<String>,
+    /// Measured attributes, fluents and facts by name, as for `--set`.
+    #[serde(default)]
+    pub set: BTreeMap<String, String>,
+}
+
+fn shipped_rules() -> Vec<String> {
+    vec![COADAPTATION.to_owned()]
+}
+
+impl Manifest {
+    /// Reads a manifest.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no manifest.
+    pub fn read(file: &Path) -> Result<Self, Message> {
+        let name = file.display().to_string();
+        let text = std::fs::read_to_string(file)
+            .map_err(|error| Message::at("M101", &name, None, format!("cannot be read: {error}")))?;
+        let mut manifest: Self = toml::from_str(&text).map_err(|error| {
+            let place = error.span().map(|span| line_and_column(&text, span.start));
+            Message::at("M104", &name, place, error.message().to_owned())
+        })?;
+        manifest.directory = file.parent().map(Path::to_owned).unwrap_or_default();
+        manifest.file = name;
+        Ok(manifest)
+    }
+
+    fn path(&self, path: &Path) -> PathBuf {
+        self.directory.join(path)
+    }
+
+    /// The knowledge base's files.
+    pub fn sources(&self) -> Sources {
+        let knowledge = &self.knowledge;
+        let all = |paths: &[PathBuf]| paths.iter().map(|path| self.path(path)).collect();
+        let rule = |name: &String| match name.as_str() {
+            COADAPTATION | TOMASYS => name.clone(),
+            path => self.path(Path::new(path)).display().to_string(),
+        };
+        Sources {
+            documents: all(&knowledge.files),
+            rules: knowledge.rules.iter().map(rule).collect(),
+            options: ReadOptions {
+                catalogs: all(&knowledge.catalogs),
+                directories: all(&knowledge.directories),
+                ..ReadOptions::default()
+            },
+        }
+    }
+
+    /// The domain file.
+    pub fn domain(&self) -> PathBuf {
+        self.path(&self.planning.domain)
+    }
+
+    /// The problem file.
+    pub fn problem(&self) -> PathBuf {
+        self.path(&self.planning.problem)
+    }
+
+    /// The bindings, the defaults among them.
+    ///
+    /// # Errors
+    /// A query that is none.
+    pub fn bindings(&self) -> Result<Bindings, Message> {
+        Bindings::with(&self.bindings).map_err(|message| Message::at("M105", &self.file, None, message))
+    }
+}
+
+fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or(text);
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().map_or(0, |last| last.chars().count()) + 1;
+    (line, column)
+}

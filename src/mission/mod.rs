@@ -1,0 +1,193 @@
+//! A mission: what the robot is (a knowledge base) and what it has to do (PDDL), joined.
+//!
+//! The only file that sees both sides: the PDDL problem gets its functions, designs and actions, which designs are available,
+//! and the values of quality attributes from the knowledge base, by the bindings of the manifest.
+
+mod binding;
+mod manifest;
+mod settings;
+
+use std::path::Path;
+
+use encodings::pddl::ast::{Domain, Problem};
+use encodings::pddl::{self, Severity, Source};
+use encodings::{GroundConfig, Task};
+
+use crate::knowledge::Knowledge;
+use crate::message::Message;
+
+pub use binding::Bindings;
+pub use manifest::{Manifest, Scenario};
+
+/// A mission that can be planned.
+#[derive(Debug, Clone)]
+pub struct Mission {
+    /// Its name.
+    pub name: String,
+    knowledge: Option<Knowledge>,
+    bindings: Bindings,
+    domain_source: Source,
+    problem_source: Source,
+    domain: Domain,
+    problem: Problem,
+    warnings: Vec<Message>,
+}
+
+impl Mission {
+    /// Reads a mission from its manifest.
+    ///
+    /// # Errors
+    /// All that is wrong with the manifest and with the files that it names.
+    pub fn read(manifest: &Path) -> Result<(Self, Manifest), Vec<Message>> {
+        let manifest = Manifest::read(manifest).map_err(|message| vec![message])?;
+        let knowledge = Knowledge::read(&manifest.sources());
+        let mission = Self::new(
+            &manifest.name,
+            Some(knowledge),
+            manifest.bindings().map_err(|message| vec![message])?,
+            source(&manifest.domain()),
+            source(&manifest.problem()),
+        )?;
+        Ok((mission, manifest))
+    }
+
+    /// Joins a knowledge base, if there is one, with a domain and a problem.
+    ///
+    /// # Errors
+    /// All that is wrong with any of them.
+    pub fn new(
+        name: &str,
+        knowledge: Option<Result<Knowledge, Vec<Message>>>,
+        bindings: Bindings,
+        domain: Result<Source, Message>,
+        problem: Result<Source, Message>,
+    ) -> Result<Self, Vec<Message>> {
+        let mut errors = Vec::new();
+        let knowledge = match knowledge.transpose() {
+            Ok(knowledge) => knowledge,
+            Err(more) => {
+                errors.extend(more);
+                None
+            }
+        };
+        let (domain_source, problem_source) = match (domain, problem) {
+            (Ok(domain), Ok(problem)) => (domain, problem),
+            (domain, problem) => {
+                errors.extend([domain.err(), problem.err()].into_iter().flatten());
+                return Err(errors);
+            }
+        };
+        let parsed = parse(&domain_source, &problem_source);
+        let (domain, problem, warnings) = match parsed {
+            Ok(parsed) if errors.is_empty() => parsed,
+            Ok(_) => return Err(errors),
+            Err(more) => {
+                errors.extend(more);
+                return Err(errors);
+            }
+        };
+        let name = name.to_owned();
+        Ok(Self { name, knowledge, bindings, domain_source, problem_source, domain, problem, warnings })
+    }
+
+    /// What is questionable about the files.
+    pub fn warnings(&self) -> impl Iterator<Item = &Message> {
+        self.warnings.iter().chain(self.knowledge.iter().flat_map(Knowledge::warnings))
+    }
+
+    /// The knowledge base, if the mission has one.
+    pub fn knowledge(&self) -> Option<&Knowledge> {
+        self.knowledge.as_ref()
+    }
+
+    /// Marks a component as failed.
+    ///
+    /// # Errors
+    /// There is no such component, or no knowledge base that could have one.
+    pub fn fail(&mut self, component: &str) -> Result<(), Message> {
+        match &mut self.knowledge {
+            Some(knowledge) => knowledge.fail(component),
+            None => Err(Message::error(
+                "M103",
+                format!("there is no knowledge base that has a component `{component}`"),
+            )),
+        }
+    }
+
+    /// Puts a scenario of the manifest into effect.
+    ///
+    /// # Errors
+    /// The first setting that does not fit the mission.
+    pub fn apply(&mut self, scenario: &Scenario) -> Result<(), Message> {
+        for component in &scenario.fail {
+            self.fail(component)?;
+        }
+        scenario.set.iter().try_for_each(|(name, value)| self.set(name, value))
+    }
+
+    /// The problem as it is to be planned: with what the knowledge base contributes.
+    ///
+    /// # Errors
+    /// What the knowledge base contributes does not fit the domain.
+    pub fn filled(&self) -> Result<(Problem, Vec<Message>), Vec<Message>> {
+        let mut problem = self.problem.clone();
+        let mut warnings = Vec::new();
+        if let Some(knowledge) = &self.knowledge {
+            warnings = binding::fill(&self.domain, &mut problem, &knowledge.view(), &self.bindings);
+        }
+        let found = pddl::check(&self.domain, &self.domain_source, &problem, &self.problem_source);
+        let (errors, questionable): (Vec<_>, Vec<_>) =
+            found.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
+        let sources = [&self.domain_source, &self.problem_source];
+        if errors.is_empty() {
+            warnings.extend(Message::from_pddl(&questionable, &sources));
+            Ok((problem, warnings))
+        } else {
+            Err(Message::from_pddl(&errors, &sources))
+        }
+    }
+
+    /// The domain.
+    pub fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    /// Grounds a problem that [`Mission::filled`] has made.
+    ///
+    /// # Errors
+    /// Everything that the planner does not handle.
+    pub fn ground(&self, problem: &Problem) -> Result<Task, Vec<Message>> {
+        let config = GroundConfig { solves: self.bindings.solves() };
+        encodings::ground(&self.domain, problem, &config)
+            .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
+    }
+}
+
+fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Vec<Message>> {
+    let (domain_tree, mut diagnostics) = pddl::parse_domain(domain);
+    let (problem_tree, more) = pddl::parse_problem(problem);
+    diagnostics.extend(more);
+    let messages = Message::from_pddl(&diagnostics, &[domain, problem]);
+    match (domain_tree, problem_tree) {
+        (Some(domain), Some(problem)) if !pddl::has_errors(&diagnostics) => Ok((domain, problem, messages)),
+        _ => Err(messages),
+    }
+}
+
+/// Reads a text file; `-` is standard input.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn source(path: &Path) -> Result<Source, Message> {
+    let name = path.display().to_string();
+    let bytes = if name == "-" {
+        let mut bytes = Vec::new();
+        std::io::Read::read_to_end(&mut std::io::stdin(), &mut bytes).map(|_| bytes)
+    } else {
+        std::fs::read(path)
+    };
+    match bytes {
+        Ok(bytes) => Ok(Source::from_bytes(name, &bytes)),
+        Err(error) => Err(Message::at("M101", &name, None, format!("cannot be read: {error}"))),
+    }
+}

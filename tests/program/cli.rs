@@ -1,0 +1,204 @@
+//! Exit statuses and messages of the command line.
+
+use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, root};
+
+/// Checks the exit status and that the messages (or the answer) contain each text; no fault is ever reported.
+fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
+    assert_eq!(outcome.status, status, "{outcome:#?}");
+    for text in texts {
+        assert!(outcome.stderr.contains(text) || outcome.stdout.contains(text), "no `{text}`: {outcome:#?}");
+    }
+    assert!(!outcome.stderr.contains("panicked") && !outcome.stderr.contains("M170"), "{outcome:#?}");
+}
+
+const DOMAIN: &str = "(define (domain d)
+  (:requirements :typing)
+  (:types place)
+  (:predicates (at ?p - place) (way ?a ?b - place))
+  (:action go :parameters (?a ?b - place)
+    :precondition (and (at ?a) (way ?a ?b))
+    :effect (and (not (at ?a)) (at ?b))))";
+
+const PROBLEM: &str = "(define (problem p) (:domain d)
+  (:objects a b c - place)
+  (:init (at a) (way a b) (way b c))
+  (:goal (at c)))";
+
+/// Plans with a domain and a problem in a directory of their own.
+fn plan(domain: &str, problem: &str, arguments: &[&str]) -> Outcome {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");
+    std::fs::write(directory.path().join("problem.pddl"), problem).expect("a file");
+    let all: Vec<&str> = ["plan", "domain.pddl", "problem.pddl"].iter().chain(arguments).copied().collect();
+    metaplan_in(directory.path(), &all, "")
+}
+
+#[test]
+fn plans_without_a_knowledge_base() {
+    let outcome = plan(DOMAIN, PROBLEM, &[]);
+    check(&outcome, 0, &["go a b", "go b c", "cost 2", "optimal, proved"]);
+    let outcome = plan(DOMAIN, PROBLEM, &["--plan-format", "ipc"]);
+    assert_eq!(outcome.stdout, "(go a b)\n(go b c)\n");
+    let outcome = plan(DOMAIN, PROBLEM, &["--plan-format", "plansys2"]);
+    assert_eq!(outcome.stdout, "Solution Found\n0.000: (go a b)  [0.000]\n0.000: (go b c)  [0.000]\n");
+}
+
+#[test]
+fn an_answer_goes_to_a_file_as_a_whole() {
+    let directory = copy_of_mission("ugv");
+    let arguments = ["plan", "missions/ugv.toml", "--format", "json", "-o", "plan.json"];
+    check(&metaplan_in(directory.path(), &arguments, ""), 0, &[]);
+    let arguments = ["validate", "missions/ugv.toml", "plan.json"];
+    check(&metaplan_in(directory.path(), &arguments, ""), 0, &["valid, metric 408"]);
+    let arguments = ["plan", "missions/ugv.toml", "-o", "no/such/directory/plan.json"];
+    check(&metaplan_in(directory.path(), &arguments, ""), 3, &["M109", "cannot be written"]);
+}
+
+#[test]
+fn limits_have_statuses_of_their_own() {
+    check(&plan(DOMAIN, PROBLEM, &["--horizon", "1"]), 11, &["no plan with up to 1 steps, proved"]);
+    check(&plan(DOMAIN, PROBLEM, &["--horizon", "2"]), 0, &["optimal, proved"]);
+    let outcome = plan(DOMAIN, PROBLEM, &["--horizon", "1", "--format", "json"]);
+    assert_eq!(outcome.json()["status"], "unsolvable_within_horizon");
+    let mission = ["plan", "missions/ugv.toml", "--horizon", "3"];
+    check(&metaplan(&mission), 11, &[]);
+}
+
+#[test]
+fn a_task_without_a_plan_is_said_to_have_none() {
+    let unreachable = PROBLEM.replace("(way b c)", "");
+    check(&plan(DOMAIN, &unreachable, &[]), 10, &["no plan exists, proved", "(at c)"]);
+    // One cannot be at two places; no relaxation of single facts sees it.
+    let both = PROBLEM.replace("(at c)", "(and (at b) (at c))");
+    check(&plan(DOMAIN, &both, &[]), 10, &["no plan exists, proved"]);
+    let empty = PROBLEM.replace("(at c)", "(at a)");
+    check(&plan(DOMAIN, &empty, &[]), 0, &["cost 0", "optimal, proved"]);
+}
+
+#[test]
+fn bad_pddl_is_reported_with_its_place() {
+    check(
+        &plan(&DOMAIN.replace("(way ?a ?b))", "(waay ?a ?b))"), PROBLEM, &[]),
+        3,
+        &["domain.pddl:6:", "did you mean `way`?"],
+    );
+    check(&plan(&DOMAIN[..DOMAIN.len() - 1], PROBLEM, &[]), 3, &["domain.pddl:1:1"]);
+    check(&plan(DOMAIN, &PROBLEM.replace("way b c", "way b d"), &[]), 3, &["problem.pddl:3:"]);
+    check(&plan(DOMAIN, "", &[]), 3, &["problem.pddl"]);
+    // All problems at once, also as JSON.
+    let twice = PROBLEM.replace("(at a)", "(on a)").replace("(way a b)", "(rail a b)");
+    let outcome = plan(DOMAIN, &twice, &["--format", "json"]);
+    check(&outcome, 3, &[]);
+    let answer = outcome.json();
+    assert_eq!(answer["format"], "metaplan-error/1");
+    let lines: Vec<_> =
+        answer["messages"].as_array().expect("messages").iter().map(|m| m["line"].as_i64()).collect();
+    assert_eq!(lines, [Some(3), Some(3)], "{answer:#}");
+}
+
+#[test]
+fn what_the_planner_does_not_handle_is_refused_with_its_place() {
+    let domain = DOMAIN.replace("(not (at ?a))", "(when (way ?b ?a) (not (at ?a)))");
+    check(&plan(&domain, PROBLEM, &[]), 3, &["domain.pddl:7:", "E301", "a conditional effect"]);
+}
+
+#[test]
+fn missing_and_malformed_files_are_reported() {
+    check(&metaplan(&["plan", "missions/none.toml"]), 3, &["missions/none.toml", "cannot be read"]);
+    check(&metaplan(&["plan", "no.pddl", "neither.pddl"]), 3, &["no.pddl", "neither.pddl"]);
+    check(&metaplan(&["reason", "none.ttl"]), 3, &["none.ttl"]);
+    let mission = copy_of_mission("ugv");
+    edit(mission.path(), "ontology/kb/ugv.ttl", "a owl:Ontology ;", "a owl:Ontology ; ; oops");
+    check(&metaplan_in(mission.path(), &["plan", "missions/ugv.toml"], ""), 3, &["ontology/kb/ugv.ttl:"]);
+    let mission = copy_of_mission("ugv");
+    edit(mission.path(), "missions/ugv.toml", "[planning]", "[plannning]");
+    check(
+        &metaplan_in(mission.path(), &["plan", "missions/ugv.toml"], ""),
+        3,
+        &["missions/ugv.toml:", "planning"],
+    );
+}
+
+#[test]
+fn arguments_that_fit_nothing_are_a_usage_error() {
+    check(&metaplan(&["plan"]), 2, &["Usage"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--fail", "c_kinekt"]), 2, &["c_kinekt", "c_kinect"]);
+    check(
+        &metaplan(&["plan", "missions/ugv.toml", "--set", "sunshine=1"]),
+        2,
+        &["sunshine", "ambient_light"],
+    );
+    check(
+        &metaplan(&["plan", "missions/ugv.toml", "--set", "ambient_light=bright"]),
+        2,
+        &["no decimal number"],
+    );
+    check(&metaplan(&["plan", "missions/ugv.toml", "--scenario", "none"]), 2, &["kinect_failure"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "soon"]), 2, &["no number of seconds"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--format", "ntriples"]), 2, &[]);
+}
+
+#[test]
+fn contradictory_knowledge_is_not_planned_with() {
+    let mission = copy_of_mission("ugv");
+    let old = ":fd_amcl_lidar a owl:NamedIndividual , t:FunctionDesign ;";
+    edit(
+        mission.path(),
+        "ontology/kb/ugv.ttl",
+        old,
+        ":fd_amcl_lidar a owl:NamedIndividual , t:FunctionDesign , t:Component ;",
+    );
+    check(
+        &metaplan_in(mission.path(), &["plan", "missions/ugv.toml"], ""),
+        20,
+        &["inconsistent", "fd_amcl_lidar"],
+    );
+    let outcome = metaplan_in(mission.path(), &["reason", "ontology/kb/ugv.ttl", "--format", "json"], "");
+    check(&outcome, 20, &[]);
+    assert_eq!(outcome.json()["consistent"], false);
+}
+
+#[test]
+fn invalid_plans_are_refused_with_the_reason() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("a file");
+    file("domain.pddl", DOMAIN);
+    file("problem.pddl", PROBLEM);
+    let validate =
+        |plan: &str| metaplan_in(directory.path(), &["validate", "domain.pddl", "problem.pddl", "-"], plan);
+    check(&validate("(go a b)\n(go b c)\n"), 0, &["valid"]);
+    check(&validate("(go b c)\n"), 30, &["invalid", "go b c", "(at b)"]);
+    check(&validate("(go a b)\n"), 30, &["invalid", "(at c)"]);
+    check(&validate("(fly a c)\n"), 30, &["fly"]);
+    check(&validate("go a b\n)("), 3, &[":1:"]);
+    check(&validate("{\"format\": 1"), 3, &["not JSON"]);
+    // A mission's plan after the world has changed.
+    let plan = metaplan(&["plan", "missions/ugv.toml", "--format", "json"]).stdout;
+    let arguments = ["validate", "missions/ugv.toml", "-", "--fail", "c_kinect"];
+    check(&metaplan_in(&root(), &arguments, &plan), 30, &["invalid", "fd_available fd_amcl_kinect"]);
+}
+
+#[test]
+fn reads_standard_input() {
+    let kb = std::fs::read_to_string(root().join("ontology/kb/ugv.ttl")).expect("the knowledge base");
+    let outcome = metaplan_in(&root(), &["reason", "-", "--rules", "coadaptation", "--fail", "c_lidar"], &kb);
+    check(&outcome, 0, &["fd_mrpt_lidar", "not available"]);
+}
+
+#[test]
+fn a_bounded_reading_stands_in_for_a_metric_without_a_best_value() {
+    let domain = "(define (domain d) (:requirements :fluents) (:predicates (p)) (:functions (profit))
+      (:action earn :parameters () :precondition () :effect (and (p) (increase (profit) 3)))
+      (:action waste :parameters () :precondition () :effect (and (p) (increase (profit) 1))))";
+    let problem =
+        "(define (problem x) (:domain d) (:init (= (profit) 0)) (:goal (p)) (:metric maximize (profit)))";
+    let outcome = plan(domain, problem, &["--format", "json"]);
+    check(&outcome, 1, &[]);
+    let answer = outcome.json();
+    assert_eq!(
+        (answer["cost"].as_i64(), answer["unbounded"].as_str()),
+        (Some(3), Some("proved")),
+        "{answer:#}"
+    );
+    assert_eq!((answer["status"].as_str(), answer["lower_bound"].as_null()), (Some("feasible"), Some(())));
+}

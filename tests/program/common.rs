@@ -1,0 +1,96 @@
+//! Running the program as its users do.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+/// What a run of the program came to.
+#[derive(Debug)]
+pub struct Outcome {
+    pub status: i32,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Outcome {
+    /// The answer as JSON.
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:#?}"))
+    }
+}
+
+/// The root of the project.
+pub fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Runs the program in the root of the project.
+pub fn metaplan(arguments: &[&str]) -> Outcome {
+    metaplan_in(&root(), arguments, "")
+}
+
+/// Runs the program in a directory with a text on standard input.
+pub fn metaplan_in(directory: &Path, arguments: &[&str], input: &str) -> Outcome {
+    use std::io::Write as _;
+    let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
+        .args(arguments)
+        .current_dir(directory)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    child.stdin.take().expect("a pipe").write_all(input.as_bytes()).expect("the program reads");
+    let output = child.wait_with_output().expect("the program ends");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    Outcome {
+        status: output.status.code().unwrap_or(-1),
+        stdout: text(output.stdout),
+        stderr: text(output.stderr),
+    }
+}
+
+/// A copy of the files of a mission in a directory of its own, to be edited.
+pub fn copy_of_mission(name: &str) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let files = [
+        format!("missions/{name}.toml"),
+        format!("encodings/{name}/domain.pddl"),
+        format!("encodings/{name}/problem.pddl"),
+        format!("ontology/kb/{name}.ttl"),
+        "ontology/kb/tomasys.ttl".to_owned(),
+    ];
+    for file in files {
+        let target = directory.path().join(&file);
+        std::fs::create_dir_all(target.parent().expect("a parent")).expect("a directory");
+        std::fs::copy(root().join(&file), target).expect("a copy");
+    }
+    directory
+}
+
+/// Replaces a text that must be there in a file.
+pub fn edit(directory: &Path, file: &str, old: &str, new: &str) {
+    let path = directory.join(file);
+    let text = std::fs::read_to_string(&path).expect("the file is read");
+    assert!(text.contains(old), "{file} has no `{old}`");
+    std::fs::write(path, text.replace(old, new)).expect("the file is written");
+}
+
+/// Steps as `action arguments | design, design`, without functions and designs among the arguments.
+pub fn steps(answer: &Value) -> Vec<String> {
+    let step = |step: &Value| {
+        let configuration = step["configuration"].as_object().expect("a configuration");
+        let designs: Vec<&str> = configuration.values().filter_map(Value::as_str).collect();
+        let configured = |a: &&str| designs.contains(a) || configuration.contains_key(*a);
+        let arguments = step["arguments"].as_array().expect("arguments").iter().filter_map(Value::as_str);
+        let route: Vec<&str> = arguments.filter(|argument| !configured(argument)).collect();
+        format!(
+            "{} {} | {}",
+            step["action"].as_str().expect("an action"),
+            route.join(" "),
+            designs.join(", ")
+        )
+    };
+    answer["steps"].as_array().expect("steps").iter().map(step).collect()
+}

@@ -1,0 +1,7 @@
+//! The whole, end to end: the program run as its users run it.
+
+mod cli;
+mod common;
+mod real;
+mod ugv;
+mod uuv;

@@ -1,0 +1,85 @@
+//! The UUV mission: before and after the battery drops, and in murky water.
+
+use crate::common::{metaplan, metaplan_in, root, steps};
+
+fn check(arguments: &[&str], expected: &[&str], cost: i64) {
+    let all: Vec<&str> =
+        ["plan", "missions/uuv.toml", "--format", "json"].iter().chain(arguments).copied().collect();
+    let outcome = metaplan(&all);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let answer = outcome.json();
+    assert_eq!(steps(&answer), expected);
+    assert_eq!((answer["status"].as_str(), answer["cost"].as_i64()), (Some("optimal"), Some(cost)));
+    let validate: Vec<&str> =
+        ["validate", "missions/uuv.toml", "-"].iter().chain(arguments).copied().collect();
+    let verdict = metaplan_in(&root(), &validate, &outcome.stdout);
+    assert_eq!(verdict.status, 0, "{verdict:#?}");
+}
+
+const INSPECTION: [&str; 2] =
+    ["search_pipeline pl1 | fd_search_high, fd_speed_high", "follow_pipeline pl1 | fd_follow, fd_speed_high"];
+
+#[test]
+fn with_a_full_battery_it_searches_and_follows() {
+    check(&[], &INSPECTION, 28);
+}
+
+#[test]
+fn when_the_battery_drops_it_recharges_first_and_slowly() {
+    let expected = ["recharge  | fd_speed_low, fd_recharge", INSPECTION[0], INSPECTION[1]];
+    check(&["--scenario", "battery_drop"], &expected, 60);
+    let answer =
+        metaplan(&["plan", "missions/uuv.toml", "--scenario", "battery_drop", "--format", "json"]).json();
+    assert_eq!(answer["steps"][1]["reconfigured"], serde_json::json!(["f_maintain_motion"]));
+}
+
+#[test]
+fn the_visibility_limits_the_search_height() {
+    let low = ["search_pipeline pl1 | fd_search_low, fd_speed_high", INSPECTION[1]];
+    check(&["--set", "water_visibility=1.5"], &low, 40);
+    let medium = ["search_pipeline pl1 | fd_search_medium, fd_speed_high", INSPECTION[1]];
+    check(&["--set", "water_visibility=2.5"], &medium, 34);
+    let outcome = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1"]);
+    assert_eq!(outcome.status, 10, "{outcome:#?}");
+}
+
+/// Designs of moving (time, battery for each unit) and of searching (time; battery 1).
+const SPEEDS: [(i64, i64); 3] = [(6, 2), (4, 5), (2, 10)];
+const HEIGHTS: [i64; 3] = [6, 4, 2];
+const RESERVE: i64 = 10;
+
+/// All plans with at most five actions and cost at most `limit`, by plain enumeration; each as its cost.
+fn enumerate(battery: i64, stage: usize, actions: usize, cost: i64, limit: i64, found: &mut Vec<i64>) {
+    if cost > limit || actions > 5 {
+        return;
+    }
+    if stage == 2 {
+        found.push(cost);
+        return;
+    }
+    for (time, usage) in SPEEDS {
+        let work: Vec<(i64, i64)> = match stage {
+            0 => HEIGHTS.iter().map(|height| (3 * (height + time), 3 * (1 + usage))).collect(),
+            _ => vec![(4 * (2 + time), 4 * (1 + usage))],
+        };
+        for (duration, used) in work {
+            if battery >= used + RESERVE {
+                enumerate(battery - used, stage + 1, actions + 1, cost + duration, limit, found);
+            }
+        }
+        if battery >= 2 * usage + RESERVE {
+            enumerate(100, stage, actions + 1, cost + 2 * (10 + time), limit, found);
+        }
+    }
+}
+
+#[test]
+fn brute_force_finds_one_optimum_each() {
+    for (battery, cost) in [(100, 28), (15, 60)] {
+        let mut found = Vec::new();
+        enumerate(battery, 0, 0, 0, 2 * cost, &mut found);
+        found.sort_unstable();
+        assert_eq!(found.first(), Some(&cost), "battery {battery}");
+        assert_ne!(found.get(1), Some(&cost), "battery {battery}: the optimum is not unique");
+    }
+}

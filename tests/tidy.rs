@@ -1,0 +1,148 @@
+//! The house rules that a machine can check.
+
+use std::path::{Path, PathBuf};
+
+const FILE_LINES: usize = 500;
+const FUNCTION_LINES: usize = 100;
+
+/// Folder, and what its source must not mention.
+const FORBIDDEN: [(&str, &[&str]); 4] = [
+    ("ontology/src", &["encodings::", "pddl::", "std::time"]),
+    ("rules/src", &["ontology::", "encodings::", "std::fs", "std::time"]),
+    ("encodings/src", &["ontology::", "oxrdf", "horned"]),
+    ("src/cli", &["horned", "oxrdf", "varisat", "crepe"]),
+];
+
+/// Crates that only one file may name.
+const SINGLE_FILE: [(&str, &str); 2] =
+    [("horned_owl", "ontology/src/horned.rs"), ("varisat::", "encodings/src/sat.rs")];
+
+fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {
+    let Ok(entries) = std::fs::read_dir(directory) else { return };
+    let mut paths: Vec<_> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
+    paths.sort();
+    for path in paths {
+        if path.is_dir() && !path.ends_with("target") {
+            rust_files(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// All Rust files of the workspace, relative to its root, with their text.
+fn files() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found = Vec::new();
+    for folder in ["src", "ontology", "rules", "encodings", "tests", "benches"] {
+        rust_files(&root.join(folder), &mut found);
+    }
+    let relative =
+        |path: PathBuf| path.strip_prefix(root).expect("below the root").to_string_lossy().replace('\\', "/");
+    found
+        .into_iter()
+        .map(|path| (relative(path.clone()), std::fs::read_to_string(path).expect("text")))
+        .collect()
+}
+
+/// Fails with all offenders at once.
+fn check(rule: &str, offends: impl Fn(&str, &str) -> Vec<String>) {
+    let offenders: Vec<String> = files().iter().flat_map(|(path, text)| offends(path, text)).collect();
+    assert!(offenders.is_empty(), "{rule}:\n{}", offenders.join("\n"));
+}
+
+/// A library's own code, without tests.
+fn library_part<'a>(path: &str, text: &'a str) -> Option<&'a str> {
+    let library = ["src/", "ontology/src/", "rules/src/", "encodings/src/"]
+        .iter()
+        .any(|folder| path.starts_with(folder));
+    let own = text.split("#[cfg(test)]").next().unwrap_or(text);
+    let exempt = path.ends_with("/tests.rs") || path.starts_with("src/cli") || path == "src/main.rs";
+    (library && !exempt).then_some(own)
+}
+
+#[test]
+fn every_file_says_what_it_is() {
+    check("a file opens with `//!`", |path, text| {
+        if text.starts_with("//!") { Vec::new() } else { vec![path.to_owned()] }
+    });
+}
+
+#[test]
+fn files_and_functions_are_short() {
+    check("a file has at most 500 lines, a function at most 100", |path, text| {
+        let mut offenders = Vec::new();
+        if text.lines().count() > FILE_LINES {
+            offenders.push(format!("{path}: {} lines", text.lines().count()));
+        }
+        let lines: Vec<&str> = text.lines().collect();
+        for (start, line) in lines.iter().enumerate() {
+            let indent = line.len() - line.trim_start().len();
+            let head = line.trim_start();
+            let is_function = head.starts_with("fn ") || head.contains(" fn ") && head.starts_with("pub");
+            if is_function {
+                let end =
+                    lines[start..].iter().position(|l| l.starts_with(&format!("{}}}", " ".repeat(indent))));
+                let length = end.unwrap_or(0) + 1;
+                if length > FUNCTION_LINES {
+                    offenders.push(format!("{path}:{}: a function of {length} lines", start + 1));
+                }
+            }
+        }
+        offenders
+    });
+}
+
+#[test]
+fn libraries_do_not_print() {
+    check("a library prints nothing", |path, text| {
+        let own = library_part(path, text).unwrap_or("");
+        let prints = ["println!", "eprintln!", "print!(", "dbg!("];
+        prints.iter().filter(|print| own.contains(**print)).map(|print| format!("{path}: {print}")).collect()
+    });
+}
+
+#[test]
+fn panics_state_an_invariant() {
+    check("`unwrap` is not used, `expect` states an invariant, in library code", |path, text| {
+        let own = library_part(path, text).unwrap_or("");
+        let bad = |line: &&str| {
+            let code = !line.trim_start().starts_with("//");
+            code && (line.contains(".unwrap()")
+                || line.contains(".expect(\"") && !line.contains(".expect(\"invariant: "))
+        };
+        own.lines().filter(bad).map(|line| format!("{path}: {}", line.trim())).collect()
+    });
+}
+
+#[test]
+fn rooms_do_not_know_forbidden_neighbours() {
+    check("a room does not name what its invariant excludes", |path, text| {
+        let mut offenders = Vec::new();
+        for (folder, names) in FORBIDDEN.iter().filter(|(folder, _)| path.starts_with(folder)) {
+            let code = text
+                .lines()
+                .filter(|line| !line.trim_start().starts_with("//"))
+                .collect::<Vec<_>>()
+                .join("\n");
+            for name in names.iter().filter(|name| code.contains(**name)) {
+                offenders.push(format!("{path}: {name} in {folder}"));
+            }
+        }
+        for (name, only) in SINGLE_FILE.iter().filter(|(_, only)| path != *only) {
+            if library_part(path, text).is_some_and(|own| own.contains(name)) {
+                offenders.push(format!("{path}: only {only} names {name}"));
+            }
+        }
+        offenders
+    });
+}
+
+#[test]
+fn nothing_is_left_for_later() {
+    check("nothing is left for later", |path, text| {
+        let marks =
+            [concat!("TO", "DO"), concat!("FIX", "ME"), concat!("unimplemented", "!"), concat!("to", "do!(")];
+        marks.iter().filter(|mark| text.contains(**mark)).map(|mark| format!("{path}: {mark}")).collect()
+    });
+}
