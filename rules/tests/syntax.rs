@@ -13,6 +13,7 @@ fn printed_rules_read_back_the_same() {
         ex:p(?x.1, "a \"b\"\n"@en-GB) ∧ differentFrom(?x, ex:i) ∧ ex:r() → <urn:x y>(?x), sameAs(?x, ex:i) .
         ex:p(?x, 1e3) , not ex:q(?x, true, "5"^^xsd:byte, "FALSE") -> .
         -> ex:A(ex:a.b), not(ex:c) .
+        [range] ex:p(?x, ?y) ^ xsd:decimal(?y) ^ rdf:PlainLiteral(?x) -> ex:q(?x) .
         # the end
     "#;
     let odd = odd.replace("?x.1", "?x");

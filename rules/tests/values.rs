@@ -190,3 +190,30 @@ fn tests_hold_or_do_not() {
         assert_eq!(built_in.holds(&arguments.iter().collect::<Vec<_>>()), expected, "{name} {arguments:?}");
     }
 }
+
+#[test]
+fn value_spaces_contain_their_values() {
+    let xsd = |local: &str| format!("http://www.w3.org/2001/XMLSchema#{local}");
+    for (text, datatypes, others) in [
+        ("5", "decimal integer byte unsignedByte", "negativeInteger float double string boolean"),
+        ("1.5", "decimal", "integer double"),
+        ("-1", "integer negativeInteger", "unsignedByte"),
+        ("1.5e0", "double", "decimal float"),
+        ("\"5\"", "string token", "integer anyURI"),
+        ("\" a\"", "string", "token"),
+        ("\"a\"@en", "", "string token"),
+        ("true", "boolean", "string"),
+        ("\"2026-01-01T00:00:00Z\"^^xsd:dateTime", "dateTime dateTimeStamp", "date"),
+        ("\"P1D\"^^xsd:duration", "duration dayTimeDuration", "yearMonthDuration"),
+        ("\"nan\"^^xsd:decimal", "", "decimal string"),
+    ] {
+        let value = literal(text);
+        let in_space = |local: &&str| value.is_in(&xsd(local));
+        assert!(datatypes.split_whitespace().all(|local| in_space(&local)), "{text} {datatypes}");
+        assert!(!others.split_whitespace().any(|local| in_space(&local)), "{text} {others}");
+    }
+    let plain = "http://www.w3.org/1999/02/22-rdf-syntax-ns#PlainLiteral";
+    assert!(literal("\"a\"@en").is_in(plain) && literal("\"a\"").is_in(plain) && !literal("1").is_in(plain));
+    assert!(literal("1").is_in("http://www.w3.org/2002/07/owl#real"));
+    assert!(literal("\"x\"^^<urn:d>").is_in("urn:d") && !literal("\"x\"^^<urn:d>").is_in("urn:e"));
+}

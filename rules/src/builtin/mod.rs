@@ -46,6 +46,9 @@ enum Kind {
 }
 
 built_ins! {
+    /// The first lies in the value space of the datatype whose IRI the second (an `xsd:anyURI`) is: SWRL's data range
+    /// atom, not a member of `swrlb`. Rule text writes it `xsd:decimal(?x)`.
+    DataRange "dataRange" 2..=2 Test,
     /// The values are equal.
     Equal "equal" 2..=2 Test,
     /// The values are comparable and not equal.
@@ -130,9 +133,9 @@ impl BuiltIn {
         Self::from_name(iri.strip_prefix(SWRLB)?)
     }
 
-    /// The built-in with this local name.
+    /// The built-in of `swrlb` with this local name.
     pub fn from_name(local: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|built_in| built_in.name() == local)
+        Self::ALL.iter().copied().find(|&built_in| built_in.name() == local && built_in != Self::DataRange)
     }
 
     /// Whether it can take this many arguments.
@@ -160,6 +163,7 @@ impl BuiltIn {
     fn test(self, left: &Literal, right: &Literal) -> bool {
         let order = || left.compare(right);
         match self {
+            Self::DataRange => matches!(right, Literal::Uri(datatype) if left.is_in(datatype)),
             Self::Equal => order() == Some(Ordering::Equal),
             Self::NotEqual => order().is_some_and(|order| order != Ordering::Equal),
             Self::LessThan => order() == Some(Ordering::Less),

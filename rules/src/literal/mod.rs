@@ -22,6 +22,9 @@ pub use temporal::{Duration, Moment, MomentKind};
 
 /// Namespace of the XML Schema datatypes.
 pub(crate) const XSD: &str = "http://www.w3.org/2001/XMLSchema#";
+const RDFS_LITERAL: &str = "http://www.w3.org/2000/01/rdf-schema#Literal";
+const OWL_REAL: &str = "http://www.w3.org/2002/07/owl#real";
+const OWL_RATIONAL: &str = "http://www.w3.org/2002/07/owl#rational";
 const RDF: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#";
 
 /// A data value. `Eq` and `Hash` are those of the value, not of the spelling.
@@ -164,6 +167,24 @@ impl Literal {
         }
     }
 
+    /// Whether the value lies in the value space of a datatype: `5` is in `xsd:byte` and `xsd:decimal`, `1.5` in
+    /// `xsd:decimal` only, no float in `xsd:decimal`. Datatypes that have no meaning here contain their own literals.
+    pub fn is_in(&self, datatype_iri: &str) -> bool {
+        if self.is_ill_typed() {
+            return false;
+        }
+        match datatype_iri {
+            RDFS_LITERAL => true,
+            OWL_REAL | OWL_RATIONAL => matches!(self, Self::Decimal(_)),
+            _ => match (self, datatype_iri.strip_prefix(RDF)) {
+                (Self::Language { .. }, Some("langString" | "PlainLiteral"))
+                | (Self::String(_), Some("PlainLiteral")) => true,
+                (_, Some(_)) | (Self::Language { .. }, _) => false,
+                _ => *self == Self::parse(&self.lexical(), Some(datatype_iri), None),
+            },
+        }
+    }
+
     /// Whether the value is a number.
     pub fn is_numeric(&self) -> bool {
         matches!(self, Self::Decimal(_) | Self::Float(_) | Self::Double(_))
@@ -225,6 +246,14 @@ enum Parsed {
     Value(Literal),
     IllTyped,
     Unknown,
+}
+
+/// Whether an IRI names a datatype of XSD, RDF, RDFS or OWL.
+pub(crate) fn is_datatype(iri: &str) -> bool {
+    let rdf = |iri: &str| {
+        iri.strip_prefix(RDF).is_some_and(|local| ["PlainLiteral", "langString"].contains(&local))
+    };
+    iri.starts_with(XSD) || [RDFS_LITERAL, OWL_REAL, OWL_RATIONAL].contains(&iri) || rdf(iri)
 }
 
 /// `text@tag` of `rdf:PlainLiteral`; the last at-sign separates.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::lexer::{Fault, Spanned, Token, tokens};
 use crate::builtin::{BuiltIn, SWRLB};
 use crate::error::Error;
-use crate::literal::{Literal, XSD};
+use crate::literal::{Literal, XSD, is_datatype};
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
 
@@ -224,6 +224,11 @@ impl Parser<'_> {
                 Some(built_in) => Ok(Atom::BuiltIn { built_in, arguments }),
                 None => Err(self.unknown_built_in(local, at)),
             };
+        }
+        if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
+            let datatype = self.symbols.literal(Literal::Uri(predicate.into()));
+            let arguments = vec![*value, Term::Constant(datatype)];
+            return Ok(Atom::BuiltIn { built_in: BuiltIn::DataRange, arguments });
         }
         let owl = predicate.strip_prefix("http://www.w3.org/2002/07/owl#");
         let word = match &name {

@@ -4,7 +4,8 @@
 use std::fmt::Write;
 
 use super::parser::Prefixes;
-use crate::builtin::SWRLB;
+use crate::builtin::{BuiltIn, SWRLB};
+use crate::literal::Literal;
 use crate::rule::{Atom, Program, Rule, Term, Variable};
 use crate::symbol::{Symbol, Symbols, Value};
 
@@ -43,6 +44,9 @@ impl Printer<'_> {
     }
 
     fn atom(&self, rule: &Rule, atom: &Atom) -> String {
+        if let Some((value, datatype)) = self.data_range(atom) {
+            return format!("{}({})", self.name(datatype), self.term(rule, value));
+        }
         let name = match atom {
             Atom::Relation { predicate, .. } => self.constant(*predicate),
             Atom::Not { predicate, .. } => format!("not {}", self.constant(*predicate)),
@@ -52,6 +56,15 @@ impl Printer<'_> {
         };
         let arguments: Vec<String> = atom.terms().into_iter().map(|term| self.term(rule, term)).collect();
         format!("{name}({})", arguments.join(", "))
+    }
+
+    fn data_range(&self, atom: &Atom) -> Option<(Term, &str)> {
+        let Atom::BuiltIn { built_in: BuiltIn::DataRange, arguments } = atom else { return None };
+        let [value, Term::Constant(datatype)] = arguments.as_slice() else { return None };
+        match self.symbols.value(*datatype) {
+            Value::Literal(Literal::Uri(iri)) => Some((*value, iri)),
+            _ => None,
+        }
     }
 
     fn term(&self, rule: &Rule, term: Term) -> String {
