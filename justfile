@@ -1,0 +1,37 @@
+# Everyday commands; `just` lists them.
+
+# List the recipes.
+default:
+    @just --list
+
+# All that must pass before a commit: format, lints, tests, documentation.
+check: fmt-check clippy test doc
+
+# Format everything.
+fmt:
+    cargo fmt --all
+
+# Fail where something is not formatted.
+fmt-check:
+    cargo fmt --all --check
+
+# Lint everything; warnings are errors.
+clippy:
+    cargo clippy --workspace --all-targets -- -D warnings
+
+# All tests of all packages.
+test:
+    cargo test
+
+# The tests that take minutes.
+long:
+    cargo test --release -- --ignored
+
+# Measure: the UGV mission end to end, and the rule engine.
+bench:
+    cargo bench --bench ugv
+    cargo bench -p metaplan-rules --bench engine
+
+# Build the documentation; warnings are errors.
+doc:
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
