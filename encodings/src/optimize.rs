@@ -18,6 +18,10 @@ use crate::task::Task;
 
 /// Formulas with more operator variables than this are not built.
 const FORMULA_LIMIT: usize = 30_000_000;
+/// What the quick search has proved, the SAT solver may spend this many conflicts on proving again…
+const CONFIRM_CONFLICTS: u64 = 5_000;
+/// … if the formula has at most this many operator variables.
+const CONFIRM_SIZE: usize = 5_000;
 /// Formulas with at most this many operator variables are solved once more without the help of bounds.
 const CONFIRM_LIMIT: usize = 400;
 
@@ -233,12 +237,13 @@ impl Run<'_> {
         };
         let horizon = allowed.len();
         let complete = bound.is_some_and(|bound| bound <= horizon);
-        let unproved = if exact { Some(Proof::Search) } else { None };
+        let (unproved, budget) =
+            if exact { (Some(Proof::Search), CONFIRM_CONFLICTS) } else { (None, u64::MAX) };
         let size: usize = allowed.iter().map(|row| row.iter().filter(|flag| **flag).count()).sum();
-        if size > FORMULA_LIMIT {
+        if size > if exact { CONFIRM_SIZE } else { FORMULA_LIMIT } {
             return self.conclude(&incumbent, lower, horizon, unproved);
         }
-        let tightened = self.tighten(&bounds, &allowed, &mut incumbent, lower);
+        let tightened = self.tighten(&bounds, &allowed, &mut incumbent, lower, budget);
         let proof = match (tightened, bound) {
             (Tightened::Exhausted, Some(step_bound)) if complete => Some(Proof::Sat { step_bound }),
             _ => unproved,
@@ -261,7 +266,7 @@ impl Run<'_> {
         let bounds = Bounds::trivial(self.task);
         let encoding = Encoding::new(self.task, &allowed, Some(CostLimit { limit, bounds: &bounds }));
         self.statistics.encode += started.elapsed();
-        let (answer, _) = self.call(&encoding);
+        let (answer, _) = self.call(&encoding, u64::MAX);
         debug_assert_ne!(answer, Answer::Satisfiable, "a plan is cheaper than the lower bound");
         (answer == Answer::Unsatisfiable).then_some(Proof::Sat { step_bound: steps })
     }
@@ -292,13 +297,14 @@ impl Run<'_> {
         allowed: &[Vec<bool>],
         incumbent: &mut GroundPlan,
         lower: i64,
+        budget: u64,
     ) -> Tightened {
         let started = Instant::now();
         let limit = CostLimit { limit: incumbent.cost - 1, bounds };
         let mut encoding = Encoding::new(self.task, allowed, Some(limit));
         self.statistics.encode += started.elapsed();
         loop {
-            let better = match self.call(&encoding) {
+            let better = match self.call(&encoding, budget) {
                 (Answer::Unsatisfiable, _) => return Tightened::Exhausted,
                 (_, None) => return Tightened::Interrupted,
                 (_, Some(better)) => better,
@@ -318,10 +324,10 @@ impl Run<'_> {
     }
 
     /// Solves a formula; a plan comes with the answer that it is satisfiable.
-    fn call(&mut self, encoding: &Encoding<'_>) -> (Answer, Option<GroundPlan>) {
+    fn call(&mut self, encoding: &Encoding<'_>, budget: u64) -> (Answer, Option<GroundPlan>) {
         let started = Instant::now();
         let formula = &encoding.formula;
-        let mut solver = Varisat::new(&self.config.limits);
+        let mut solver = Varisat::new(&self.config.limits, budget);
         for (_, clause) in formula.clauses() {
             solver.add_clause(clause);
         }
@@ -347,7 +353,7 @@ impl Run<'_> {
             let window = bounds.window(self.task, None, Some(horizon));
             let encoding = Encoding::new(self.task, &window.allowed, None);
             self.statistics.encode += started.elapsed();
-            match self.call(&encoding) {
+            match self.call(&encoding, u64::MAX) {
                 (_, Some(plan)) => return Ok(plan),
                 (Answer::Unsatisfiable, None) if horizon < most => {
                     horizon = (horizon + 1 + horizon / 4).min(most);
@@ -430,7 +436,7 @@ impl Run<'_> {
         let allowed = bounds.window(&shifted, Some(plan.cost - 1), Some(steps));
         let mut rows = allowed.allowed;
         rows.truncate(steps);
-        let tightened = run.tighten(&bounds, &rows, &mut plan, 0);
+        let tightened = run.tighten(&bounds, &rows, &mut plan, 0, u64::MAX);
         let proof = matches!(tightened, Tightened::Exhausted).then_some(Proof::Sat { step_bound: steps });
         let statistics = run.statistics;
         plan.cost += lowest * steps as i64;

@@ -72,9 +72,15 @@ pub(crate) struct Varisat {
 }
 
 impl Varisat {
-    pub(crate) fn new(limits: &Limits) -> Self {
+    /// A solver that gives up at a limit, or after learning `budget` clauses.
+    pub(crate) fn new(limits: &Limits, budget: u64) -> Self {
         let conflicts = Rc::new(Cell::new(0));
-        let sink = CountingSink { limits: limits.clone(), conflicts: Rc::clone(&conflicts), at_line_start: true };
+        let sink = CountingSink {
+            limits: limits.clone(),
+            budget,
+            conflicts: Rc::clone(&conflicts),
+            at_line_start: true,
+        };
         let mut solver = varisat::Solver::new();
         solver.write_proof(sink, varisat::ProofFormat::Drat);
         Self { solver, conflicts, assignment: Vec::new(), buffer: Vec::new() }
@@ -84,7 +90,8 @@ impl Varisat {
 impl Solver for Varisat {
     fn add_clause(&mut self, clause: &[Lit]) {
         self.buffer.clear();
-        self.buffer.extend(clause.iter().map(|l| varisat::Lit::from_index(l.variable() as usize, l.is_positive())));
+        self.buffer
+            .extend(clause.iter().map(|l| varisat::Lit::from_index(l.variable() as usize, l.is_positive())));
         self.solver.add_clause(&self.buffer);
     }
 
@@ -115,16 +122,17 @@ impl Solver for Varisat {
     }
 }
 
-/// Swallows a DRAT proof, counts the clauses that it adds, and fails when a limit is reached.
+/// Swallows a DRAT proof, counts the clauses that it adds, and fails when a limit or the budget is reached.
 struct CountingSink {
     limits: Limits,
+    budget: u64,
     conflicts: Rc<Cell<u64>>,
     at_line_start: bool,
 }
 
 impl io::Write for CountingSink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.limits.reached() {
+        if self.limits.reached() || self.conflicts.get() > self.budget {
             return Err(io::Error::other("limit reached"));
         }
         let mut added = 0;

@@ -198,7 +198,7 @@ mod tests {
 
     /// Whether the formula has an assignment in which the bits read as the value.
     fn can_be(formula: &Formula, bits: &Bits, value: i64) -> bool {
-        let mut solver = Varisat::new(&Limits::none());
+        let mut solver = Varisat::new(&Limits::none(), u64::MAX);
         formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));
         for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
             solver.add_clause(&[if wanted == Formula::truth() { *bit } else { !*bit }]);
