@@ -1,0 +1,259 @@
+//! A random program, and a random script of changes: after every step the engine holds exactly what naive evaluation
+//! derives from scratch, reports exactly the difference, and can prove every fact.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use metaplan_rules::{
+    Atom, BuiltIn, Cause, Delta, Derivation, Engine, Fact, Literal, Program, Reason, Rule, RuleIdentity,
+    Symbol, Symbols, Term, Variable,
+};
+
+use crate::oracle::{Binding, ground, holds, matches, naive, value};
+
+const PREDICATES: u8 = 9;
+/// Predicates of one level, with one, two and three arguments.
+const PER_LEVEL: u8 = 3;
+const VARIABLES: u8 = 4;
+const CONSTANTS: u8 = 4;
+/// Which predicates changes and heads take: few, so that conclusions meet.
+const CHANGED: [u8; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 0, 1, 2, 3, 3, 4, 6, 7];
+const CONCLUDED: [u8; 9] = [0, 1, 2, 3, 3, 4, 4, 6, 7];
+
+/// An atom before it is made safe: kind, predicate, arguments.
+pub type RawAtom = (u8, u8, [u8; 3]);
+/// A rule before it is made safe: head predicates and arguments, body.
+pub type RawRule = (Vec<(u8, [u8; 3])>, Vec<RawAtom>);
+/// A change: whether it inserts, predicate, arguments.
+pub type RawChange = (bool, u8, [u8; 3]);
+
+fn arity(predicate: u8) -> usize {
+    1 + usize::from(predicate % PER_LEVEL)
+}
+
+struct World {
+    symbols: Symbols,
+    predicates: Vec<Symbol>,
+    constants: Vec<Symbol>,
+}
+
+impl World {
+    fn new() -> Self {
+        let mut symbols = Symbols::new();
+        let predicates = (0..PREDICATES).map(|number| symbols.name(&format!("p{number}"))).collect();
+        let names = ["a", "b"].map(|name| symbols.name(name));
+        let numbers = [1, 2].map(|number| symbols.literal(Literal::integer(number)));
+        Self { symbols, predicates, constants: names.into_iter().chain(numbers).collect() }
+    }
+
+    fn level(&self, predicate: Symbol) -> usize {
+        self.predicates
+            .iter()
+            .position(|&known| known == predicate)
+            .map_or(0, |position| position / usize::from(PER_LEVEL))
+    }
+
+    fn fact(&self, predicate: u8, arguments: [u8; 3]) -> Fact {
+        let predicate = CHANGED[usize::from(predicate % 16)];
+        let arguments = arguments.iter().take(arity(predicate));
+        let constant = |&number: &u8| self.constants[usize::from(number % CONSTANTS)];
+        Fact::new(self.predicates[usize::from(predicate)], arguments.map(constant))
+    }
+
+    fn term(&self, number: u8) -> Term {
+        match number % (VARIABLES + CONSTANTS) {
+            variable if variable < VARIABLES => Term::Variable(Variable(variable.into())),
+            constant => Term::Constant(self.constants[usize::from(constant - VARIABLES)]),
+        }
+    }
+
+    fn relation(&self, predicate: u8, arguments: &[u8]) -> Atom {
+        let arguments = arguments.iter().take(arity(predicate)).map(|&number| self.term(number));
+        Atom::relation(self.predicates[usize::from(predicate)], arguments)
+    }
+
+    /// Levels make negation stratified; terms that nothing binds become constants.
+    fn rule(&self, position: usize, raw: &RawRule) -> Rule {
+        let (heads, body) = raw;
+        let constraint = heads[0].0 % 9 == 8;
+        let heads = heads.iter().map(|(head, arguments)| {
+            (if constraint { 8 } else { CONCLUDED[usize::from(head % 9)] }, arguments)
+        });
+        let heads: Vec<(u8, &[u8; 3])> = heads.collect();
+        let level = heads.iter().map(|(head, _)| head / PER_LEVEL).min().unwrap_or(0);
+        let positive = body.iter().filter(|(kind, ..)| kind % 10 < 4 || level == 0 && kind % 10 < 7);
+        let relations =
+            positive.map(|(_, p, arguments)| self.relation(p % (PER_LEVEL * (level + 1)), arguments));
+        let mut atoms: Vec<Atom> = relations.collect();
+        let mut bound: BTreeSet<Term> = atoms.iter().flat_map(Atom::terms).collect();
+        let safe = |term: Term, bound: &BTreeSet<Term>| match term {
+            Term::Variable(_) if !bound.contains(&term) => Term::Constant(self.constants[0]),
+            other => other,
+        };
+        for &(kind, p, [a, b, c]) in body {
+            let [left, right] = [a, b].map(|number| safe(self.term(number), &bound));
+            match kind % 10 {
+                4..=6 if level > 0 => {
+                    let p = p % (PER_LEVEL * level);
+                    let arguments = [left, right].into_iter().chain([left]).take(arity(p)).collect();
+                    atoms.push(Atom::Not { predicate: self.predicates[usize::from(p)], arguments });
+                }
+                7 => atoms.push(Atom::BuiltIn {
+                    built_in: if p % 2 == 0 { BuiltIn::LessThan } else { BuiltIn::NotEqual },
+                    arguments: vec![left, right],
+                }),
+                8 if p % 2 == 0 => atoms.push(Atom::Different(left, right)),
+                8 => {
+                    let result = Term::Variable(Variable(u16::from(c % VARIABLES)));
+                    bound.insert(result);
+                    atoms.push(Atom::Same(result, right));
+                }
+                9 if level > 0 && atoms.iter().all(|atom| self.is_below(atom, level)) => {
+                    let result = Term::Variable(Variable(u16::from(VARIABLES + c % 2)));
+                    bound.insert(result);
+                    let arguments = vec![result, left, right];
+                    atoms.push(Atom::BuiltIn { built_in: BuiltIn::Subtract, arguments });
+                }
+                _ => {}
+            }
+        }
+        let computed = Term::Variable(Variable(u16::from(VARIABLES)));
+        let head = |&(head, arguments): &(u8, &[u8; 3])| {
+            let mut terms = arguments.map(|number| safe(self.term(number), &bound));
+            if bound.contains(&computed) {
+                terms[0] = computed;
+            }
+            Atom::relation(self.predicates[usize::from(head)], terms.into_iter().take(arity(head)))
+        };
+        let heads: Vec<Atom> = heads.iter().map(head).collect();
+        let identity = RuleIdentity::new("random", position as u32);
+        Rule::new(identity, if constraint { vec![] } else { heads }, atoms)
+    }
+
+    fn is_below(&self, atom: &Atom, level: u8) -> bool {
+        match atom {
+            Atom::Relation { predicate, .. } => self.level(*predicate) < usize::from(level),
+            _ => true,
+        }
+    }
+}
+
+/// Every step follows from its supports by its rule, and no fact supports itself.
+fn check_derivation(engine: &Engine, derivation: &Derivation) {
+    let mut supported = vec![false; derivation.steps.len()];
+    // Supports are settled in as many passes as the longest chain; a circle never is.
+    for _ in 0..derivation.steps.len() {
+        for (position, step) in derivation.steps.iter().enumerate() {
+            supported[position] |= match &step.reason {
+                Reason::Asserted => engine.is_asserted(&step.fact),
+                Reason::Rule { supports, .. } => supports.iter().all(|&support| supported[support]),
+            };
+        }
+    }
+    assert!(supported.iter().all(|&supported| supported), "circular: {derivation:?}");
+    for step in &derivation.steps {
+        let Reason::Rule { identity, bindings, supports, absent } = &step.reason else { continue };
+        let rule = &engine.program().rules[identity.position as usize];
+        let values: Binding = (0..).map(Variable).zip(bindings.iter().map(|(_, value)| *value)).collect();
+        assert!(rule.head.iter().any(|head| ground(head, &values) == step.fact), "{step:?}");
+        let body = |negated: bool| {
+            let atoms = rule.body.iter().filter(move |atom| match atom {
+                Atom::Relation { .. } => !negated,
+                Atom::Not { .. } => negated,
+                _ => false,
+            });
+            atoms.map(|atom| ground(atom, &values)).collect::<Vec<_>>()
+        };
+        let supporting: Vec<Fact> = supports.iter().map(|&at| derivation.steps[at].fact.clone()).collect();
+        assert_eq!(body(false), supporting);
+        assert_eq!(&body(true), absent);
+        assert!(absent.iter().all(|fact| !engine.holds(fact)));
+        for atom in &rule.body {
+            assert!(match atom {
+                Atom::BuiltIn { built_in, arguments } =>
+                    holds(*built_in, arguments, &values, engine.symbols()),
+                Atom::Same(left, right) => value(*left, &values) == value(*right, &values),
+                Atom::Different(left, right) => value(*left, &values) != value(*right, &values),
+                Atom::Relation { .. } | Atom::Not { .. } => true,
+            });
+        }
+    }
+}
+
+/// The constraints that fire, with how many matches each has.
+fn violations(program: &Program, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<u32, usize> {
+    let constraints = program.rules.iter().filter(|rule| rule.head.is_empty());
+    let counts = constraints.map(|rule| (rule.identity.position, matches(rule, symbols, facts).len()));
+    counts.filter(|&(_, count)| count > 0).collect()
+}
+
+fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTreeSet<Fact> {
+    let mut symbols = engine.symbols().clone();
+    let expected = naive(engine.program(), &mut symbols, stated, |predicate| world.level(predicate));
+    let facts: BTreeSet<Fact> = engine.facts().collect();
+    assert_eq!(facts, expected);
+    for fact in &facts {
+        assert_eq!(engine.is_asserted(fact), stated.contains(fact));
+        check_derivation(engine, &engine.why(fact).expect("a derivation of what holds"));
+        let pattern: Vec<Option<Symbol>> =
+            fact.arguments.iter().enumerate().map(|(at, &symbol)| (at != 1).then_some(symbol)).collect();
+        assert!(engine.matching(fact.predicate, &pattern).any(|row| row == fact.arguments.as_slice()));
+    }
+    for (predicate, constant) in (0..PREDICATES).step_by(3).flat_map(|p| (0..CONSTANTS).map(move |c| (p, c)))
+    {
+        let (predicate, constant) = (usize::from(predicate), usize::from(constant));
+        let fact = Fact::new(world.predicates[predicate], [world.constants[constant]]);
+        let misses = engine.why_not(&fact);
+        assert!(misses.iter().all(|miss| !miss.obstacles.is_empty()), "{fact:?} {misses:?}");
+        assert!(misses.is_empty() || !facts.contains(&fact));
+    }
+    let mut counts = BTreeMap::new();
+    for violation in engine.violations() {
+        if let Cause::Constraint(identity) = violation.cause {
+            assert!(violation.supports.iter().all(|fact| facts.contains(fact)));
+            *counts.entry(identity.position).or_insert(0) += 1;
+        }
+    }
+    assert_eq!(counts, violations(engine.program(), &mut symbols, &facts));
+    facts
+}
+
+/// Runs a script of changes and compares with the oracle after every step.
+pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>]) {
+    let world = World::new();
+    let program = Program { rules: rules.iter().enumerate().map(|(at, raw)| world.rule(at, raw)).collect() };
+    // Identical rules are evaluated once, under the first one's identity.
+    let mut seen = BTreeSet::new();
+    let distinct = |rule: &Rule| seen.insert(format!("{:?}{:?}", rule.head, rule.body));
+    let program = Program { rules: program.rules.into_iter().filter(distinct).collect() };
+    let program = renumber(program);
+    let mut stated: BTreeSet<Fact> =
+        start.iter().map(|&(_, p, arguments)| world.fact(p, arguments)).collect();
+    let mut engine =
+        Engine::new(world.symbols.clone(), program.clone(), stated.iter().cloned()).expect("safe rules");
+    let mut before = check_state(&engine, &world, &stated);
+    for step in script {
+        let facts = |wanted: bool| {
+            let chosen = step.iter().filter(move |(insert, ..)| *insert == wanted);
+            chosen.map(|&(_, p, arguments)| world.fact(p, arguments)).collect::<Vec<_>>()
+        };
+        let delta = Delta { insert: facts(true), delete: facts(false) };
+        delta.delete.iter().for_each(|fact| {
+            stated.remove(fact);
+        });
+        stated.extend(delta.insert.iter().cloned());
+        let change = engine.apply(delta).expect("within the budget");
+        let after = check_state(&engine, &world, &stated);
+        assert_eq!(change.insert, after.difference(&before).cloned().collect::<Vec<_>>());
+        assert_eq!(change.delete, before.difference(&after).cloned().collect::<Vec<_>>());
+        before = after;
+    }
+    let reversed = renumber(Program { rules: program.rules.into_iter().rev().collect() });
+    let engine =
+        Engine::new(engine.symbols().clone(), reversed, stated.into_iter().rev()).expect("safe rules");
+    assert_eq!(engine.facts().collect::<BTreeSet<_>>(), before);
+}
+
+fn renumber(program: Program) -> Program {
+    let number = |(position, rule)| Rule { identity: RuleIdentity::new("random", position as u32), ..rule };
+    Program { rules: program.rules.into_iter().enumerate().map(number).collect() }
+}
