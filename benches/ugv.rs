@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use encodings::{Config, Status, optimize};
+use encodings::{Config, Limits, Status, optimize};
 use metaplan::mission::Mission;
 
 fn plan(scenario: Option<&str>) {
@@ -14,7 +14,7 @@ fn plan(scenario: Option<&str>) {
         mission.apply(&manifest.scenarios[scenario]).expect("the scenario fits");
     }
     let (problem, _) = mission.filled().expect("the knowledge base fits the domain");
-    let task = mission.ground(&problem).expect("the mission is ground");
+    let task = mission.ground(&problem, &Limits::none()).expect("the mission is ground");
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     assert_eq!(black_box(solution).status, Status::Optimal);
 }

@@ -122,60 +122,37 @@ impl Message {
 
     /// An error of reading a knowledge base.
     pub fn from_ontology(error: &ontology::Error) -> Self {
-        let (file, line, column) = match error.position() {
-            Some(place) => (Some(place.file.clone()), Some(place.line as usize), Some(place.column as usize)),
-            None => (None, None, None),
-        };
-        let text = format!("{error}\n");
-        let code = error.code().to_owned();
-        Self(Box::new(Details {
-            severity: "error",
-            code,
-            message: error.to_string(),
-            file,
-            line,
-            column,
-            help: None,
-            text,
-        }))
+        Self::from_text("error", error.code(), &error.to_string())
     }
 
     /// A warning of reading or lowering a knowledge base.
     pub fn from_ontology_warning(warning: &ontology::Warning) -> Self {
-        let text = format!("{warning}\n");
-        let code = warning.code().to_owned();
-        let message = warning.to_string();
-        Self(Box::new(Details {
-            severity: "warning",
-            code,
-            message,
-            file: None,
-            line: None,
-            column: None,
-            help: None,
-            text,
-        }))
+        Self::from_text("warning", warning.code(), &warning.to_string())
     }
 
     /// An error in rules.
     pub fn from_rules(error: &rules::Error) -> Self {
-        let text = format!("{error}\n");
-        let message = error.to_string();
-        let code = message
-            .split_whitespace()
-            .find(|word| word.len() == 4 && word.starts_with('R'))
-            .unwrap_or("R100");
-        let code = code.to_owned();
-        Self(Box::new(Details {
-            severity: "error",
-            code,
-            message,
-            file: None,
-            line: None,
-            column: None,
-            help: None,
-            text,
-        }))
+        let text = error.to_string();
+        let is_code = |word: &&str| word.len() == 4 && word.starts_with('R');
+        let code = text.split_whitespace().find(is_code).unwrap_or("R100").to_owned();
+        Self::from_text("error", &code, &text)
+    }
+
+    /// A message from `[FILE:[LINE:COLUMN:]] [SEVERITY[CODE]:] SENTENCE`, the form in which libraries print theirs.
+    fn from_text(severity: &'static str, code: &str, text: &str) -> Self {
+        let marks = [format!("{severity}[{code}]: "), format!("{code} ")];
+        let cut = marks.iter().find_map(|mark| text.find(mark.as_str()).map(|at| (at, at + mark.len())));
+        let (place, message) = cut.map_or(("", text), |(start, end)| (&text[..start], &text[end..]));
+        let place = place.trim().trim_end_matches(':');
+        let mut parts = place.rsplitn(3, ':');
+        let (column, line, file) = (parts.next(), parts.next(), parts.next());
+        let number = |part: Option<&str>| part.and_then(|part| part.parse::<usize>().ok());
+        let (file, line, column) = match (file, number(line), number(column)) {
+            (Some(file), Some(line), Some(column)) => (Some(file.to_owned()), Some(line), Some(column)),
+            _ => ((!place.is_empty()).then(|| place.to_owned()), None, None),
+        };
+        let (code, message, text) = (code.to_owned(), message.to_owned(), format!("{text}\n"));
+        Self(Box::new(Details { severity, code, message, file, line, column, help: None, text }))
     }
 
     /// Whether it is an error.

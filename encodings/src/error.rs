@@ -56,6 +56,9 @@ pub enum Error {
         /// The quantity.
         what: String,
     },
+    /// A limit was reached before the task was ground.
+    #[error("a limit was reached while grounding")]
+    Interrupted,
     /// A rule of the relaxed reachability program that the rule engine refuses.
     #[error("grounding: {0}")]
     Rules(String),
@@ -70,6 +73,7 @@ impl Error {
             Self::NonLinear { .. } => "E303",
             Self::Overflow { .. } => "E304",
             Self::Rules(_) => "E305",
+            Self::Interrupted => "E306",
         }
     }
 
@@ -79,7 +83,7 @@ impl Error {
             Self::Unsupported { place, .. } | Self::Unknown { place, .. } | Self::NonLinear { place } => {
                 Some(*place)
             }
-            Self::Overflow { .. } | Self::Rules(_) => None,
+            Self::Overflow { .. } | Self::Rules(_) | Self::Interrupted => None,
         }
     }
 }

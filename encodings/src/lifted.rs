@@ -124,7 +124,13 @@ impl Formula {
 pub(crate) enum Effect {
     Add(PredicateId, Vec<Term>),
     Delete(PredicateId, Vec<Term>),
-    Assign { assignment: Assignment, function: FunctionId, terms: Vec<Term>, expression: Expression, place: Place },
+    Assign {
+        assignment: Assignment,
+        function: FunctionId,
+        terms: Vec<Term>,
+        expression: Expression,
+        place: Place,
+    },
 }
 
 /// A numeric expression.

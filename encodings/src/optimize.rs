@@ -186,7 +186,7 @@ impl Run<'_> {
 
     fn solve(mut self) -> Solution {
         let started = Instant::now();
-        let bounds = Bounds::new(self.task);
+        let bounds = Bounds::new(self.task, &self.config.limits);
         let Some(lower) = bounds.estimate(&self.task.initial) else {
             let reason =
                 "no path leads to the goal in a projection of the task to one or two of its variables";
@@ -428,7 +428,7 @@ impl Run<'_> {
             statistics: self.statistics,
             bounds: None,
         };
-        let bounds = Bounds::new(&shifted);
+        let bounds = Bounds::new(&shifted, &self.config.limits);
         let mut plan = match run.first_plan(&bounds) {
             Ok(plan) => plan,
             Err(solution) => return *solution,

@@ -43,7 +43,13 @@ impl NumericId {
 
 /// The arithmetic that quantities need.
 pub(crate) trait Number:
-    Clone + PartialEq + Ord + num_traits::Zero + num_traits::One + std::ops::Neg<Output = Self> + std::ops::Mul<Output = Self>
+    Clone
+    + PartialEq
+    + Ord
+    + num_traits::Zero
+    + num_traits::One
+    + std::ops::Neg<Output = Self>
+    + std::ops::Mul<Output = Self>
 {
 }
 
@@ -124,7 +130,12 @@ impl<N: Number> Quantity<N> {
         let tables = self
             .tables
             .iter()
-            .map(|table| Some(Table { slots: table.slots.clone(), values: table.values.iter().map(&mut f).collect::<Option<_>>()? }))
+            .map(|table| {
+                Some(Table {
+                    slots: table.slots.clone(),
+                    values: table.values.iter().map(&mut f).collect::<Option<_>>()?,
+                })
+            })
             .collect::<Option<_>>()?;
         Some(Quantity { constant, tables })
     }
@@ -133,18 +144,22 @@ impl<N: Number> Quantity<N> {
 impl Quantity<i64> {
     /// A lower bound that ignores that tables share slots; exact if no two do.
     pub(crate) fn minimum(&self) -> i64 {
-        self.constant + self.tables.iter().map(|table| table.values.iter().min().copied().unwrap_or(0)).sum::<i64>()
+        self.constant
+            + self.tables.iter().map(|table| table.values.iter().min().copied().unwrap_or(0)).sum::<i64>()
     }
 
     /// An upper bound, as `minimum` is a lower one.
     pub(crate) fn maximum(&self) -> i64 {
-        self.constant + self.tables.iter().map(|table| table.values.iter().max().copied().unwrap_or(0)).sum::<i64>()
+        self.constant
+            + self.tables.iter().map(|table| table.values.iter().max().copied().unwrap_or(0)).sum::<i64>()
     }
 }
 
 impl<N> Table<N> {
     fn index(&self, choice: &[u16], sizes: &[usize]) -> usize {
-        self.slots.iter().fold(0, |index, slot| index * sizes[*slot as usize] + choice[*slot as usize] as usize)
+        self.slots
+            .iter()
+            .fold(0, |index, slot| index * sizes[*slot as usize] + choice[*slot as usize] as usize)
     }
 }
 

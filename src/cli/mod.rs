@@ -71,7 +71,7 @@ struct Common {
     /// No warnings and no progress on standard error.
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// More detail: statistics, and every warning.
+    /// Statistics besides the answer.
     #[arg(long, short, global = true)]
     verbose: bool,
 }
@@ -125,7 +125,7 @@ struct Imports {
     #[arg(long, value_name = "FILE")]
     catalog: Vec<PathBuf>,
     /// A directory to look for imports in, with those below it (repeatable).
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = existing_directory)]
     directory: Vec<PathBuf>,
 }
 
@@ -139,6 +139,11 @@ impl Imports {
     }
 }
 
+fn existing_directory(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if path.is_dir() { Ok(path) } else { Err(format!("there is no directory `{text}`")) }
+}
+
 fn setting(text: &str) -> Result<(String, String), String> {
     let (name, value) =
         text.split_once('=').ok_or_else(|| format!("`{text}` is not of the form NAME=VALUE"))?;
@@ -150,8 +155,11 @@ impl Situation {
     fn mission(&self, inputs: &[PathBuf]) -> Result<Mission, Failure> {
         let mut mission = match inputs {
             [manifest] => {
-                if !self.knowledge.is_empty() || !self.rules.is_empty() {
-                    let text = "`--kb` and `--rules` go with DOMAIN and PROBLEM; a mission names its own";
+                let imports = &self.imports;
+                let none = self.knowledge.is_empty() && self.rules.is_empty();
+                if !(none && imports.catalog.is_empty() && imports.directory.is_empty()) {
+                    let text = "`--kb`, `--rules`, `--catalog` and `--directory` go with DOMAIN and PROBLEM; \
+                                a mission's manifest names its own";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
                 let (mut mission, manifest) = Mission::read(manifest)?;
@@ -162,7 +170,10 @@ impl Situation {
                             format!("the mission has no scenario `{name}`; it has: {}", known.join(", "));
                         Failure::usage(Message::error("M108", text))
                     })?;
-                    mission.apply(scenario)?;
+                    mission.apply(scenario).map_err(|message| {
+                        let text = format!("scenario `{name}`: {}", message.message);
+                        Message::at(&message.code, manifest.file(), None, text)
+                    })?;
                 }
                 mission
             }
@@ -170,6 +181,9 @@ impl Situation {
                 if self.scenario.is_some() {
                     let text = "`--scenario` goes with a mission's manifest";
                     return Err(Failure::usage(Message::error("M107", text)));
+                }
+                if self.knowledge.is_empty() && !self.rules.is_empty() {
+                    return Err(Failure::usage(Message::error("M107", "`--rules` goes with `--kb`")));
                 }
                 let knowledge = (!self.knowledge.is_empty()).then(|| {
                     let rules = if self.rules.is_empty() {
@@ -223,6 +237,7 @@ pub fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|_| {}));
     let outcome = std::panic::catch_unwind(|| run(&cli));
     let exit = match outcome {
+        Ok(Ok(_)) if output::answer_lost() => Exit::BadInput,
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => {
             output::failure(&cli.common, &failure.messages);

@@ -1,7 +1,8 @@
 //! Writing: answers, messages, tables, files that are either whole or not there.
 
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{ContentArrangement, Table, TableStyle};
 use encodings::Exact;
@@ -10,11 +11,27 @@ use serde_json::{Value, json};
 
 use crate::cli::{Common, Failure, Format};
 
-/// Writes to standard output; a reader that has gone away is no fault.
+/// Whether an answer could not be written.
+static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
+
+/// How many messages are shown before the rest is only counted.
+const MESSAGE_LIMIT: usize = 20;
+
+/// Writes to standard output; a reader that has gone away is no fault, a full disk is.
 pub fn answer(text: &str) {
     let mut stdout = std::io::stdout().lock();
-    let _ = stdout.write_all(text.as_bytes());
-    let _ = stdout.flush();
+    if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        ANSWER_LOST.store(true, Ordering::Relaxed);
+        let message = Message::error("M109", format!("the answer cannot be written: {error}"));
+        let _ = std::io::stderr().write_all(message.text().as_bytes());
+    }
+}
+
+/// Whether an answer could not be written.
+pub fn answer_lost() -> bool {
+    ANSWER_LOST.load(Ordering::Relaxed)
 }
 
 /// Writes a JSON value to standard output.
@@ -25,6 +42,11 @@ pub fn json_answer(value: &Value) {
 /// A JSON value as text, with a line break at its end.
 pub fn pretty(value: &Value) -> String {
     format!("{value:#}\n")
+}
+
+/// A sentence for people beside the answer, on standard error.
+pub fn note(text: &str) {
+    let _ = std::io::stderr().write_all(text.as_bytes());
 }
 
 /// Warnings, on standard error unless asked to be quiet.
@@ -44,8 +66,13 @@ pub fn failure(common: &Common, messages: &[Message]) {
         return;
     }
     let mut stderr = std::io::stderr().lock();
-    for message in messages.iter().filter(|message| message.is_error() || !common.quiet) {
+    let shown: Vec<_> = messages.iter().filter(|message| message.is_error() || !common.quiet).collect();
+    for message in shown.iter().take(MESSAGE_LIMIT) {
         let _ = stderr.write_all(message.text().as_bytes());
+    }
+    if shown.len() > MESSAGE_LIMIT {
+        let rest = shown.len() - MESSAGE_LIMIT;
+        let _ = writeln!(stderr, "… and {rest} more; `--format json` lists all");
     }
 }
 
@@ -59,10 +86,13 @@ pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     });
     match written {
         Ok(_) => Ok(()),
-        Err(error) => {
-            Err(Message::at("M109", &path.display().to_string(), None, format!("cannot be written: {error}"))
-                .into())
-        }
+        Err(error) => Err(Message::at(
+            "M109",
+            &path.display().to_string(),
+            None,
+            format!("cannot be written: {}", error.kind()),
+        )
+        .into()),
     }
 }
 

@@ -21,10 +21,10 @@ pub struct Arguments {
     #[command(flatten)]
     situation: Situation,
     /// Only plans with at most this many steps.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     horizon: Option<usize>,
     /// Stop after this many seconds with the best plan so far.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
     /// Only the plan, in a format that other tools read.
     #[arg(long, value_enum)]
@@ -70,7 +70,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
     let read = started.elapsed();
-    let task = mission.ground(&problem)?;
+    let task = mission.ground(&problem, &limits).map_err(|messages| {
+        let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
+        Failure { exit, messages }
+    })?;
     let stages = Stages { read, ground: started.elapsed().saturating_sub(read) };
 
     let config = Config { horizon: arguments.horizon, limits, ..Config::default() };
@@ -89,17 +92,21 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             output::pretty(&json(&mission.name, &solution, &stages))
         }
         (None, _) => text(&mission.name, &solution, common.verbose, &stages),
-        (Some(format), _) => match &solution.plan {
-            Some(plan) => plan_text(plan, format),
-            None => String::new(),
-        },
+        (Some(format), _) => {
+            let Some(plan) = &solution.plan else {
+                // There is nothing to write, and readers of plans would stumble over anything else.
+                output::note(&verdict(&solution));
+                return Ok(exit(solution.status));
+            };
+            plan_text(plan, format)
+        }
     };
     match &arguments.output {
-        Some(file) => output::write_file(file, &text)?,
+        Some(file) => {
+            output::write_file(file, &text)?;
+            output::note(&verdict(&solution));
+        }
         None => output::answer(&text),
-    }
-    if solution.plan.is_none() && !text.is_empty() && arguments.output.is_some() {
-        output::answer(&verdict(&solution));
     }
     Ok(exit(solution.status))
 }
@@ -142,7 +149,8 @@ fn verdict(solution: &Solution) -> String {
     let horizon = solution.horizon;
     match (solution.status, &solution.proof, solution.unbounded) {
         (Status::Optimal, Some(Proof::Sat { step_bound }), _) => format!(
-            "optimal, proved: no cheaper plan has up to {step_bound} steps (unsatisfiable), and none with more can be cheaper\n"
+            "optimal, proved: no cheaper plan has up to {} (unsatisfiable), and none with more can be cheaper\n",
+            steps(*step_bound)
         ),
         (Status::Optimal, Some(Proof::Bound), _) => {
             "optimal, proved: the cost equals a lower bound on the cost of all plans\n".to_owned()
@@ -163,19 +171,20 @@ fn verdict(solution: &Solution) -> String {
             )
         }
         (Status::Feasible, _, None) => {
-            format!("a plan, not proved optimal (plans of up to {horizon} steps considered)\n")
+            format!("a plan, not proved optimal (plans of up to {} considered)\n", steps(horizon))
         }
         (Status::Unsolvable, Some(Proof::Relaxation(reason)), _) => {
             format!("no plan exists, proved: {reason}\n")
         }
         (Status::Unsolvable, Some(Proof::Sat { step_bound }), _) => format!(
-            "no plan exists, proved: none has up to {step_bound} steps (unsatisfiable), and a shortest one has no more\n"
+            "no plan exists, proved: none has up to {} (unsatisfiable), and a shortest one has no more\n",
+            steps(*step_bound)
         ),
         (Status::Unsolvable, _, _) => {
             "no plan exists, proved: every reachable state was visited\n".to_owned()
         }
         (Status::UnsolvableWithinHorizon, _, _) => {
-            format!("no plan with up to {horizon} steps, proved; longer ones were not considered\n")
+            format!("no plan with up to {}, proved; longer ones were not considered\n", steps(horizon))
         }
         (Status::Unknown, _, _) => {
             "a limit was reached before a plan was found; nothing is proved\n".to_owned()
@@ -183,9 +192,16 @@ fn verdict(solution: &Solution) -> String {
     }
 }
 
+fn steps(count: usize) -> String {
+    if count == 1 { "1 step".to_owned() } else { format!("{count} steps") }
+}
+
 fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> String {
     let mut text = String::new();
     if let Some(plan) = &solution.plan {
+        if plan.steps.is_empty() {
+            text += "nothing has to be done: the goal holds already\n";
+        }
         let rows = plan.steps.iter().enumerate().map(|(index, step)| {
             let configuration: Vec<_> =
                 step.configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
@@ -199,6 +215,7 @@ fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> Stri
                 step.cost.to_string(),
             ]
         });
+        let rows: Vec<_> = rows.collect();
         text += &output::table(&["step", "start", "duration", "action", "configuration", "cost"], rows);
         let _ = write!(
             text,

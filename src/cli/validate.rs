@@ -20,7 +20,7 @@ use crate::cli::{Common, Exit, Failure, Format, Situation, output};
 pub struct Arguments {
     /// A mission's manifest, or a PDDL domain and a PDDL problem, and then the plan: lines `(action arguments)` or
     /// `start: (action arguments) [duration]`, or the JSON of `metaplan plan`; `-` is standard input.
-    #[arg(required = true, num_args = 2..=3, value_name = "MISSION PLAN | DOMAIN PROBLEM PLAN")]
+    #[arg(required = true, num_args = 1..=3, value_name = "MISSION PLAN | DOMAIN PROBLEM PLAN")]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
@@ -28,8 +28,14 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let Some((plan, mission)) = arguments.inputs.split_last() else {
-        return Err(Failure::usage(Message::error("M107", "give a plan")));
+    let (plan, mission) = match arguments.inputs.split_last() {
+        Some((plan, mission)) if !mission.is_empty() => (plan, mission),
+        _ => {
+            return Err(Failure::usage(Message::error(
+                "M107",
+                "give a mission, or a domain and a problem, and a plan",
+            )));
+        }
     };
     let mission = arguments.situation.mission(mission)?;
     let (problem, warnings) = mission.filled()?;

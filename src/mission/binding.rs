@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use encodings::GroundConfig;
 use encodings::pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
     TypedName,
@@ -37,8 +38,6 @@ pub struct Bindings {
     own: BTreeMap<Name, Query>,
 }
 
-const SOLVES: [&str; 2] = ["fd_solve_f", "fd_solves_f"];
-
 impl Bindings {
     /// The defaults, and on top of them the given ones.
     ///
@@ -53,7 +52,12 @@ impl Bindings {
     /// The predicates that say which design solves which function.
     pub fn solves(&self) -> Vec<Name> {
         let own = self.own.iter().filter(|(_, query)| **query == Query::Solves).map(|(name, _)| name.clone());
-        own.chain(SOLVES.map(Name::new)).collect()
+        own.chain(GroundConfig::default().solves).collect()
+    }
+
+    /// Whether a predicate says which designs are available.
+    pub(super) fn is_availability(&self, predicate: &Name) -> bool {
+        self.predicate(predicate) == Some(Query::Available)
     }
 
     fn r#type(&self, name: &Name) -> Option<Query> {
@@ -75,7 +79,7 @@ impl Bindings {
             match name.as_str() {
                 "fd_available" => Some(Query::Available),
                 "a_req_f" => Some(Query::Requires(None)),
-                other if SOLVES.contains(&other) => Some(Query::Solves),
+                other if self.solves().contains(&Name::new(other)) => Some(Query::Solves),
                 other => {
                     other.strip_suffix("_requires_f").map(|action| Query::Requires(Some(action.to_owned())))
                 }
@@ -118,6 +122,13 @@ pub(super) fn fill(
     bindings: &Bindings,
 ) -> Vec<Message> {
     let mut fill = Fill { problem, view, designs: view.function_designs(), warnings: Vec::new() };
+    let types = domain.types.iter().map(|declared| &declared.identifier.name);
+    let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
+    let known: BTreeSet<&Name> = types.chain(symbols).collect();
+    for name in bindings.own.keys().filter(|name| !known.contains(name)) {
+        let text = format!("`{name}` is bound, but the domain declares no such type, predicate or function");
+        fill.warnings.push(Message::warning("M204", text));
+    }
     for declared in &domain.types {
         let name = &declared.identifier.name;
         if let Some(Query::Class(class)) = bindings.r#type(name) {

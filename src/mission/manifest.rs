@@ -9,6 +9,7 @@ use serde::Deserialize;
 use crate::knowledge::{COADAPTATION, Sources, TOMASYS};
 use crate::message::Message;
 use crate::mission::binding::Bindings;
+use crate::mission::source;
 
 /// A manifest; paths in it are relative to the manifest.
 #[derive(Debug, Clone, Deserialize)]
@@ -62,9 +63,9 @@ pub struct Scenario {
     /// Components that have failed.
     #[serde(default)]
     pub fail: Vec<String>,
-    /// Measured attributes, fluents and facts by name, as for `--set`.
+    /// Measured attributes, fluents and facts by name, as for `--set`; strings, numbers or truth values.
     #[serde(default)]
-    pub set: BTreeMap<String, String>,
+    pub set: BTreeMap<String, toml::Value>,
 }
 
 fn shipped_rules() -> Vec<String> {
@@ -72,16 +73,15 @@ fn shipped_rules() -> Vec<String> {
 }
 
 impl Manifest {
-    /// Reads a manifest.
+    /// Reads a manifest; `-` is standard input, and paths are relative to the current directory then.
     ///
     /// # Errors
     /// The file cannot be read, or is no manifest.
     pub fn read(file: &Path) -> Result<Self, Message> {
-        let name = file.display().to_string();
-        let text = std::fs::read_to_string(file)
-            .map_err(|error| Message::at("M101", &name, None, format!("cannot be read: {error}")))?;
-        let mut manifest: Self = toml::from_str(&text).map_err(|error| {
-            let place = error.span().map(|span| line_and_column(&text, span.start));
+        let source = source(file)?;
+        let (name, text) = (source.name().to_owned(), source.text());
+        let mut manifest: Self = toml::from_str(text).map_err(|error| {
+            let place = error.span().map(|span| line_and_column(text, span.start));
             Message::at("M104", &name, place, error.message().to_owned())
         })?;
         manifest.directory = file.parent().map(Path::to_owned).unwrap_or_default();
@@ -91,6 +91,11 @@ impl Manifest {
 
     fn path(&self, path: &Path) -> PathBuf {
         self.directory.join(path)
+    }
+
+    /// The manifest's own name.
+    pub fn file(&self) -> &str {
+        &self.file
     }
 
     /// The knowledge base's files.

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use encodings::pddl::ast::{Domain, Problem};
 use encodings::pddl::{self, Severity, Source};
-use encodings::{GroundConfig, Task};
+use encodings::{GroundConfig, Limits, Task};
 
 use crate::knowledge::Knowledge;
 use crate::message::Message;
@@ -122,7 +122,10 @@ impl Mission {
         for component in &scenario.fail {
             self.fail(component)?;
         }
-        scenario.set.iter().try_for_each(|(name, value)| self.set(name, value))
+        scenario.set.iter().try_for_each(|(name, value)| match value {
+            toml::Value::String(text) => self.set(name, text),
+            other => self.set(name, &other.to_string()),
+        })
     }
 
     /// The problem as it is to be planned: with what the knowledge base contributes.
@@ -141,10 +144,17 @@ impl Mission {
         let sources = [&self.domain_source, &self.problem_source];
         if errors.is_empty() {
             warnings.extend(Message::from_pddl(&questionable, &sources));
-            Ok((problem, warnings))
-        } else {
-            Err(Message::from_pddl(&errors, &sources))
+            return Ok((problem, warnings));
         }
+        // What settings and the knowledge base have contributed stands in no file.
+        let (contributed, own): (Vec<_>, Vec<_>) =
+            errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
+        let mut messages = Message::from_pddl(&own, &sources);
+        messages.extend(contributed.iter().map(|diagnostic| {
+            let text = format!("{} (from a setting or from the knowledge base)", diagnostic.message);
+            Message::error(diagnostic.code, text)
+        }));
+        Err(messages)
     }
 
     /// The domain.
@@ -155,9 +165,9 @@ impl Mission {
     /// Grounds a problem that [`Mission::filled`] has made.
     ///
     /// # Errors
-    /// Everything that the planner does not handle.
-    pub fn ground(&self, problem: &Problem) -> Result<Task, Vec<Message>> {
-        let config = GroundConfig { solves: self.bindings.solves() };
+    /// Everything that the planner does not handle, or that a limit was reached.
+    pub fn ground(&self, problem: &Problem, limits: &Limits) -> Result<Task, Vec<Message>> {
+        let config = GroundConfig { solves: self.bindings.solves(), limits: limits.clone() };
         encodings::ground(&self.domain, problem, &config)
             .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
     }

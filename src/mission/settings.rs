@@ -2,8 +2,8 @@
 
 use encodings::pddl::ast::{InitialElement, Name, Span, Term};
 use num_rational::BigRational;
-use num_traits::Num as _;
 
+use crate::knowledge::Knowledge;
 use crate::message::Message;
 use crate::mission::Mission;
 use crate::mission::binding::atom;
@@ -23,6 +23,12 @@ impl Mission {
         if let Some(knowledge) = &mut self.knowledge
             && knowledge.has_attribute(name.trim())
         {
+            if !is_measured(knowledge, name.trim()) {
+                let text = format!(
+                    "`{name}` is estimated for designs; nothing measures it, and no design has a bound on it"
+                );
+                return Err(Message::error("M106", text));
+            }
             return knowledge.measure(name.trim(), value);
         }
         let words: Vec<&str> = name.split_whitespace().collect();
@@ -30,6 +36,10 @@ impl Mission {
             return Err(Message::error("M106", "`--set` needs a name before the equals sign"));
         };
         let symbol = Name::new(symbol);
+        if self.knowledge.is_some() && self.bindings.is_availability(&symbol) {
+            let text = format!("the knowledge base decides on `{symbol}`; let components fail with `--fail`");
+            return Err(Message::error("M106", text));
+        }
         let arity = |declared: &[encodings::pddl::ast::Declaration]| {
             declared.iter().find(|d| d.identifier.name == symbol).map(|d| d.parameters.len())
         };
@@ -116,15 +126,18 @@ fn same_terms(terms: &[Term], arguments: &[&str]) -> bool {
     terms.len() == arguments.len() && terms.iter().zip(arguments).all(same)
 }
 
-/// An exact number from a decimal: `-12`, `0.25`, `3.`.
+/// An exact number from a decimal: `-12`, `0.25`, `1e2`.
 fn decimal(text: &str) -> Option<BigRational> {
-    let (sign, digits) = text.strip_prefix('-').map_or((1, text), |rest| (-1, rest));
-    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-    let all = format!("{whole}{fraction}");
-    if all.is_empty() || !all.bytes().all(|byte| byte.is_ascii_digit()) {
-        return None;
-    }
-    let denominator = format!("1{}", "0".repeat(fraction.len()));
-    let number = BigRational::from_str_radix(&format!("{all}/{denominator}"), 10).ok()?;
-    Some(number * BigRational::from_integer(sign.into()))
+    rules::Literal::parse(text, Some("http://www.w3.org/2001/XMLSchema#decimal"), None).as_rational()
+}
+
+/// Whether an attribute is measured, or bounds what designs can be used.
+fn is_measured(knowledge: &Knowledge, attribute: &str) -> bool {
+    let view = knowledge.view();
+    let local = ontology::vocab::local_name(attribute);
+    view.measurements().iter().any(|measurement| measurement.attribute == local)
+        || view
+            .function_designs()
+            .iter()
+            .any(|design| design.requirements.iter().any(|r| r.attribute == local))
 }

@@ -56,7 +56,7 @@ fn an_answer_goes_to_a_file_as_a_whole() {
 
 #[test]
 fn limits_have_statuses_of_their_own() {
-    check(&plan(DOMAIN, PROBLEM, &["--horizon", "1"]), 11, &["no plan with up to 1 steps, proved"]);
+    check(&plan(DOMAIN, PROBLEM, &["--horizon", "1"]), 11, &["no plan with up to 1 step, proved"]);
     check(&plan(DOMAIN, PROBLEM, &["--horizon", "2"]), 0, &["optimal, proved"]);
     let outcome = plan(DOMAIN, PROBLEM, &["--horizon", "1", "--format", "json"]);
     assert_eq!(outcome.json()["status"], "unsolvable_within_horizon");
@@ -134,8 +134,77 @@ fn arguments_that_fit_nothing_are_a_usage_error() {
         &["no decimal number"],
     );
     check(&metaplan(&["plan", "missions/ugv.toml", "--scenario", "none"]), 2, &["kinect_failure"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "-1"]), 2, &["negative"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--set", "safety=1"]), 2, &["nothing measures it"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--set", "fd_available fd_aruco=false"]), 2, &["--fail"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--directory", "."]), 2, &["manifest names its own"]);
+    check(&metaplan(&["reason", "ontology/kb/ugv.ttl", "--directory", "nowhere"]), 2, &["no directory"]);
+    check(&metaplan(&["validate", "missions/ugv.toml"]), 2, &["and a plan"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "soon"]), 2, &["no number of seconds"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--format", "ntriples"]), 2, &[]);
+}
+
+#[test]
+fn objects_from_settings_are_not_blamed_on_the_file() {
+    let outcome = metaplan(&["plan", "missions/ugv.toml", "--set", "robot_at=wp99"]);
+    check(&outcome, 3, &["wp99", "from a setting"]);
+    assert!(!outcome.stderr.contains("problem.pddl"), "{outcome:#?}");
+}
+
+#[test]
+fn messages_for_programs_have_their_place_in_fields() {
+    let mission = copy_of_mission("ugv");
+    edit(mission.path(), "ontology/kb/ugv.ttl", "a owl:Ontology ;", "a owl:Ontology ; ; oops");
+    let answer =
+        metaplan_in(mission.path(), &["reason", "ontology/kb/ugv.ttl", "--format", "json"], "").json();
+    let message = &answer["messages"][0];
+    assert!(message["file"].as_str().is_some_and(|file| file.ends_with("ontology/kb/ugv.ttl")), "{answer:#}");
+    assert!(message["line"].as_i64() > Some(5) && message["code"] == "O102", "{answer:#}");
+    assert!(!message["message"].as_str().unwrap_or("").contains("O102"), "{answer:#}");
+    std::fs::write(mission.path().join("bad.swrl"), "a b c").expect("a file");
+    let arguments = ["reason", "ontology/kb/ugv.ttl", "--rules", "bad.swrl", "--format", "json"];
+    let answer = metaplan_in(mission.path(), &arguments, "").json();
+    assert_eq!(
+        (answer["messages"][0]["file"].as_str(), answer["messages"][0]["line"].as_i64()),
+        (Some("bad.swrl"), Some(1))
+    );
+}
+
+#[test]
+fn formats_for_other_tools_say_on_standard_error_that_there_is_no_plan() {
+    let outcome =
+        metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1", "--plan-format", "ipc"]);
+    assert_eq!((outcome.status, outcome.stdout.as_str()), (10, ""));
+    assert!(outcome.stderr.contains("no plan exists, proved"), "{outcome:#?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_answer_that_cannot_be_written_is_an_error() {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("the device");
+    let status = std::process::Command::new(env!("CARGO_BIN_EXE_metaplan"))
+        .args(["plan", "missions/ugv.toml"])
+        .current_dir(root())
+        .stdout(full)
+        .stderr(std::process::Stdio::null())
+        .status()
+        .expect("the program runs");
+    assert_eq!(status.code(), Some(3));
+}
+
+#[test]
+fn a_manifest_may_come_from_standard_input() {
+    let manifest =
+        std::fs::read_to_string(root().join("missions/ugv.toml")).expect("the manifest").replace("../", "");
+    check(&metaplan_in(&root(), &["plan", "-", "--scenario", "kinect_failure"], &manifest), 0, &["cost 412"]);
+    let unknown = manifest.replace("c_kinect", "c_kinekt");
+    check(
+        &metaplan_in(&root(), &["plan", "-", "--scenario", "kinect_failure"], &unknown),
+        3,
+        &["kinect_failure", "c_kinekt"],
+    );
+    let bound = format!("{manifest}\n[bindings]\nnothing_like_it = \"solves\"\n");
+    check(&metaplan_in(&root(), &["plan", "-"], &bound), 0, &["M204", "nothing_like_it"]);
 }
 
 #[test]

@@ -10,6 +10,7 @@ mod projection;
 
 pub(crate) use projection::Projection;
 
+use crate::limits::Limits;
 use crate::task::{State, Task};
 
 /// Longest plan that step bounds are computed for.
@@ -33,7 +34,7 @@ pub(crate) struct Window {
 }
 
 impl Bounds {
-    pub(crate) fn new(task: &Task) -> Self {
+    pub(crate) fn new(task: &Task, limits: &Limits) -> Self {
         let goal_variables: Vec<_> = task.goal.facts.iter().map(|fact| fact.variable).collect();
         let mut patterns: Vec<Vec<_>> = goal_variables.iter().map(|variable| vec![*variable]).collect();
         let mut others: Vec<_> = (0..task.variables.len() as u32).map(crate::task::VariableId).collect();
@@ -53,8 +54,13 @@ impl Bounds {
         if patterns.is_empty() {
             patterns.push(Vec::new());
         }
-        let mut projections: Vec<_> =
-            patterns.into_iter().map(|pattern| Projection::new(task, pattern)).collect();
+        let mut projections: Vec<Projection> = Vec::new();
+        for pattern in patterns {
+            // Any one projection will do if time is short.
+            if projections.is_empty() || !limits.reached() {
+                projections.push(Projection::new(task, pattern));
+            }
+        }
         projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
         // Beyond the best few, projections cost more time than they save steps.
         projections.truncate(12);

@@ -13,9 +13,9 @@ mod groups;
 mod numeric;
 mod operators;
 mod selection;
+mod state;
 #[cfg(test)]
 mod tests;
-mod state;
 
 use rustc_hash::FxHashMap;
 

@@ -29,7 +29,7 @@ const PROBLEM: &str = "(define (problem p) (:domain d)
 fn task() -> Task {
     let (domain, problem, _) =
         read(&Source::new("domain", DOMAIN), &Source::new("problem", PROBLEM)).expect("PDDL");
-    let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")] };
+    let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")], ..Config::default() };
     ground(&domain, &problem, &config).expect("a task")
 }
 
@@ -85,7 +85,7 @@ fn clauses(encoding: &Encoding<'_>, family: Family) -> String {
 
 fn check(family: Family) -> String {
     let task = task();
-    let bounds = Bounds::new(&task);
+    let bounds = Bounds::new(&task, &crate::limits::Limits::none());
     let allowed = vec![vec![true; task.operators.len()]; 2];
     let encoding = Encoding::new(&task, &allowed, Some(CostLimit { limit: 6, bounds: &bounds }));
     clauses(&encoding, family)

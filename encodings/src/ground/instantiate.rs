@@ -15,6 +15,7 @@ use crate::ground::metric::GroundObjective;
 use crate::ground::normal_form::{GroundCondition, condition};
 use crate::ground::reach::Reached;
 use crate::lifted::{Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
+use crate::limits::Limits;
 use crate::pddl::ast::{Assignment, Span};
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet};
 use crate::task::{Argument, Forbidden};
@@ -55,6 +56,7 @@ pub(crate) fn instantiate<'a>(
     designs: &[Vec<SlotParameter>],
     slots: &[Vec<SlotParameter>],
     reached: &'a Reached,
+    limits: &Limits,
 ) -> Result<GroundTask<'a>, Vec<Error>> {
     let mut world = World::new(lifted, &reached.atoms);
     let (mut operators, mut errors) = (Vec::new(), Vec::new());
@@ -62,6 +64,9 @@ pub(crate) fn instantiate<'a>(
         lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0..)
     {
         for binding in instances {
+            if operators.len().is_multiple_of(256) && limits.reached() {
+                return Err(vec![Error::Interrupted]);
+            }
             match operator(&mut world, schema, index, slots, binding) {
                 Ok(mut operator) => {
                     operator.configuration =

@@ -17,6 +17,7 @@ mod reach;
 
 use crate::configuration::{design_parameters, slot_parameters};
 use crate::error::Error;
+use crate::limits::Limits;
 use crate::normalize::normalize;
 use crate::pddl::ast::{Domain, Name, Problem};
 use crate::task::Task;
@@ -26,12 +27,17 @@ use crate::task::Task;
 pub struct Config {
     /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
     pub solves: Vec<Name>,
+    /// When to give up.
+    pub limits: Limits,
 }
 
 impl Default for Config {
     /// The names of the Metaplan paper and of the files of kas-lab.
     fn default() -> Self {
-        Self { solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec() }
+        Self {
+            solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec(),
+            limits: Limits::none(),
+        }
     }
 }
 
@@ -50,8 +56,11 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Tas
         .map(|(schema, designs)| slot_parameters(&lifted, schema, designs))
         .collect();
     let reached = reach::reach(&lifted, &slots).map_err(|error| vec![error])?;
-    let mut ground = instantiate::instantiate(&lifted, &designs, &slots, &reached)?;
+    let mut ground = instantiate::instantiate(&lifted, &designs, &slots, &reached, &config.limits)?;
     metric::attach_costs(&lifted, &mut ground)?;
+    if config.limits.reached() {
+        return Err(vec![Error::Interrupted]);
+    }
     let unreachable = prune::prune(&lifted, &mut ground);
     finish::finish(&lifted, &ground, unreachable).map_err(|error| vec![error])
 }
