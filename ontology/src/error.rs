@@ -92,6 +92,31 @@ pub enum Error {
         /// The names that there are, sorted.
         known: Vec<String>,
     },
+    /// O107: a name that cannot be part of an IRI.
+    #[error("error[O107]: `{name}` cannot name an individual: {character:?} is not allowed in an IRI")]
+    BadName {
+        /// The name.
+        name: String,
+        /// What is wrong with it.
+        character: char,
+    },
+    /// O108: an individual that is there already.
+    #[error("error[O108]: there is already an objective `{name}`")]
+    Exists {
+        /// Its name.
+        name: String,
+    },
+    /// O110: a measurement that is not a number.
+    #[error("error[O110]: the value `{value}` of {attribute} is not a number")]
+    NotANumber {
+        /// The attribute type.
+        attribute: String,
+        /// What was given as its value.
+        value: String,
+    },
+    /// O109: the engine cannot make the change.
+    #[error("error[O109]: {0}")]
+    Engine(#[from] rules::Error),
 }
 
 impl Error {
@@ -104,6 +129,10 @@ impl Error {
             Self::Catalog { .. } => "O104",
             Self::NotAnOntology { .. } => "O105",
             Self::Unknown { .. } => "O106",
+            Self::BadName { .. } => "O107",
+            Self::Exists { .. } => "O108",
+            Self::Engine(_) => "O109",
+            Self::NotANumber { .. } => "O110",
         }
     }
 

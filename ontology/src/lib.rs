@@ -2,7 +2,7 @@
 //!
 //! [`read_files`] reads RDF/XML, Turtle, N-Triples, OWL/XML and functional-style documents with their imports into an
 //! [`Ontology`]; [`lower`](lower()) turns that into a `rules::Program` and facts; [`tomasys`] is the typed view on what an
-//! engine has concluded; [`kb`] holds the knowledge bases that we wrote.
+//! engine has concluded, [`runtime`] keeps one in step with the robot; [`kb`] holds the knowledge bases that we wrote.
 //!
 //! Absent here: PDDL, plans, clocks and the network.
 
@@ -20,6 +20,7 @@ mod ntriples;
 mod read;
 
 pub mod kb;
+pub mod runtime;
 pub mod tomasys;
 
 pub use error::{Error, Position, Warning};

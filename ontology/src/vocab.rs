@@ -101,6 +101,9 @@ vocabulary! {
         IS_MEASURED = "isMeasured", C_STATUS = "c_status", FD_REALISABILITY = "fd_realisability",
         FD_AVAILABLE = "fd_available", FD_EFFICACY = "fd_efficacy",
         QA_COMPARISON_OPERATOR = "qa_comparison_operator", TYPE_FD = "typeFD", HAS_QA_VALUE = "hasQAvalue",
+        TYPE_F = "typeF", HAS_NFR = "hasNFR", O_STATUS = "o_status", O_UPDATABLE = "o_updatable",
+        O_ALWAYS_IMPROVE = "o_always_improve", SOLVES_O = "solvesO", FG_STATUS = "fg_status",
+        FD_ERROR_LOG = "fd_error_log",
     }
 }
 

@@ -5,8 +5,8 @@
 
 use rules::{Atom, Delta, Engine, Fact, Literal, Symbol, Symbols, Term as Argument};
 
-use super::terms::{self, Term, beside};
-use super::{Individual, View};
+use super::facts::Facts;
+use super::terms::{self, beside};
 use crate::error::Error;
 use crate::vocab::local_name;
 
@@ -31,19 +31,45 @@ fn spellings(status: Status) -> Vec<Literal> {
     vec![Literal::string(mros), Literal::string(planta), Literal::Boolean(truth)]
 }
 
+/// Whether a status in any spelling says that a component is out of order.
+pub(crate) fn is_failed(status: &str) -> bool {
+    spells(Status::Failed, status)
+}
+
+/// Whether a status says that a component is in order after a failure. Vocabularies without a word for that say only
+/// that it is in order, which is not meant here.
+pub(crate) fn is_recovered(status: &str) -> bool {
+    spells(Status::Recovered, status) && !spells(Status::Working, status)
+}
+
+fn spells(status: Status, text: &str) -> bool {
+    spellings(status).iter().any(|literal| literal.lexical() == text)
+}
+
 /// The update that gives a component a status, in place of any it was said to have. The component is named by its
 /// IRI or local name; the status is spelled as the knowledge base's range of the status property asks.
 ///
 /// # Errors
 /// [`Error::Unknown`] where the knowledge base has no such component.
 pub fn component_status(engine: &mut Engine, component: &str, status: Status) -> Result<Delta, Error> {
-    let (individual, class) = find(engine, "component", terms::COMPONENT, component)?;
+    let (subject, class) = Facts::new(engine).find("component", terms::COMPONENT, component)?;
     let property = engine.symbols_mut().name(beside(terms::STATUS, class));
-    let subject = engine.symbols_mut().name(&individual.iri);
     let spellings: Vec<Symbol> =
         spellings(status).into_iter().map(|literal| engine.symbols_mut().literal(literal)).collect();
     let fitting = spellings.iter().copied().find(|&value| allows(engine, property, value));
     let value = fitting.unwrap_or(spellings[0]);
+    Ok(replace(engine, property, subject, Some(value)))
+}
+
+/// As [`component_status`], with the status as someone else spells it; whether the knowledge base allows it is not
+/// looked at, so that a wrong spelling is a contradiction.
+///
+/// # Errors
+/// As [`component_status`].
+pub fn component_report(engine: &mut Engine, component: &str, status: Literal) -> Result<Delta, Error> {
+    let (subject, class) = Facts::new(engine).find("component", terms::COMPONENT, component)?;
+    let property = engine.symbols_mut().name(beside(terms::STATUS, class));
+    let value = engine.symbols_mut().literal(status);
     Ok(replace(engine, property, subject, Some(value)))
 }
 
@@ -52,9 +78,8 @@ pub fn component_status(engine: &mut Engine, component: &str, status: Status) ->
 /// # Errors
 /// [`Error::Unknown`] where the knowledge base has no such component.
 pub fn clear_component_status(engine: &mut Engine, component: &str) -> Result<Delta, Error> {
-    let (individual, class) = find(engine, "component", terms::COMPONENT, component)?;
+    let (subject, class) = Facts::new(engine).find("component", terms::COMPONENT, component)?;
     let property = engine.symbols_mut().name(beside(terms::STATUS, class));
-    let subject = engine.symbols_mut().name(&individual.iri);
     Ok(replace(engine, property, subject, None))
 }
 
@@ -66,30 +91,25 @@ pub fn clear_component_status(engine: &mut Engine, component: &str) -> Result<De
 /// # Errors
 /// [`Error::Unknown`] where the knowledge base has no such attribute type.
 pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> Result<Delta, Error> {
-    let (kind, class) = find(engine, "quality attribute type", terms::ATTRIBUTE_TYPE, attribute)?;
-    let groundings = groundings(engine, &kind);
-    let measurements = View::new(engine).measurements().into_iter();
-    let mut holders: Vec<Individual> = measurements
-        .filter(|measurement| measurement.attribute == kind.name)
-        .map(|measurement| measurement.individual)
-        .collect();
+    let facts = Facts::new(engine);
+    let (kind, class) = facts.find("quality attribute type", terms::ATTRIBUTE_TYPE, attribute)?;
+    let groundings = groundings(facts, kind);
+    let mut holders = holders(facts, kind);
     let mut delta = Delta::default();
     if holders.is_empty() {
-        let holder =
-            Individual::new(&format!("{}obs_{}", &kind.iri[..kind.iri.len() - kind.name.len()], kind.name));
-        delta.insert = observation(engine.symbols_mut(), &holder, &kind, class);
+        let iri = facts.name(kind).unwrap_or_default();
+        let name = local_name(iri);
+        let holder = format!("{}obs_{name}", &iri[..iri.len() - name.len()]);
+        let holder = engine.symbols_mut().name(&holder);
+        delta.insert = observation(engine.symbols_mut(), holder, kind, class);
         holders.push(holder);
     }
     let symbols = engine.symbols_mut();
     let property = symbols.name(beside(terms::HAS_VALUE, class));
     let (link, value) = (symbols.name(terms::HAS_QA_VALUE[0]), symbols.literal(value));
     for holder in holders {
-        let subject = engine.symbols_mut().name(&holder.iri);
-        for grounding in &groundings {
-            let grounding = engine.symbols_mut().name(&grounding.iri);
-            delta.insert.push(Fact::new(link, [grounding, subject]));
-        }
-        let change = replace(engine, property, subject, Some(value));
+        delta.insert.extend(groundings.iter().map(|&grounding| Fact::new(link, [grounding, holder])));
+        let change = replace(engine, property, holder, Some(value));
         delta.insert.extend(change.insert);
         delta.delete.extend(change.delete);
     }
@@ -97,30 +117,31 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
 }
 
 /// The facts that make `holder` hold measurements of a type.
-fn observation(symbols: &mut Symbols, holder: &Individual, kind: &Individual, class: &str) -> Vec<Fact> {
-    let (subject, kind) = (symbols.name(&holder.iri), symbols.name(&kind.iri));
+fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str) -> Vec<Fact> {
     let mut facts = vec![
-        Fact::new(symbols.name(beside(terms::QA_VALUE, class)), [subject]),
-        Fact::new(symbols.name(beside(terms::IS_TYPE, class)), [subject, kind]),
+        Fact::new(symbols.name(beside(terms::QA_VALUE, class)), [holder]),
+        Fact::new(symbols.name(beside(terms::IS_TYPE, class)), [holder, kind]),
     ];
     if let Some(measured) = symbols.find_name(terms::IS_MEASURED[0]) {
         let truth = symbols.literal(Literal::Boolean(true));
-        facts.push(Fact::new(measured, [subject, truth]));
+        facts.push(Fact::new(measured, [holder, truth]));
     }
     facts
 }
 
+/// What holds measurements of an attribute type: what says so, and what is named as MROS names it.
+pub(crate) fn holders(facts: Facts, kind: Symbol) -> Vec<Symbol> {
+    let named = |holder| facts.name(holder).is_some_and(|iri| local_name(iri).starts_with("obs_"));
+    let mut holders = facts.subjects(kind, terms::IS_TYPE);
+    holders.retain(|&holder| named(holder) || facts.is_true(holder, terms::IS_MEASURED));
+    holders
+}
+
 /// The groundings whose design has an estimation of an attribute type.
-fn groundings(engine: &Engine, kind: &Individual) -> Vec<Individual> {
-    let view = View::new(engine);
-    let estimates = |design: &Individual| {
-        let values = view.objects(&design.iri, terms::HAS_ESTIMATION);
-        values.iter().any(|value| view.objects(&value.iri, terms::IS_TYPE).contains(kind))
-    };
-    let groundings = view.members(terms::FUNCTION_GROUNDING).into_iter();
-    groundings
-        .filter(|grounding| view.objects(&grounding.iri, terms::TYPE_FD).iter().any(estimates))
-        .collect()
+fn groundings(facts: Facts, kind: Symbol) -> Vec<Symbol> {
+    let values = facts.subjects(kind, terms::IS_TYPE).into_iter();
+    let designs = values.flat_map(|value| facts.subjects(value, terms::HAS_ESTIMATION));
+    designs.flat_map(|design| facts.subjects(design, terms::TYPE_FD)).collect()
 }
 
 /// The update after which `subject` has one stated value of a property, or none.
@@ -156,26 +177,4 @@ fn is_enumeration(engine: &Engine, range: Symbol) -> bool {
         matches!(atom, Atom::Relation { predicate, arguments }
             if *predicate == range && matches!(arguments[..], [Argument::Variable(_)]))
     })
-}
-
-/// The individual with that IRI or local name among the members of a notion, and the class that it is a member of.
-fn find(
-    engine: &Engine,
-    kind: &'static str,
-    term: Term,
-    name: &str,
-) -> Result<(Individual, &'static str), Error> {
-    let view = View::new(engine);
-    let mut known = Vec::new();
-    for class in term {
-        for individual in view.individuals_of(class) {
-            if individual.iri == name || individual.name == local_name(name) && !name.contains(':') {
-                return Ok((individual, class));
-            }
-            known.push(individual.name);
-        }
-    }
-    known.sort();
-    known.dedup();
-    Err(Error::Unknown { kind, name: name.to_owned(), known })
 }

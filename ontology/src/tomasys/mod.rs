@@ -5,7 +5,8 @@
 //! by IRI, numbers are exact.
 
 pub mod change;
-mod terms;
+pub(crate) mod facts;
+pub(crate) mod terms;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -27,7 +28,7 @@ pub struct Individual {
 }
 
 impl Individual {
-    fn new(iri: &str) -> Self {
+    pub(crate) fn new(iri: &str) -> Self {
         Self { iri: iri.to_owned(), name: local_name(iri).to_owned() }
     }
 }

@@ -33,8 +33,22 @@ pub(crate) const STATUS: Term = &[t::C_STATUS, www::C_STATUS];
 pub(crate) const REALISABILITY: Term = &[t::FD_REALISABILITY, www::FD_REALISABILITY];
 pub(crate) const AVAILABLE: Term = &[t::FD_AVAILABLE];
 pub(crate) const UTILITY: Term = &[www::FD_UTILITY, t::FD_EFFICACY];
+/// Utility that a knowledge base concludes by rules.
+pub(crate) const CONCLUDED_UTILITY: Term = &[www::FD_UTILITY];
 pub(crate) const TYPE_FD: Term = &[t::TYPE_FD];
 pub(crate) const HAS_QA_VALUE: Term = &[t::HAS_QA_VALUE];
+pub(crate) const OBJECTIVE: Term = &[t::OBJECTIVE];
+pub(crate) const TYPE_F: Term = &[t::TYPE_F];
+pub(crate) const HAS_NFR: Term = &[t::HAS_NFR];
+pub(crate) const OBJECTIVE_STATUS: Term = &[t::O_STATUS];
+pub(crate) const UPDATABLE: Term = &[t::O_UPDATABLE];
+pub(crate) const ALWAYS_IMPROVE: Term = &[t::O_ALWAYS_IMPROVE];
+/// From the grounding to the objective.
+pub(crate) const SOLVES_O: Term = &[t::SOLVES_O];
+pub(crate) const GROUNDING_STATUS: Term = &[t::FG_STATUS];
+/// From the design to the objectives that it failed.
+pub(crate) const ERROR_LOG: Term = &[t::FD_ERROR_LOG];
+pub(crate) const OPERATOR: Term = &[t::QA_COMPARISON_OPERATOR];
 
 /// The name of a notion in the vocabulary that `other` belongs to, or else the first.
 pub(crate) fn beside(term: Term, other: &str) -> &'static str {

@@ -1,0 +1,127 @@
+//! What an adaptation loop asks: objectives with their status and why, groundings, components.
+
+use rules::{Derivation, Fact, Literal, Symbol};
+
+use super::Runtime;
+use crate::error::Error;
+use crate::tomasys::Individual;
+use crate::tomasys::facts::Facts;
+use crate::tomasys::terms::{self, Term};
+
+/// Statuses that call for another design: those of MROS, and of Metacontrol before it.
+const ERRORS: [&str; 6] =
+    ["IN_ERROR_COMPONENT", "IN_ERROR_FR", "IN_ERROR_NFR", "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"];
+
+/// An objective and how it fares.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Objective {
+    /// Which objective.
+    pub individual: Individual,
+    /// The function to provide, if one is stated.
+    pub function: Option<Individual>,
+    /// `UNGROUNDED`, `IN_ERROR_COMPONENT` and so on, as the rules say; none while all is well. Two statuses contradict
+    /// each other.
+    pub statuses: Vec<String>,
+    /// Whether a component has recovered, so that a better design may be available.
+    pub updatable: bool,
+    /// Whether to look for a better design also while all is well.
+    pub always_improve: bool,
+    /// What provides the function now.
+    pub groundings: Vec<Grounding>,
+}
+
+impl Objective {
+    /// Whether its status says that something is wrong.
+    pub fn is_in_error(&self) -> bool {
+        self.statuses.iter().any(|status| ERRORS.contains(&status.as_str()))
+    }
+
+    /// Whether a design should be selected for it now.
+    pub fn wants_design(&self) -> bool {
+        self.is_in_error()
+            || self.updatable
+            || self.always_improve
+            || self.statuses.iter().any(|status| status == "UNGROUNDED")
+    }
+}
+
+/// A design in use for an objective.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Grounding {
+    /// Which grounding.
+    pub individual: Individual,
+    /// The design.
+    pub design: Option<Individual>,
+    /// Its status, as the rules say; none while all is well.
+    pub statuses: Vec<String>,
+    /// What was measured of it since: the holder of the value, and the value.
+    pub measurements: Vec<(Individual, Option<Literal>)>,
+}
+
+impl Runtime {
+    /// All objectives, sorted by IRI.
+    pub fn objectives(&self) -> Vec<Objective> {
+        let facts = self.facts();
+        let mut objectives: Vec<Objective> =
+            facts.members(terms::OBJECTIVE).into_iter().map(|symbol| self.objective(facts, symbol)).collect();
+        objectives.sort_by(|a, b| a.individual.cmp(&b.individual));
+        objectives
+    }
+
+    /// The objectives that a design should be selected for now, sorted by IRI.
+    pub fn objectives_to_adapt(&self) -> Vec<Objective> {
+        self.objectives().into_iter().filter(Objective::wants_design).collect()
+    }
+
+    /// Why an objective has its status, or is updatable: one derivation for each.
+    ///
+    /// # Errors
+    /// [`Error::Unknown`] where there is no such objective.
+    pub fn why(&self, objective: &str) -> Result<Vec<Derivation>, Error> {
+        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
+        let mut derivations = Vec::new();
+        for property in [terms::OBJECTIVE_STATUS, terms::UPDATABLE] {
+            for fact in self.known(objective, property) {
+                let latched = self.reasons.get(&fact).cloned();
+                derivations.extend(latched.or_else(|| self.engine.why(&fact)));
+            }
+        }
+        Ok(derivations)
+    }
+
+    /// The facts that say the values of a property, as far as they count.
+    fn known(&self, subject: Symbol, property: Term) -> Vec<Fact> {
+        let values = self.facts().objects(subject, property);
+        let symbols = self.engine.symbols();
+        let predicates = property.iter().filter_map(|name| symbols.find_name(name));
+        let facts = predicates.flat_map(|p| values.iter().map(move |&value| Fact::new(p, [subject, value])));
+        facts.filter(|fact| self.engine.holds(fact)).collect()
+    }
+
+    fn objective(&self, facts: Facts, symbol: Symbol) -> Objective {
+        let function =
+            facts.objects(symbol, terms::TYPE_F).first().map(|&function| self.individual(function));
+        let groundings = facts.subjects(symbol, terms::SOLVES_O).into_iter();
+        let mut groundings: Vec<_> = groundings.map(|grounding| self.grounding(facts, grounding)).collect();
+        groundings.sort_by(|a, b| a.individual.cmp(&b.individual));
+        Objective {
+            individual: self.individual(symbol),
+            function,
+            statuses: facts.texts(symbol, terms::OBJECTIVE_STATUS),
+            updatable: facts.is_true(symbol, terms::UPDATABLE),
+            always_improve: facts.is_true(symbol, terms::ALWAYS_IMPROVE),
+            groundings,
+        }
+    }
+
+    fn grounding(&self, facts: Facts, symbol: Symbol) -> Grounding {
+        let design = facts.objects(symbol, terms::TYPE_FD).first().map(|&design| self.individual(design));
+        let holders = facts.objects(symbol, terms::HAS_QA_VALUE).into_iter();
+        let value = |holder| facts.literals(holder, terms::HAS_VALUE).first().map(|&value| value.clone());
+        let mut measurements: Vec<_> =
+            holders.map(|holder| (self.individual(holder), value(holder))).collect();
+        measurements.sort_by(|a, b| a.0.cmp(&b.0));
+        let statuses = facts.texts(symbol, terms::GROUNDING_STATUS);
+        Grounding { individual: self.individual(symbol), design, statuses, measurements }
+    }
+}
