@@ -1,6 +1,6 @@
 //! What can be wrong with a knowledge base: [`Error`] where it cannot be used, [`Warning`] where reading goes on.
 //!
-//! Codes are stable: `O1xx` errors, `O2xx` warnings of reading, `O3xx` warnings of lowering.
+//! Codes are stable: `O1xx` errors, `O2xx` warnings of reading, `O3xx` of lowering, `O4xx` about what the model says.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -238,6 +238,65 @@ pub enum Warning {
         /// The rule's label.
         label: Option<String>,
     },
+    /// O401: a design that solves nothing.
+    #[error("warning[O401]: the function design <{design}> solves no function, so it is never chosen")]
+    DesignWithoutFunction {
+        /// The design.
+        design: String,
+    },
+    /// O402: a function that nothing solves.
+    #[error(
+        "warning[O402]: no function design solves the function <{function}>, so nothing that needs it can run"
+    )]
+    FunctionWithoutDesign {
+        /// The function.
+        function: String,
+    },
+    /// O403: a requirement that says no value.
+    #[error("warning[O403]: the requirement <{requirement}> has no value, so everything meets it")]
+    RequirementWithoutValue {
+        /// The requirement.
+        requirement: String,
+    },
+    /// O404: several stated values of a property that is declared functional.
+    #[error(
+        "warning[O404]: <{subject}> has {} values of <{property}>, which is functional: {}; {consequence}",
+        values.len(), values.join(", ")
+    )]
+    SeveralValues {
+        /// The individual.
+        subject: String,
+        /// The functional property.
+        property: String,
+        /// The values, sorted, as N-Triples writes them.
+        values: Vec<String>,
+        /// What follows.
+        consequence: &'static str,
+    },
+    /// O405: an attribute that designs compare with a measurement that does not exist.
+    #[error(
+        "warning[O405]: <{attribute}> is compared with what is measured, and nothing has been; until then no design is \
+         ruled out by it"
+    )]
+    NothingMeasured {
+        /// The attribute type.
+        attribute: String,
+    },
+    /// O406: a status of another datatype than the knowledge base asks for.
+    #[error(
+        "warning[O406]: <{subject}> has the status {value} of <{property}>, of which {expected} is expected; rules do \
+         not see it"
+    )]
+    StatusDatatype {
+        /// The individual.
+        subject: String,
+        /// The status property.
+        property: String,
+        /// The value, as N-Triples writes it.
+        value: String,
+        /// What the property's range or the rules ask for.
+        expected: &'static str,
+    },
 }
 
 impl Warning {
@@ -253,6 +312,12 @@ impl Warning {
             Self::OutsideProfile { .. } => "O301",
             Self::UnusableRule { .. } => "O302",
             Self::DisabledRule { .. } => "O303",
+            Self::DesignWithoutFunction { .. } => "O401",
+            Self::FunctionWithoutDesign { .. } => "O402",
+            Self::RequirementWithoutValue { .. } => "O403",
+            Self::SeveralValues { .. } => "O404",
+            Self::NothingMeasured { .. } => "O405",
+            Self::StatusDatatype { .. } => "O406",
         }
     }
 }

@@ -1,12 +1,15 @@
 //! What an engine has concluded, in the nouns of TOMASys: functions, designs, components, attributes, actions.
 //!
-//! [`View`] reads; [`change`] builds the updates that keep an engine's knowledge in step with the robot. Both know
-//! the vocabularies in real use through one table. Individuals are given by IRI and by local name, lists are sorted
+//! [`View`] reads; [`change`] builds the updates that keep an engine's knowledge in step with the robot; [`check`] tells
+//! authors what looks like a mistake. All know the vocabularies in real use through one table. Individuals are given by IRI and by local name, lists are sorted
 //! by IRI, numbers are exact.
 
 pub mod change;
+mod check;
 pub(crate) mod facts;
 pub(crate) mod terms;
+
+pub use check::check;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};

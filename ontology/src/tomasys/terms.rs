@@ -25,6 +25,7 @@ pub(crate) const REQUIRED_BY: Term = &[mros::REQUIRED_BY, navigation::REQUIRED_B
 pub(crate) const HAS_ESTIMATION: Term = &[t::HAS_QA_ESTIMATION, www::HAS_QA_ESTIMATION];
 pub(crate) const IS_TYPE: Term = &[t::IS_QA_TYPE, www::IS_QA_TYPE];
 pub(crate) const HAS_VALUE: Term = &[t::HAS_VALUE, www::QA_HAS_VALUE];
+pub(crate) const REQUIREMENT: Term = &[t::REQUIREMENT];
 pub(crate) const HAS_REQUIREMENT: Term = &[t::HAS_REQUIREMENT];
 pub(crate) const HAS_MINIMUM: Term = &[t::HAS_MINIMUM];
 pub(crate) const HAS_MAXIMUM: Term = &[t::HAS_MAXIMUM];

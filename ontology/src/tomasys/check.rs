@@ -1,0 +1,201 @@
+//! What looks like a mistake of a model's author: nothing here is wrong OWL, and all of it makes a robot adapt less
+//! than its author expects.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rules::{Engine, Literal as Value, Symbol};
+
+use super::change::holders;
+use super::facts::Facts;
+use super::terms::{self, Term};
+use crate::error::Warning;
+use crate::owl::{
+    Argument, Atom, Axiom, Characteristic, DataRange, Iri, Literal, ObjectPropertyExpression as Property,
+    Ontology,
+};
+
+/// Checks a model: the ontology, and an engine that holds what follows from it. Sorted.
+pub fn check(ontology: &Ontology, engine: &Engine) -> Vec<Warning> {
+    let facts = Facts::new(engine);
+    let mut warnings = functions(facts);
+    warnings.extend(requirements(facts));
+    warnings.extend(measurements(facts));
+    warnings.extend(several_values(ontology));
+    warnings.extend(statuses(ontology));
+    warnings.sort();
+    warnings.dedup();
+    warnings
+}
+
+fn iri(facts: Facts, symbol: Symbol) -> String {
+    facts.name(symbol).unwrap_or_default().to_owned()
+}
+
+/// Designs without function and functions without design.
+fn functions(facts: Facts) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    for design in facts.members(terms::FUNCTION_DESIGN) {
+        if facts.objects(design, terms::SOLVES_F).is_empty() {
+            warnings.push(Warning::DesignWithoutFunction { design: iri(facts, design) });
+        }
+    }
+    for function in facts.members(terms::FUNCTION) {
+        if facts.subjects(function, terms::SOLVES_F).is_empty() {
+            warnings.push(Warning::FunctionWithoutDesign { function: iri(facts, function) });
+        }
+    }
+    warnings
+}
+
+/// Bounds of designs without minimum and maximum, and requirements of objectives without value.
+fn requirements(facts: Facts) -> Vec<Warning> {
+    let says = |requirement: Symbol, properties: &[Term]| {
+        properties.iter().any(|property| !facts.literals(requirement, property).is_empty())
+    };
+    let bounds = facts.members(terms::REQUIREMENT).into_iter();
+    let mut silent: BTreeSet<Symbol> =
+        bounds.filter(|&bound| !says(bound, &[terms::HAS_MINIMUM, terms::HAS_MAXIMUM])).collect();
+    for objective in facts.members(terms::OBJECTIVE) {
+        let required = facts.objects(objective, terms::HAS_NFR).into_iter();
+        silent.extend(required.filter(|&value| !says(value, &[terms::HAS_VALUE])));
+    }
+    let warning = |requirement| Warning::RequirementWithoutValue { requirement: iri(facts, requirement) };
+    silent.into_iter().map(warning).collect()
+}
+
+/// Attributes of which nothing was measured, though designs bound them, or have estimations of them and the attribute
+/// has a comparison operator.
+fn measurements(facts: Facts) -> Vec<Warning> {
+    let estimated = |kind: Symbol| {
+        let mut values = facts.subjects(kind, terms::IS_TYPE).into_iter();
+        values.any(|value| !facts.subjects(value, terms::HAS_ESTIMATION).is_empty())
+    };
+    let kinds = facts.members(terms::ATTRIBUTE_TYPE).into_iter();
+    let kinds = kinds.filter(|&kind| !facts.literals(kind, terms::OPERATOR).is_empty());
+    let mut compared: BTreeSet<Symbol> = kinds.filter(|&kind| estimated(kind)).collect();
+    for design in facts.members(terms::FUNCTION_DESIGN) {
+        let bounds = facts.objects(design, terms::HAS_REQUIREMENT).into_iter();
+        compared.extend(bounds.flat_map(|bound| facts.objects(bound, terms::IS_TYPE)));
+    }
+    let measured = |kind: Symbol| {
+        holders(facts, kind).into_iter().any(|holder| !facts.literals(holder, terms::HAS_VALUE).is_empty())
+    };
+    let unmeasured = compared.into_iter().filter(|&kind| !measured(kind));
+    unmeasured.map(|kind| Warning::NothingMeasured { attribute: iri(facts, kind) }).collect()
+}
+
+/// Individuals with several stated values of a functional property. Numbers are compared by value.
+fn several_values(ontology: &Ontology) -> Vec<Warning> {
+    let functional: BTreeSet<&Iri> =
+        ontology
+            .axioms
+            .iter()
+            .filter_map(|annotated| match &annotated.axiom {
+                Axiom::FunctionalDataProperty(property)
+                | Axiom::ObjectPropertyCharacteristic(
+                    Characteristic::Functional,
+                    Property::Property(property),
+                ) => Some(property),
+                _ => None,
+            })
+            .collect();
+    let mut individuals = BTreeMap::<(&Iri, &Iri), BTreeSet<String>>::new();
+    let mut literals = BTreeMap::<(&Iri, &Iri), BTreeSet<String>>::new();
+    for annotated in &ontology.axioms {
+        match &annotated.axiom {
+            Axiom::ObjectPropertyAssertion(Property::Property(property), from, to)
+                if functional.contains(property) =>
+            {
+                individuals.entry((from, property)).or_default().insert(format!("<{to}>"));
+            }
+            Axiom::DataPropertyAssertion(property, from, to) if functional.contains(property) => {
+                literals.entry((from, property)).or_default().insert(value(to).to_string());
+            }
+            _ => {}
+        }
+    }
+    let one = "they are taken for one individual";
+    let contradiction = "this is a contradiction";
+    let kinds = [(individuals, one), (literals, contradiction)];
+    let all =
+        kinds.into_iter().flat_map(|(kind, consequence)| kind.into_iter().map(move |v| (v, consequence)));
+    all.filter(|((_, values), _)| values.len() > 1)
+        .map(|(((subject, property), values), consequence)| Warning::SeveralValues {
+            subject: subject.to_string(),
+            property: property.to_string(),
+            values: values.into_iter().collect(),
+            consequence,
+        })
+        .collect()
+}
+
+fn value(literal: &Literal) -> Value {
+    Value::parse(&literal.lexical, literal.datatype.as_deref(), literal.language.as_deref())
+}
+
+/// What a status may be.
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Boolean(_) => "a boolean",
+        _ if value.as_rational().is_some() => "a number",
+        _ => "a string",
+    }
+}
+
+/// Stated statuses of another kind than the property's ranges ask for or, where it has none, than rules test.
+fn statuses(ontology: &Ontology) -> Vec<Warning> {
+    let properties =
+        [terms::STATUS, terms::OBJECTIVE_STATUS, terms::GROUNDING_STATUS, terms::REALISABILITY].concat();
+    let mut warnings = Vec::new();
+    for property in properties {
+        let ranges = ranges(ontology, property);
+        let expected = if ranges.is_empty() { tested(ontology, property) } else { ranges };
+        let &[expected] = expected.iter().collect::<Vec<_>>().as_slice() else { continue };
+        for annotated in &ontology.axioms {
+            let Axiom::DataPropertyAssertion(stated, subject, status) = &annotated.axiom else { continue };
+            let status = value(status);
+            if &**stated == property && kind(&status) != *expected {
+                warnings.push(Warning::StatusDatatype {
+                    subject: subject.to_string(),
+                    property: property.to_owned(),
+                    value: status.to_string(),
+                    expected,
+                });
+            }
+        }
+    }
+    warnings
+}
+
+/// The kinds of values that the ranges of a property allow.
+fn ranges(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
+    let mut kinds = BTreeSet::new();
+    for annotated in &ontology.axioms {
+        match &annotated.axiom {
+            Axiom::DataPropertyRange(of, DataRange::OneOf(values)) if &**of == property => {
+                kinds.extend(values.iter().map(|literal| kind(&value(literal))));
+            }
+            Axiom::DataPropertyRange(of, DataRange::Datatype(datatype)) if &**of == property => {
+                kinds.insert(match crate::vocab::local_name(datatype) {
+                    "boolean" => "a boolean",
+                    "string" => "a string",
+                    _ => "a number",
+                });
+            }
+            _ => {}
+        }
+    }
+    kinds
+}
+
+/// The kinds of values that rules test a property for.
+fn tested(ontology: &Ontology, property: &str) -> BTreeSet<&'static str> {
+    let atoms = ontology.rules.iter().flat_map(|rule| &rule.body);
+    let constants = atoms.filter_map(|atom| match atom {
+        Atom::DataProperty(of, _, Argument::Literal(literal)) if &**of == property => {
+            Some(kind(&value(literal)))
+        }
+        _ => None,
+    });
+    constants.collect()
+}
