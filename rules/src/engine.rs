@@ -16,7 +16,7 @@ use crate::fact::Fact;
 use crate::maintain::{Maintenance, state_change};
 use crate::network::{Network, compile};
 use crate::record::Records;
-use crate::rule::Program;
+use crate::rule::{Program, Rule};
 use crate::store::{Record, Store, columns, state};
 use crate::symbol::{Symbol, Symbols};
 
@@ -46,6 +46,8 @@ pub struct Engine {
     pub(crate) store: Store,
     pub(crate) records: Records,
     pub(crate) budget: u64,
+    /// Rules that are switched off.
+    pub(crate) disabled: Vec<Rule>,
 }
 
 impl Engine {
@@ -83,7 +85,7 @@ impl Engine {
         let network = compile(&program, &mut symbols, &mut store)?;
         let records = Records::new(&network);
         let (program, network) = (Arc::new(program), Arc::new(network));
-        let mut engine = Self { symbols, program, network, store, records, budget };
+        let mut engine = Self { symbols, program, network, store, records, budget, disabled: Vec::new() };
         Maintenance::new(&mut engine).derive_all().map_err(|error| vec![error])?;
         Ok(engine)
     }
@@ -118,7 +120,7 @@ impl Engine {
     }
 
     /// Derives everything anew after an update that was stopped, from what was stated before.
-    fn restore(&mut self, undo: &Delta) {
+    pub(crate) fn restore(&mut self, undo: &Delta) {
         let kept = self.facts_with(state::ASSERTED).filter(|fact| !undo.delete.contains(fact));
         let facts: Vec<Fact> = kept.chain(undo.insert.iter().cloned()).collect();
         for relation in &mut self.store.relations {
@@ -157,7 +159,7 @@ impl Engine {
         facts.into_iter()
     }
 
-    fn facts_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
+    pub(crate) fn facts_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
         let named = self.store.relations.iter().filter_map(|relation| Some((relation, relation.predicate?)));
         named.flat_map(move |(relation, predicate)| {
             let rows = relation.scan().filter(move |&row| relation.state(row) & bits == bits);

@@ -13,6 +13,7 @@ mod maintain;
 mod network;
 mod plan;
 mod record;
+mod revision;
 mod rule;
 mod store;
 mod strata;

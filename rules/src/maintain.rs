@@ -14,6 +14,7 @@ use crate::error::Error;
 use crate::fact::Fact;
 use crate::fixpoint::{Budget, Matches, PlanId, Round, Seed, Start, resolve, run};
 use crate::network::{Network, Stratum};
+use crate::plan::HIDDEN;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::Symbol;
 
@@ -101,15 +102,7 @@ impl<'a> Maintenance<'a> {
     pub fn derive_all(mut self) -> Result<(), Error> {
         let network = Arc::clone(&self.network);
         for stratum in &network.strata {
-            for &(relation, plan) in &stratum.initial {
-                if let Some(relation) = relation {
-                    let rows: Rows =
-                        self.engine.store.get(relation).scan().map(|row| (relation, row)).collect();
-                    self.run(&rows, |_| Some(std::slice::from_ref(&plan)), false)?;
-                } else {
-                    self.run_chunk(&[Seed { plan, start: Start::Nothing }], &[], false)?;
-                }
-            }
+            self.begin(&stratum.initial)?;
             self.saturate(stratum)?;
         }
         for (relation, row) in self.added {
@@ -125,12 +118,61 @@ impl<'a> Maintenance<'a> {
         for &(relation, _) in stated.added.iter().chain(&stated.doomed) {
             self.touch(relation);
         }
+        self.propagate(&FxHashSet::default())
+    }
+
+    /// Takes away what rests on rules that are no more and adds what follows from new ones.
+    pub fn change_rules(
+        &mut self,
+        removed: &FxHashSet<u32>,
+        heads: &FxHashSet<RelationId>,
+        added: &FxHashSet<u32>,
+    ) -> Result<(), Error> {
+        let mut ids: Vec<RelationId> = heads.iter().copied().collect();
+        ids.sort_unstable();
+        for id in ids {
+            let Engine { store, records, .. } = &mut *self.engine;
+            let relation = store.get_mut(id);
+            let concluded = |&row: &Row| removed.contains(&relation.record(row).rule);
+            for row in relation.scan().filter(concluded).collect::<Vec<_>>() {
+                if relation.state(row) & state::ASSERTED == 0 {
+                    relation.set(row, state::DOOMED);
+                    self.doomed.push((id, row));
+                } else {
+                    records.remove(relation.record(row));
+                    relation.set_record(row, Record::NONE);
+                }
+            }
+            self.touch(id);
+        }
+        self.propagate(added)
+    }
+
+    fn propagate(&mut self, new_rules: &FxHashSet<u32>) -> Result<(), Error> {
         let network = Arc::clone(&self.network);
         for (number, stratum) in network.strata.iter().enumerate() {
-            if self.touched[number] {
+            let is_new = |plan: PlanId| new_rules.contains(&network.plans[plan as usize].rule);
+            let new: Vec<_> = stratum.initial.iter().copied().filter(|&(_, plan)| is_new(plan)).collect();
+            if self.touched[number] || !new.is_empty() {
                 self.over_delete(stratum)?;
                 self.rederive(stratum)?;
+                self.begin(&new)?;
                 self.insert(stratum)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs plans from nothing or from all rows of a relation that hold.
+    fn begin(&mut self, plans: &[(Option<RelationId>, PlanId)]) -> Result<(), Error> {
+        for (relation, plan) in plans {
+            if let Some(id) = *relation {
+                let relation = self.engine.store.get(id);
+                let visible = relation.scan().filter(|&row| relation.state(row) & HIDDEN == 0);
+                let rows: Rows = visible.map(|row| (id, row)).collect();
+                self.run(&rows, |_| Some(std::slice::from_ref(plan)), false)?;
+            } else {
+                self.run_chunk(&[Seed { plan: *plan, start: Start::Nothing }], &[], false)?;
             }
         }
         Ok(())
@@ -189,7 +231,10 @@ impl<'a> Maintenance<'a> {
 
     fn insert(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let disappeared = self.still_doomed();
-        let relevant = |&&(id, _): &&(RelationId, Row)| stratum.positive.contains_key(&id);
+        let relevant = |&&(id, row): &&(RelationId, Row)| {
+            let is_pending = self.engine.store.get(id).state(row) & state::PENDING != 0;
+            stratum.positive.contains_key(&id) && !is_pending
+        };
         let front: Rows = self.added.iter().filter(relevant).copied().collect();
         let revived = std::mem::take(&mut self.pending);
         self.promote(&revived);

@@ -73,6 +73,79 @@ pub(crate) fn compile(
     Ok(network)
 }
 
+/// What a change of rules did to a network.
+pub(crate) struct Revision {
+    pub network: Network,
+    /// Compiled rules that are no more; their numbers stay unused until the next revision.
+    pub removed: FxHashSet<u32>,
+    /// Compiled rules that are new.
+    pub added: FxHashSet<u32>,
+}
+
+/// Compiles the rules in which a program differs from the one that the network was compiled from; the others keep
+/// their numbers, to which recorded derivations refer. `None` where that is not possible, because a rule whose heads
+/// lay in one stratum would have to be split.
+pub(crate) fn revise(
+    network: &Network,
+    old: &Program,
+    new: &Program,
+    symbols: &mut Symbols,
+    store: &mut Store,
+) -> Result<Option<Revision>, Vec<Error>> {
+    let mut errors: Vec<Error> = new.rules.iter().flat_map(check).collect();
+    errors.extend(new.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let mut positions = FxHashMap::default();
+    for (position, rule) in new.rules.iter().enumerate() {
+        positions.entry((&rule.head, &rule.body)).or_insert(position);
+    }
+    let mut revised = Network { constraints: Vec::new(), ..network.clone() };
+    let position_of = |position: usize| {
+        let rule = &old.rules[position];
+        positions.get(&(&rule.head, &rule.body)).copied()
+    };
+    let kept = network.constraints.iter();
+    revised.constraints = kept.filter_map(|&(id, rule)| Some((id, position_of(rule)?))).collect();
+    let (mut removed, mut unused, mut compiled) = (FxHashSet::default(), Vec::new(), FxHashSet::default());
+    for (number, rule) in revised.rules.iter_mut().enumerate() {
+        if rule.heads.is_empty() {
+            unused.push(number);
+        } else if let Some(position) = position_of(rule.rule) {
+            rule.rule = position;
+            compiled.insert(position);
+        } else {
+            *rule = Lowered { rule: 0, width: rule.width, heads: Vec::new(), body: Vec::new() };
+            removed.insert(number as u32);
+        }
+    }
+    let mut missing: Vec<usize> = positions.into_values().filter(|p| !compiled.contains(p)).collect();
+    missing.sort_unstable();
+    let lowered: Vec<Lowered> = missing
+        .into_iter()
+        .map(|at| lower(at, &new.rules[at], symbols, store, &mut revised.constraints))
+        .collect();
+    let all: Vec<Lowered> = revised.rules.iter().chain(&lowered).cloned().collect();
+    revised.stratum_of = stratify(new, symbols, store, &all)?;
+    if split_by_stratum(revised.rules.clone(), &revised.stratum_of).len() != revised.live_rules() {
+        return Ok(None);
+    }
+    let mut added = FxHashSet::default();
+    for rule in split_by_stratum(lowered, &revised.stratum_of) {
+        let number = unused.pop().unwrap_or(revised.rules.len());
+        if number == revised.rules.len() {
+            revised.rules.push(rule);
+        } else {
+            revised.rules[number] = rule;
+        }
+        added.insert(number as u32);
+    }
+    revised.widths = revised.rules.iter().map(|rule| rule.width).collect();
+    revised.plan(store, true);
+    Ok(Some(Revision { network: revised, removed, added }))
+}
+
 fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     let atoms = || rule.head.iter().chain(&rule.body);
     let predicates = atoms().filter_map(|atom| match atom {
@@ -123,7 +196,8 @@ fn lower(
         heads.push(Template { relation: store.relation(predicate, terms.len()), arguments: sources(&terms) });
     }
     if rule.head.is_empty() {
-        let relation = store.anonymous(rule.variable_count());
+        let taken = |id: RelationId| constraints.iter().any(|&(other, _)| other == id);
+        let relation = store.anonymous(rule.variable_count(), taken);
         let arguments = (0..rule.variable_count()).map(|number| Source::Variable(number as u16)).collect();
         heads.push(Template { relation, arguments });
         constraints.push((relation, position));
@@ -180,6 +254,10 @@ fn split_by_stratum(rules: Vec<Lowered>, strata: &[usize]) -> Vec<Lowered> {
 }
 
 impl Network {
+    fn live_rules(&self) -> usize {
+        self.rules.iter().filter(|rule| !rule.heads.is_empty()).count()
+    }
+
     /// Plans all rules anew by the sizes that relations have now. `complete` says that the rules have been evaluated.
     pub fn plan(&mut self, store: &mut Store, complete: bool) {
         let heads = self.rules.iter().flat_map(|rule| &rule.heads);

@@ -23,6 +23,17 @@ impl Records {
         Self { rules: network.widths.iter().map(slots).collect() }
     }
 
+    /// Makes room for the rules of a revised network; the bindings of rules that are no more are forgotten.
+    pub fn revise(&mut self, network: &Network, is_removed: impl Fn(u32) -> bool) {
+        let old = std::mem::take(self);
+        *self = Self::new(network);
+        for (number, (slots, kept)) in self.rules.iter_mut().zip(old.rules).enumerate() {
+            if !is_removed(number as u32) && slots.width == kept.width {
+                *slots = kept;
+            }
+        }
+    }
+
     pub fn add(&mut self, rule: u32, bindings: &[Symbol]) -> Record {
         let slots = &mut self.rules[rule as usize];
         let slot = if let Some(slot) = slots.free.pop() {

@@ -70,9 +70,15 @@ impl Store {
         id
     }
 
-    /// A relation that belongs to no predicate: the matches of an integrity constraint.
-    pub fn anonymous(&mut self, arity: usize) -> RelationId {
-        self.push(Relation::new(None, arity))
+    /// A relation that belongs to no predicate: the matches of an integrity constraint. One that is empty and not
+    /// taken is used again.
+    pub fn anonymous(&mut self, arity: usize, taken: impl Fn(RelationId) -> bool) -> RelationId {
+        let fits = |relation: &Relation| {
+            relation.predicate.is_none() && relation.arity == arity && relation.len() == 0
+        };
+        let mut ids = (0..self.relations.len() as u32).map(RelationId);
+        let unused = ids.find(|&id| fits(self.get(id)) && !taken(id));
+        unused.unwrap_or_else(|| self.push(Relation::new(None, arity)))
     }
 
     fn push(&mut self, relation: Relation) -> RelationId {

@@ -152,7 +152,8 @@ fn check_derivation(engine: &Engine, derivation: &Derivation) {
     assert!(supported.iter().all(|&supported| supported), "circular: {derivation:?}");
     for step in &derivation.steps {
         let Reason::Rule { identity, bindings, supports, absent } = &step.reason else { continue };
-        let rule = &engine.program().rules[identity.position as usize];
+        let rule =
+            engine.program().rules.iter().find(|rule| rule.identity == *identity).expect("an active rule");
         let values: Binding = (0..).map(Variable).zip(bindings.iter().map(|(_, value)| *value)).collect();
         assert!(rule.head.iter().any(|head| ground(head, &values) == step.fact), "{step:?}");
         let body = |negated: bool| {
@@ -231,7 +232,15 @@ pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>]) 
     let mut engine =
         Engine::new(world.symbols.clone(), program.clone(), stated.iter().cloned()).expect("safe rules");
     let mut before = check_state(&engine, &world, &stated);
+    let mut absent = BTreeSet::new();
     for step in script {
+        if let Some(&(_, kind, [number, ..])) = step.first().filter(|(_, kind, _)| kind % 8 == 7) {
+            let position = usize::from(number) % program.rules.len();
+            let change = switch(&mut engine, &program, position, kind / 8, &mut absent);
+            let after = check_state(&engine, &world, &stated);
+            assert_difference(&change, &before, &after);
+            before = after;
+        }
         let facts = |wanted: bool| {
             let chosen = step.iter().filter(move |(insert, ..)| *insert == wanted);
             chosen.map(|&(_, p, arguments)| world.fact(p, arguments)).collect::<Vec<_>>()
@@ -243,14 +252,54 @@ pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>]) 
         stated.extend(delta.insert.iter().cloned());
         let change = engine.apply(delta).expect("within the budget");
         let after = check_state(&engine, &world, &stated);
-        assert_eq!(change.insert, after.difference(&before).cloned().collect::<Vec<_>>());
-        assert_eq!(change.delete, before.difference(&after).cloned().collect::<Vec<_>>());
+        assert_difference(&change, &before, &after);
         before = after;
     }
-    let reversed = renumber(Program { rules: program.rules.into_iter().rev().collect() });
+    let active = program.rules.into_iter().filter(|rule| !absent.contains(&rule.identity.position));
+    let reversed = renumber(Program { rules: active.rev().collect() });
     let engine =
         Engine::new(engine.symbols().clone(), reversed, stated.into_iter().rev()).expect("safe rules");
     assert_eq!(engine.facts().collect::<BTreeSet<_>>(), before);
+}
+
+fn assert_difference(change: &Delta, before: &BTreeSet<Fact>, after: &BTreeSet<Fact>) {
+    assert_eq!(change.insert, after.difference(before).cloned().collect::<Vec<_>>());
+    assert_eq!(change.delete, before.difference(after).cloned().collect::<Vec<_>>());
+}
+
+/// Takes an active rule away or brings an absent one back, in one of the ways there are.
+fn switch(
+    engine: &mut Engine,
+    program: &Program,
+    position: usize,
+    way: u8,
+    absent: &mut BTreeSet<u32>,
+) -> Delta {
+    let rule = &program.rules[position];
+    let number = rule.identity.position;
+    let is_disabled = engine.disabled_rules().contains(rule);
+    let comes = absent.remove(&number);
+    if !comes {
+        absent.insert(number);
+    }
+    let change = match way % 3 {
+        0 if !comes || is_disabled => engine.set_enabled(&rule.identity, comes),
+        1 if !comes => engine.remove_rule(&rule.identity),
+        1 if !is_disabled => engine.add_rules([rule.clone()]),
+        _ if is_disabled => engine.set_enabled(&rule.identity, true),
+        _ => {
+            let mut rules = engine.program().rules.clone();
+            rules.retain(|other| other != rule);
+            if comes {
+                rules.insert(0, rule.clone());
+            }
+            engine.set_program(Program { rules })
+        }
+    };
+    let active: BTreeSet<u32> = engine.program().rules.iter().map(|rule| rule.identity.position).collect();
+    let expected = program.rules.iter().map(|rule| rule.identity.position).filter(|n| !absent.contains(n));
+    assert_eq!(active, expected.collect());
+    change.expect("safe rules")
 }
 
 fn renumber(program: Program) -> Program {

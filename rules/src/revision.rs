@@ -1,0 +1,115 @@
+//! Rules that come and go while the engine runs: from a change of the program to the change of what holds.
+//!
+//! The rules that stay keep their recorded derivations. What a removed rule concluded loses its support, as if a fact
+//! of its body had gone, and is rederived where another rule concludes it too; a new rule is evaluated once over
+//! everything that holds. Only where the strata of the rules that stay fall apart is everything derived anew.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashSet;
+
+use crate::engine::{Delta, Engine};
+use crate::error::Error;
+use crate::fact::Fact;
+use crate::maintain::Maintenance;
+use crate::network::{Revision, revise};
+use crate::rule::{Program, Rule, RuleIdentity};
+use crate::store::{RelationId, state};
+
+impl Engine {
+    /// Replaces the rules and returns the net change of all facts that hold, sorted. The cost depends on the rules in
+    /// which the programs differ and on what follows from them.
+    ///
+    /// # Errors
+    /// As [`Engine::new`]; the engine is then as it was before.
+    pub fn set_program(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
+        let revision = revise(&self.network, &self.program, &program, &mut self.symbols, &mut self.store)?;
+        match revision {
+            Some(revision) => self.revise(revision, program).map_err(|error| vec![error]),
+            None => self.rebuild(program),
+        }
+    }
+
+    /// Adds rules and returns the net change of all facts that hold, sorted.
+    ///
+    /// # Errors
+    /// As [`Engine::new`]; the engine is then as it was before.
+    pub fn add_rules(&mut self, rules: impl IntoIterator<Item = Rule>) -> Result<Delta, Vec<Error>> {
+        let mut program = Program::clone(&self.program);
+        program.rules.extend(rules);
+        self.set_program(program)
+    }
+
+    /// Removes every rule with this identity and returns the net change of all facts that hold, sorted.
+    ///
+    /// # Errors
+    /// R301 where what remains does not follow within the step budget; the engine is then as it was before.
+    pub fn remove_rule(&mut self, identity: &RuleIdentity) -> Result<Delta, Vec<Error>> {
+        let mut program = Program::clone(&self.program);
+        program.rules.retain(|rule| rule.identity != *identity);
+        let change = self.set_program(program)?;
+        self.disabled.retain(|rule| rule.identity != *identity);
+        Ok(change)
+    }
+
+    /// Disables or enables every rule with this identity and returns the net change of all facts that hold, sorted. A
+    /// disabled rule is not in [`Engine::program`] but in [`Engine::disabled_rules`]; enabled again, it comes last.
+    ///
+    /// # Errors
+    /// As [`Engine::new`]; the engine is then as it was before.
+    pub fn set_enabled(&mut self, identity: &RuleIdentity, enabled: bool) -> Result<Delta, Vec<Error>> {
+        let mut program = Program::clone(&self.program);
+        let is_meant = |rule: &mut Rule| rule.identity == *identity;
+        let mut disabled = self.disabled.clone();
+        if enabled {
+            program.rules.extend(disabled.extract_if(.., is_meant));
+        } else {
+            disabled.extend(program.rules.extract_if(.., is_meant));
+        }
+        let change = self.set_program(program)?;
+        self.disabled = disabled;
+        Ok(change)
+    }
+
+    /// The rules that [`Engine::set_enabled`] disabled.
+    pub fn disabled_rules(&self) -> &[Rule] {
+        &self.disabled
+    }
+
+    fn revise(&mut self, revision: Revision, program: Program) -> Result<Delta, Error> {
+        let Revision { network, removed, added } = revision;
+        let heads: FxHashSet<RelationId> = removed
+            .iter()
+            .flat_map(|&number| &self.network.rules[number as usize].heads)
+            .map(|head| head.relation)
+            .collect();
+        let old = (Arc::clone(&self.network), Arc::clone(&self.program));
+        // The bindings of removed rules are needed until what they concluded is gone.
+        self.records.revise(&network, |_| false);
+        (self.network, self.program) = (Arc::new(network), Arc::new(program));
+        let mut maintenance = Maintenance::new(self);
+        match maintenance.change_rules(&removed, &heads, &added) {
+            Ok(()) => {
+                let change = maintenance.finish();
+                let network = Arc::clone(&self.network);
+                self.records.revise(&network, |number| removed.contains(&number));
+                Ok(change)
+            }
+            Err(error) => {
+                (self.network, self.program) = old;
+                self.restore(&Delta::default());
+                Err(error)
+            }
+        }
+    }
+
+    fn rebuild(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
+        let stated: Vec<Fact> = self.facts_with(state::ASSERTED).collect();
+        let mut engine = Self::with_step_budget(self.symbols.clone(), program, stated, self.budget)?;
+        engine.disabled.clone_from(&self.disabled);
+        let insert = engine.facts().filter(|fact| !self.holds(fact)).collect();
+        let delete = self.facts().filter(|fact| !engine.holds(fact)).collect();
+        *self = engine;
+        Ok(Delta { insert, delete })
+    }
+}
