@@ -114,6 +114,14 @@ pub enum Error {
         /// What was given as its value.
         value: String,
     },
+    /// O111: a syntax that cannot say what the knowledge base says.
+    #[error("error[O111]: cannot be written in {syntax}: {reason}")]
+    Unwritable {
+        /// The syntax.
+        syntax: &'static str,
+        /// Why not.
+        reason: String,
+    },
     /// O109: the engine cannot make the change.
     #[error("error[O109]: {0}")]
     Engine(#[from] rules::Error),
@@ -133,6 +141,7 @@ impl Error {
             Self::Exists { .. } => "O108",
             Self::Engine(_) => "O109",
             Self::NotANumber { .. } => "O110",
+            Self::Unwritable { .. } => "O111",
         }
     }
 

@@ -4,7 +4,7 @@
 use std::fmt::{Display, Formatter, Result};
 
 use crate::owl::{
-    Argument, Atom, Axiom, Bound, Characteristic, ClassExpression, DataRange, Iri, Literal,
+    ANONYMOUS, Argument, Atom, Axiom, Bound, Characteristic, ClassExpression, DataRange, Iri, Literal,
     ObjectPropertyExpression, Rule,
 };
 use crate::vocab::{local_name, xsd};
@@ -23,12 +23,15 @@ fn calls<T: Display>(f: &mut Formatter<'_>, name: &str, arguments: &[T]) -> Resu
     call(f, name, &arguments)
 }
 
-/// `<iri>`.
+/// `<iri>`, or `_:label` for an anonymous individual.
 struct Angle<'a>(&'a Iri);
 
 impl Display for Angle<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        write!(f, "<{}>", self.0)
+        match self.0.strip_prefix(ANONYMOUS) {
+            Some(label) => write!(f, "_:{label}"),
+            None => write!(f, "<{}>", self.0),
+        }
     }
 }
 

@@ -1,8 +1,7 @@
 //! Triples with an index by subject, in document order, from which triples can be taken.
 
-use std::collections::{HashMap, HashSet};
-
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
+use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 
 use crate::vocab::rdf;
 
@@ -97,7 +96,7 @@ impl Graph {
     /// The items of the list that starts at `head`, or a message that says what is wrong with it.
     pub(crate) fn list(&self, head: &Term) -> Result<List, String> {
         let mut list = List { items: Vec::new(), spine: Vec::new() };
-        let (mut node, mut seen) = (head.clone(), HashSet::new());
+        let (mut node, mut seen) = (head.clone(), HashSet::default());
         loop {
             if matches!(&node, Term::NamedNode(iri) if iri.as_str() == rdf::NIL) {
                 return Ok(list);
@@ -138,13 +137,18 @@ impl Graph {
 
     /// Blank nodes and how often each is an object.
     pub(crate) fn references(&self) -> HashMap<BlankNode, usize> {
-        let mut counts = HashMap::new();
+        let mut counts = HashMap::default();
         for (_, triple) in self.iter() {
             if let Term::BlankNode(node) = &triple.object {
                 *counts.entry(node.clone()).or_default() += 1;
             }
         }
         counts
+    }
+
+    /// The triples that are left, in order.
+    pub(crate) fn into_triples(self) -> Vec<Triple> {
+        self.triples.into_iter().flatten().collect()
     }
 
     /// The triples that are left, as an N-Triples document.

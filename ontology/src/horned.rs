@@ -59,6 +59,20 @@ pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> 
     catch_unwind(AssertUnwindSafe(transcription)).map_err(panicked)?.map_err(fault)
 }
 
+/// A functional-style document as an OWL/XML document.
+pub(crate) fn owl_xml(text: &[u8]) -> Result<String, String> {
+    let transcription = || {
+        let (mut text, build) = (text, ho::Build::new_rc());
+        let ontology: SetOntology<RcStr> = ofn::reader::read(&mut text, ParserConfiguration::new(&build))?.0;
+        let ontology = ComponentMappedOntology::<RcStr, RcAnnotatedComponent>::from(ontology);
+        owx::writer::write(Vec::new(), &ontology, None)
+    };
+    let bytes: Vec<u8> = catch_unwind(AssertUnwindSafe(transcription))
+        .map_err(|_| "the OWL/XML writer failed on it".to_owned())?
+        .map_err(|error: HornedError| error.to_string())?;
+    String::from_utf8(bytes).map_err(|error| error.to_string())
+}
+
 /// Reads a normalised N-Triples document about the ontology `about`; `origins` says where each rule comes from.
 pub(crate) fn build(ntriples: &[u8], about: &str, origins: &[Origin]) -> Result<Parts, String> {
     let reading = || {

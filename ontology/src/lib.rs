@@ -18,6 +18,7 @@ mod lower;
 mod normalize;
 mod ntriples;
 mod read;
+mod write;
 
 pub mod kb;
 pub mod runtime;
@@ -28,3 +29,4 @@ pub use lower::{AXIOM_SOURCE, Equality, INTERNAL, Lowered, lower, lower_with};
 pub use ntriples::ntriples;
 pub use owl::*;
 pub use read::{ReadOptions, Syntax, read_files, read_text};
+pub use write::{OutputSyntax, convert_files, turtle};

@@ -46,10 +46,10 @@ pub(crate) struct Origin {
     pub iri: Option<Iri>,
 }
 
-/// Merges and rewrites; see the module documentation.
-pub(crate) fn normalize(documents: Vec<Document>) -> Normal {
-    let (mut graph, mut warnings) = (Graph::default(), Vec::new());
-    let mut parts = Vec::new();
+/// One graph of all documents, with the header of the first only, and for each document where it starts and the
+/// ontology that it is.
+pub(crate) fn merge(documents: Vec<Document>) -> (Graph, Vec<(usize, Iri)>) {
+    let (mut graph, mut parts) = (Graph::default(), Vec::new());
     for (index, document) in documents.into_iter().enumerate() {
         let name = document.iri.clone().unwrap_or_else(|| document.name.as_str().into());
         let start = graph.len();
@@ -62,6 +62,12 @@ pub(crate) fn normalize(documents: Vec<Document>) -> Normal {
         }
         parts.push((start, name));
     }
+    (graph, parts)
+}
+
+/// Merges and rewrites; see the module documentation.
+pub(crate) fn normalize(documents: Vec<Document>) -> Normal {
+    let ((mut graph, parts), mut warnings) = (merge(documents), Vec::new());
     let rules = swrl::rewrite(&mut graph, &parts, &mut warnings);
     lists::rewrite(&mut graph, &mut warnings);
     anonymous::rewrite(&mut graph, &mut warnings);

@@ -16,6 +16,8 @@ pub use syntax::Syntax;
 use std::collections::{HashSet, VecDeque};
 use std::path::{Path, PathBuf};
 
+use oxrdf::Triple;
+
 use crate::error::{Error, Warning};
 use crate::owl::{AnnotatedAxiom, Annotation, EntityKind, Iri, Ontology, Rule, Source};
 use crate::{horned, normalize};
@@ -51,6 +53,16 @@ pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<
 pub fn read_text(text: &str, name: &str, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
     let root = Pending::Text(name.to_owned(), text.as_bytes().to_vec());
     read(VecDeque::from([root]), options)
+}
+
+/// The triples of documents and all that they import; only the first document keeps its header, and nothing is imported.
+pub(crate) fn merged<P: AsRef<Path>>(
+    files: &[P],
+    options: &ReadOptions,
+) -> Result<(Vec<Triple>, Vec<Warning>), Vec<Error>> {
+    let roots = files.iter().map(|file| Pending::File(file.as_ref().to_owned()));
+    let (documents, warnings) = closure(roots.collect(), options)?;
+    Ok((normalize::merge(documents).0.into_triples(), warnings))
 }
 
 /// A document still to be read.

@@ -1,0 +1,107 @@
+//! An [`Ontology`] as a document in functional-style syntax, with IRIs in full.
+
+use std::fmt::Write;
+
+use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Argument, Atom, EntityKind, Iri, Ontology, Rule};
+use crate::vocab::xsd;
+
+/// The document; what stands where depends on the ontology alone.
+pub(super) fn document(ontology: &Ontology) -> String {
+    let mut text = String::from("Prefix(xsd:=<http://www.w3.org/2001/XMLSchema#>)\n\n");
+    let root = ontology.sources.first();
+    let iri = ontology.iri().map(|iri| format!("<{iri}>")).unwrap_or_default();
+    let version = root.and_then(|source| source.version.as_ref());
+    let version = version.map(|version| format!(" <{version}>")).unwrap_or_default();
+    line(&mut text, &format!("Ontology({iri}{version}"));
+    let about = |subject: &Iri| Some(subject) == ontology.iri();
+    for (_, found) in ontology.annotations.iter().filter(|(subject, _)| about(subject)) {
+        line(&mut text, &annotation(found));
+    }
+    for (kind, iri) in &ontology.entities {
+        line(&mut text, &format!("Declaration({}(<{iri}>))", entity(*kind)));
+    }
+    for annotated in &ontology.axioms {
+        let annotations: String = annotated.annotations.iter().map(|found| annotation(found) + " ").collect();
+        let axiom = annotated.axiom.to_string();
+        // The name of an axiom ends at its first parenthesis, where its annotations belong.
+        line(&mut text, &axiom.replacen('(', &format!("({annotations}"), 1));
+    }
+    for (subject, found) in ontology.annotations.iter().filter(|(subject, _)| !about(subject)) {
+        let (property, value) = (&found.property, value(&found.value));
+        line(&mut text, &format!("AnnotationAssertion(<{property}> {} {value})", node(subject)));
+    }
+    for found in &ontology.rules {
+        line(&mut text, &rule(found));
+    }
+    text + ")\n"
+}
+
+fn line(text: &mut String, content: &str) {
+    // Writing to a string does not fail.
+    let _ = writeln!(text, "{content}");
+}
+
+fn entity(kind: EntityKind) -> &'static str {
+    match kind {
+        EntityKind::Class => "Class",
+        EntityKind::ObjectProperty => "ObjectProperty",
+        EntityKind::DataProperty => "DataProperty",
+        EntityKind::AnnotationProperty => "AnnotationProperty",
+        EntityKind::Datatype => "Datatype",
+        EntityKind::NamedIndividual => "NamedIndividual",
+    }
+}
+
+fn node(iri: &Iri) -> String {
+    iri.strip_prefix(ANONYMOUS).map_or_else(|| format!("<{iri}>"), |label| format!("_:{label}"))
+}
+
+fn annotation(annotation: &Annotation) -> String {
+    format!("Annotation(<{}> {})", annotation.property, value(&annotation.value))
+}
+
+fn value(value: &AnnotationValue) -> String {
+    match value {
+        AnnotationValue::Literal(literal) => literal.to_string(),
+        AnnotationValue::Iri(iri) => node(iri),
+    }
+}
+
+fn rule(rule: &Rule) -> String {
+    let annotations: String = rule.annotations.iter().map(|found| annotation(found) + " ").collect();
+    let atoms = |atoms: &[Atom]| atoms.iter().map(atom).collect::<Vec<_>>().join(" ");
+    format!("DLSafeRule({annotations}Body({}) Head({}))", atoms(&rule.body), atoms(&rule.head))
+}
+
+fn atom(atom: &Atom) -> String {
+    match atom {
+        Atom::Class(class, x) => format!("ClassAtom({class} {})", argument(x)),
+        Atom::DataRange(range, x) => format!("DataRangeAtom({range} {})", argument(x)),
+        Atom::ObjectProperty(property, x, y) => {
+            format!("ObjectPropertyAtom({property} {} {})", argument(x), argument(y))
+        }
+        Atom::DataProperty(property, x, y) => {
+            format!("DataPropertyAtom(<{property}> {} {})", argument(x), argument(y))
+        }
+        Atom::SameIndividual(x, y) => format!("SameIndividualAtom({} {})", argument(x), argument(y)),
+        Atom::DifferentIndividuals(x, y) => {
+            format!("DifferentIndividualsAtom({} {})", argument(x), argument(y))
+        }
+        Atom::BuiltIn(built_in, arguments) => {
+            let arguments: Vec<_> = arguments.iter().map(argument).collect();
+            format!("BuiltInAtom(<{built_in}> {})", arguments.join(" "))
+        }
+    }
+}
+
+fn argument(argument: &Argument) -> String {
+    match argument {
+        Argument::Variable(iri) => format!("Variable(<{iri}>)"),
+        Argument::Individual(iri) => node(iri),
+        // A plain literal would come back as one, but the parsers of rules want a datatype.
+        Argument::Literal(literal) if literal.datatype.is_none() && literal.language.is_none() => {
+            format!("{literal}^^<{}>", xsd::STRING)
+        }
+        Argument::Literal(literal) => literal.to_string(),
+    }
+}

@@ -1,0 +1,111 @@
+//! Knowledge bases to documents in any of the syntaxes that are read: documents and all that they import, merged into
+//! one that imports nothing.
+//!
+//! The RDF syntaxes hold every triple as it was read, with blank nodes renamed. Functional-style syntax and OWL/XML
+//! hold what was understood: entities, axioms, annotations and rules, and a warning for everything else.
+
+mod functional;
+
+use std::path::Path;
+
+use oxrdf::{NamedNode, Triple};
+use oxrdfio::{RdfFormat, RdfSerializer};
+
+use crate::error::{Error, Warning};
+use crate::horned;
+use crate::read::{self, ReadOptions};
+use crate::vocab::{owl, rdf, rdfs, swrl, tomasys, xsd};
+
+/// A syntax to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OutputSyntax {
+    /// RDF/XML.
+    RdfXml,
+    /// Turtle.
+    Turtle,
+    /// N-Triples, sorted, each triple once.
+    NTriples,
+    /// OWL/XML.
+    OwlXml,
+    /// OWL 2 functional-style syntax, rules as `DLSafeRule`.
+    Functional,
+}
+
+/// Reads documents with all that they import, and writes them as one document.
+///
+/// # Errors
+/// As [`crate::read_files`]; [`Error::Unwritable`] where the syntax has no form for something.
+pub fn convert_files<P: AsRef<Path>>(
+    files: &[P],
+    options: &ReadOptions,
+    syntax: OutputSyntax,
+) -> Result<(String, Vec<Warning>), Vec<Error>> {
+    let format = match syntax {
+        OutputSyntax::RdfXml => RdfFormat::RdfXml,
+        OutputSyntax::Turtle => RdfFormat::Turtle,
+        OutputSyntax::NTriples => RdfFormat::NTriples,
+        OutputSyntax::OwlXml | OutputSyntax::Functional => {
+            let ontology = read::read_files(files, options)?;
+            let text = functional::document(&ontology);
+            let text = match syntax {
+                OutputSyntax::Functional => text,
+                _ => horned::owl_xml(text.as_bytes())
+                    .map_err(|reason| vec![Error::Unwritable { syntax: "OWL/XML", reason }])?,
+            };
+            return Ok((text, ontology.warnings));
+        }
+    };
+    let (mut triples, warnings) = read::merged(files, options)?;
+    if format == RdfFormat::NTriples {
+        triples.sort_by_cached_key(ToString::to_string);
+        triples.dedup();
+    }
+    serialize(format, &triples)
+        .map(|text| (text, warnings))
+        .map_err(|reason| vec![Error::Unwritable { syntax: format.name(), reason }])
+}
+
+/// Writes an N-Triples document (of this crate's making) as Turtle with the prefixes of the vocabularies in it.
+///
+/// # Errors
+/// [`Error::Unwritable`] where it is no N-Triples.
+pub fn turtle(ntriples: &str) -> Result<String, Error> {
+    let unwritable = |reason| Error::Unwritable { syntax: "Turtle", reason };
+    let parsed: Result<Vec<Triple>, _> =
+        oxttl::NTriplesParser::new().for_slice(ntriples.as_bytes()).collect();
+    let triples = parsed.map_err(|error| unwritable(error.to_string()))?;
+    serialize(RdfFormat::Turtle, &triples).map_err(unwritable)
+}
+
+fn serialize(format: RdfFormat, triples: &[Triple]) -> Result<String, String> {
+    let mut serializer = RdfSerializer::from_format(format);
+    for (prefix, namespace) in [
+        ("owl", owl::NS),
+        ("rdf", rdf::NS),
+        ("rdfs", rdfs::NS),
+        ("swrl", swrl::NS),
+        ("tomasys", tomasys::NS),
+        ("xsd", xsd::NS),
+    ] {
+        // A prefix that nothing uses is no help to a reader.
+        let uses = |iri: &NamedNode| iri.as_str().starts_with(namespace);
+        let used = |triple: &Triple| {
+            uses(&triple.predicate)
+                || matches!(&triple.object, oxrdf::Term::NamedNode(iri) if uses(iri))
+                || matches!(&triple.subject, oxrdf::NamedOrBlankNode::NamedNode(iri) if uses(iri))
+        };
+        if triples.iter().any(used) {
+            serializer = serializer.with_prefix(prefix, namespace).map_err(|error| error.to_string())?;
+        }
+    }
+    let mut writer = serializer.for_writer(Vec::new());
+    for triple in triples {
+        writer.serialize_triple(triple).map_err(|error| error.to_string())?;
+    }
+    let bytes = writer.finish().map_err(|error| error.to_string())?;
+    let mut text = String::from_utf8(bytes).map_err(|error| error.to_string())?;
+    if !text.is_empty() && !text.ends_with('\n') {
+        text.push('\n');
+    }
+    Ok(text)
+}

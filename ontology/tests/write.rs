@@ -1,0 +1,96 @@
+//! What is written is read again as the same knowledge, in every syntax.
+
+#![allow(clippy::print_stdout)] // a skipped test says so
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use ontology::{
+    Equality, Ontology, OutputSyntax, ReadOptions, convert_files, lower_with, read_files, turtle,
+};
+use rules::{Engine, Symbols};
+
+const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/owl");
+const OURS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/kb");
+
+const ALL: [OutputSyntax; 5] = [
+    OutputSyntax::RdfXml,
+    OutputSyntax::Turtle,
+    OutputSyntax::NTriples,
+    OutputSyntax::OwlXml,
+    OutputSyntax::Functional,
+];
+
+/// All that follows, as text; anonymous individuals are left out, since their names may change.
+fn conclusions(ontology: &Ontology) -> BTreeSet<String> {
+    let mut symbols = Symbols::new();
+    let lowered = lower_with(ontology, Equality::Owl, &mut symbols);
+    let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe rules");
+    let facts = engine.facts().map(|fact| fact.display(engine.symbols()).to_string());
+    facts.filter(|fact| !fact.contains("urn:metaplan:")).collect()
+}
+
+/// The rules, each once: OWL/XML does not say which ontology states a rule, so that equal ones become one.
+fn rules(ontology: &Ontology) -> BTreeSet<String> {
+    ontology.rules.iter().map(ToString::to_string).collect()
+}
+
+/// Writes a file with its imports in each syntax, and reads that alone.
+fn check(file: &Path) {
+    let options = ReadOptions { directories: vec![REAL.into(), OURS.into()], ..ReadOptions::default() };
+    let original = read_files(&[file], &options).expect("readable");
+    let (axioms, rules) = (conclusions(&original), rules(&original));
+    for syntax in ALL {
+        let (text, _) = convert_files(&[file], &options, syntax).expect("writable");
+        let (again, _) = convert_files(&[file], &options, syntax).expect("writable");
+        assert!(text == again, "{syntax:?} of {} differs from run to run", file.display());
+        let copy = tempfile::NamedTempFile::new().expect("temporary file");
+        std::fs::write(copy.path(), &text).expect("written");
+        // Nothing is imported any more.
+        let read = read_files(&[copy.path()], &ReadOptions::default())
+            .unwrap_or_else(|errors| panic!("{syntax:?} of {}: {errors:?}", file.display()));
+        assert_eq!(read.iri(), original.iri(), "{syntax:?} of {}", file.display());
+        assert_eq!(self::rules(&read), rules, "rules in {syntax:?} of {}", file.display());
+        let found = conclusions(&read);
+        let differences: Vec<_> = axioms.symmetric_difference(&found).take(3).collect();
+        assert!(differences.is_empty(), "{syntax:?} of {}: {differences:#?}", file.display());
+    }
+}
+
+#[test]
+fn our_own_knowledge_bases() {
+    for name in ["tomasys", "ugv", "uuv"] {
+        check(&Path::new(OURS).join(format!("{name}.ttl")));
+    }
+}
+
+#[test]
+fn knowledge_bases_in_real_use() {
+    for file in [
+        "suave/suave.owl",
+        "suave_planta/suave.owl",
+        "mc_mros_reasoner/kb.owl",
+        "mros_ontology/urjc_pilot.owl",
+        "navigation_planta/navigation.owl",
+    ] {
+        let file = PathBuf::from(REAL).join(file);
+        if !file.is_file() {
+            println!("skipped: {} is not there", file.display());
+            return;
+        }
+        check(&file);
+    }
+}
+
+#[test]
+fn inferred_triples_as_turtle() {
+    let ntriples = "<http://metacontrol.org/tomasys#a> <http://www.w3.org/1999/02/22-rdf-syntax-ns#type> \
+                    <http://metacontrol.org/tomasys#B> .\n";
+    let text = turtle(ntriples).expect("N-Triples");
+    assert_eq!(
+        text,
+        "@prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .\n\
+         @prefix tomasys: <http://metacontrol.org/tomasys#> .\ntomasys:a a tomasys:B .\n"
+    );
+    assert!(turtle("no triple").is_err());
+}
