@@ -11,6 +11,7 @@ mod fixpoint;
 mod literal;
 mod maintain;
 mod network;
+pub mod owl_rl;
 mod plan;
 mod record;
 mod revision;

@@ -303,7 +303,7 @@ fn unbound(rule: &Rule) -> Vec<Error> {
 }
 
 /// Which variables relation atoms, equalities and computed results bind.
-fn bound_variables(rule: &Rule) -> Vec<bool> {
+pub(crate) fn bound_variables(rule: &Rule) -> Vec<bool> {
     let mut bound = Bound(vec![false; rule.variable_count()]);
     loop {
         let before = bound.0.clone();

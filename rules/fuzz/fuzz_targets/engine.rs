@@ -10,10 +10,10 @@ mod script;
 use libfuzzer_sys::fuzz_target;
 use script::{RawChange, RawRule};
 
-type Input = (Vec<RawRule>, Vec<RawChange>, Vec<Vec<RawChange>>);
+type Input = (bool, Vec<RawRule>, Vec<RawChange>, Vec<Vec<RawChange>>);
 
 fuzz_target!(|input: Input| {
-    let (mut rules, mut start, mut steps) = input;
+    let (equality, mut rules, mut start, mut steps) = input;
     rules.retain(|(heads, _)| !heads.is_empty());
     rules.truncate(6);
     for (heads, body) in &mut rules {
@@ -23,5 +23,5 @@ fuzz_target!(|input: Input| {
     start.truncate(12);
     steps.truncate(20);
     steps.iter_mut().for_each(|step| step.truncate(4));
-    script::check(&rules, &start, &steps);
+    script::check(&rules, &start, &steps, equality);
 });

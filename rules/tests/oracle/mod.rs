@@ -9,14 +9,16 @@ use metaplan_rules::{Atom, BuiltIn, Fact, Literal, Program, Rule, Symbol, Symbol
 pub type Binding = BTreeMap<Variable, Symbol>;
 
 /// Everything that follows, given the level of each predicate: rules run level by level, so that what a rule negates
-/// is complete.
+/// is complete. `close` adds what follows by other means than rules.
 pub fn naive(
     program: &Program,
     symbols: &mut Symbols,
     stated: &BTreeSet<Fact>,
     level: impl Fn(Symbol) -> usize,
+    close: impl Fn(&mut BTreeSet<Fact>),
 ) -> BTreeSet<Fact> {
     let mut facts = stated.clone();
+    close(&mut facts);
     let heads = program.rules.iter().flat_map(|rule| rule.head.iter().map(move |head| (rule, head)));
     let heads: Vec<(usize, &Rule, &Atom)> =
         heads.map(|(rule, head)| (level(predicate(head)), rule, head)).collect();
@@ -28,12 +30,48 @@ pub fn naive(
             }
             let before = facts.len();
             facts.append(&mut new);
+            close(&mut facts);
             if facts.len() == before {
                 break;
             }
         }
     }
     facts
+}
+
+/// Closes facts under equality: finds the classes of individuals that `same` relates, then puts each member of a class
+/// in the place of each other. Facts of `same` itself relate all pairs of different members.
+pub fn close_under(same: Symbol, facts: &mut BTreeSet<Fact>) {
+    let mut classes: Vec<BTreeSet<Symbol>> = Vec::new();
+    for fact in facts.iter().filter(|fact| fact.predicate == same) {
+        let (mut joined, others): (Vec<_>, Vec<_>) =
+            classes.into_iter().partition(|class| fact.arguments.iter().any(|symbol| class.contains(symbol)));
+        joined.push(fact.arguments.iter().copied().collect());
+        classes = others;
+        classes.push(joined.into_iter().flatten().collect());
+    }
+    let class_of = |symbol: Symbol| {
+        let class = classes.iter().find(|class| class.contains(&symbol));
+        class.map_or_else(|| vec![symbol], |class| class.iter().copied().collect())
+    };
+    let mut closed = BTreeSet::new();
+    for fact in facts.iter().filter(|fact| fact.predicate != same) {
+        let mut rows = vec![Vec::new()];
+        for &symbol in &fact.arguments {
+            let members = class_of(symbol);
+            let longer = |row: &Vec<Symbol>| {
+                let row = row.clone();
+                members.iter().map(move |&member| [row.as_slice(), &[member]].concat()).collect::<Vec<_>>()
+            };
+            rows = rows.iter().flat_map(longer).collect();
+        }
+        closed.extend(rows.into_iter().map(|row| Fact::new(fact.predicate, row)));
+    }
+    for class in &classes {
+        let pairs = class.iter().flat_map(|&a| class.iter().map(move |&b| [a, b]));
+        closed.extend(pairs.filter(|[a, b]| a != b).map(|pair| Fact::new(same, pair)));
+    }
+    facts.append(&mut closed);
 }
 
 fn predicate(atom: &Atom) -> Symbol {
@@ -85,8 +123,10 @@ pub fn matches(rule: &Rule, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BT
 
 fn extend(atom: &Atom, binding: &Binding, facts: &BTreeSet<Fact>) -> Vec<Binding> {
     let terms = atom.terms();
-    let rows =
-        facts.iter().filter(|fact| fact.predicate == predicate(atom) && fact.arguments.len() == terms.len());
+    let of_predicate = facts.range(Fact::new(predicate(atom), [])..);
+    let rows = of_predicate
+        .take_while(|fact| fact.predicate == predicate(atom))
+        .filter(|fact| fact.arguments.len() == terms.len());
     rows.filter_map(|fact| {
         let mut longer = binding.clone();
         for (&term, &symbol) in terms.iter().zip(&fact.arguments) {

@@ -5,14 +5,17 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use metaplan_rules::{
     Atom, BuiltIn, Cause, Delta, Derivation, Engine, Fact, Literal, Program, Reason, Rule, RuleIdentity,
-    Symbol, Symbols, Term, Variable,
+    Symbol, Symbols, Term, Variable, owl_rl,
 };
 
-use crate::oracle::{Binding, ground, holds, matches, naive, value};
+use crate::oracle::{Binding, close_under, ground, holds, matches, naive, value};
 
 const PREDICATES: u8 = 9;
 /// Predicates of one level, with one, two and three arguments.
 const PER_LEVEL: u8 = 3;
+/// The predicate that is `owl:sameAs` in scripts with equality.
+const EQUALITY: u8 = 1;
+const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
 const VARIABLES: u8 = 4;
 const CONSTANTS: u8 = 4;
 /// Which predicates changes and heads take: few, so that conclusions meet.
@@ -37,12 +40,19 @@ struct World {
 }
 
 impl World {
-    fn new() -> Self {
+    fn new(equality: bool) -> Self {
         let mut symbols = Symbols::new();
-        let predicates = (0..PREDICATES).map(|number| symbols.name(&format!("p{number}"))).collect();
+        let name =
+            |number| if equality && number == EQUALITY { SAME_AS.into() } else { format!("p{number}") };
+        let predicates = (0..PREDICATES).map(|number| symbols.name(&name(number))).collect();
         let names = ["a", "b"].map(|name| symbols.name(name));
         let numbers = [1, 2].map(|number| symbols.literal(Literal::integer(number)));
         Self { symbols, predicates, constants: names.into_iter().chain(numbers).collect() }
+    }
+
+    /// All relations with their numbers of arguments.
+    fn relations(&self) -> impl Iterator<Item = (Symbol, usize)> {
+        (0..PREDICATES).map(|number| (self.predicates[usize::from(number)], arity(number)))
     }
 
     fn level(&self, predicate: Symbol) -> usize {
@@ -137,7 +147,8 @@ impl World {
     }
 }
 
-/// Every step follows from its supports by its rule, and no fact supports itself.
+/// The first step follows from its supports by its rule, and no fact supports itself. The other steps are first in
+/// derivations of their own.
 fn check_derivation(engine: &Engine, derivation: &Derivation) {
     let mut supported = vec![false; derivation.steps.len()];
     // Supports are settled in as many passes as the longest chain; a circle never is.
@@ -150,7 +161,7 @@ fn check_derivation(engine: &Engine, derivation: &Derivation) {
         }
     }
     assert!(supported.iter().all(|&supported| supported), "circular: {derivation:?}");
-    for step in &derivation.steps {
+    for step in &derivation.steps[..1] {
         let Reason::Rule { identity, bindings, supports, absent } = &step.reason else { continue };
         let rule =
             engine.program().rules.iter().find(|rule| rule.identity == *identity).expect("an active rule");
@@ -182,14 +193,25 @@ fn check_derivation(engine: &Engine, derivation: &Derivation) {
 
 /// The constraints that fire, with how many matches each has.
 fn violations(program: &Program, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<u32, usize> {
-    let constraints = program.rules.iter().filter(|rule| rule.head.is_empty());
+    let random = program.rules.iter().filter(|rule| &*rule.identity.source == "random");
+    let constraints = random.filter(|rule| rule.head.is_empty());
     let counts = constraints.map(|rule| (rule.identity.position, matches(rule, symbols, facts).len()));
     counts.filter(|&(_, count)| count > 0).collect()
 }
 
 fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTreeSet<Fact> {
     let mut symbols = engine.symbols().clone();
-    let expected = naive(engine.program(), &mut symbols, stated, |predicate| world.level(predicate));
+    let of_equality = |rule: &&Rule| &*rule.identity.source == owl_rl::SOURCE;
+    let random = engine.program().rules.iter().filter(|rule| !of_equality(rule)).cloned().collect();
+    let same = world.predicates[usize::from(EQUALITY)];
+    let equality = symbols.value(same).as_name() == Some(SAME_AS);
+    let close = |facts: &mut BTreeSet<Fact>| {
+        if equality {
+            close_under(same, facts);
+        }
+    };
+    let level = |predicate| world.level(predicate);
+    let expected = naive(&Program { rules: random }, &mut symbols, stated, level, close);
     let facts: BTreeSet<Fact> = engine.facts().collect();
     assert_eq!(facts, expected);
     for fact in &facts {
@@ -219,18 +241,22 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
 }
 
 /// Runs a script of changes and compares with the oracle after every step.
-pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>]) {
-    let world = World::new();
+pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], equality: bool) {
+    let world = World::new(equality);
     let program = Program { rules: rules.iter().enumerate().map(|(at, raw)| world.rule(at, raw)).collect() };
     // Identical rules are evaluated once, under the first one's identity.
     let mut seen = BTreeSet::new();
     let distinct = |rule: &Rule| seen.insert(format!("{:?}{:?}", rule.head, rule.body));
     let program = Program { rules: program.rules.into_iter().filter(distinct).collect() };
     let program = renumber(program);
+    let mut symbols = world.symbols.clone();
+    let complete = |program: Program, symbols: &mut Symbols| {
+        if equality { owl_rl::close_under_equality(&program, world.relations(), symbols) } else { program }
+    };
     let mut stated: BTreeSet<Fact> =
         start.iter().map(|&(_, p, arguments)| world.fact(p, arguments)).collect();
-    let mut engine =
-        Engine::new(world.symbols.clone(), program.clone(), stated.iter().cloned()).expect("safe rules");
+    let full = complete(program.clone(), &mut symbols);
+    let mut engine = Engine::new(symbols, full, stated.iter().cloned()).expect("safe rules");
     let mut before = check_state(&engine, &world, &stated);
     let mut absent = BTreeSet::new();
     for step in script {
@@ -256,9 +282,9 @@ pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>]) 
         before = after;
     }
     let active = program.rules.into_iter().filter(|rule| !absent.contains(&rule.identity.position));
-    let reversed = renumber(Program { rules: active.rev().collect() });
-    let engine =
-        Engine::new(engine.symbols().clone(), reversed, stated.into_iter().rev()).expect("safe rules");
+    let mut symbols = engine.symbols().clone();
+    let reversed = complete(renumber(Program { rules: active.rev().collect() }), &mut symbols);
+    let engine = Engine::new(symbols, reversed, stated.into_iter().rev()).expect("safe rules");
     assert_eq!(engine.facts().collect::<BTreeSet<_>>(), before);
 }
 
@@ -296,7 +322,8 @@ fn switch(
             engine.set_program(Program { rules })
         }
     };
-    let active: BTreeSet<u32> = engine.program().rules.iter().map(|rule| rule.identity.position).collect();
+    let random = engine.program().rules.iter().filter(|rule| &*rule.identity.source == "random");
+    let active: BTreeSet<u32> = random.map(|rule| rule.identity.position).collect();
     let expected = program.rules.iter().map(|rule| rule.identity.position).filter(|n| !absent.contains(n));
     assert_eq!(active, expected.collect());
     change.expect("safe rules")
