@@ -1,4 +1,4 @@
-//! OWL axioms to rules, by the tables of OWL 2 RL/RDF ([1], section 4.3), instantiated per axiom.
+//! OWL axioms to rules, by the tables of OWL 2 RL/RDF (section 4.3 of \[1\]), instantiated per axiom.
 //!
 //! A rule of the tables speaks of triples; here each class is a relation with one argument and each property one with
 //! two, so every axiom gives rules of its own and no join ever runs over all triples. The schema table (`scm-*`) has
@@ -7,7 +7,7 @@
 //!
 //! Equality (table 4) is `owl:sameAs` as an equivalence under which every relation is closed. Datatype clashes need no rule: see [`crate::Engine::violations`].
 //!
-//! [1] W3C OWL 2 Web Ontology Language Profiles (Second Edition), 2012.
+//! \[1\] W3C OWL 2 Web Ontology Language Profiles (Second Edition), 2012.
 
 use std::collections::BTreeSet;
 

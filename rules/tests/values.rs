@@ -157,11 +157,96 @@ fn functions_compute() {
         ("substringBefore", "\"a=b\" \"=\"", Some("\"a\"")),
         ("substringAfter", "\"a=b\" \"=\"", Some("\"b\"")),
         ("substringAfter", "\"ab\" \"=\"", Some("\"\"")),
+        ("replace", "\"abab\" \"(a)b\" \"$1-\"", Some("\"a-a-\"")),
+        ("replace", "\"aXb\" \"x\" \"\\\\$\" \"i\"", Some("\"a$b\"")),
+        ("replace", "\"ab\" \"x*\" \"y\"", None),
+        ("replace", "\"ab\" \"(\" \"y\"", None),
     ] {
         let arguments = values(arguments);
         let built_in = BuiltIn::from_name(name).expect(name);
         let result = built_in.compute(&arguments.iter().collect::<Vec<_>>());
         assert_eq!(result, expected.map(literal), "{name} {arguments:?}");
+    }
+}
+
+/// Values written `kind:lexical`, where the kind is a date, time or duration type, or else as rule text.
+fn temporal(text: &str) -> Literal {
+    let (kind, lexical) = text.split_once(':').unwrap_or(("", text));
+    let datatype = match kind {
+        "dt" => "dateTime",
+        "d" => "date",
+        "t" => "time",
+        "p" => "duration",
+        _ => return literal(text),
+    };
+    literal(&format!("\"{lexical}\"^^xsd:{datatype}"))
+}
+
+#[test]
+fn moments_and_durations_compute() {
+    for (name, arguments, expected) in [
+        ("yearMonthDuration", "1 14", Some("p:P2Y2M")),
+        ("dayTimeDuration", "1 2 3 4.5", Some("p:P1DT2H3M4.5S")),
+        ("dayTimeDuration", "1 2 -3 4.5", None),
+        ("dateTime", "2026 2 3 4 5 6.5", Some("dt:2026-02-03T04:05:06.5")),
+        ("dateTime", "2026 2 3 4 5 6 \"+02:00\"", Some("dt:2026-02-03T02:05:06Z")),
+        ("dateTime", "2026 2 30 4 5 6", None),
+        ("date", "2026 2 3 \"Z\"", Some("d:2026-02-03Z")),
+        ("time", "4 5 6", Some("t:04:05:06")),
+        ("addYearMonthDurations", "p:P1Y p:P2M", Some("p:P1Y2M")),
+        ("addYearMonthDurations", "p:P1Y p:P2D", None),
+        ("subtractYearMonthDurations", "p:P1Y p:P2M", Some("p:P10M")),
+        ("multiplyYearMonthDuration", "p:P1Y 1.5", Some("p:P1Y6M")),
+        ("multiplyYearMonthDuration", "p:P1M 0.5", Some("p:P1M")),
+        ("divideYearMonthDurations", "p:P1Y 5", Some("p:P2M")),
+        ("divideYearMonthDurations", "p:P1Y 0", None),
+        ("addDayTimeDurations", "p:PT1H p:P1D", Some("p:P1DT1H")),
+        ("subtractDayTimeDurations", "p:PT1H p:P1D", Some("p:-PT23H")),
+        ("multiplyDayTimeDurations", "p:PT1H 2.5", Some("p:PT2H30M")),
+        ("divideDayTimeDuration", "p:PT1H 4", Some("p:PT15M")),
+        ("subtractDates", "d:2026-03-01 d:2026-02-01", Some("p:P28D")),
+        ("subtractDates", "d:2026-03-01 d:2026-02-01Z", None),
+        ("subtractTimes", "t:01:00:00 t:02:30:00", Some("p:-PT1H30M")),
+        ("addYearMonthDurationToDateTime", "dt:2026-01-31T10:00:00 p:P1M", Some("dt:2026-02-28T10:00:00")),
+        (
+            "subtractYearMonthDurationFromDateTime",
+            "dt:2024-02-29T10:00:00Z p:P1Y",
+            Some("dt:2023-02-28T10:00:00Z"),
+        ),
+        ("addDayTimeDurationToDateTime", "dt:2026-12-31T23:59:59.5 p:PT1S", Some("dt:2027-01-01T00:00:00.5")),
+        (
+            "subtractDayTimeDurationFromDateTime",
+            "dt:2026-01-01T00:00:00 p:PT0.5S",
+            Some("dt:2025-12-31T23:59:59.5"),
+        ),
+        ("addYearMonthDurationToDate", "d:2026-11-30 p:P3M", Some("d:2027-02-28")),
+        ("subtractYearMonthDurationFromDate", "d:2026-01-30 p:P1Y", Some("d:2025-01-30")),
+        ("addDayTimeDurationToDate", "d:2026-02-28 p:P1DT5H", Some("d:2026-03-01")),
+        ("subtractDayTimeDurationFromDate", "d:2026-03-01 p:PT1H", Some("d:2026-02-28")),
+        ("addDayTimeDurationToTime", "t:23:30:00 p:PT1H", Some("t:00:30:00")),
+        ("subtractDayTimeDurationFromTime", "t:00:30:00 p:PT1H", Some("t:23:30:00")),
+        ("addDayTimeDurationToTime", "t:23:30:00 p:P1M", None),
+        ("addDayTimeDurationToTime", "d:2026-01-01 p:PT1H", None),
+        (
+            "subtractDateTimesYieldingYearMonthDuration",
+            "dt:2026-03-01T00:00:00 dt:2025-02-02T00:00:00",
+            Some("p:P1Y"),
+        ),
+        (
+            "subtractDateTimesYieldingYearMonthDuration",
+            "dt:2025-02-02T00:00:00 dt:2026-03-02T00:00:00",
+            Some("p:-P1Y1M"),
+        ),
+        (
+            "subtractDateTimesYieldingDayTimeDuration",
+            "dt:2026-03-01T00:00:00Z dt:2026-02-28T12:00:00Z",
+            Some("p:PT12H"),
+        ),
+    ] {
+        let arguments: Vec<Literal> = arguments.split(' ').map(temporal).collect();
+        let built_in = BuiltIn::from_name(name).expect(name);
+        let result = built_in.compute(&arguments.iter().collect::<Vec<_>>());
+        assert_eq!(result, expected.map(temporal), "{name} {arguments:?}");
     }
 }
 
@@ -181,6 +266,11 @@ fn tests_hold_or_do_not() {
         ("containsIgnoreCase", "\"aBc\" \"Bc\"", true),
         ("contains", "\"aBc\" \"bc\"", false),
         ("stringEqualIgnoreCase", "\"FALSE\" \"false\"", true),
+        ("matches", "\"c_thruster_1\" \"^c_[a-z]+_[0-9]$\"", true),
+        ("matches", "\"ABC\" \"b\"", false),
+        ("matches", "\"ABC\" \"b\" \"i\"", true),
+        ("matches", "\"ABC\" \"(\"", false),
+        ("matches", "1 \"1\"", false),
         ("add", "3 1 2", true),
         ("add", "3 1 1", false),
         ("lessThan", "1", false),

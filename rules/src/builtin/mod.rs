@@ -6,6 +6,8 @@
 //! [1] W3C Member Submission: SWRL, 2004.
 
 mod math;
+mod pattern;
+mod temporal;
 mod text;
 
 use std::cmp::Ordering;
@@ -125,6 +127,64 @@ built_ins! {
     SubstringBefore "substringBefore" 3..=3 Function,
     /// The part of the second after the third, empty if it does not occur.
     SubstringAfter "substringAfter" 3..=3 Function,
+    /// The first matches the regular expression of the second; the third, if any, holds `XPath` flags.
+    Matches "matches" 2..=3 Test,
+    /// The second, each match of the third's regular expression replaced by the fourth; flags may follow.
+    Replace "replace" 4..=5 Function,
+    /// Duration of so many years and months.
+    YearMonthDuration "yearMonthDuration" 3..=3 Function,
+    /// Duration of so many days, hours, minutes and seconds.
+    DayTimeDuration "dayTimeDuration" 5..=5 Function,
+    /// Moment from year, month, day, hour, minute, second and, if given, time zone (`Z`, `+02:00`).
+    DateTime "dateTime" 7..=8 Function,
+    /// Date from year, month, day and, if given, time zone.
+    Date "date" 4..=5 Function,
+    /// Time from hour, minute, second and, if given, time zone.
+    Time "time" 4..=5 Function,
+    /// Sum of two durations in months.
+    AddYearMonthDurations "addYearMonthDurations" 3..=3 Function,
+    /// Difference of two durations in months.
+    SubtractYearMonthDurations "subtractYearMonthDurations" 3..=3 Function,
+    /// A duration in months times a number, rounded to months.
+    MultiplyYearMonthDuration "multiplyYearMonthDuration" 3..=3 Function,
+    /// A duration in months divided by a number, rounded to months.
+    DivideYearMonthDuration "divideYearMonthDurations" 3..=3 Function,
+    /// Sum of two durations in seconds.
+    AddDayTimeDurations "addDayTimeDurations" 3..=3 Function,
+    /// Difference of two durations in seconds.
+    SubtractDayTimeDurations "subtractDayTimeDurations" 3..=3 Function,
+    /// A duration in seconds times a number.
+    MultiplyDayTimeDuration "multiplyDayTimeDurations" 3..=3 Function,
+    /// A duration in seconds divided by a number.
+    DivideDayTimeDuration "divideDayTimeDuration" 3..=3 Function,
+    /// From the third date to the second.
+    SubtractDates "subtractDates" 3..=3 Function,
+    /// From the third time to the second.
+    SubtractTimes "subtractTimes" 3..=3 Function,
+    /// A moment so many months later.
+    AddYearMonthDurationToDateTime "addYearMonthDurationToDateTime" 3..=3 Function,
+    /// A moment so many seconds later.
+    AddDayTimeDurationToDateTime "addDayTimeDurationToDateTime" 3..=3 Function,
+    /// A moment so many months earlier.
+    SubtractYearMonthDurationFromDateTime "subtractYearMonthDurationFromDateTime" 3..=3 Function,
+    /// A moment so many seconds earlier.
+    SubtractDayTimeDurationFromDateTime "subtractDayTimeDurationFromDateTime" 3..=3 Function,
+    /// A date so many months later.
+    AddYearMonthDurationToDate "addYearMonthDurationToDate" 3..=3 Function,
+    /// A date so much later, in whole days.
+    AddDayTimeDurationToDate "addDayTimeDurationToDate" 3..=3 Function,
+    /// A date so many months earlier.
+    SubtractYearMonthDurationFromDate "subtractYearMonthDurationFromDate" 3..=3 Function,
+    /// A date so much earlier, in whole days.
+    SubtractDayTimeDurationFromDate "subtractDayTimeDurationFromDate" 3..=3 Function,
+    /// A time so much later, around midnight.
+    AddDayTimeDurationToTime "addDayTimeDurationToTime" 3..=3 Function,
+    /// A time so much earlier, around midnight.
+    SubtractDayTimeDurationFromTime "subtractDayTimeDurationFromTime" 3..=3 Function,
+    /// Whole months from the third moment to the second.
+    SubtractDateTimesYieldingYearMonthDuration "subtractDateTimesYieldingYearMonthDuration" 3..=3 Function,
+    /// Seconds from the third moment to the second.
+    SubtractDateTimesYieldingDayTimeDuration "subtractDateTimesYieldingDayTimeDuration" 3..=3 Function,
 }
 
 impl BuiltIn {
@@ -155,6 +215,7 @@ impl BuiltIn {
             [result, rest @ ..] if self.is_function() => {
                 self.compute(rest).is_some_and(|value| value == **result)
             }
+            _ if self == Self::Matches => pattern::matches(arguments),
             [left, right] => self.test(left, right),
             _ => false,
         }
@@ -179,6 +240,7 @@ impl BuiltIn {
         if !self.is_function() || !self.accepts(arguments.len() + 1) {
             return None;
         }
-        math::compute(self, arguments).or_else(|| text::compute(self, arguments))
+        let result = math::compute(self, arguments).or_else(|| text::compute(self, arguments));
+        result.or_else(|| temporal::compute(self, arguments))
     }
 }

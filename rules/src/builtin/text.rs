@@ -21,6 +21,9 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
     if built_in == BuiltIn::StringConcat {
         return Some(Literal::String(arguments.iter().map(|a| a.lexical()).collect::<String>().into()));
     }
+    if built_in == BuiltIn::Replace {
+        return super::pattern::replace(arguments);
+    }
     let first = as_text(arguments.first()?)?;
     if built_in == BuiltIn::Substring {
         return substring(first, &arguments[1..]).map(|text| Literal::String(text.into()));
@@ -43,7 +46,7 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
     Some(Literal::String(text.into()))
 }
 
-fn as_text(literal: &Literal) -> Option<&str> {
+pub(super) fn as_text(literal: &Literal) -> Option<&str> {
     match literal {
         Literal::String(text) | Literal::Uri(text) | Literal::Language { text, .. } => Some(text),
         _ => None,

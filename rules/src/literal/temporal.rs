@@ -66,6 +66,57 @@ impl Moment {
         &self.seconds
     }
 
+    /// Later by a duration: months first, where a day that the month does not have becomes its last, then seconds. A
+    /// time of day wraps around midnight; a date takes whole days, rounded down. `None` for months on a time.
+    ///
+    /// A moment with a time zone is moved in UTC, which is where its months begin.
+    pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
+        let (day, _) = split_day(&self.seconds);
+        let (year, month, date) = civil_from_days(day);
+        let moved = (year.checked_mul(12)?.checked_add(month - 1)?).checked_add(duration.months)?;
+        let (year, month) = (moved.div_euclid(12), moved.rem_euclid(12) + 1);
+        if year.abs() > 1_000_000_000 || (self.kind == MomentKind::Time && duration.months != 0) {
+            return None;
+        }
+        let fits = |date: &i64| {
+            let days = days_from_civil(year, month, *date);
+            civil_from_days(days) == (year, month, *date)
+        };
+        let date = (1..=date).rev().find(fits)?;
+        let shift = days_from_civil(year, month, date) - day;
+        let seconds = add(&add_seconds(&self.seconds, shift.checked_mul(DAY)?), &duration.seconds);
+        let (day, _) = split_day(&seconds);
+        let seconds = match self.kind {
+            MomentKind::DateTime => seconds,
+            MomentKind::Date => Decimal::from(day * DAY),
+            MomentKind::Time => add_seconds(&seconds, -day * DAY),
+        };
+        Some(Self { kind: self.kind, seconds, zoned: self.zoned })
+    }
+
+    /// The seconds from another moment of the same kind to this one; `None` where only one has a time zone.
+    pub(crate) fn since(&self, other: &Self) -> Option<Duration> {
+        let comparable = self.kind == other.kind && self.zoned == other.zoned;
+        comparable.then(|| Duration { months: 0, seconds: add(&self.seconds, &negate(&other.seconds)) })
+    }
+
+    /// The whole months from another moment to this one, truncated; `None` as for [`Moment::since`].
+    pub(crate) fn months_since(&self, other: &Self) -> Option<Duration> {
+        let negative = self.since(other)?.seconds < Decimal::from(0);
+        let (late, early) = if negative { (other, self) } else { (self, other) };
+        let parts = |moment: &Self| {
+            let (day, _) = split_day(&moment.seconds);
+            let (year, month, _) = civil_from_days(day);
+            year * 12 + month
+        };
+        let mut months = parts(late) - parts(early);
+        let reached = early.later(&Duration { months, seconds: Decimal::from(0) })?;
+        if reached.seconds > late.seconds {
+            months -= 1;
+        }
+        Some(Duration { months: if negative { -months } else { months }, seconds: Decimal::from(0) })
+    }
+
     /// Which datatype.
     pub fn kind(&self) -> MomentKind {
         self.kind
@@ -152,6 +203,26 @@ impl Duration {
         })
     }
 
+    /// So many months and seconds.
+    pub(crate) fn new(months: i64, seconds: Decimal) -> Self {
+        Self { months, seconds }
+    }
+
+    /// The part in months.
+    pub fn months(&self) -> i64 {
+        self.months
+    }
+
+    /// The part in seconds.
+    pub fn seconds(&self) -> &Decimal {
+        &self.seconds
+    }
+
+    /// As long, in the other direction.
+    pub(crate) fn negated(&self) -> Option<Self> {
+        Some(Self { months: self.months.checked_neg()?, seconds: negate(&self.seconds) })
+    }
+
     pub(super) fn datatype(&self) -> &'static str {
         if self.months == 0 {
             "http://www.w3.org/2001/XMLSchema#dayTimeDuration"
@@ -203,6 +274,10 @@ fn take_field(text: &str, unit: char) -> Option<(i64, &str)> {
 fn negate(value: &Decimal) -> Decimal {
     let (unscaled, scale) = value.parts();
     Decimal::new(-unscaled, scale)
+}
+
+fn add(left: &Decimal, right: &Decimal) -> Decimal {
+    Decimal::from_rational(&(left.to_rational() + right.to_rational()))
 }
 
 fn add_seconds(value: &Decimal, whole: i64) -> Decimal {
