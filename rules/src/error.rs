@@ -42,6 +42,32 @@ pub enum Error {
         /// As written.
         name: String,
     },
+    /// A `swrlb` name whose arguments or results are lists or URIs.
+    #[error(
+        "{file}:{line}:{column}: R104 built-in `{name}` works on lists or URIs, which the engine has no values for"
+    )]
+    RefusedBuiltIn {
+        /// The source as named by the caller.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// In characters, counted from 1.
+        column: u32,
+        /// As written.
+        name: String,
+    },
+    /// An atom that SWRL does not have, in text that is to be SWRL.
+    #[error("{file}:{line}:{column}: R105 {what} is not SWRL")]
+    NotSwrl {
+        /// The source as named by the caller.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// In characters, counted from 1.
+        column: u32,
+        /// The kind of atom.
+        what: &'static str,
+    },
     /// A head variable that no body atom binds.
     #[error("R202 rule {rule}: variable ?{variable} in the head is not bound by the body")]
     UnsafeHead {

@@ -22,14 +22,14 @@ mod swrl;
 mod symbol;
 mod why_not;
 
-pub use builtin::{BuiltIn, SWRLB};
+pub use builtin::{BuiltIn, CustomBuiltIn, Definition, SWRLB};
 pub use engine::{DEFAULT_STEP_BUDGET, Delta, Engine};
 pub use error::Error;
 pub use explain::{Cause, Derivation, DerivationStep, Reason, Violation};
 pub use fact::{Arguments, Fact};
 pub use literal::{Decimal, Duration, Literal, Moment, MomentKind};
 pub use rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
-pub use swrl::{Prefixes, parse_rules, print_rules};
+pub use swrl::{Prefixes, Syntax, parse_rules, parse_rules_as, print_rules};
 pub use symbol::{Symbol, Symbols, Value};
 pub use why_not::{NearMiss, Obstacle};
 

@@ -69,7 +69,7 @@ fn errors_have_codes_and_positions() {
     );
     check(
         "p(?x) ^ swrlb:listConcat(?x, ?x) -> q(?x)",
-        &["test:1:9: R103 unknown or unsupported built-in `listConcat`"],
+        &["test:1:9: R104 built-in `listConcat` works on lists or URIs, which the engine has no values for"],
     );
     check(
         "p(?x) -> q(\"open",

@@ -5,6 +5,7 @@
 //!
 //! [1] W3C Member Submission: SWRL, 2004.
 
+mod custom;
 mod math;
 mod pattern;
 mod temporal;
@@ -14,6 +15,8 @@ use std::cmp::Ordering;
 
 use crate::literal::Literal;
 
+pub use custom::{CustomBuiltIn, Definition};
+
 /// The namespace of SWRL's built-ins.
 pub const SWRLB: &str = "http://www.w3.org/2003/11/swrlb#";
 
@@ -22,19 +25,29 @@ macro_rules! built_ins {
         /// A built-in predicate or function on literals.
         #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
         #[non_exhaustive]
-        pub enum BuiltIn { $($(#[$doc])* $variant,)* }
+        pub enum BuiltIn {
+            $($(#[$doc])* $variant,)*
+            /// One that is not SWRL's, see [`BuiltIn::custom`].
+            Custom(CustomBuiltIn),
+        }
 
         impl BuiltIn {
-            /// Every built-in there is.
+            /// Every built-in of the engine itself.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// The local name in the `swrlb` namespace.
+            /// The local name in the `swrlb` namespace; the IRI of a custom built-in.
             pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $name,)* }
+                match self {
+                    $(Self::$variant => $name,)*
+                    Self::Custom(custom) => custom.definition().iri(),
+                }
             }
 
-            fn shape(self) -> (usize, usize, Kind) {
-                match self { $(Self::$variant => ($minimum, $maximum, Kind::$kind),)* }
+            fn shape(self) -> Option<(usize, usize, Kind)> {
+                match self {
+                    $(Self::$variant => Some(($minimum, $maximum, Kind::$kind)),)*
+                    Self::Custom(_) => None,
+                }
             }
         }
     };
@@ -187,6 +200,27 @@ built_ins! {
     SubtractDateTimesYieldingDayTimeDuration "subtractDateTimesYieldingDayTimeDuration" 3..=3 Function,
 }
 
+/// Members of `swrlb` whose arguments or results are lists, or whose meaning is relative to a document.
+const REFUSED: [&str; 12] = [
+    "anyURI",
+    "empty",
+    "first",
+    "length",
+    "listConcat",
+    "listIntersection",
+    "listSubtraction",
+    "member",
+    "resolveURI",
+    "rest",
+    "sublist",
+    "tokenize",
+];
+
+/// Whether a local name is SWRL's but works on lists or URIs, which the engine has no values for.
+pub(crate) fn is_refused(local: &str) -> bool {
+    REFUSED.contains(&local)
+}
+
 impl BuiltIn {
     /// The built-in of an IRI in the `swrlb` namespace.
     pub fn from_iri(iri: &str) -> Option<Self> {
@@ -200,23 +234,30 @@ impl BuiltIn {
 
     /// Whether it can take this many arguments.
     pub fn accepts(self, count: usize) -> bool {
-        let (minimum, maximum, _) = self.shape();
-        (minimum..=maximum).contains(&count)
+        match (self, self.shape()) {
+            (Self::Custom(custom), _) => count > 0 && custom.definition().accepts(count),
+            (_, Some((minimum, maximum, _))) => (minimum..=maximum).contains(&count),
+            _ => false,
+        }
     }
 
     /// Whether the first argument is computed from the others and so may be unbound.
     pub fn is_function(self) -> bool {
-        self.shape().2 == Kind::Function
+        match self {
+            Self::Custom(custom) => custom.definition().is_function(),
+            _ => self.shape().is_some_and(|(.., kind)| kind == Kind::Function),
+        }
     }
 
     /// Whether a test holds of its arguments; for a function, whether the first argument is its result.
     pub fn holds(self, arguments: &[&Literal]) -> bool {
-        match arguments {
-            [result, rest @ ..] if self.is_function() => {
+        match (self, arguments) {
+            (Self::Custom(custom), _) if !self.is_function() => custom.definition().holds(arguments),
+            (_, [result, rest @ ..]) if self.is_function() => {
                 self.compute(rest).is_some_and(|value| value == **result)
             }
-            _ if self == Self::Matches => pattern::matches(arguments),
-            [left, right] => self.test(left, right),
+            (Self::Matches, _) => pattern::matches(arguments),
+            (_, [left, right]) => self.test(left, right),
             _ => false,
         }
     }
@@ -239,6 +280,9 @@ impl BuiltIn {
     pub fn compute(self, arguments: &[&Literal]) -> Option<Literal> {
         if !self.is_function() || !self.accepts(arguments.len() + 1) {
             return None;
+        }
+        if let Self::Custom(custom) = self {
+            return custom.definition().compute(arguments);
         }
         let result = math::compute(self, arguments).or_else(|| text::compute(self, arguments));
         result.or_else(|| temporal::compute(self, arguments))

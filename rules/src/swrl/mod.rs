@@ -17,5 +17,5 @@ mod lexer;
 mod parser;
 mod printer;
 
-pub use parser::{Prefixes, parse_rules};
+pub use parser::{Prefixes, Syntax, parse_rules, parse_rules_as};
 pub use printer::print_rules;

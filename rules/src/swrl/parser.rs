@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::lexer::{Fault, Spanned, Token, tokens};
-use crate::builtin::{BuiltIn, SWRLB};
+use crate::builtin::{BuiltIn, SWRLB, is_refused};
 use crate::error::Error;
 use crate::literal::{Literal, XSD, is_datatype};
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
@@ -58,27 +58,51 @@ impl Prefixes {
     }
 }
 
+/// What rule text may contain.
+#[derive(Clone, PartialEq, Eq, Default, Debug)]
+pub struct Syntax {
+    /// Refuse what SWRL does not have: `not`.
+    pub swrl_only: bool,
+    /// Built-ins besides SWRL's, see [`BuiltIn::custom`].
+    pub built_ins: Vec<BuiltIn>,
+}
+
 /// Reads rules. `source` names the text in rule identities and errors; prefixes that the text declares come on top
 /// of those given.
 ///
 /// # Errors
-/// All errors of the text: R101, R102, R103.
+/// All errors of the text: R101, R102, R103, R104.
 pub fn parse_rules(
     text: &str,
     source: &str,
     symbols: &mut Symbols,
     prefixes: &Prefixes,
 ) -> Result<Program, Vec<Error>> {
+    parse_rules_as(text, source, symbols, prefixes, &Syntax::default())
+}
+
+/// As [`parse_rules`], in a syntax of the caller's choice.
+///
+/// # Errors
+/// As [`parse_rules`], and R105.
+pub fn parse_rules_as(
+    text: &str,
+    source: &str,
+    symbols: &mut Symbols,
+    prefixes: &Prefixes,
+    syntax: &Syntax,
+) -> Result<Program, Vec<Error>> {
     let (tokens, faults) = tokens(text);
-    let errors = faults.into_iter().map(|fault| syntax(source, fault)).collect();
+    let errors = faults.into_iter().map(|fault| fault_at(source, fault)).collect();
     let source: Arc<str> = source.into();
     let prefixes = prefixes.clone();
-    let mut parser = Parser { tokens, at: 0, source, symbols, prefixes, variables: Vec::new(), errors };
+    let mut parser =
+        Parser { tokens, at: 0, source, symbols, prefixes, syntax, variables: Vec::new(), errors };
     let program = parser.program();
     if parser.errors.is_empty() { Ok(program) } else { Err(parser.errors) }
 }
 
-fn syntax(source: &str, fault: Fault) -> Error {
+fn fault_at(source: &str, fault: Fault) -> Error {
     Error::Syntax { file: source.to_string(), line: fault.line, column: fault.column, message: fault.message }
 }
 
@@ -88,6 +112,7 @@ struct Parser<'a> {
     source: Arc<str>,
     symbols: &'a mut Symbols,
     prefixes: Prefixes,
+    syntax: &'a Syntax,
     variables: Vec<Box<str>>,
     errors: Vec<Error>,
 }
@@ -139,7 +164,7 @@ impl Parser<'_> {
     fn error(&self, expected: &str) -> Error {
         let (line, column) = self.position();
         let message = format!("expected {expected}, found {}", describe(self.peek()));
-        syntax(&self.source, Fault { message, line, column })
+        fault_at(&self.source, Fault { message, line, column })
     }
 
     fn expect(&mut self, token: &Token, expected: &str) -> Parsed<()> {
@@ -215,9 +240,16 @@ impl Parser<'_> {
             }
             self.expect(&Token::Close, "`,` or `)`")?;
         }
+        if negated && self.syntax.swrl_only {
+            let (file, (line, column)) = (self.source.to_string(), at);
+            return Err(Error::NotSwrl { file, line, column, what: "negation as failure" });
+        }
         if negated {
             let predicate = self.symbols.name(&predicate);
             return Ok(Atom::Not { predicate, arguments });
+        }
+        if let Some(&built_in) = self.syntax.built_ins.iter().find(|b| b.name() == predicate) {
+            return Ok(Atom::BuiltIn { built_in, arguments });
         }
         if let Some(local) = predicate.strip_prefix(SWRLB) {
             return match BuiltIn::from_name(local) {
@@ -243,7 +275,12 @@ impl Parser<'_> {
     }
 
     fn unknown_built_in(&self, name: &str, (line, column): (u32, u32)) -> Error {
-        Error::UnknownBuiltIn { file: self.source.to_string(), line, column, name: name.to_string() }
+        let (file, name) = (self.source.to_string(), name.to_string());
+        if is_refused(&name) {
+            Error::RefusedBuiltIn { file, line, column, name }
+        } else {
+            Error::UnknownBuiltIn { file, line, column, name }
+        }
     }
 
     /// A name or IRI, in full.

@@ -50,6 +50,7 @@ impl Printer<'_> {
         let name = match atom {
             Atom::Relation { predicate, .. } => self.constant(*predicate),
             Atom::Not { predicate, .. } => format!("not {}", self.constant(*predicate)),
+            Atom::BuiltIn { built_in: custom @ BuiltIn::Custom(_), .. } => self.name(custom.name()),
             Atom::BuiltIn { built_in, .. } => self.name(&format!("{SWRLB}{}", built_in.name())),
             Atom::Same(..) => "sameAs".into(),
             Atom::Different(..) => "differentFrom".into(),
