@@ -411,7 +411,11 @@ impl Run<'_> {
         let shortest = optimize(&by_steps, self.config, &mut silent);
         let steps = match (&shortest.plan, shortest.status) {
             (Some(plan), Status::Optimal) => plan.steps.len(),
-            _ => return Solution { lower_bound: None, ..shortest },
+            // The plan that there may be is measured by its steps, not by the metric: of no use to the user.
+            (Some(_), _) => {
+                return Solution { status: Status::Unknown, plan: None, lower_bound: None, ..shortest };
+            }
+            (None, _) => return Solution { lower_bound: None, ..shortest },
         };
         // Every plan of the task with this horizon has exactly this many steps, so a constant for each step
         // changes nothing but the sign of the costs.

@@ -28,7 +28,7 @@ const CHOICE_LIMIT: usize = 20_000;
 pub(crate) enum Found {
     /// A cheapest plan.
     Optimal(GroundPlan),
-    /// There is no plan: every reachable state was visited.
+    /// There is no plan: every reachable state was visited, or is dominated by one that was.
     None,
     /// A limit was reached first.
     Unknown,

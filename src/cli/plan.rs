@@ -6,8 +6,15 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use encodings::{Config, Improvement, Limits, Plan, Proof, Solution, Status, Step, Unbounded, optimize};
+use encodings::pddl::ast::{Name, Problem};
+use encodings::validate::{Options, PlanStep, PlanText, validate};
+use encodings::{
+    Config, Exact, Improvement, Limits, Plan, Proof, Solution, Status, Step, Unbounded, optimize,
+};
 use indicatif::{ProgressBar, ProgressStyle};
+use metaplan::message::Message;
+use metaplan::mission::Mission;
+use num_rational::BigRational;
 use serde_json::{Value, json};
 
 use crate::cli::{Common, Exit, Failure, Format, Situation, output};
@@ -86,6 +93,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let solution = optimize(&task, &config, &mut report);
     progress.finish_and_clear();
+    if let Some(plan) = &solution.plan {
+        confirm(&mission, &problem, plan)?;
+    }
 
     let text = match (arguments.plan_format, common.format) {
         (Some(PlanFormat::Json), _) | (None, Format::Json) => {
@@ -109,6 +119,31 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => output::answer(&text),
     }
     Ok(exit(solution.status))
+}
+
+/// Has the independent validator execute the plan; what it refuses is not shown.
+fn confirm(mission: &Mission, problem: &Problem, plan: &Plan) -> Result<(), Failure> {
+    let rational = |exact: Exact| BigRational::new(exact.numerator.into(), exact.denominator.into());
+    let steps = plan.steps.iter().map(|step| PlanStep {
+        action: Name::new(&step.action),
+        arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
+        start: Some(rational(step.start)),
+        duration: (step.duration.numerator != 0).then(|| rational(step.duration)),
+        line: 0,
+    });
+    let verdict =
+        validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &Options::default());
+    let reason = match (&verdict.violation, verdict.metric) {
+        (Some(violation), _) => {
+            format!("the validator refuses the plan that was found: {}", violation.message)
+        }
+        (None, Some(metric)) if metric != rational(plan.cost) => {
+            format!("the plan that was found costs {metric}, and not {} as claimed", plan.cost)
+        }
+        (None, _) => return Ok(()),
+    };
+    let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
+    Err(Failure { exit: Exit::Fault, messages: vec![Message::error("M170", text)] })
 }
 
 fn exit(status: Status) -> Exit {
@@ -181,7 +216,7 @@ fn verdict(solution: &Solution) -> String {
             steps(*step_bound)
         ),
         (Status::Unsolvable, _, _) => {
-            "no plan exists, proved: every reachable state was visited\n".to_owned()
+            "no plan exists, proved: every reachable state was visited or is dominated\n".to_owned()
         }
         (Status::UnsolvableWithinHorizon, _, _) => {
             format!("no plan with up to {}, proved; longer ones were not considered\n", steps(horizon))
