@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ontology::tomasys::View;
 use ontology::tomasys::change::{self, Status};
-use ontology::{Ontology, ReadOptions};
+use ontology::{Equality, Ontology, ReadOptions};
 use rules::{Delta, Engine, Fact, Literal, Prefixes, Program, Symbols};
 
 use crate::message::Message;
@@ -48,26 +48,36 @@ impl Knowledge {
     /// # Errors
     /// All that is wrong with them.
     pub fn read(sources: &Sources) -> Result<Self, Vec<Message>> {
-        let read = ontology::read_files(&sources.documents, &sources.options);
-        Self::build(read, &sources.rules)
+        Self::read_as(sources, Equality::Owl)
     }
 
-    /// As [`Knowledge::read`], from the text of one document, which `name` stands for in messages.
+    /// As [`Knowledge::read`], where two names may stand for one individual, as in OWL, or never.
     ///
     /// # Errors
-    /// All that is wrong with it.
-    pub fn read_text(
+    /// All that is wrong with the sources.
+    pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+        let read = ontology::read_files(&sources.documents, &sources.options);
+        Self::build(read, &sources.rules, equality)
+    }
+
+    /// As [`Knowledge::read_as`], from the text of one document, which `name` stands for in messages, in place of the
+    /// documents.
+    ///
+    /// # Errors
+    /// All that is wrong with the sources.
+    pub fn read_text_as(
         text: &str,
         name: &str,
-        rules: &[String],
-        options: &ReadOptions,
+        sources: &Sources,
+        equality: Equality,
     ) -> Result<Self, Vec<Message>> {
-        Self::build(ontology::read_text(text, name, options), rules)
+        Self::build(ontology::read_text(text, name, &sources.options), &sources.rules, equality)
     }
 
     fn build(
         read: Result<Ontology, Vec<ontology::Error>>,
         rule_files: &[String],
+        equality: Equality,
     ) -> Result<Self, Vec<Message>> {
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
@@ -86,14 +96,16 @@ impl Knowledge {
                 return Err(errors);
             }
         };
-        let lowered = ontology::lower(&ontology, &mut symbols);
-        let warnings =
+        let lowered = ontology::lower_with(&ontology, equality, &mut symbols);
+        let mut warnings: Vec<Message> =
             ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
         let rule_count = ontology.rules.len() + own.len();
         let mut program = lowered.program;
         program.rules.extend(own);
         let engine = Engine::new(symbols, program, lowered.facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
+        let mistakes = ontology::tomasys::check(&ontology, &engine);
+        warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
         Ok(Self { engine, rule_count, warnings })
     }
 

@@ -1,5 +1,6 @@
 //! Arguments to calls of the library, answers to standard output, everything else to standard error.
 
+mod convert;
 mod output;
 mod plan;
 mod reason;
@@ -84,6 +85,8 @@ enum Format {
     Json,
     /// `reason` only: the inferred assertions, sorted.
     Ntriples,
+    /// `reason` only: the inferred assertions by subject.
+    Turtle,
 }
 
 #[derive(Debug, Subcommand)]
@@ -92,6 +95,8 @@ enum Command {
     Plan(plan::Arguments),
     /// What follows from knowledge bases and rules: assertions, availability, objectives in error.
     Reason(reason::Arguments),
+    /// A knowledge base with its imports as one document in another syntax.
+    Convert(convert::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
     Validate(validate::Arguments),
 }
@@ -258,12 +263,15 @@ pub fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli) -> Result<Exit, Failure> {
-    if cli.common.format == Format::Ntriples && !matches!(cli.command, Command::Reason(_)) {
-        return Err(Failure::usage(Message::error("M107", "`--format ntriples` goes with `reason`")));
+    let triples = matches!(cli.common.format, Format::Ntriples | Format::Turtle);
+    if triples && !matches!(cli.command, Command::Reason(_)) {
+        let text = "`--format ntriples` and `--format turtle` go with `reason`";
+        return Err(Failure::usage(Message::error("M107", text)));
     }
     match &cli.command {
         Command::Plan(arguments) => plan::run(arguments, &cli.common),
         Command::Reason(arguments) => reason::run(arguments, &cli.common),
+        Command::Convert(arguments) => convert::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),
     }
 }

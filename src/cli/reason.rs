@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use metaplan::knowledge::{Contradiction, Knowledge, Sources};
+use metaplan::message::Message;
 use metaplan::mission::source;
+use ontology::Equality;
 use rules::{Delta, Value};
 use serde_json::json;
 
@@ -34,6 +36,9 @@ pub struct Arguments {
     /// A component that has failed (repeatable).
     #[arg(long, value_name = "COMPONENT")]
     fail: Vec<String>,
+    /// Two names never stand for one individual, as in databases and in PDDL; in OWL they may.
+    #[arg(long)]
+    unique_names: bool,
 }
 
 /// Runs the command.
@@ -59,25 +64,31 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Format::Ntriples => {
             output::answer(&ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred()));
         }
+        Format::Turtle => {
+            let triples = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
+            output::answer(&ontology::turtle(&triples).map_err(|error| Message::from_ontology(&error))?);
+        }
         Format::Json => output::json_answer(&json(&knowledge, &contradictions)),
         Format::Text => output::answer(&text(&knowledge, &contradictions)),
     }
-    if !contradictions.is_empty() && common.format == Format::Ntriples {
+    if !contradictions.is_empty() && matches!(common.format, Format::Ntriples | Format::Turtle) {
         return crate::cli::consistent(Some(&knowledge)).map(|()| Exit::Done);
     }
     Ok(if contradictions.is_empty() { Exit::Done } else { Exit::Inconsistent })
 }
 
 fn read(arguments: &Arguments) -> Result<Knowledge, Failure> {
-    let options = arguments.imports.options();
+    let equality = if arguments.unique_names { Equality::UniqueNames } else { Equality::Owl };
+    let (rules, options) = (arguments.rules.clone(), arguments.imports.options());
+    let mut sources = Sources { documents: Vec::new(), rules, options };
     match &arguments.documents[..] {
         [only] if only.as_os_str() == "-" => {
             let text = source(only)?;
-            Ok(Knowledge::read_text(text.text(), "-", &arguments.rules, &options)?)
+            Ok(Knowledge::read_text_as(text.text(), "-", &sources, equality)?)
         }
         documents => {
-            let (documents, rules) = (documents.to_vec(), arguments.rules.clone());
-            Ok(Knowledge::read(&Sources { documents, rules, options })?)
+            sources.documents = documents.to_vec();
+            Ok(Knowledge::read_as(&sources, equality)?)
         }
     }
 }

@@ -3,5 +3,7 @@
 mod cli;
 mod common;
 mod real;
+mod reference;
+mod reason;
 mod ugv;
 mod uuv;

@@ -1,0 +1,101 @@
+//! `metaplan reason` and `metaplan convert` as their users run them.
+
+use crate::common::{Outcome, metaplan, metaplan_in, root};
+
+/// Checks the exit status and that answer or messages contain each text; no fault is ever reported.
+fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
+    assert_eq!(outcome.status, status, "{outcome:#?}");
+    for text in texts {
+        assert!(outcome.stderr.contains(text) || outcome.stdout.contains(text), "no `{text}`: {outcome:#?}");
+    }
+    assert!(!outcome.stderr.contains("panicked") && !outcome.stderr.contains("M170"), "{outcome:#?}");
+}
+
+/// Runs a command on a text from standard input or, where the arguments name `model.ttl`, from a file.
+fn run(arguments: &[&str], text: &str) -> Outcome {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    std::fs::write(directory.path().join("model.ttl"), text).expect("a file");
+    let input = if arguments.contains(&"-") { text } else { "" };
+    metaplan_in(directory.path(), arguments, input)
+}
+
+const HEAD: &str = "@prefix t: <http://metacontrol.org/tomasys#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix : <http://x#> .
+<http://x> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .
+:f a t:Function . :fd a t:FunctionDesign ; t:solvesF :f .
+";
+
+#[test]
+fn inferred_assertions_as_turtle() {
+    let arguments = ["reason", "ontology/kb/ugv.ttl", "--fail", "c_kinect", "--format", "turtle"];
+    let outcome = metaplan(&arguments);
+    check(&outcome, 0, &["@prefix tomasys: <http://metacontrol.org/tomasys#>", "tomasys:fd_realisability"]);
+    // What is printed is a document that can be read.
+    check(&metaplan_in(&root(), &["reason", "-"], &outcome.stdout), 0, &["inferred assertions"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--format", "turtle"]), 2, &["M107", "reason"]);
+}
+
+#[test]
+fn names_may_stand_for_one_individual_or_not() {
+    let model = format!("{HEAD}:g a t:Function . :fd t:solvesF :g . :a a t:Action ; t:requiresF :g .");
+    let merged = run(&["reason", "-", "--format", "ntriples"], &model);
+    check(&merged, 0, &["<http://x#a> <http://metacontrol.org/tomasys#requiresF> <http://x#f> ."]);
+    let unique = run(&["reason", "-", "--unique-names", "--format", "ntriples"], &model);
+    check(&unique, 0, &[]);
+    assert!(!unique.stdout.contains("requiresF"), "{unique:#?}");
+}
+
+#[test]
+fn authors_are_warned() {
+    let mistakes = ":g a t:Function . :e a t:FunctionDesign . :r a t:Requirement .";
+    let outcome = run(&["reason", "model.ttl"], &format!("{HEAD}{mistakes}"));
+    check(&outcome, 0, &["warning[O401]", "<http://x#e>", "warning[O402]", "<http://x#g>", "warning[O403]"]);
+    let quiet = run(&["reason", "model.ttl", "-q"], &format!("{HEAD}{mistakes}"));
+    assert_eq!(quiet.stderr, "");
+    let contradiction =
+        run(&["reason", "model.ttl"], &format!("{HEAD}:c a t:Component ; t:c_status false ."));
+    check(&contradiction, 20, &["warning[O406]", "a string is expected", "inconsistent"]);
+    let none = metaplan(&["reason", "ontology/kb/ugv.ttl"]);
+    assert_eq!(none.stderr, "");
+}
+
+#[test]
+fn a_knowledge_base_in_every_syntax() {
+    let expected = metaplan(&["reason", "ontology/kb/uuv.ttl", "--format", "ntriples"]);
+    check(&expected, 0, &[]);
+    let mut starts = Vec::new();
+    for syntax in ["rdfxml", "turtle", "ntriples", "owlxml", "functional"] {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let file = directory.path().join("copy.owl");
+        let file = file.to_str().expect("UTF-8");
+        check(&metaplan(&["convert", "ontology/kb/uuv.ttl", "--to", syntax, "-o", file]), 0, &[]);
+        let answer = metaplan(&["convert", "ontology/kb/uuv.ttl", "--to", syntax]);
+        let written = std::fs::read_to_string(file).expect("the file is read");
+        assert_eq!(answer.stdout, written, "{syntax}");
+        starts.push(written.chars().take(5).collect::<String>());
+        let again = metaplan(&["reason", file, "--format", "ntriples"]);
+        check(&again, 0, &[]);
+        assert_eq!(again.stdout, expected.stdout, "{syntax}");
+    }
+    assert_eq!(starts, ["<?xml", "@pref", "<http", "<?xml", "Prefi"]);
+}
+
+#[test]
+fn what_cannot_be_read_is_bad_input() {
+    for (text, message) in [
+        ("@prefix : <http://x#> . :a x:b :c .", "model.ttl:1:"),
+        ("<rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\"><a>", "model.ttl:1:"),
+        (
+            "<http://x> <http://www.w3.org/2002/07/owl#imports> <http://nowhere> .\n<http://x> a \
+          <http://www.w3.org/2002/07/owl#Ontology> .",
+            "O103",
+        ),
+    ] {
+        for command in [&["reason", "model.ttl"][..], &["convert", "model.ttl", "--to", "turtle"]] {
+            check(&run(command, text), 3, &[message]);
+        }
+    }
+    check(&run(&["convert", "model.ttl", "--to", "klingon"], ""), 2, &["functional"]);
+    check(&run(&["convert", "absent.ttl", "--to", "turtle"], ""), 3, &["O101"]);
+}
