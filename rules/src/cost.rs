@@ -21,7 +21,8 @@ pub(crate) struct Costs {
 impl Costs {
     /// `is_open` says which relations the rules have yet to fill.
     pub fn new(store: &Store, is_open: impl Fn(RelationId) -> bool) -> Self {
-        let largest = store.relations.iter().map(Relation::len).max().unwrap_or(0).max(UNKNOWN_ROWS);
+        let largest =
+            store.relations.iter().map(|relation| relation.len()).max().unwrap_or(0).max(UNKNOWN_ROWS);
         let sizes = store.relations.iter().enumerate().map(|(number, relation)| {
             let rows = match relation.len() {
                 _ if is_open(RelationId(number as u32)) => largest,

@@ -38,9 +38,12 @@ pub struct Delta {
 }
 
 /// Facts, rules, and everything that follows from them.
+///
+/// A clone answers what would be if: it shares everything with its original, and either copies a relation, the bindings
+/// recorded for a rule or the symbols when it first changes them.
 #[derive(Clone, Debug)]
 pub struct Engine {
-    pub(crate) symbols: Symbols,
+    pub(crate) symbols: Arc<Symbols>,
     pub(crate) program: Arc<Program>,
     pub(crate) network: Arc<Network>,
     pub(crate) store: Store,
@@ -85,6 +88,7 @@ impl Engine {
         let network = compile(&program, &mut symbols, &mut store)?;
         let records = Records::new(&network);
         let (program, network) = (Arc::new(program), Arc::new(network));
+        let symbols = Arc::new(symbols);
         let mut engine = Self { symbols, program, network, store, records, budget, disabled: Vec::new() };
         Maintenance::new(&mut engine).derive_all().map_err(|error| vec![error])?;
         Ok(engine)
@@ -124,7 +128,7 @@ impl Engine {
         let kept = self.facts_with(state::ASSERTED).filter(|fact| !undo.delete.contains(fact));
         let facts: Vec<Fact> = kept.chain(undo.insert.iter().cloned()).collect();
         for relation in &mut self.store.relations {
-            relation.clear_all();
+            Arc::make_mut(relation).clear_all();
         }
         self.records = Records::new(&self.network);
         for fact in facts {
@@ -198,7 +202,7 @@ impl Engine {
 
     /// The interner, to add names and literals for new facts.
     pub fn symbols_mut(&mut self) -> &mut Symbols {
-        &mut self.symbols
+        Arc::make_mut(&mut self.symbols)
     }
 
     /// The rules.

@@ -9,6 +9,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::hash::{BuildHasherDefault, Hash, Hasher};
+use std::sync::Arc;
 
 use rustc_hash::FxHasher;
 
@@ -54,7 +55,7 @@ pub(crate) struct Round<'a> {
     pub plans: &'a [Plan],
     /// Variables per match, by compiled rule.
     pub widths: &'a [usize],
-    pub symbols: RefCell<&'a mut Symbols>,
+    pub symbols: RefCell<&'a mut Arc<Symbols>>,
     /// Changed rows, as ranges of [`Seed`]s.
     pub rows: &'a [Row],
     /// Whether the state before the update is asked for, of which the store holds a superset.
@@ -322,7 +323,9 @@ impl Round<'_> {
         let mut kept = 0;
         for start in (0..block.len()).step_by(width) {
             let Some(value) = function(&symbols, &block[start..start + width]) else { continue };
-            block[start + usize::from(result)] = symbols.literal(value);
+            let known = symbols.find_literal(&value);
+            block[start + usize::from(result)] =
+                known.unwrap_or_else(|| Arc::make_mut(&mut symbols).literal(value));
             block.copy_within(start..start + width, kept);
             kept += width;
         }

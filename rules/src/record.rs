@@ -1,5 +1,7 @@
 //! Bindings of recorded derivations: per compiled rule one vector of slots, reused when a row goes.
 
+use std::sync::Arc;
+
 use crate::network::Network;
 use crate::store::Record;
 use crate::symbol::Symbol;
@@ -7,7 +9,7 @@ use crate::symbol::Symbol;
 /// The recorded bindings of all derived rows.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Records {
-    rules: Vec<Slots>,
+    rules: Vec<Arc<Slots>>,
 }
 
 #[derive(Clone, Default, Debug)]
@@ -19,7 +21,7 @@ struct Slots {
 
 impl Records {
     pub fn new(network: &Network) -> Self {
-        let slots = |&width: &usize| Slots { width, ..Slots::default() };
+        let slots = |&width: &usize| Arc::new(Slots { width, ..Slots::default() });
         Self { rules: network.widths.iter().map(slots).collect() }
     }
 
@@ -35,7 +37,7 @@ impl Records {
     }
 
     pub fn add(&mut self, rule: u32, bindings: &[Symbol]) -> Record {
-        let slots = &mut self.rules[rule as usize];
+        let slots = Arc::make_mut(&mut self.rules[rule as usize]);
         let slot = if let Some(slot) = slots.free.pop() {
             let start = slot as usize * slots.width;
             slots.bindings[start..start + slots.width].copy_from_slice(bindings);
@@ -49,7 +51,7 @@ impl Records {
 
     pub fn remove(&mut self, record: Record) {
         if record != Record::NONE {
-            self.rules[record.rule as usize].free.push(record.slot);
+            Arc::make_mut(&mut self.rules[record.rule as usize]).free.push(record.slot);
         }
     }
 

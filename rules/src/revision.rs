@@ -23,7 +23,8 @@ impl Engine {
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
     pub fn set_program(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
-        let revision = revise(&self.network, &self.program, &program, &mut self.symbols, &mut self.store)?;
+        let symbols = Arc::make_mut(&mut self.symbols);
+        let revision = revise(&self.network, &self.program, &program, symbols, &mut self.store)?;
         match revision {
             Some(revision) => self.revise(revision, program).map_err(|error| vec![error]),
             None => self.rebuild(program),
@@ -105,7 +106,7 @@ impl Engine {
 
     fn rebuild(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
         let stated: Vec<Fact> = self.facts_with(state::ASSERTED).collect();
-        let mut engine = Self::with_step_budget(self.symbols.clone(), program, stated, self.budget)?;
+        let mut engine = Self::with_step_budget(self.symbols().clone(), program, stated, self.budget)?;
         engine.disabled.clone_from(&self.disabled);
         let insert = engine.facts().filter(|fact| !self.holds(fact)).collect();
         let delete = self.facts().filter(|fact| !engine.holds(fact)).collect();

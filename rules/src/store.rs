@@ -7,6 +7,7 @@
 use hashbrown::HashTable;
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::hash::BuildHasher;
+use std::sync::Arc;
 
 use crate::fact::{Arguments, Fact};
 use crate::symbol::Symbol;
@@ -48,10 +49,10 @@ impl Record {
     pub const NONE: Self = Self { rule: u32::MAX, slot: 0 };
 }
 
-/// All relations.
+/// All relations. A clone shares each until one of the two changes it.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct Store {
-    pub relations: Vec<Relation>,
+    pub relations: Vec<Arc<Relation>>,
     by_predicate: FxHashMap<(Symbol, u32), RelationId>,
 }
 
@@ -83,13 +84,13 @@ impl Store {
 
     fn push(&mut self, relation: Relation) -> RelationId {
         let id = RelationId(self.relations.len() as u32);
-        self.relations.push(relation);
+        self.relations.push(Arc::new(relation));
         id
     }
 
     /// How many facts are stored, matches of constraints included.
     pub fn len(&self) -> usize {
-        self.relations.iter().map(Relation::len).sum()
+        self.relations.iter().map(|relation| relation.len()).sum()
     }
 
     pub fn get(&self, id: RelationId) -> &Relation {
@@ -97,7 +98,7 @@ impl Store {
     }
 
     pub fn get_mut(&mut self, id: RelationId) -> &mut Relation {
-        &mut self.relations[id.0 as usize]
+        Arc::make_mut(&mut self.relations[id.0 as usize])
     }
 }
 

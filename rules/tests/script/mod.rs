@@ -260,7 +260,9 @@ pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], 
     let mut before = check_state(&engine, &world, &stated);
     let mut absent = BTreeSet::new();
     for step in script {
-        if let Some(&(_, kind, [number, ..])) = step.first().filter(|(_, kind, _)| kind % 8 == 7) {
+        if let Some(&(_, kind, [number, ..])) =
+            step.first().filter(|(_, kind, _)| kind % 8 == 7 && !program.rules.is_empty())
+        {
             let position = usize::from(number) % program.rules.len();
             let change = switch(&mut engine, &program, position, kind / 8, &mut absent);
             let after = check_state(&engine, &world, &stated);
