@@ -1,4 +1,4 @@
-//! An engine and what a robot reports to it at run time: the working knowledge of the MROS reasoner [1].
+//! An engine and what a robot reports to it at run time: the working knowledge of the MROS reasoner \[1\].
 //!
 //! A [`Runtime`] takes reports (component statuses, measurements, objectives, groundings) as updates of its engine
 //! and answers what an adaptation loop asks: which objectives are in error and why, which designs are available, which
@@ -8,7 +8,7 @@
 //! once a cycle, so they stay until grounding or a component's report takes them away; [`Mode::Latch`] does the same,
 //! for those who want to compare or to migrate.
 //!
-//! - [1] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
+//! - \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
 mod objective;
 mod select;
