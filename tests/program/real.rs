@@ -7,7 +7,7 @@ use crate::common::{metaplan, metaplan_in, root};
 use serde_json::Value;
 
 /// The directory with the real files, where it is there.
-fn shared() -> Option<PathBuf> {
+pub fn shared() -> Option<PathBuf> {
     let directory = root().join("../shared");
     if directory.is_dir() {
         return Some(directory);
