@@ -156,6 +156,14 @@ fn updates(criterion: &mut Criterion) {
                 black_box(engine.apply(change(&[], &[&status])).expect("no budget needed"));
             });
         });
+        group.bench_function(BenchmarkId::new("clone", size), |bencher| bencher.iter(|| engine.clone()));
+        group.bench_function(BenchmarkId::new("clone_and_component_failure", size), |bencher| {
+            bencher.iter(|| {
+                let mut what_if = engine.clone();
+                black_box(what_if.apply(change(&[&status], &[])).expect("no budget needed"));
+                what_if
+            });
+        });
         group.bench_function(BenchmarkId::new("measurement", size), |bencher| {
             bencher.iter(|| {
                 black_box(engine.apply(change(&[&low], &[&high])).expect("no budget needed"));

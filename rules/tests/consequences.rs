@@ -196,3 +196,20 @@ fn large_cartesian_products_are_evaluated_piecemeal() {
     let change = engine.apply(Delta { insert: vec![], delete }).expect("no budget needed");
     assert_eq!(change.delete.len(), 1 + side.pow(3) - (side - 1).pow(3));
 }
+
+#[test]
+fn a_clone_and_its_original_go_separate_ways() {
+    let rules = "p(?x) ^ swrlb:add(?y, ?x, 1) -> q(?y) . q(?x) ^ not r(?x) -> s(?x) .";
+    let mut original = engine(rules, "p(1), p(2)").expect("rules");
+    let before: Vec<_> = original.facts().collect();
+    let mut what_if = original.clone();
+    let insert = facts(what_if.symbols_mut(), "p(7), r(2)");
+    let delete = facts(what_if.symbols_mut(), "p(2)");
+    let change = what_if.apply(Delta { insert, delete }).expect("no budget needed");
+    assert_eq!((change.insert.len(), change.delete.len()), (4, 4));
+    assert_eq!(original.facts().collect::<Vec<_>>(), before);
+    let delete = facts(original.symbols_mut(), "p(1)");
+    original.apply(Delta { insert: vec![], delete }).expect("no budget needed");
+    let eight = fact(&mut what_if, "s(8)");
+    assert!(what_if.holds(&eight) && what_if.why(&eight).is_some());
+}
