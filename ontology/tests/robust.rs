@@ -46,3 +46,57 @@ fn texts_cut_off_anywhere() {
         }
     }
 }
+
+/// What reading a text of one line that is no document in any syntax says.
+fn garbage(length: usize) -> String {
+    let text = "x".repeat(length);
+    let errors = read_text(&text, "garbage", &ReadOptions::default()).expect_err("no document");
+    assert!(errors.len() <= 10, "{} errors", errors.len());
+    let longest = errors.iter().map(|error| error.to_string().len()).max().expect("an error");
+    assert!(longest < 2_000, "a message of {longest} bytes");
+    errors[0].to_string()
+}
+
+#[test]
+fn a_long_line_of_garbage() {
+    assert!(garbage(4_000_000).starts_with("garbage:1:"));
+}
+
+#[test]
+#[ignore = "takes a gigabyte of memory"]
+fn a_very_long_line_of_garbage() {
+    assert!(garbage(200_000_000).starts_with("garbage:1:"));
+}
+
+#[cfg(unix)]
+#[test]
+fn loops_of_links_end() {
+    use std::os::unix::fs::symlink;
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let (root, below) = (directory.path().join("root.ttl"), directory.path().join("below"));
+    symlink(directory.path(), &below).expect("link");
+    symlink(directory.path().join("b.ttl"), directory.path().join("a.ttl")).expect("link");
+    symlink(directory.path().join("a.ttl"), directory.path().join("b.ttl")).expect("link");
+    let header = "@prefix owl: <http://www.w3.org/2002/07/owl#> . <http://x> a owl:Ontology ; owl:imports";
+    let options =
+        ReadOptions { directories: vec![directory.path().to_owned(), below], ..ReadOptions::default() };
+    for (import, code) in
+        [("below/below/root.ttl", None), ("a.ttl", Some("O103")), ("http://elsewhere/a.ttl", Some("O103"))]
+    {
+        std::fs::write(&root, format!("{header} <{import}> .")).expect("written");
+        let result = ontology::read_files(&[&root], &options);
+        let found = result.map_err(|errors| errors[0].code()).map(|ontology| ontology.sources.len());
+        assert_eq!(found, code.map_or(Ok(1), Err), "{import}");
+    }
+}
+
+/// Nothing is declared: kinds are taken from use, with a warning for each.
+#[test]
+fn an_undeclared_vocabulary_is_read_with_warnings() {
+    let text = "@prefix : <http://x#> .\n:a a :Robot ; :carries :b ; :mass 2.5 .\n:b a :Load .\n";
+    let ontology = read_text(text, "undeclared.ttl", &ReadOptions::default()).expect("readable");
+    let codes: Vec<_> = ontology.warnings.iter().map(ontology::Warning::code).collect();
+    assert_eq!(codes, ["O201"; 4], "{:?}", ontology.warnings);
+    let facts = lower(&ontology, &mut Symbols::new()).facts;
+    assert_eq!(facts.len(), 4);
+}
