@@ -30,7 +30,21 @@ fn processor_time() -> Duration {
     Duration::from_nanos(nanoseconds.expect("nanoseconds on the processor"))
 }
 
+/// What the process holds in memory, as the kernel reports it, and the most it ever held.
+fn resident() -> String {
+    let status = std::fs::read_to_string("/proc/self/status").expect("Linux");
+    status
+        .lines()
+        .filter(|line| line.starts_with("VmRSS") || line.starts_with("VmHWM"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
 fn main() {
+    let knowledge_base = updates::build(333_334);
+    let memory = resident();
+    println!("{} facts, {memory}", knowledge_base.facts().count());
+    drop(knowledge_base);
     let edges = closure::edges();
     println!("transitive closure from scratch, {} edges", edges.len());
     let mut first = None;

@@ -14,8 +14,8 @@ const RULES: &str = r#"
     solvesO(?fg, ?o) ^ fg_status(?fg, "IN_ERROR_COMPONENT") -> o_status(?o, "IN_ERROR_COMPONENT") .
 "#;
 
-/// The median time of one update.
-pub fn engine(designs: u32) -> Duration {
+/// The engine over three facts for each design.
+pub fn build(designs: u32) -> Engine {
     let mut symbols = Symbols::new();
     let program = parse_rules(RULES, "status", &mut symbols, &Prefixes::new()).expect("rules");
     let mut facts = Vec::new();
@@ -28,9 +28,15 @@ pub fn engine(designs: u32) -> Duration {
         fact("typeFD", format!("fg{number}"), format!("fd{number}"));
         fact("solvesO", format!("fg{number}"), format!("o{number}"));
     }
+    Engine::new(symbols, program, facts).expect("safe rules")
+}
+
+/// The median time of one update.
+pub fn engine(designs: u32) -> Duration {
+    let mut engine = build(designs);
+    let symbols = engine.symbols_mut();
     let failed = symbols.literal(Literal::string("FALSE"));
     let status = Fact::new(symbols.name("c_status"), [symbols.name("c7"), failed]);
-    let mut engine = Engine::new(symbols, program, facts).expect("safe rules");
     let times = (0..ROUNDS).map(|round| {
         let (mut insert, mut delete) = (Vec::new(), Vec::new());
         if round % 2 == 0 { &mut insert } else { &mut delete }.push(status.clone());
