@@ -1,18 +1,19 @@
-//! The only file that knows horned-owl: normalised triples through its RDF reader into our own structures, and
-//! OWL/XML and functional-style documents through its readers into triples.
+//! The only module that knows horned-owl: normalised triples through its RDF reader into our own structures, and
+//! (`transcribe`) OWL/XML and functional-style documents through its readers into triples.
 //!
 //! horned-owl returns sets in hash order; everything is sorted here. What it leaves over becomes warnings.
+
+mod transcribe;
+
+pub(crate) use transcribe::{owl_xml, transcribe};
 
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use horned_owl::error::{HornedError, Location};
 use horned_owl::io::rdf::reader::{ConcreteRcRDFOntology, IncompleteParse, OntologyParser, Term};
-use horned_owl::io::{ParserConfiguration, ofn, owx, rdf};
+use horned_owl::io::ParserConfiguration;
 use horned_owl::model::{self as ho, Component, RcAnnotatedComponent, RcStr};
-use horned_owl::ontology::component_mapped::ComponentMappedOntology;
-use horned_owl::ontology::set::SetOntology;
 
 use crate::error::Warning;
 use crate::normalize::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
@@ -20,58 +21,8 @@ use crate::owl::{
     ANONYMOUS, AnnotatedAxiom, Annotation, AnnotationValue, Argument, Atom, Axiom, Bound, Characteristic,
     ClassExpression, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Rule,
 };
-use crate::read::{Parts, Syntax};
+use crate::read::Parts;
 use crate::vocab::{rdfs, swrla};
-
-/// Why a document cannot be transcribed.
-#[derive(Debug)]
-pub(crate) struct Fault {
-    /// Bytes into the document, 0 where unknown.
-    pub offset: usize,
-    pub message: String,
-}
-
-/// An OWL/XML or functional-style document as an N-Triples document.
-pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> {
-    let fault = |error: HornedError| {
-        let offset = match &error {
-            HornedError::ParserError(_, location) | HornedError::ValidityError(_, location) => match location
-            {
-                Location::BytePosition(at) => *at,
-                Location::ByteSpan(span) => span.start,
-                Location::Unknown => 0,
-            },
-            _ => 0,
-        };
-        Fault { offset: usize::try_from(offset).unwrap_or(0), message: error.to_string() }
-    };
-    let transcription = || {
-        let (mut text, build) = (text, ho::Build::new_rc());
-        let configuration = ParserConfiguration::new(&build);
-        let ontology: SetOntology<RcStr> = match syntax {
-            Syntax::OwlXml => owx::reader::read(&mut text, configuration)?.0,
-            _ => ofn::reader::read(&mut text, configuration)?.0,
-        };
-        let ontology = ComponentMappedOntology::<RcStr, RcAnnotatedComponent>::from(ontology);
-        rdf::writer::write_to_rdf_format(Vec::new(), &ontology, "nt")
-    };
-    let panicked = |_| Fault { offset: 0, message: format!("the {syntax} reader failed on this document") };
-    catch_unwind(AssertUnwindSafe(transcription)).map_err(panicked)?.map_err(fault)
-}
-
-/// A functional-style document as an OWL/XML document.
-pub(crate) fn owl_xml(text: &[u8]) -> Result<String, String> {
-    let transcription = || {
-        let (mut text, build) = (text, ho::Build::new_rc());
-        let ontology: SetOntology<RcStr> = ofn::reader::read(&mut text, ParserConfiguration::new(&build))?.0;
-        let ontology = ComponentMappedOntology::<RcStr, RcAnnotatedComponent>::from(ontology);
-        owx::writer::write(Vec::new(), &ontology, None)
-    };
-    let bytes: Vec<u8> = catch_unwind(AssertUnwindSafe(transcription))
-        .map_err(|_| "the OWL/XML writer failed on it".to_owned())?
-        .map_err(|error: HornedError| error.to_string())?;
-    String::from_utf8(bytes).map_err(|error| error.to_string())
-}
 
 /// Reads a normalised N-Triples document about the ontology `about`; `origins` says where each rule comes from.
 pub(crate) fn build(ntriples: &[u8], about: &str, origins: &[Origin]) -> Result<Parts, String> {

@@ -1,0 +1,61 @@
+//! OWL/XML and functional-style documents as N-Triples, and N-Triples as OWL/XML, by the readers and writers of horned-owl.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use horned_owl::error::{HornedError, Location};
+use horned_owl::io::{ParserConfiguration, ofn, owx, rdf};
+use horned_owl::model::{self as ho, RcAnnotatedComponent, RcStr};
+use horned_owl::ontology::component_mapped::ComponentMappedOntology;
+use horned_owl::ontology::set::SetOntology;
+
+use crate::read::Syntax;
+
+/// Why a document cannot be transcribed.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    /// Bytes into the document, 0 where unknown.
+    pub offset: usize,
+    pub message: String,
+}
+
+/// An OWL/XML or functional-style document as an N-Triples document.
+pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> {
+    let fault = |error: HornedError| {
+        let offset = match &error {
+            HornedError::ParserError(_, location) | HornedError::ValidityError(_, location) => match location
+            {
+                Location::BytePosition(at) => *at,
+                Location::ByteSpan(span) => span.start,
+                Location::Unknown => 0,
+            },
+            _ => 0,
+        };
+        Fault { offset: usize::try_from(offset).unwrap_or(0), message: error.to_string() }
+    };
+    let transcription = || {
+        let (mut text, build) = (text, ho::Build::new_rc());
+        let configuration = ParserConfiguration::new(&build);
+        let ontology: SetOntology<RcStr> = match syntax {
+            Syntax::OwlXml => owx::reader::read(&mut text, configuration)?.0,
+            _ => ofn::reader::read(&mut text, configuration)?.0,
+        };
+        let ontology = ComponentMappedOntology::<RcStr, RcAnnotatedComponent>::from(ontology);
+        rdf::writer::write_to_rdf_format(Vec::new(), &ontology, "nt")
+    };
+    let panicked = |_| Fault { offset: 0, message: format!("the {syntax} reader failed on this document") };
+    catch_unwind(AssertUnwindSafe(transcription)).map_err(panicked)?.map_err(fault)
+}
+
+/// A functional-style document as an OWL/XML document.
+pub(crate) fn owl_xml(text: &[u8]) -> Result<String, String> {
+    let transcription = || {
+        let (mut text, build) = (text, ho::Build::new_rc());
+        let ontology: SetOntology<RcStr> = ofn::reader::read(&mut text, ParserConfiguration::new(&build))?.0;
+        let ontology = ComponentMappedOntology::<RcStr, RcAnnotatedComponent>::from(ontology);
+        owx::writer::write(Vec::new(), &ontology, None)
+    };
+    let bytes: Vec<u8> = catch_unwind(AssertUnwindSafe(transcription))
+        .map_err(|_| "the OWL/XML writer failed on it".to_owned())?
+        .map_err(|error: HornedError| error.to_string())?;
+    String::from_utf8(bytes).map_err(|error| error.to_string())
+}
