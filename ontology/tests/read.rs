@@ -123,7 +123,7 @@ fn rules_in_unusual_shapes_are_read() {
                 "_:b a :C . _:v a swrl:Variable . {}",
                 rule(&format!("( {} )", atom(":C", "_:v")), &format!("( {} )", atom(":D", "_:b")))
             ),
-            "<C>(?d0b1) -> <D>(<urn:metaplan:anonymous:d0b0>)",
+            "<C>(?d0b1) -> <D>(_:d0b0)",
         ),
         // A class expression.
         (
@@ -172,8 +172,8 @@ fn axioms_in_unusual_shapes_are_read() {
             &["DisjointObjectProperties(<p> <q>)"],
         ),
         ("_:b a :C ; :p :i .", &[
-            "ClassAssertion(<C> <urn:metaplan:anonymous:d0b0>)",
-            "ObjectPropertyAssertion(<p> <urn:metaplan:anonymous:d0b0> <i>)",
+            "ClassAssertion(<C> _:d0b0)",
+            "ObjectPropertyAssertion(<p> _:d0b0 <i>)",
         ]),
         // One enumeration for two ranges.
         (
