@@ -3,7 +3,7 @@
 mod cli;
 mod common;
 mod real;
-mod reference;
 mod reason;
+mod reference;
 mod ugv;
 mod uuv;

@@ -11,8 +11,8 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use horned_owl::io::rdf::reader::{ConcreteRcRDFOntology, IncompleteParse, OntologyParser, Term};
 use horned_owl::io::ParserConfiguration;
+use horned_owl::io::rdf::reader::{ConcreteRcRDFOntology, IncompleteParse, OntologyParser, Term};
 use horned_owl::model::{self as ho, Component, RcAnnotatedComponent, RcStr};
 
 use crate::error::Warning;
