@@ -98,6 +98,16 @@ fn bad_pddl_is_reported_with_its_place() {
 
 #[test]
 fn what_the_planner_does_not_handle_is_refused_with_its_place() {
+    let counting = DOMAIN
+        .replace("(:action", "(:functions (used)) (:action")
+        .replace("(at ?b))", "(at ?b) (increase (used) 1))");
+    let unset = PROBLEM.replace("(at c)))", "(at c)) (:metric minimize (used)))");
+    check(&plan(&counting, &unset, &[]), 3, &["domain.pddl:7:", "E301", "`used` without an initial value"]);
+    check(
+        &plan(&counting, &unset.replace("(at a)", "(at a) (= (used) 0)"), &[]),
+        0,
+        &["cost 2", "optimal, proved"],
+    );
     let domain = DOMAIN.replace("(not (at ?a))", "(when (way ?b ?a) (not (at ?a)))");
     check(&plan(&domain, PROBLEM, &[]), 3, &["domain.pddl:7:", "E301", "a conditional effect"]);
 }

@@ -8,7 +8,7 @@ use crate::error::{Error, Place};
 use crate::lifted::{
     Arguments, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term,
 };
-use crate::pddl::ast::Comparison;
+use crate::pddl::ast::{Comparison, Name};
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet, Table};
 
 /// A ground atom over a fluent predicate.
@@ -95,8 +95,23 @@ impl<'a> World<'a> {
         AtomId(self.atoms.insert_full((predicate, arguments), ()).0 as u32)
     }
 
-    pub(crate) fn numeric(&mut self, function: FunctionId, arguments: Arguments) -> NumericId {
-        NumericId(self.numerics.insert_full((function, arguments), ()).0 as u32)
+    /// The variable of a numeric fluent, which must have a value from the start; `total-cost` begins at 0.
+    pub(crate) fn numeric(
+        &mut self,
+        function: FunctionId,
+        arguments: Arguments,
+        place: Place,
+    ) -> Result<NumericId, Failure> {
+        let name = &self.lifted.functions[function.index()].name;
+        let key = (function, arguments);
+        if !self.values.contains_key(&key) && *name != Name::new("total-cost") {
+            return Err(Failure::Error(Error::Unsupported {
+                construct: format!("`{name}` without an initial value"),
+                instead: "a value for it in `:init`".into(),
+                place,
+            }));
+        }
+        Ok(NumericId(self.numerics.insert_full(key, ()).0 as u32))
     }
 
     /// The arguments under a binding that covers them.
@@ -177,10 +192,10 @@ impl<'a> World<'a> {
             Expression::Number(number) => Ok(Linear::constant(*number)),
             // Only the metric mentions it, and takes it apart before it comes here.
             Expression::TotalTime => Err(Failure::Undefined),
-            Expression::Function(function, terms, _) => {
+            Expression::Function(function, terms, place) => {
                 let arguments = Self::arguments(terms, binding);
                 if self.lifted.functions[function.index()].fluent {
-                    return Ok(Linear::variable(self.numeric(*function, arguments)));
+                    return Ok(Linear::variable(self.numeric(*function, arguments, *place)?));
                 }
                 self.values
                     .get(&(*function, arguments))

@@ -316,7 +316,7 @@ impl Build<'_, '_> {
         let mut changed: BTreeMap<NumericId, Linear<Rational>> = BTreeMap::new();
         for effect in effects {
             let Effect::Assign { assignment, function, terms, expression, place } = effect else { continue };
-            let variable = self.world.numeric(*function, World::arguments(terms, &self.binding));
+            let variable = self.world.numeric(*function, World::arguments(terms, &self.binding), *place)?;
             let mut operand = self.open(expression)?;
             substitute(&mut operand, before);
             let current = || {

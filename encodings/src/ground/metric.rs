@@ -64,7 +64,7 @@ pub(crate) fn attach_costs(lifted: &Lifted, task: &mut GroundTask<'_>) -> Result
     if errors.is_empty() { Ok(()) } else { Err(errors) }
 }
 
-/// The initial value of a numeric variable; 0 where the file gives none, as is usual for `total-cost`.
+/// The initial value of a numeric variable; 0 for a `total-cost` to which the file gives none.
 pub(crate) fn initial_value(world: &World<'_>, variable: NumericId) -> Rational {
     let key = world.numerics.get_index(variable.index()).map(|(key, ())| key);
     key.and_then(|key| world.values.get(key)).copied().unwrap_or_else(Rational::zero)
