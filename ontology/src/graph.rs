@@ -25,7 +25,12 @@ impl Graph {
     /// Adds a triple and returns its index.
     pub(crate) fn add(&mut self, triple: Triple) -> usize {
         let index = self.triples.len();
-        self.by_subject.entry(triple.subject.clone()).or_default().push(index);
+        match self.by_subject.get_mut(&triple.subject) {
+            Some(indices) => indices.push(index),
+            None => {
+                self.by_subject.insert(triple.subject.clone(), vec![index]);
+            }
+        }
         self.triples.push(Some(triple));
         index
     }

@@ -15,6 +15,7 @@ mod functional;
 mod graph;
 mod horned;
 mod lower;
+mod names;
 mod normalize;
 mod ntriples;
 mod read;

@@ -7,7 +7,6 @@ mod transcribe;
 
 pub(crate) use transcribe::{owl_xml, transcribe};
 
-use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -16,6 +15,7 @@ use horned_owl::io::rdf::reader::{ConcreteRcRDFOntology, IncompleteParse, Ontolo
 use horned_owl::model::{self as ho, Component, RcAnnotatedComponent, RcStr};
 
 use crate::error::Warning;
+use crate::names::Names;
 use crate::normalize::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
 use crate::owl::{
     ANONYMOUS, AnnotatedAxiom, Annotation, AnnotationValue, Argument, Atom, Axiom, Bound, Characteristic,
@@ -24,8 +24,15 @@ use crate::owl::{
 use crate::read::Parts;
 use crate::vocab::{rdfs, swrla};
 
-/// Reads a normalised N-Triples document about the ontology `about`; `origins` says where each rule comes from.
-pub(crate) fn build(ntriples: &[u8], about: &str, origins: &[Origin]) -> Result<Parts, String> {
+/// Reads a normalised N-Triples document about the ontology `about`, and adds what it says to `plain`, whose IRIs are
+/// `names`; `origins` says where each rule comes from.
+pub(crate) fn build(
+    ntriples: &[u8],
+    about: &str,
+    origins: &[Origin],
+    plain: Parts,
+    names: Names,
+) -> Result<Parts, String> {
     let reading = || {
         let build = ho::Build::new_rc();
         let mut text = ntriples;
@@ -40,8 +47,7 @@ pub(crate) fn build(ntriples: &[u8], about: &str, origins: &[Origin]) -> Result<
     let (ontology, rest) = catch_unwind(AssertUnwindSafe(reading))
         .map_err(|_| "the OWL reader failed on it".to_owned())?
         .map_err(|error| error.to_string())?;
-    let mut builder =
-        Builder { ontology: about.into(), names: HashMap::new(), parts: Parts::default(), rules: Vec::new() };
+    let mut builder = Builder { ontology: about.into(), names, parts: plain, rules: Vec::new() };
     for annotated in ontology {
         builder.component(annotated.component, annotated.ann);
     }
@@ -67,7 +73,7 @@ fn located(rule: Rule, origin: &Origin) -> Rule {
 struct Builder {
     /// The IRI of the first document, or nothing.
     ontology: Iri,
-    names: HashMap<String, Iri>,
+    names: Names,
     parts: Parts,
     /// Rules with their index among the origins.
     rules: Vec<(usize, Rule)>,
@@ -75,12 +81,7 @@ struct Builder {
 
 impl Builder {
     fn iri(&mut self, name: &str) -> Iri {
-        if let Some(iri) = self.names.get(name) {
-            return iri.clone();
-        }
-        let iri = Iri::from(name);
-        self.names.insert(name.to_owned(), iri.clone());
-        iri
+        self.names.iri(name)
     }
 
     fn iris<'a, T: std::ops::Deref<Target = ho::IRI<RcStr>> + 'a>(

@@ -3,9 +3,10 @@
 //! A blank node is an individual if it has a type or a property value, or is one, and no part of it belongs to the
 //! structure of axioms. A blank node with annotations only describes nothing, and is reported.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
+use rustc_hash::FxHashSet as HashSet;
 
 use super::is_reserved;
 use crate::error::Warning;
@@ -49,7 +50,7 @@ fn name(node: &BlankNode) -> NamedNode {
 
 /// Blank nodes that carry part of an axiom, a class expression, a rule or a list.
 fn structural(graph: &Graph) -> HashSet<BlankNode> {
-    let mut nodes = HashSet::new();
+    let mut nodes = HashSet::default();
     for (_, triple) in graph.iter() {
         if let NamedOrBlankNode::BlankNode(node) = &triple.subject
             && is_structure(triple)
@@ -81,7 +82,7 @@ fn individuals(graph: &Graph, structural: &HashSet<BlankNode>) -> HashSet<BlankN
             || predicate.as_str() == swrla::IS_RULE_ENABLED
             || annotations.contains(&NamedOrBlankNode::NamedNode(predicate.clone()))
     };
-    let mut nodes = HashSet::new();
+    let mut nodes = HashSet::default();
     for (_, triple) in graph.iter() {
         let predicate = &triple.predicate;
         if let NamedOrBlankNode::BlankNode(node) = &triple.subject

@@ -4,9 +4,10 @@
 //! with a warning: a property with literals as values is a data property, one between individuals an object property,
 //! one that describes only classes, properties or ontologies an annotation property.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 use oxrdf::{NamedNode, NamedOrBlankNode, Term, Triple};
+use rustc_hash::FxHashSet as HashSet;
 
 use super::{ORIGIN, is_reserved};
 use crate::error::Warning;

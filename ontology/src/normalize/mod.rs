@@ -11,18 +11,21 @@
 //! | `lists` | disjointness of many into pairs, shared lists into copies, property chains checked |
 //! | `anonymous` | blank-node individuals into IRIs |
 //! | `kinds` | undeclared entities into declared ones |
+//! | `plain` | statements that need no reader into our own structures |
 
 mod anonymous;
 mod kinds;
 mod lists;
+mod plain;
 mod swrl;
 
 pub(crate) use swrl::{INDIVIDUAL, ORIGIN, TRUE, VARIABLE};
 
 use crate::error::Warning;
 use crate::graph::{Graph, is_type};
+use crate::names::Names;
 use crate::owl::Iri;
-use crate::read::Document;
+use crate::read::{Document, Parts};
 use crate::vocab::{self, owl, rdf, rdfs, xsd};
 
 /// What normalisation yields.
@@ -30,6 +33,10 @@ use crate::vocab::{self, owl, rdf, rdfs, xsd};
 pub(crate) struct Normal {
     /// The document for horned-owl.
     pub ntriples: Vec<u8>,
+    /// What does not have to go through it.
+    pub plain: Parts,
+    /// The IRIs in `plain`.
+    pub names: Names,
     /// Where each rule comes from; its canonical form is annotated with the index here.
     pub rules: Vec<Origin>,
     pub warnings: Vec<Warning>,
@@ -72,7 +79,9 @@ pub(crate) fn normalize(documents: Vec<Document>) -> Normal {
     lists::rewrite(&mut graph, &mut warnings);
     anonymous::rewrite(&mut graph, &mut warnings);
     kinds::declare(&mut graph, &mut warnings);
-    Normal { ntriples: graph.to_ntriples(), rules, warnings }
+    let mut names = Names::default();
+    let plain = plain::take(&mut graph, &mut names);
+    Normal { ntriples: graph.to_ntriples(), plain, names, rules, warnings }
 }
 
 /// Whether an IRI belongs to the vocabularies of RDF, RDFS, OWL, SWRL or XML Schema itself.

@@ -19,8 +19,9 @@ use std::path::{Path, PathBuf};
 use oxrdf::Triple;
 
 use crate::error::{Error, Warning};
+use crate::horned;
+use crate::normalize::{self, Normal};
 use crate::owl::{AnnotatedAxiom, Annotation, EntityKind, Iri, Ontology, Rule, Source};
-use crate::{horned, normalize};
 use imports::{Resolution, Resolver};
 
 /// Where to look for what a document imports.
@@ -85,9 +86,9 @@ fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec
     let (documents, mut warnings) = closure(roots, options)?;
     let sources: Vec<Source> = documents.iter().map(source).collect();
     let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
-    let normal = normalize::normalize(documents);
-    warnings.extend(normal.warnings);
-    let parts = horned::build(&normal.ntriples, &about, &normal.rules)
+    let Normal { ntriples, plain, names, rules, warnings: more } = normalize::normalize(documents);
+    warnings.extend(more);
+    let parts = horned::build(&ntriples, &about, &rules, plain, names)
         .map_err(|reason| vec![Error::NotAnOntology { reason }])?;
     warnings.extend(parts.warnings);
     warnings.sort();

@@ -1,0 +1,161 @@
+//! Plain assertions and annotations out of the graph, straight into our own structures.
+//!
+//! Most of a large knowledge base says of individuals which class they are of and which values they have. Such a triple
+//! is an axiom by itself, once the kinds of its terms are known, so that no pattern has to be matched. What may be part
+//! of a pattern stays: subjects that an annotated axiom mentions, headers of ontologies, predicates of several kinds,
+//! and the vocabularies of OWL itself.
+
+use oxrdf::{NamedOrBlankNode, Term, Triple};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use super::is_reserved;
+use crate::graph::Graph;
+use crate::names::Names;
+use crate::owl::{
+    AnnotatedAxiom, Annotation, AnnotationValue, Axiom, ClassExpression, EntityKind, Literal,
+    ObjectPropertyExpression,
+};
+use crate::read::{Parts, iri_of};
+use crate::vocab::{owl, rdf, rdfs};
+
+/// Annotation properties that need no declaration.
+const DESCRIPTIONS: [&str; 4] = [rdfs::LABEL, rdfs::COMMENT, rdfs::SEE_ALSO, rdfs::IS_DEFINED_BY];
+
+/// What a plain triple says of its subject.
+#[derive(Clone, Copy)]
+enum Statement {
+    Individual,
+    Class,
+    Object,
+    Data,
+    Annotation,
+}
+
+/// What an IRI is declared to be.
+#[derive(Clone, Copy, Default)]
+struct Kinds {
+    class: bool,
+    /// The statement that it makes as a predicate; `Err` where it is a property of several kinds.
+    property: Option<Result<Statement, ()>>,
+}
+
+/// Takes plain statements from a graph whose entities are all declared.
+pub(crate) fn take(graph: &mut Graph, names: &mut Names) -> Parts {
+    let mut parts = Parts::default();
+    for (index, statement) in statements(graph) {
+        if let Some(triple) = graph.take(index) {
+            convert(triple, statement, names, &mut parts);
+        }
+    }
+    parts
+}
+
+/// The plain statements with the indices of their triples, in order.
+fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
+    let (kinds, patterns) = (kinds(graph), patterns(graph));
+    let of = |triple: &Triple| {
+        let subject = named(triple).filter(|subject| !is_reserved(subject) && !patterns.contains(subject))?;
+        let kind = |iri: &str| kinds.get(iri).copied().unwrap_or_default();
+        match (triple.predicate.as_str(), &triple.object) {
+            (_, Term::BlankNode(_)) => None,
+            (rdf::TYPE, Term::NamedNode(class)) if class.as_str() == owl::NAMED_INDIVIDUAL => {
+                Some(Statement::Individual)
+            }
+            (rdf::TYPE, Term::NamedNode(class)) if !is_reserved(class.as_str()) => {
+                kind(class.as_str()).class.then_some(Statement::Class)
+            }
+            (predicate, _) if DESCRIPTIONS.contains(&predicate) => Some(Statement::Annotation),
+            (predicate, _) if is_reserved(predicate) || subject == predicate => None,
+            (predicate, value) => match (kind(predicate).property?.ok()?, value) {
+                (Statement::Object, Term::Literal(_)) | (Statement::Data, Term::NamedNode(_)) => None,
+                (statement, _) => Some(statement),
+            },
+        }
+    };
+    graph.iter().filter_map(|(index, triple)| Some((index, of(triple)?))).collect()
+}
+
+fn named(triple: &Triple) -> Option<&str> {
+    match &triple.subject {
+        NamedOrBlankNode::NamedNode(node) => Some(node.as_str()),
+        NamedOrBlankNode::BlankNode(_) => None,
+    }
+}
+
+fn kinds(graph: &Graph) -> FxHashMap<&str, Kinds> {
+    let mut kinds = FxHashMap::<&str, Kinds>::default();
+    for (_, triple) in graph.iter().filter(|(_, triple)| triple.predicate.as_str() == rdf::TYPE) {
+        let (Some(subject), Some(class)) = (named(triple), iri_of(&triple.object)) else { continue };
+        let property = match class {
+            owl::CLASS | rdfs::CLASS => {
+                kinds.entry(subject).or_default().class = true;
+                continue;
+            }
+            owl::OBJECT_PROPERTY => Statement::Object,
+            owl::DATATYPE_PROPERTY => Statement::Data,
+            owl::ANNOTATION_PROPERTY => Statement::Annotation,
+            _ => continue,
+        };
+        let known = &mut kinds.entry(subject).or_default().property;
+        *known = match known {
+            Some(Ok(other)) if std::mem::discriminant(other) != std::mem::discriminant(&property) => {
+                Some(Err(()))
+            }
+            Some(Err(())) => Some(Err(())),
+            _ => Some(Ok(property)),
+        };
+    }
+    kinds
+}
+
+/// Subjects of which a triple may be part of more than one statement.
+fn patterns(graph: &Graph) -> FxHashSet<&str> {
+    graph.iter().filter_map(|(_, triple)| pattern(triple)).collect()
+}
+
+fn pattern(triple: &Triple) -> Option<&str> {
+    match (triple.predicate.as_str(), iri_of(&triple.object)?) {
+        (owl::ANNOTATED_SOURCE, source) => Some(source),
+        (rdf::TYPE, owl::ONTOLOGY) => named(triple),
+        _ => None,
+    }
+}
+
+fn convert(triple: Triple, statement: Statement, names: &mut Names, parts: &mut Parts) {
+    let NamedOrBlankNode::NamedNode(subject) = triple.subject else { return };
+    let (subject, predicate) = (names.iri(subject.as_str()), names.iri(triple.predicate.as_str()));
+    let axiom = match (statement, triple.object) {
+        (Statement::Individual, _) => {
+            parts.entities.push((EntityKind::NamedIndividual, subject));
+            return;
+        }
+        (Statement::Annotation, value) => {
+            let value = match value {
+                Term::NamedNode(iri) => AnnotationValue::Iri(names.iri(iri.as_str())),
+                Term::Literal(value) => AnnotationValue::Literal(literal(value, names)),
+                Term::BlankNode(_) => return,
+            };
+            parts.annotations.push((subject, Annotation { property: predicate, value }));
+            return;
+        }
+        (Statement::Class, Term::NamedNode(class)) => {
+            Axiom::ClassAssertion(ClassExpression::Class(names.iri(class.as_str())), subject)
+        }
+        (_, Term::NamedNode(object)) => {
+            let property = ObjectPropertyExpression::Property(predicate);
+            Axiom::ObjectPropertyAssertion(property, subject, names.iri(object.as_str()))
+        }
+        (_, Term::Literal(value)) => Axiom::DataPropertyAssertion(predicate, subject, literal(value, names)),
+        (_, Term::BlankNode(_)) => return,
+    };
+    parts.axioms.push(AnnotatedAxiom { axiom, annotations: Vec::new() });
+}
+
+fn literal(literal: oxrdf::Literal, names: &mut Names) -> Literal {
+    let (lexical, datatype, language) = literal.destruct();
+    Literal {
+        lexical: lexical.into(),
+        datatype: datatype.map(|datatype| names.iri(datatype.as_str())),
+        language: language.map(Into::into),
+    }
+}
