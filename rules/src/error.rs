@@ -120,6 +120,24 @@ pub enum Error {
         /// How many there are.
         count: usize,
     },
+    /// An aggregate through recursion.
+    #[error(
+        "R208 rule {rule}: its {aggregate} depends on its own conclusion, so the rules have no stratification"
+    )]
+    UnstratifiedAggregate {
+        /// A rule on the cycle.
+        rule: RuleIdentity,
+        /// Which aggregate.
+        aggregate: &'static str,
+    },
+    /// An aggregate within an aggregate.
+    #[error(
+        "R209 rule {rule}: an aggregate within an aggregate; conclude the inner one by a rule of its own"
+    )]
+    NestedAggregate {
+        /// Which rule.
+        rule: RuleIdentity,
+    },
     /// The evaluation was stopped; the engine is as it was before the update.
     #[error("R301 step budget of {budget} used up, last in rule {rule}")]
     BudgetExhausted {

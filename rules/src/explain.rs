@@ -9,6 +9,7 @@ use crate::fact::Fact;
 use crate::fixpoint::resolve;
 use crate::plan::{Condition, Source};
 use crate::rule::{Rule, RuleIdentity, Variable};
+use crate::safety::bound_variables;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::{Symbol, Symbols};
 
@@ -38,13 +39,25 @@ pub enum Reason {
     Rule {
         /// Which rule.
         identity: RuleIdentity,
-        /// The rule's variables and their values; variables are named without question mark.
+        /// The rule's variables and their values, those of aggregates' own left out; variables are named without
+        /// question mark.
         bindings: Vec<(String, Symbol)>,
         /// For each relation atom of the body, in order, the position of its fact in [`Derivation::steps`].
         supports: Vec<usize>,
         /// For each negated atom of the body, in order, the fact that does not hold.
         absent: Vec<Fact>,
+        /// For each aggregate of the body, in order, what it ran over.
+        aggregates: Vec<Aggregated>,
     },
+}
+
+/// The value of an aggregate and the matches that it comes from.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Aggregated {
+    /// The value.
+    pub result: Symbol,
+    /// For each match the positions in [`Derivation::steps`] of the facts that its relation atoms found.
+    pub matches: Vec<Vec<usize>>,
 }
 
 /// Something that must not hold, and does.
@@ -90,12 +103,19 @@ impl fmt::Display for DisplayDerivation<'_> {
             match &step.reason {
                 Reason::Asserted => writeln!(f, " is stated")?,
                 Reason::Rule { .. } if repeated => writeln!(f, ", as above")?,
-                Reason::Rule { identity, supports, absent, .. } => {
+                Reason::Rule { identity, supports, absent, aggregates, .. } => {
                     writeln!(f, " by rule {identity}")?;
                     for fact in absent {
                         let fact = fact.display(self.symbols);
                         writeln!(f, "{:indent$}not {fact}", "", indent = 2 * depth + 2)?;
                     }
+                    for Aggregated { result, matches } in aggregates {
+                        let (result, count) = (self.symbols.value(*result), matches.len());
+                        writeln!(f, "{:indent$}{result} from {count} matches", "", indent = 2 * depth + 2)?;
+                    }
+                    let matched =
+                        aggregates.iter().rev().flat_map(|aggregate| aggregate.matches.iter().rev());
+                    stack.extend(matched.flat_map(|found| found.iter().rev().map(|&at| (at, depth + 2))));
                     stack.extend(supports.iter().rev().map(|&support| (support, depth + 1)));
                 }
             }
@@ -128,7 +148,11 @@ impl Engine {
             let relation = self.store.get(relation);
             for row in relation.scan() {
                 let record = relation.record(row);
-                let supports = self.body_facts(record, false);
+                let mut supports = self.body_facts(record, false);
+                for (matches, key, _) in self.aggregates(record) {
+                    let rows = self.group(matches, &key).map(|(row, _)| self.store.get(matches).record(row));
+                    supports.extend(rows.flat_map(|record| self.body_facts(record, false)));
+                }
                 let cause = Cause::Constraint(self.program.rules[position].identity.clone());
                 violations.push(Violation { cause, supports });
             }
@@ -160,6 +184,19 @@ impl Engine {
             .collect()
     }
 
+    /// The aggregates of a recorded derivation's body: what they run over, their group and their result.
+    fn aggregates(&self, record: Record) -> impl Iterator<Item = (RelationId, Vec<Symbol>, Symbol)> {
+        let bound = self.records.get(record);
+        let rule = self.network.rules.get(record.rule as usize);
+        rule.into_iter().flat_map(|rule| &rule.body).filter_map(|condition| match condition {
+            Condition::Aggregate { matches, group, result, .. } => {
+                let key = group.iter().map(|&source| resolve(source, bound)).collect();
+                Some((*matches, key, resolve(*result, bound)))
+            }
+            _ => None,
+        })
+    }
+
     fn body(&self, record: Record, negated: bool) -> impl Iterator<Item = (RelationId, &[Source])> {
         let rule = self.network.rules.get(record.rule as usize);
         rule.into_iter().flat_map(|rule| &rule.body).filter_map(move |condition| match condition {
@@ -167,6 +204,23 @@ impl Engine {
             Condition::Not(relation, sources) if negated => Some((*relation, sources.as_slice())),
             _ => None,
         })
+    }
+
+    /// The rows of a relation that begin with these values.
+    pub(crate) fn group(
+        &self,
+        relation: RelationId,
+        key: &[Symbol],
+    ) -> impl Iterator<Item = (Row, &[Symbol])> {
+        let relation = self.store.get(relation);
+        let bound = (0..key.len()).fold(0, |mask, column| mask | 1 << column);
+        let index = relation.best_index(bound).filter(|&(_, columns)| columns == bound);
+        let found = index.map(|(index, _)| relation.lookup(index, key));
+        let scanned = if found.is_none() { 0..relation.bound() } else { 0..0 };
+        let rows = found.into_iter().flatten().chain(scanned);
+        let visible = rows.filter(|&row| relation.state(row) & state::FREE == 0);
+        let key = key.to_vec();
+        visible.map(|row| (row, relation.row(row))).filter(move |(_, row)| row[..key.len()] == key[..])
     }
 
     fn rule_of(&self, record: Record) -> Option<&Rule> {
@@ -196,8 +250,19 @@ impl Search<'_> {
         let asserted = engine.store.get(relation).state(row) & state::ASSERTED != 0;
         let Some(rule) = engine.rule_of(record).filter(|_| !asserted) else { return Reason::Asserted };
         let bound = engine.records.get(record);
-        let used = (0..rule.variable_count()).map(|number| Variable(number as u16));
+        let used =
+            (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound).map(|(v, _)| Variable(v));
         let bindings = used.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
+        let supports = self.supports(record);
+        let absent = engine.body_facts(record, true);
+        let aggregates = self.aggregates(record);
+        Reason::Rule { identity: rule.identity.clone(), bindings, supports, absent, aggregates }
+    }
+
+    /// The positions of the facts that the relation atoms of a recorded derivation found.
+    fn supports(&mut self, record: Record) -> Vec<usize> {
+        let engine = self.engine;
+        let bound = engine.records.get(record);
         let mut supports = Vec::new();
         for (relation, sources) in engine.body(record, false) {
             let arguments: Vec<Symbol> = sources.iter().map(|&source| resolve(source, bound)).collect();
@@ -205,7 +270,19 @@ impl Search<'_> {
                 supports.push(self.position(relation, row));
             }
         }
-        let absent = engine.body_facts(record, true);
-        Reason::Rule { identity: rule.identity.clone(), bindings, supports, absent }
+        supports
+    }
+
+    fn aggregates(&mut self, record: Record) -> Vec<Aggregated> {
+        let engine = self.engine;
+        let mut aggregates = Vec::new();
+        for (relation, key, result) in engine.aggregates(record) {
+            let mut rows: Vec<(Row, &[Symbol])> = engine.group(relation, &key).collect();
+            rows.sort_unstable_by_key(|&(_, row)| row);
+            let record = |row: Row| engine.store.get(relation).record(row);
+            let matches = rows.into_iter().map(|(row, _)| self.supports(record(row))).collect();
+            aggregates.push(Aggregated { result, matches });
+        }
+        aggregates
     }
 }

@@ -13,8 +13,10 @@ use std::sync::Arc;
 
 use rustc_hash::FxHasher;
 
+use crate::aggregate::Function;
+use crate::fact::Arguments;
 use crate::literal::Literal;
-use crate::plan::{Pattern, Plan, Source, Step};
+use crate::plan::{HIDDEN, Pattern, Plan, Source, Step};
 use crate::store::{Relation, RelationId, Row, Store, state};
 use crate::symbol::{Symbol, Symbols};
 
@@ -264,6 +266,10 @@ impl Round<'_> {
                     built_in.compute(&literals(symbols, arguments, bound)?)
                 })
             }
+            Step::Aggregate { matches, function, index, group, result, binds } => {
+                let group = Group { relation: self.store.get(*matches), index: *index, key: group };
+                self.aggregate(block, width, *function, &group, (*result, *binds))
+            }
             Step::Equate { variable, source } => {
                 let mut block = block;
                 for bound in block.chunks_exact_mut(width) {
@@ -312,6 +318,48 @@ impl Round<'_> {
         (longer, block.len())
     }
 
+    /// Binds or checks what an aggregate comes to; when retracting, what it came to before the update.
+    fn aggregate(
+        &self,
+        mut block: Vec<Symbol>,
+        width: usize,
+        function: Function,
+        group: &Group,
+        (result, binds): (Source, bool),
+    ) -> Vec<Symbol> {
+        let skip = if self.retracting { state::FREE | state::NEW } else { HIDDEN };
+        let visible = |row: &Row| group.relation.state(*row) & skip == 0;
+        let (mut kept, mut last) = (0, None::<(Arguments, Option<Symbol>)>);
+        for start in (0..block.len()).step_by(width) {
+            let bound = &mut block[start..start + width];
+            let key: Arguments = group.key.iter().map(|&source| resolve(source, bound)).collect();
+            let known = last.as_ref().filter(|(other, _)| *other == key).map(|&(_, value)| value);
+            let value = known.unwrap_or_else(|| {
+                let mut symbols = self.symbols.borrow_mut();
+                let rows = |row| group.relation.row(row);
+                let value = match group.index {
+                    Some(index) => {
+                        let found = group.relation.lookup(index, &key).filter(visible);
+                        function.of(found.map(rows), &symbols)
+                    }
+                    None => function.of(group.relation.scan().filter(visible).map(rows), &symbols),
+                };
+                value.map(|value| intern(&mut symbols, value))
+            });
+            last = Some((key, value));
+            let Some(value) = value else { continue };
+            match result {
+                Source::Variable(number) if binds => bound[usize::from(number)] = value,
+                source if resolve(source, bound) != value => continue,
+                _ => {}
+            }
+            block.copy_within(start..start + width, kept);
+            kept += width;
+        }
+        block.truncate(kept);
+        block
+    }
+
     fn compute(
         &self,
         mut block: Vec<Symbol>,
@@ -323,15 +371,25 @@ impl Round<'_> {
         let mut kept = 0;
         for start in (0..block.len()).step_by(width) {
             let Some(value) = function(&symbols, &block[start..start + width]) else { continue };
-            let known = symbols.find_literal(&value);
-            block[start + usize::from(result)] =
-                known.unwrap_or_else(|| Arc::make_mut(&mut symbols).literal(value));
+            block[start + usize::from(result)] = intern(&mut symbols, value);
             block.copy_within(start..start + width, kept);
             kept += width;
         }
         block.truncate(kept);
         block
     }
+}
+
+/// The symbol of a computed value; symbols that a clone shares are copied only for a new one.
+fn intern(symbols: &mut Arc<Symbols>, value: Literal) -> Symbol {
+    symbols.find_literal(&value).unwrap_or_else(|| Arc::make_mut(symbols).literal(value))
+}
+
+/// Rows that begin with the values of a key.
+struct Group<'a> {
+    relation: &'a Relation,
+    index: Option<usize>,
+    key: &'a [Source],
 }
 
 /// The parts of a join step.

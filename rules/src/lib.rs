@@ -1,6 +1,7 @@
 //! What follows: SWRL and Datalog rules over interned facts, maintained incrementally.
 #![doc = include_str!("../README.md")]
 
+mod aggregate;
 mod builtin;
 mod cost;
 mod engine;
@@ -9,6 +10,7 @@ mod explain;
 mod fact;
 mod fixpoint;
 mod literal;
+mod lower;
 mod maintain;
 mod network;
 pub mod owl_rl;
@@ -16,6 +18,7 @@ mod plan;
 mod record;
 mod revision;
 mod rule;
+mod safety;
 mod store;
 mod strata;
 mod swrl;
@@ -25,10 +28,10 @@ mod why_not;
 pub use builtin::{BuiltIn, CustomBuiltIn, Definition, SWRLB};
 pub use engine::{DEFAULT_STEP_BUDGET, Delta, Engine};
 pub use error::Error;
-pub use explain::{Cause, Derivation, DerivationStep, Reason, Violation};
+pub use explain::{Aggregated, Cause, Derivation, DerivationStep, Reason, Violation};
 pub use fact::{Arguments, Fact};
 pub use literal::{Decimal, Duration, Literal, Moment, MomentKind};
-pub use rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
+pub use rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 pub use swrl::{Prefixes, Syntax, parse_rules, parse_rules_as, print_rules};
 pub use symbol::{Symbol, Symbols, Value};
 pub use why_not::{NearMiss, Obstacle};

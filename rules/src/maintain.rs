@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 
 use crate::engine::{Delta, Engine};
 use crate::error::Error;
-use crate::fact::Fact;
+use crate::fact::{Arguments, Fact};
 use crate::fixpoint::{Budget, Matches, PlanId, Round, Seed, Start, resolve, run};
 use crate::network::{Network, Stratum};
 use crate::plan::HIDDEN;
@@ -209,6 +209,7 @@ impl<'a> Maintenance<'a> {
     fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
         let appeared = self.added.clone();
         self.run(&appeared, |relation| stratum.negative.get(&relation).map(Vec::as_slice), true)?;
+        self.run_groups(stratum, true)?;
         let mut done = 0;
         while done < self.doomed.len() {
             let front = self.doomed[done..].to_vec();
@@ -216,6 +217,24 @@ impl<'a> Maintenance<'a> {
             self.run(&front, |relation| stratum.positive.get(&relation).map(Vec::as_slice), true)?;
         }
         Ok(())
+    }
+
+    /// Runs the plans of aggregates, once for each group that has changed.
+    fn run_groups(&mut self, stratum: &Stratum, retracting: bool) -> Result<(), Error> {
+        if stratum.aggregated.is_empty() {
+            return Ok(());
+        }
+        let mut seen: FxHashSet<(RelationId, Arguments)> = FxHashSet::default();
+        let is_first = |&(id, row): &(RelationId, Row)| {
+            let Some(&plan) = stratum.aggregated.get(&id).and_then(|plans| plans.first()) else {
+                return false;
+            };
+            let seed = &self.network.plans[plan as usize].seed;
+            let group = seed.binds.len() + seed.checks.len();
+            seen.insert((id, SmallVec::from_slice(&self.engine.store.get(id).row(row)[..group])))
+        };
+        let changed: Rows = self.added.iter().chain(&self.doomed).copied().filter(is_first).collect();
+        self.run(&changed, |relation| stratum.aggregated.get(&relation).map(Vec::as_slice), retracting)
     }
 
     fn rederive(&mut self, stratum: &Stratum) -> Result<(), Error> {
@@ -243,6 +262,7 @@ impl<'a> Maintenance<'a> {
         self.run(&front, |relation| stratum.positive.get(&relation).map(Vec::as_slice), false)?;
         self.mark(&front, false);
         self.run(&disappeared, |relation| stratum.negative.get(&relation).map(Vec::as_slice), false)?;
+        self.run_groups(stratum, false)?;
         self.saturate(stratum)
     }
 

@@ -6,11 +6,13 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::cost::Costs;
 use crate::error::Error;
 use crate::fixpoint::PlanId;
-use crate::plan::{Condition, Lowered, Plan, Planner, Source, Template, check};
+use crate::lower::Lowering;
+use crate::plan::{Condition, Lowered, Plan, Planner, Template};
 use crate::rule::{Atom, Program, Rule, Term};
+use crate::safety::check;
 use crate::store::{RelationId, Store};
 use crate::strata::components;
-use crate::symbol::{Symbol, Symbols};
+use crate::symbol::Symbols;
 
 /// The relation in which equal individuals are concluded.
 pub(crate) const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
@@ -43,6 +45,8 @@ pub(crate) struct Stratum {
     pub positive: FxHashMap<RelationId, Vec<PlanId>>,
     /// Plans from the rows of a negated relation that went or came.
     pub negative: FxHashMap<RelationId, Vec<PlanId>>,
+    /// Plans from a row of what an aggregate runs over, to its group.
+    pub aggregated: FxHashMap<RelationId, Vec<PlanId>>,
     /// Plans from a row that lost its support.
     pub rederive: FxHashMap<RelationId, Vec<PlanId>>,
 }
@@ -60,12 +64,13 @@ pub(crate) fn compile(
     }
     let mut network = Network::default();
     let mut seen = FxHashSet::default();
-    let mut lowered = Vec::new();
+    let mut lowering = Lowering::new(symbols, store, &mut network.constraints, FxHashSet::default());
     for (position, rule) in program.rules.iter().enumerate() {
         if seen.insert((&rule.head, &rule.body)) {
-            lowered.push(lower(position, rule, symbols, store, &mut network.constraints));
+            lowering.rule(position, rule);
         }
     }
+    let lowered = lowering.lowered;
     network.stratum_of = stratify(program, symbols, store, &lowered)?;
     network.rules = split_by_stratum(lowered, &network.stratum_of);
     network.widths = network.rules.iter().map(|rule| rule.width).collect();
@@ -122,10 +127,13 @@ pub(crate) fn revise(
     }
     let mut missing: Vec<usize> = positions.into_values().filter(|p| !compiled.contains(p)).collect();
     missing.sort_unstable();
-    let lowered: Vec<Lowered> = missing
-        .into_iter()
-        .map(|at| lower(at, &new.rules[at], symbols, store, &mut revised.constraints))
-        .collect();
+    let heads = revised.rules.iter().flat_map(|rule| &rule.heads);
+    let taken = heads.map(|head| head.relation).collect();
+    let mut lowering = Lowering::new(symbols, store, &mut revised.constraints, taken);
+    for at in missing {
+        lowering.rule(at, &new.rules[at]);
+    }
+    let lowered = lowering.lowered;
     let all: Vec<Lowered> = revised.rules.iter().chain(&lowered).cloned().collect();
     revised.stratum_of = stratify(new, symbols, store, &all)?;
     if split_by_stratum(revised.rules.clone(), &revised.stratum_of).len() != revised.live_rules() {
@@ -147,7 +155,7 @@ pub(crate) fn revise(
 }
 
 fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
-    let atoms = || rule.head.iter().chain(&rule.body);
+    let atoms = || rule.head.iter().chain(&rule.body).flat_map(|atom| atom.parts().iter().chain([atom]));
     let predicates = atoms().filter_map(|atom| match atom {
         Atom::Relation { predicate, .. } | Atom::Not { predicate, .. } => Some(*predicate),
         _ => None,
@@ -158,51 +166,6 @@ fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     });
     let unknown = predicates.chain(constants).find(|symbol| symbol.index() >= symbols.len())?;
     Some(Error::UnknownSymbol { index: unknown.index() })
-}
-
-fn sources(terms: &[Term]) -> Vec<Source> {
-    terms.iter().copied().map(Source::from).collect()
-}
-
-fn lower(
-    position: usize,
-    rule: &Rule,
-    symbols: &mut Symbols,
-    store: &mut Store,
-    constraints: &mut Vec<(RelationId, usize)>,
-) -> Lowered {
-    let width = rule.variable_count().max(1);
-    let mut relation_of = |predicate: Symbol, terms: &[Term]| store.relation(predicate, terms.len());
-    let body = rule.body.iter().map(|atom| match atom {
-        Atom::Relation { predicate, arguments } => {
-            Condition::Relation(relation_of(*predicate, arguments), sources(arguments))
-        }
-        Atom::Not { predicate, arguments } => {
-            Condition::Not(relation_of(*predicate, arguments), sources(arguments))
-        }
-        Atom::BuiltIn { built_in, arguments } => Condition::BuiltIn(*built_in, sources(arguments)),
-        Atom::Same(left, right) => Condition::Same((*left).into(), (*right).into()),
-        Atom::Different(left, right) => Condition::Different((*left).into(), (*right).into()),
-    });
-    let body = body.collect();
-    let mut heads = Vec::new();
-    for atom in &rule.head {
-        let (predicate, terms) = match atom {
-            Atom::Relation { predicate, arguments } => (*predicate, arguments.clone()),
-            Atom::Same(left, right) => (symbols.name(SAME_AS), vec![*left, *right]),
-            Atom::Different(left, right) => (symbols.name(DIFFERENT_FROM), vec![*left, *right]),
-            Atom::Not { .. } | Atom::BuiltIn { .. } => continue,
-        };
-        heads.push(Template { relation: store.relation(predicate, terms.len()), arguments: sources(&terms) });
-    }
-    if rule.head.is_empty() {
-        let taken = |id: RelationId| constraints.iter().any(|&(other, _)| other == id);
-        let relation = store.anonymous(rule.variable_count(), taken);
-        let arguments = (0..rule.variable_count()).map(|number| Source::Variable(number as u16)).collect();
-        heads.push(Template { relation, arguments });
-        constraints.push((relation, position));
-    }
-    Lowered { rule: position, width, heads, body }
 }
 
 /// The stratum of each relation.
@@ -216,7 +179,7 @@ fn stratify(
     for rule in rules {
         let heads = || rule.heads.iter().map(|head| head.relation.0 as usize);
         for condition in &rule.body {
-            if let Condition::Relation(relation, _) | Condition::Not(relation, _) = condition {
+            if let Some(relation) = condition.relation() {
                 successors[relation.0 as usize].extend(heads());
             }
         }
@@ -225,13 +188,21 @@ fn stratify(
     let mut errors = Vec::new();
     for rule in rules {
         for condition in &rule.body {
-            let Condition::Not(relation, _) = condition else { continue };
+            let (Condition::Not(relation, _) | Condition::Aggregate { matches: relation, .. }) = condition
+            else {
+                continue;
+            };
             let stratum = strata[relation.0 as usize];
-            if rule.heads.iter().any(|head| strata[head.relation.0 as usize] == stratum) {
-                let name = store.get(*relation).predicate.map(|p| symbols.value(p).to_string());
-                let identity = program.rules[rule.rule].identity.clone();
-                errors.push(Error::Unstratified { rule: identity, predicate: name.unwrap_or_default() });
+            if rule.heads.iter().all(|head| strata[head.relation.0 as usize] != stratum) {
+                continue;
             }
+            let identity = program.rules[rule.rule].identity.clone();
+            errors.push(if let Condition::Aggregate { function, .. } = condition {
+                Error::UnstratifiedAggregate { rule: identity, aggregate: function.aggregate.name() }
+            } else {
+                let name = store.get(*relation).predicate.map(|p| symbols.value(p).to_string());
+                Error::Unstratified { rule: identity, predicate: name.unwrap_or_default() }
+            });
         }
     }
     if errors.is_empty() { Ok(strata) } else { Err(errors) }
@@ -273,7 +244,8 @@ impl Network {
         strata.retain(|stratum| !stratum.rederive.is_empty());
         self.readers = vec![Vec::new(); self.stratum_of.len()];
         for (number, stratum) in strata.iter().enumerate() {
-            let used = stratum.positive.keys().chain(stratum.negative.keys()).chain(stratum.rederive.keys());
+            let used = stratum.positive.keys().chain(stratum.negative.keys());
+            let used = used.chain(stratum.aggregated.keys()).chain(stratum.rederive.keys());
             for relation in used.collect::<FxHashSet<_>>() {
                 self.readers[relation.0 as usize].push(number as u32);
             }
@@ -295,6 +267,7 @@ fn plan_rule(mut planner: Planner, plans: &mut Vec<Plan>, stratum: &mut Stratum)
         let (relation, starts) = match condition {
             Condition::Relation(relation, _) => (*relation, &mut stratum.positive),
             Condition::Not(relation, _) => (*relation, &mut stratum.negative),
+            Condition::Aggregate { matches, .. } => (*matches, &mut stratum.aggregated),
             _ => continue,
         };
         let exactly_once = matches!(condition, Condition::Relation(..));

@@ -12,8 +12,8 @@
 use std::collections::BTreeSet;
 
 use crate::network::{DIFFERENT_FROM, SAME_AS};
-use crate::plan::bound_variables;
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Term};
+use crate::safety::bound_variables;
 use crate::swrl::{Prefixes, parse_rules};
 use crate::symbol::{Symbol, Symbols};
 

@@ -4,10 +4,10 @@
 //! tests as soon as their variables are bound, then the atom with the smallest expected number of matches, given the
 //! columns bound so far and the size of its relation.
 
+use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
 use crate::cost::Costs;
-use crate::error::Error;
-use crate::rule::{Atom, Rule, Term, Variable};
+use crate::rule::{Term, Variable};
 use crate::store::{RelationId, Store, state};
 use crate::symbol::Symbol;
 
@@ -45,6 +45,15 @@ pub(crate) enum Step {
     Compute { built_in: BuiltIn, result: u16, arguments: Vec<Source> },
     /// Binds a variable to a known value.
     Equate { variable: u16, source: Source },
+    /// What an aggregate makes of a group: rows that agree on their first columns.
+    Aggregate {
+        matches: RelationId,
+        function: Function,
+        index: Option<usize>,
+        group: Vec<Source>,
+        result: Source,
+        binds: bool,
+    },
     /// Whether two known values are the same.
     Compare { left: Source, right: Source, equal: bool },
 }
@@ -82,6 +91,13 @@ pub(crate) enum Condition {
     Relation(RelationId, Vec<Source>),
     Not(RelationId, Vec<Source>),
     BuiltIn(BuiltIn, Vec<Source>),
+    /// The result of an aggregate over the rows of a relation that begin with the values of the group.
+    Aggregate {
+        matches: RelationId,
+        function: Function,
+        group: Vec<Source>,
+        result: Source,
+    },
     Same(Source, Source),
     Different(Source, Source),
 }
@@ -96,31 +112,41 @@ impl From<Term> for Source {
 }
 
 impl Condition {
+    /// The relation whose changes concern the condition.
+    pub fn relation(&self) -> Option<RelationId> {
+        match self {
+            Self::Relation(relation, _) | Self::Not(relation, _) => Some(*relation),
+            Self::Aggregate { matches, .. } => Some(*matches),
+            Self::BuiltIn(..) | Self::Same(..) | Self::Different(..) => None,
+        }
+    }
+
     fn sources(&self) -> Vec<Source> {
         match self {
             Self::Relation(_, sources) | Self::Not(_, sources) | Self::BuiltIn(_, sources) => sources.clone(),
+            Self::Aggregate { group, result, .. } => [group.as_slice(), &[*result]].concat(),
             Self::Same(left, right) | Self::Different(left, right) => vec![*left, *right],
         }
     }
 }
 
 /// The variables bound so far.
-#[derive(Clone)]
-struct Bound(Vec<bool>);
+#[derive(Clone, PartialEq, Eq)]
+pub(crate) struct Bound(pub Vec<bool>);
 
 impl Bound {
-    fn knows(&self, source: Source) -> bool {
+    pub fn knows(&self, source: Source) -> bool {
         match source {
             Source::Constant(_) => true,
             Source::Variable(number) => self.0[usize::from(number)],
         }
     }
 
-    fn knows_all(&self, sources: &[Source]) -> bool {
+    pub fn knows_all(&self, sources: &[Source]) -> bool {
         sources.iter().all(|&source| self.knows(source))
     }
 
-    fn bind(&mut self, number: u16) {
+    pub fn bind(&mut self, number: u16) {
         self.0[usize::from(number)] = true;
     }
 
@@ -156,12 +182,15 @@ impl Planner<'_> {
     /// A plan that starts from a row of the condition at `position`. Conditions before it do not see fresh rows, so
     /// that each match is found from exactly one of its fresh rows.
     pub fn start_at_condition(&mut self, position: usize, exactly_once: bool) -> Option<Plan> {
-        let (Condition::Relation(_, sources) | Condition::Not(_, sources)) = &self.lowered.body[position]
-        else {
-            return None;
-        };
         let fresh_from = if exactly_once { position } else { 0 };
-        self.plan(sources.clone(), Some(position), fresh_from)
+        match &self.lowered.body[position] {
+            Condition::Relation(_, sources) | Condition::Not(_, sources) => {
+                self.plan(sources.clone(), Some(position), fresh_from)
+            }
+            // The rows say which group has changed; what it comes to is computed as a step.
+            Condition::Aggregate { group, .. } => self.plan(group.clone(), None, fresh_from),
+            _ => None,
+        }
     }
 
     /// A plan that starts from a row of a head atom and looks for its support.
@@ -181,7 +210,10 @@ impl Planner<'_> {
         let mut rest: Vec<usize> = (0..self.lowered.body.len()).filter(|&p| Some(p) != skip).collect();
         let mut steps = Vec::new();
         while !rest.is_empty() {
-            let ready = rest.iter().position(|&p| is_ready(&self.lowered.body[p], &bound));
+            let is_aggregate = |p: usize| matches!(self.lowered.body[p], Condition::Aggregate { .. });
+            let ready = |p: usize| is_ready(&self.lowered.body[p], &bound);
+            let test = rest.iter().position(|&p| ready(p) && !is_aggregate(p));
+            let ready = test.or_else(|| rest.iter().position(|&p| ready(p)));
             let chosen = ready.or_else(|| self.cheapest(&rest, &bound))?;
             let position = rest.remove(chosen);
             let hidden = if position < fresh_from { HIDDEN | state::FRESH } else { HIDDEN };
@@ -231,6 +263,16 @@ impl Planner<'_> {
                 }
                 _ => Step::Test { built_in: *built_in, arguments: sources.clone() },
             },
+            Condition::Aggregate { matches, function, group, result } => {
+                let mask = (0..group.len()).fold(0, |mask, column| mask | 1 << column);
+                let index = (mask != 0).then(|| self.store.get_mut(*matches).index(mask));
+                let binds = !bound.knows(*result);
+                if let Source::Variable(number) = *result {
+                    bound.bind(number);
+                }
+                let (matches, function, result) = (*matches, *function, *result);
+                Step::Aggregate { matches, function, index, group: group.clone(), result, binds }
+            }
             Condition::Same(left, right) => match (*left, *right) {
                 (Source::Variable(variable), source) | (source, Source::Variable(variable))
                     if !bound.knows(Source::Variable(variable)) =>
@@ -250,79 +292,7 @@ fn is_ready(condition: &Condition, bound: &Bound) -> bool {
     match condition {
         Condition::Same(left, right) => bound.knows(*left) || bound.knows(*right),
         Condition::BuiltIn(built_in, sources) if built_in.is_function() => bound.knows_all(&sources[1..]),
+        Condition::Aggregate { group, .. } => bound.knows_all(group),
         other => bound.knows_all(&other.sources()),
-    }
-}
-
-/// The errors of one rule: built-in arities, forbidden head atoms, variables that nothing binds.
-pub(crate) fn check(rule: &Rule) -> Vec<Error> {
-    let mut errors = Vec::new();
-    let identity = || rule.identity.clone();
-    for atom in &rule.head {
-        let what = match atom {
-            Atom::Not { .. } => "a negated atom",
-            Atom::BuiltIn { .. } => "a built-in",
-            _ => continue,
-        };
-        errors.push(Error::HeadAtom { rule: identity(), what });
-    }
-    for atom in rule.head.iter().chain(&rule.body) {
-        match atom {
-            Atom::BuiltIn { built_in, arguments } if !built_in.accepts(arguments.len()) => {
-                let (built_in, count) = (built_in.name(), arguments.len());
-                errors.push(Error::BuiltInArity { rule: identity(), built_in, count });
-            }
-            Atom::Relation { arguments, .. } | Atom::Not { arguments, .. } if arguments.len() > 32 => {
-                errors.push(Error::Arity { rule: identity(), count: arguments.len() });
-            }
-            _ => {}
-        }
-    }
-    if errors.is_empty() { unbound(rule) } else { errors }
-}
-
-fn unbound(rule: &Rule) -> Vec<Error> {
-    let bound = bound_variables(rule);
-    let mut errors = Vec::new();
-    let mut reported = vec![false; bound.len()];
-    let head = rule.head.iter().flat_map(Atom::terms).map(|term| (true, term));
-    let body = rule.body.iter().flat_map(Atom::terms).map(|term| (false, term));
-    for (in_head, term) in body.chain(head) {
-        let Some(variable) = term.as_variable().filter(|v| !bound[usize::from(v.0)]) else { continue };
-        if std::mem::replace(&mut reported[usize::from(variable.0)], true) {
-            continue;
-        }
-        let (rule, variable) = (rule.identity.clone(), rule.variable_name(variable));
-        errors.push(if in_head {
-            Error::UnsafeHead { rule, variable }
-        } else {
-            Error::UnsafeBody { rule, variable }
-        });
-    }
-    errors
-}
-
-/// Which variables relation atoms, equalities and computed results bind.
-pub(crate) fn bound_variables(rule: &Rule) -> Vec<bool> {
-    let mut bound = Bound(vec![false; rule.variable_count()]);
-    loop {
-        let before = bound.0.clone();
-        for atom in &rule.body {
-            let terms: Vec<Source> = atom.terms().into_iter().map(Source::from).collect();
-            let binds = match atom {
-                Atom::Relation { .. } => true,
-                Atom::Same(..) => terms.iter().any(|&term| bound.knows(term)),
-                Atom::BuiltIn { built_in, .. } => built_in.is_function() && bound.knows_all(&terms[1..]),
-                Atom::Not { .. } | Atom::Different(..) => false,
-            };
-            let numbers = terms.iter().filter_map(|term| match term {
-                Source::Variable(number) if binds => Some(*number),
-                _ => None,
-            });
-            numbers.for_each(|number| bound.bind(number));
-        }
-        if before == bound.0 {
-            return bound.0;
-        }
     }
 }

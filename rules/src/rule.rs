@@ -43,10 +43,56 @@ pub enum Atom {
         /// The result comes first, as in `swrlb`.
         arguments: Vec<Term>,
     },
+    /// The result is what the aggregate makes of all matches of a conjunction of its own, in bodies only.
+    ///
+    /// Variables that atoms outside the aggregate bind have their values there: they make the group. Without any, all
+    /// matches are one group. The others are local to the aggregate.
+    Aggregate {
+        /// Which.
+        aggregate: Aggregate,
+        /// What the aggregate of the group has to equal, or a variable that it binds.
+        result: Term,
+        /// Any atoms but aggregates.
+        body: Vec<Atom>,
+    },
     /// Both terms denote the same individual.
     Same(Term, Term),
     /// The terms denote different individuals.
     Different(Term, Term),
+}
+
+/// What is made of the matches of a conjunction, each a distinct binding of all variables in it.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub enum Aggregate {
+    /// How many matches there are; 0 where there are none.
+    Count,
+    /// The sum of a term over all matches, exact for decimals, else in the widest floating-point type among them; 0
+    /// where there are none. No value where one is not a number.
+    Sum(Term),
+    /// The least value of a term. No value where there is no match, or where two values do not compare.
+    Min(Term),
+    /// The greatest value of a term, as for the least.
+    Max(Term),
+}
+
+impl Aggregate {
+    /// The word for it in rule text.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Count => "count",
+            Self::Sum(_) => "sum",
+            Self::Min(_) => "min",
+            Self::Max(_) => "max",
+        }
+    }
+
+    /// What is summed or compared.
+    pub fn value(self) -> Option<Term> {
+        match self {
+            Self::Count => None,
+            Self::Sum(value) | Self::Min(value) | Self::Max(value) => Some(value),
+        }
+    }
 }
 
 /// Which rule it is. Labels repeat in real knowledge bases; the position does not.
@@ -146,9 +192,21 @@ impl Atom {
         Self::Relation { predicate, arguments: arguments.into_iter().collect() }
     }
 
-    /// The arguments, in order.
+    /// The atoms within an aggregate, none of any other atom.
+    pub fn parts(&self) -> &[Self] {
+        match self {
+            Self::Aggregate { body, .. } => body,
+            _ => &[],
+        }
+    }
+
+    /// The arguments, in order; of an aggregate, its result, its value and the arguments of its atoms.
     pub fn terms(&self) -> Vec<Term> {
         match self {
+            Self::Aggregate { aggregate, result, body } => {
+                let own = std::iter::once(*result).chain(aggregate.value());
+                own.chain(body.iter().flat_map(Self::terms)).collect()
+            }
             Self::Relation { arguments, .. }
             | Self::Not { arguments, .. }
             | Self::BuiltIn { arguments, .. } => arguments.clone(),

@@ -71,8 +71,8 @@ impl Store {
         id
     }
 
-    /// A relation that belongs to no predicate: the matches of an integrity constraint. One that is empty and not
-    /// taken is used again.
+    /// A relation that belongs to no predicate: the matches of an integrity constraint or of an aggregate. One that is
+    /// empty and not taken is used again.
     pub fn anonymous(&mut self, arity: usize, taken: impl Fn(RelationId) -> bool) -> RelationId {
         let fits = |relation: &Relation| {
             relation.predicate.is_none() && relation.arity == arity && relation.len() == 0
@@ -105,7 +105,7 @@ impl Store {
 /// The facts of one predicate and arity.
 #[derive(Clone, Debug)]
 pub(crate) struct Relation {
-    /// `None` for the matches of a constraint.
+    /// `None` for the matches of a constraint or an aggregate.
     pub predicate: Option<Symbol>,
     arity: usize,
     arguments: Vec<Symbol>,

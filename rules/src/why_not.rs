@@ -9,12 +9,13 @@ use std::fmt;
 use num_rational::BigRational;
 use num_traits::{Signed, ToPrimitive};
 
+use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
 use crate::engine::Engine;
 use crate::fact::Fact;
-use crate::literal::Decimal;
+use crate::literal::{Decimal, Literal};
 use crate::plan::{Condition, Lowered, Source};
-use crate::rule::{RuleIdentity, Variable};
+use crate::rule::{Aggregate, RuleIdentity, Variable};
 use crate::store::RelationId;
 use crate::symbol::{Symbol, Symbols};
 
@@ -56,6 +57,17 @@ pub enum Obstacle {
         /// or a value that occurs nowhere.
         arguments: Vec<Option<Symbol>>,
         /// How far two numbers that are compared lie apart, exactly.
+        gap: Option<BigRational>,
+    },
+    /// An aggregate has another value, or none.
+    Aggregate {
+        /// Which.
+        aggregate: Aggregate,
+        /// The value that it would have to have; `None` where any would do.
+        wanted: Option<Symbol>,
+        /// The value that it has.
+        found: Option<Literal>,
+        /// How far two numbers lie apart, exactly.
         gap: Option<BigRational>,
     },
     /// Two terms are, or are not, the same although they must not, or must.
@@ -100,6 +112,19 @@ impl fmt::Display for DisplayObstacle<'_> {
             Obstacle::Present(fact) => write!(f, "but {}", fact.display(self.symbols)),
             Obstacle::False { built_in, arguments, gap } => {
                 write!(f, "{}({}) is false", built_in.name(), self.arguments(arguments))?;
+                match gap {
+                    Some(gap) => write!(f, ", by {}", Decimal::from_rational(gap)),
+                    None => Ok(()),
+                }
+            }
+            Obstacle::Aggregate { aggregate, wanted, found, gap } => {
+                match found {
+                    Some(found) => write!(f, "{} is {found}", aggregate.name())?,
+                    None => write!(f, "there is no {}", aggregate.name())?,
+                }
+                if let Some(wanted) = wanted {
+                    write!(f, ", not {}", self.symbols.value(*wanted))?;
+                }
                 match gap {
                     Some(gap) => write!(f, ", by {}", Decimal::from_rational(gap)),
                     None => Ok(()),
@@ -210,6 +235,7 @@ impl Search<'_> {
                     let open = usize::from(built_in.is_function());
                     if known(&sources[open..]) == sources.len() - open { 100 } else { 0 }
                 }
+                Condition::Aggregate { group, .. } if known(group) == group.len() => 100,
                 Condition::Same(a, b) if known(&[*a, *b]) > 0 => 100,
                 Condition::Different(a, b) if known(&[*a, *b]) == 2 => 100,
                 _ => 0,
@@ -269,7 +295,39 @@ impl Search<'_> {
                     state.obstacles.push(Obstacle::Equality { left, right, wanted: false });
                 }
             }
+            Condition::Aggregate { matches, function, group, result } => {
+                let group: Option<Vec<Symbol>> = group.iter().map(|&s| value(s, &state.bound)).collect();
+                if let Some(group) = group {
+                    self.aggregate(*matches, *function, &group, *result, state);
+                }
+            }
             Condition::Relation(..) => {}
+        }
+    }
+
+    fn aggregate(
+        &self,
+        matches: RelationId,
+        function: Function,
+        group: &[Symbol],
+        result: Source,
+        state: &mut State,
+    ) {
+        let symbols = &self.engine.symbols;
+        let found = function.of(self.engine.group(matches, group).map(|(_, row)| row), symbols);
+        let wanted = value(result, &state.bound);
+        let known = found.as_ref().and_then(|found| symbols.find_literal(found));
+        match (wanted, known) {
+            (None, Some(known)) => bind(result, known, &mut state.bound),
+            (Some(wanted), Some(known)) if wanted == known => {}
+            _ => {
+                let number = |literal: &Literal| literal.as_rational();
+                let wanted_number = wanted.and_then(|wanted| symbols.as_literal(wanted)).and_then(number);
+                let gap = found.as_ref().and_then(number).zip(wanted_number).map(|(a, b)| (a - b).abs());
+                state.distance += gap.as_ref().and_then(ToPrimitive::to_f64).unwrap_or(0.0);
+                let aggregate = function.aggregate;
+                state.obstacles.push(Obstacle::Aggregate { aggregate, wanted, found, gap });
+            }
         }
     }
 

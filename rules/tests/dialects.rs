@@ -11,7 +11,7 @@ fn check(text: &str, syntax: &Syntax, expected: &[&str]) {
 }
 
 #[test]
-fn swrl_has_no_negation_as_failure() {
+fn swrl_has_neither_negation_as_failure_nor_aggregates() {
     let swrl = Syntax { swrl_only: true, ..Syntax::default() };
     let text = "p(?x) ^ not q(?x) -> r(?x) . p(?x) -> q(?x) . p(?x) ^ not q(?x) -> s(?x)";
     check(text, &Syntax::default(), &[]);
@@ -21,6 +21,9 @@ fn swrl_has_no_negation_as_failure() {
     ];
     check(text, &swrl, &expected);
     check("p(?x) ^ not(?x) -> r(?x)", &swrl, &[]);
+    let text = "?n = count { p(?x) } -> r(?n)";
+    check(text, &Syntax::default(), &[]);
+    check(text, &swrl, &["test:1:1: R105 an aggregate is not SWRL"]);
 }
 
 /// Whether the first is a multiple of the second; the second of the double of the first.

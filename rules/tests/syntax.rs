@@ -13,6 +13,8 @@ fn printed_rules_read_back_the_same() {
         ex:p(?x.1, "a \"b\"\n"@en-GB) ∧ differentFrom(?x, ex:i) ∧ ex:r() → <urn:x y>(?x), sameAs(?x, ex:i) .
         ex:p(?x, 1e3) , not ex:q(?x, true, "5"^^xsd:byte, "FALSE") -> .
         -> ex:A(ex:a.b), not(ex:c) .
+        [aggregates] ex:p(?x, ?y) ^ ?n = count { ex:q(?x, ?z) ^ not ex:r(?z) } ^ 0 = sum{?n|ex:s(?n, ?y)}
+            ^ "1.5"^^xsd:decimal = min { ?w | ex:v(?x, ?w) } ^ ?n = max { 7 | ex:r(ex:a) } -> ex:A(?n) .
         [range] ex:p(?x, ?y) ^ xsd:decimal(?y) ^ rdf:PlainLiteral(?x) -> ex:q(?x) .
         # the end
     "#;
@@ -54,6 +56,12 @@ fn check(rules: &str, expected: &[&str]) {
 
 #[test]
 fn errors_have_codes_and_positions() {
+    check(
+        "?n = mean { ?x | p(?x) } -> q(?n)",
+        &["test:1:6: R101 expected `count`, `sum`, `min` or `max`, found `mean`"],
+    );
+    check("?n = sum { p(?x) } -> q(?n)", &["test:1:13: R101 expected `|`, found `(`"]);
+    check("?n(?x) -> q(?n)", &["test:1:3: R101 expected an atom, or `=` and an aggregate, found `(`"]);
     check("p(?x) ^ -> q(?x) .", &["test:1:9: R101 expected a name, found `->`"]);
     check(
         "p(?x -> q(?x) .\n\n  q(?x) -> r(?x) . s(é, $) -> t(?x) .",

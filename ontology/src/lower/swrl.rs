@@ -71,6 +71,7 @@ fn renamed(atom: &rules::Atom, name: &mut dyn FnMut(Variable) -> Term) -> rules:
         A::BuiltIn { built_in, arguments } => {
             A::BuiltIn { built_in, arguments: arguments.into_iter().map(term).collect() }
         }
+        A::Aggregate { .. } => atom.clone(),
         A::Same(left, right) => A::Same(term(left), term(right)),
         A::Different(left, right) => A::Different(term(left), term(right)),
     }

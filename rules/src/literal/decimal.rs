@@ -114,6 +114,22 @@ impl Decimal {
     }
 }
 
+/// The exact sum.
+impl<'a> std::iter::Sum<&'a Decimal> for Decimal {
+    fn sum<I: Iterator<Item = &'a Self>>(values: I) -> Self {
+        let (mut sum, mut scale) = (BigInt::zero(), 0);
+        for value in values {
+            let (unscaled, own) = value.parts();
+            if own > scale {
+                sum *= power_of_ten(own - scale);
+                scale = own;
+            }
+            sum += unscaled * power_of_ten(scale - own);
+        }
+        Self::new(sum, scale)
+    }
+}
+
 impl From<i64> for Decimal {
     fn from(value: i64) -> Self {
         Self(Repr::Small { unscaled: value, scale: 0 })

@@ -22,6 +22,11 @@ pub(super) enum Token {
     Carets,
     Open,
     Close,
+    /// `{`, `|` and `}`, around the atoms of an aggregate.
+    OpenBrace,
+    Bar,
+    CloseBrace,
+    Equals,
     /// `^`, `∧` or `,`: whether it can separate arguments.
     And,
     Comma,
@@ -133,6 +138,10 @@ impl Lexer {
             ',' => Ok(self.symbol(1, Token::Comma)),
             '(' => Ok(self.symbol(1, Token::Open)),
             ')' => Ok(self.symbol(1, Token::Close)),
+            '{' => Ok(self.symbol(1, Token::OpenBrace)),
+            '|' => Ok(self.symbol(1, Token::Bar)),
+            '}' => Ok(self.symbol(1, Token::CloseBrace)),
+            '=' => Ok(self.symbol(1, Token::Equals)),
             '.' => Ok(self.symbol(1, Token::Stop)),
             ':' => Ok(self.name()),
             other if is_name_start(other) => Ok(self.name()),

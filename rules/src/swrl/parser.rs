@@ -7,7 +7,7 @@ use super::lexer::{Fault, Spanned, Token, tokens};
 use crate::builtin::{BuiltIn, SWRLB, is_refused};
 use crate::error::Error;
 use crate::literal::{Literal, XSD, is_datatype};
-use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
+use crate::rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
 
 /// Abbreviations of IRIs. `swrlb`, `xsd`, `rdf`, `rdfs` and `owl` are always there unless declared otherwise.
@@ -61,7 +61,7 @@ impl Prefixes {
 /// What rule text may contain.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub struct Syntax {
-    /// Refuse what SWRL does not have: `not`.
+    /// Refuse what SWRL does not have: `not` and aggregates.
     pub swrl_only: bool,
     /// Built-ins besides SWRL's, see [`BuiltIn::custom`].
     pub built_ins: Vec<BuiltIn>,
@@ -225,6 +225,10 @@ impl Parser<'_> {
     }
 
     fn atom(&mut self) -> Parsed<Atom> {
+        let is_equation = self.tokens.get(self.at + 1).is_some_and(|next| next.token == Token::Equals);
+        if is_equation || matches!(self.peek(), Token::Variable(_) | Token::Text(_) | Token::Number(_)) {
+            return self.aggregate();
+        }
         let is_not = matches!(self.peek(), Token::Name(None, name) if name == "not");
         let negated = is_not && self.tokens.get(self.at + 1).is_some_and(|next| next.token != Token::Open);
         self.at += usize::from(negated);
@@ -240,11 +244,8 @@ impl Parser<'_> {
             }
             self.expect(&Token::Close, "`,` or `)`")?;
         }
-        if negated && self.syntax.swrl_only {
-            let (file, (line, column)) = (self.source.to_string(), at);
-            return Err(Error::NotSwrl { file, line, column, what: "negation as failure" });
-        }
         if negated {
+            self.refuse_in_swrl("negation as failure", at)?;
             let predicate = self.symbols.name(&predicate);
             return Ok(Atom::Not { predicate, arguments });
         }
@@ -272,6 +273,42 @@ impl Parser<'_> {
             (Some("differentFrom"), &[left, right]) => Atom::Different(left, right),
             _ => Atom::Relation { predicate: self.symbols.name(&predicate), arguments },
         })
+    }
+
+    /// `?n = count { atoms }`, `?n = sum { term | atoms }`, and `min` and `max` likewise.
+    fn aggregate(&mut self) -> Parsed<Atom> {
+        let at = self.position();
+        let result = self.term()?;
+        self.expect(&Token::Equals, "an atom, or `=` and an aggregate")?;
+        let aggregate: Option<fn(Term) -> Aggregate> = match self.peek() {
+            Token::Name(None, word) => match word.as_str() {
+                "count" => None,
+                "sum" => Some(Aggregate::Sum),
+                "min" => Some(Aggregate::Min),
+                "max" => Some(Aggregate::Max),
+                _ => return Err(self.error("`count`, `sum`, `min` or `max`")),
+            },
+            _ => return Err(self.error("`count`, `sum`, `min` or `max`")),
+        };
+        self.bump();
+        self.expect(&Token::OpenBrace, "`{`")?;
+        let aggregate = match aggregate {
+            Some(aggregate) => {
+                let value = self.term()?;
+                self.expect(&Token::Bar, "`|`")?;
+                aggregate(value)
+            }
+            None => Aggregate::Count,
+        };
+        let body = self.atoms()?;
+        self.expect(&Token::CloseBrace, "`^`, `,` or `}`")?;
+        self.refuse_in_swrl("an aggregate", at)?;
+        Ok(Atom::Aggregate { aggregate, result, body })
+    }
+
+    fn refuse_in_swrl(&self, what: &'static str, (line, column): (u32, u32)) -> Parsed<()> {
+        let file = self.source.to_string();
+        if self.syntax.swrl_only { Err(Error::NotSwrl { file, line, column, what }) } else { Ok(()) }
     }
 
     fn unknown_built_in(&self, name: &str, (line, column): (u32, u32)) -> Error {
@@ -380,6 +417,10 @@ fn describe(token: &Token) -> String {
         Token::Carets => "`^^`".into(),
         Token::Open => "`(`".into(),
         Token::Close => "`)`".into(),
+        Token::OpenBrace => "`{`".into(),
+        Token::Bar => "`|`".into(),
+        Token::CloseBrace => "`}`".into(),
+        Token::Equals => "`=`".into(),
         Token::And => "`^`".into(),
         Token::Comma => "`,`".into(),
         Token::Arrow => "`->`".into(),

@@ -47,7 +47,14 @@ impl Printer<'_> {
         if let Some((value, datatype)) = self.data_range(atom) {
             return format!("{}({})", self.name(datatype), self.term(rule, value));
         }
+        if let Atom::Aggregate { aggregate, result, body } = atom {
+            let value = aggregate.value().map(|value| format!("{} | ", self.term(rule, value)));
+            let (result, name) = (self.term(rule, *result), aggregate.name());
+            let (value, body) = (value.unwrap_or_default(), self.atoms(rule, body));
+            return format!("{result} = {name} {{ {value}{body} }}");
+        }
         let name = match atom {
+            Atom::Aggregate { .. } => String::new(),
             Atom::Relation { predicate, .. } => self.constant(*predicate),
             Atom::Not { predicate, .. } => format!("not {}", self.constant(*predicate)),
             Atom::BuiltIn { built_in: custom @ BuiltIn::Custom(_), .. } => self.name(custom.name()),

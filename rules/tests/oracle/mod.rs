@@ -3,7 +3,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use metaplan_rules::{Atom, BuiltIn, Fact, Literal, Program, Rule, Symbol, Symbols, Term, Variable};
+use metaplan_rules::{
+    Aggregate, Atom, BuiltIn, Fact, Literal, Program, Rule, Symbol, Symbols, Term, Variable,
+};
 
 /// Values of variables.
 pub type Binding = BTreeMap<Variable, Symbol>;
@@ -95,14 +97,28 @@ pub fn value(term: Term, binding: &Binding) -> Option<Symbol> {
 
 /// All matches of a body: relations first in textual order, then the rest as soon as it is bound.
 pub fn matches(rule: &Rule, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeSet<Binding> {
-    let mut partial = vec![Binding::new()];
-    for atom in rule.body.iter().filter(|atom| matches!(atom, Atom::Relation { .. })) {
+    extensions(&rule.body, Binding::new(), symbols, facts)
+}
+
+/// All matches of a conjunction that extend a binding.
+fn extensions(
+    body: &[Atom],
+    binding: Binding,
+    symbols: &mut Symbols,
+    facts: &BTreeSet<Fact>,
+) -> BTreeSet<Binding> {
+    let mut partial = vec![binding];
+    for atom in body.iter().filter(|atom| matches!(atom, Atom::Relation { .. })) {
         partial = partial.iter().flat_map(|binding| extend(atom, binding, facts)).collect();
     }
-    let mut rest: Vec<&Atom> =
-        rule.body.iter().filter(|atom| !matches!(atom, Atom::Relation { .. })).collect();
+    let mut rest: Vec<&Atom> = body.iter().filter(|atom| !matches!(atom, Atom::Relation { .. })).collect();
     while !rest.is_empty() {
         let known = |atom: &Atom, binding: &Binding| {
+            if let Atom::Aggregate { .. } = atom {
+                let outside = outside(body, atom);
+                let own = atom.terms()[1..].to_vec();
+                return own.iter().all(|term| !outside.contains(term) || value(*term, binding).is_some());
+            }
             let unbound = atom.terms().iter().filter(|&&term| value(term, binding).is_none()).count();
             let binds = match atom {
                 Atom::Same(..) => 1,
@@ -116,7 +132,9 @@ pub fn matches(rule: &Rule, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BT
         let Some(example) = partial.first() else { return BTreeSet::new() };
         let ready = rest.iter().position(|atom| known(atom, example)).expect("a safe rule");
         let atom = rest.remove(ready);
-        partial = partial.into_iter().filter_map(|binding| filter(atom, binding, symbols, facts)).collect();
+        let outside = outside(body, atom);
+        let pass = |binding| filter(atom, binding, symbols, facts, &outside);
+        partial = partial.into_iter().filter_map(pass).collect();
     }
     partial.into_iter().collect()
 }
@@ -145,8 +163,57 @@ fn extend(atom: &Atom, binding: &Binding, facts: &BTreeSet<Fact>) -> Vec<Binding
     .collect()
 }
 
-fn filter(atom: &Atom, binding: Binding, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> Option<Binding> {
+/// The terms of a body's atoms, of other aggregates only the result.
+fn outside(body: &[Atom], aggregate: &Atom) -> BTreeSet<Term> {
+    let others = body.iter().filter(|&other| !std::ptr::eq(other, aggregate));
+    let visible = others.flat_map(|other| match other {
+        Atom::Aggregate { result, .. } => vec![*result],
+        other => other.terms(),
+    });
+    visible.collect()
+}
+
+/// What an aggregate comes to under a binding of its group, over integers.
+pub fn aggregate(
+    atom: &Atom,
+    binding: &Binding,
+    symbols: &mut Symbols,
+    facts: &BTreeSet<Fact>,
+    outside: &BTreeSet<Term>,
+) -> Option<Literal> {
+    let Atom::Aggregate { aggregate, body, .. } = atom else { panic!("{atom:?} is no aggregate") };
+    let mut group = binding.clone();
+    group.retain(|variable, _| outside.contains(&Term::Variable(*variable)));
+    let found = extensions(body, group, symbols, facts);
+    let values = found.iter().map(|binding| literal(aggregate.value()?, binding, symbols)?.as_rational());
+    if let Aggregate::Count = aggregate {
+        return Some(Literal::integer(found.len() as i64));
+    }
+    let values: Vec<_> = values.collect::<Option<_>>()?;
+    let result = match aggregate {
+        Aggregate::Sum(_) => values.iter().sum(),
+        Aggregate::Min(_) => values.into_iter().min()?,
+        _ => values.into_iter().max()?,
+    };
+    Some(Literal::parse(&result.to_string(), Some("http://www.w3.org/2001/XMLSchema#integer"), None))
+}
+
+fn filter(
+    atom: &Atom,
+    binding: Binding,
+    symbols: &mut Symbols,
+    facts: &BTreeSet<Fact>,
+    outside: &BTreeSet<Term>,
+) -> Option<Binding> {
     match atom {
+        Atom::Aggregate { result, .. } => {
+            let found = aggregate(atom, &binding, symbols, facts, outside)?;
+            let found = symbols.literal(found);
+            match value(*result, &binding) {
+                Some(wanted) => (wanted == found).then_some(binding),
+                None => bind(*result, found, binding),
+            }
+        }
         Atom::Not { .. } => (!facts.contains(&ground(atom, &binding))).then_some(binding),
         Atom::Same(left, right) => match (value(*left, &binding), value(*right, &binding)) {
             (Some(a), Some(b)) => (a == b).then_some(binding),

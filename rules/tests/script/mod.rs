@@ -4,11 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use metaplan_rules::{
-    Atom, BuiltIn, Cause, Delta, Derivation, Engine, Fact, Literal, Program, Reason, Rule, RuleIdentity,
-    Symbol, Symbols, Term, Variable, owl_rl,
+    Aggregate, Atom, BuiltIn, Cause, Delta, Derivation, Engine, Fact, Literal, Program, Reason, Rule,
+    RuleIdentity, Symbol, Symbols, Term, Variable, owl_rl,
 };
 
-use crate::oracle::{Binding, close_under, ground, holds, matches, naive, value};
+use crate::oracle::{self, Binding, close_under, ground, holds, matches, naive, value};
 
 const PREDICATES: u8 = 9;
 /// Predicates of one level, with one, two and three arguments.
@@ -45,6 +45,10 @@ impl World {
         let name =
             |number| if equality && number == EQUALITY { SAME_AS.into() } else { format!("p{number}") };
         let predicates = (0..PREDICATES).map(|number| symbols.name(&name(number))).collect();
+        for name in ["integer", "string"] {
+            let iri = format!("http://www.w3.org/2001/XMLSchema#{name}");
+            symbols.literal(Literal::Uri(iri.into()));
+        }
         let names = ["a", "b"].map(|name| symbols.name(name));
         let numbers = [1, 2].map(|number| symbols.literal(Literal::integer(number)));
         Self { symbols, predicates, constants: names.into_iter().chain(numbers).collect() }
@@ -90,7 +94,7 @@ impl World {
         });
         let heads: Vec<(u8, &[u8; 3])> = heads.collect();
         let level = heads.iter().map(|(head, _)| head / PER_LEVEL).min().unwrap_or(0);
-        let positive = body.iter().filter(|(kind, ..)| kind % 10 < 4 || level == 0 && kind % 10 < 7);
+        let positive = body.iter().filter(|(kind, ..)| kind % 13 < 4 || level == 0 && kind % 13 < 7);
         let relations =
             positive.map(|(_, p, arguments)| self.relation(p % (PER_LEVEL * (level + 1)), arguments));
         let mut atoms: Vec<Atom> = relations.collect();
@@ -101,7 +105,7 @@ impl World {
         };
         for &(kind, p, [a, b, c]) in body {
             let [left, right] = [a, b].map(|number| safe(self.term(number), &bound));
-            match kind % 10 {
+            match kind % 13 {
                 4..=6 if level > 0 => {
                     let p = p % (PER_LEVEL * level);
                     let arguments = [left, right].into_iter().chain([left]).take(arity(p)).collect();
@@ -123,6 +127,19 @@ impl World {
                     let arguments = vec![result, left, right];
                     atoms.push(Atom::BuiltIn { built_in: BuiltIn::Subtract, arguments });
                 }
+                10 if p % 3 > 0 => {
+                    let datatype = ["integer", "string"].map(|name| self.datatype(name))[usize::from(p % 2)];
+                    let arguments = vec![left, datatype];
+                    atoms.push(Atom::BuiltIn { built_in: BuiltIn::DataRange, arguments });
+                }
+                11 | 12 if level > 0 => {
+                    let result = Term::Variable(Variable(u16::from(VARIABLES + c % 2)));
+                    // What is asked of outside must lie below, too.
+                    let below = atoms.iter().all(|atom| self.is_below(atom, level));
+                    let outside = if below { bound.clone() } else { BTreeSet::new() };
+                    atoms.push(self.aggregate(result, (kind / 13, p, [a, b, c]), level, &outside));
+                    bound.insert(result);
+                }
                 _ => {}
             }
         }
@@ -139,6 +156,33 @@ impl World {
         Rule::new(identity, if constraint { vec![] } else { heads }, atoms)
     }
 
+    fn datatype(&self, name: &str) -> Term {
+        let iri = format!("http://www.w3.org/2001/XMLSchema#{name}");
+        Term::Constant(self.symbols.find_literal(&Literal::Uri(iri.into())).expect("interned"))
+    }
+
+    /// An aggregate over one or two atoms of lower levels; the second may ask for variables bound outside.
+    fn aggregate(&self, result: Term, (way, p, numbers): RawAtom, level: u8, bound: &BTreeSet<Term>) -> Atom {
+        let below = PER_LEVEL * level;
+        let first = self.relation(p % below, &numbers);
+        let terms = first.terms();
+        let value = terms[usize::from(way) % terms.len()];
+        let outside = bound.iter().nth(usize::from(p) % bound.len().max(1)).copied().unwrap_or(terms[0]);
+        let second = match way / 4 % 5 {
+            0 => Some(self.relation((p / 3) % below, &[numbers[2], numbers[1], numbers[0]])),
+            1 => Some(Atom::Not { predicate: self.predicates[0], arguments: vec![value] }),
+            2 => Some(Atom::BuiltIn { built_in: BuiltIn::LessThan, arguments: vec![value, outside] }),
+            _ => None,
+        };
+        let aggregate = match way % 4 {
+            0 => Aggregate::Count,
+            1 => Aggregate::Sum(value),
+            2 => Aggregate::Min(value),
+            _ => Aggregate::Max(value),
+        };
+        Atom::Aggregate { aggregate, result, body: std::iter::once(first).chain(second).collect() }
+    }
+
     fn is_below(&self, atom: &Atom, level: u8) -> bool {
         match atom {
             Atom::Relation { predicate, .. } => self.level(*predicate) < usize::from(level),
@@ -149,23 +193,33 @@ impl World {
 
 /// The first step follows from its supports by its rule, and no fact supports itself. The other steps are first in
 /// derivations of their own.
-fn check_derivation(engine: &Engine, derivation: &Derivation) {
+fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<Fact>) {
     let mut supported = vec![false; derivation.steps.len()];
     // Supports are settled in as many passes as the longest chain; a circle never is.
     for _ in 0..derivation.steps.len() {
         for (position, step) in derivation.steps.iter().enumerate() {
             supported[position] |= match &step.reason {
                 Reason::Asserted => engine.is_asserted(&step.fact),
-                Reason::Rule { supports, .. } => supports.iter().all(|&support| supported[support]),
+                Reason::Rule { supports, aggregates, .. } => {
+                    let matched = aggregates.iter().flat_map(|aggregate| aggregate.matches.iter().flatten());
+                    supports.iter().chain(matched).all(|&support| supported[support])
+                }
             };
         }
     }
     assert!(supported.iter().all(|&supported| supported), "circular: {derivation:?}");
     for step in &derivation.steps[..1] {
-        let Reason::Rule { identity, bindings, supports, absent } = &step.reason else { continue };
+        let Reason::Rule { identity, bindings, supports, absent, aggregates } = &step.reason else {
+            continue;
+        };
         let rule =
             engine.program().rules.iter().find(|rule| rule.identity == *identity).expect("an active rule");
-        let values: Binding = (0..).map(Variable).zip(bindings.iter().map(|(_, value)| *value)).collect();
+        let number = |name: &String| {
+            let mut variables = (0..rule.variable_count() as u16).map(Variable);
+            variables.find(|&variable| rule.variable_name(variable) == *name).expect("a variable of the rule")
+        };
+        let values: Binding = bindings.iter().map(|(name, value)| (number(name), *value)).collect();
+        let mut aggregates = aggregates.iter();
         assert!(rule.head.iter().any(|head| ground(head, &values) == step.fact), "{step:?}");
         let body = |negated: bool| {
             let atoms = rule.body.iter().filter(move |atom| match atom {
@@ -185,6 +239,16 @@ fn check_derivation(engine: &Engine, derivation: &Derivation) {
                     holds(*built_in, arguments, &values, engine.symbols()),
                 Atom::Same(left, right) => value(*left, &values) == value(*right, &values),
                 Atom::Different(left, right) => value(*left, &values) != value(*right, &values),
+                Atom::Aggregate { aggregate, result, .. } => {
+                    let found = aggregates.next().expect("one for each");
+                    let known: BTreeSet<Term> = values.keys().map(|&variable| variable.into()).collect();
+                    let mut symbols = engine.symbols().clone();
+                    let expected = oracle::aggregate(atom, &values, &mut symbols, facts, &known);
+                    value(*result, &values) == Some(found.result)
+                        && expected.as_ref() == engine.symbols().value(found.result).as_literal()
+                        && (*aggregate != Aggregate::Count
+                            || expected == Some(Literal::integer(found.matches.len() as i64)))
+                }
                 Atom::Relation { .. } | Atom::Not { .. } => true,
             });
         }
@@ -216,7 +280,7 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
     assert_eq!(facts, expected);
     for fact in &facts {
         assert_eq!(engine.is_asserted(fact), stated.contains(fact));
-        check_derivation(engine, &engine.why(fact).expect("a derivation of what holds"));
+        check_derivation(engine, &engine.why(fact).expect("a derivation of what holds"), &facts);
         let pattern: Vec<Option<Symbol>> =
             fact.arguments.iter().enumerate().map(|(at, &symbol)| (at != 1).then_some(symbol)).collect();
         assert!(engine.matching(fact.predicate, &pattern).any(|row| row == fact.arguments.as_slice()));

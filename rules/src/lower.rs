@@ -1,0 +1,130 @@
+//! Rules to conditions and templates that name relations. The atoms of an aggregate become a rule of their own, which
+//! concludes one row for each match in a relation without a name: first the group, then what is local.
+
+use rustc_hash::FxHashSet;
+
+use crate::aggregate::Function;
+use crate::network::{DIFFERENT_FROM, SAME_AS};
+use crate::plan::{Condition, Lowered, Source, Template};
+use crate::rule::{Atom, Rule, Term, Variable};
+use crate::safety::{Scope, binding, bound_variables};
+use crate::store::{RelationId, Store};
+use crate::symbol::{Symbol, Symbols};
+
+/// Lowers rules that [`crate::safety::check`] found nothing wrong with.
+pub(crate) struct Lowering<'a> {
+    symbols: &'a mut Symbols,
+    store: &'a mut Store,
+    /// The relation of each integrity constraint's matches, with its position in the program.
+    constraints: &'a mut Vec<(RelationId, usize)>,
+    /// Relations without a name that are in use.
+    taken: FxHashSet<RelationId>,
+    pub lowered: Vec<Lowered>,
+}
+
+fn sources(terms: &[Term]) -> Vec<Source> {
+    terms.iter().copied().map(Source::from).collect()
+}
+
+fn columns(variables: &[u16]) -> Vec<Source> {
+    variables.iter().copied().map(Source::Variable).collect()
+}
+
+impl<'a> Lowering<'a> {
+    pub fn new(
+        symbols: &'a mut Symbols,
+        store: &'a mut Store,
+        constraints: &'a mut Vec<(RelationId, usize)>,
+        taken: FxHashSet<RelationId>,
+    ) -> Self {
+        Self { symbols, store, constraints, taken, lowered: Vec::new() }
+    }
+
+    /// Lowers the rule at a position of the program, the rules of its aggregates first.
+    pub fn rule(&mut self, position: usize, rule: &Rule) {
+        let width = rule.variable_count().max(1);
+        let mut body: Vec<Option<Condition>> = rule.body.iter().map(|atom| self.condition(atom)).collect();
+        for scope in binding(rule).scopes {
+            body[scope.at] = self.aggregate(position, rule, &scope, &body);
+        }
+        let body: Vec<Condition> = body.into_iter().flatten().collect();
+        let mut heads: Vec<Template> = rule.head.iter().filter_map(|atom| self.template(atom)).collect();
+        if rule.head.is_empty() {
+            let bound = (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound);
+            let bound: Vec<u16> = bound.map(|(number, _)| number).collect();
+            let relation = self.anonymous(bound.len());
+            heads.push(Template { relation, arguments: columns(&bound) });
+            self.constraints.push((relation, position));
+        }
+        self.lowered.push(Lowered { rule: position, width, heads, body });
+    }
+
+    fn anonymous(&mut self, arity: usize) -> RelationId {
+        let relation = self.store.anonymous(arity, |id| self.taken.contains(&id));
+        self.taken.insert(relation);
+        relation
+    }
+
+    fn relation(&mut self, predicate: Symbol, terms: &[Term]) -> RelationId {
+        self.store.relation(predicate, terms.len())
+    }
+
+    /// `None` for aggregates.
+    fn condition(&mut self, atom: &Atom) -> Option<Condition> {
+        Some(match atom {
+            Atom::Relation { predicate, arguments } => {
+                Condition::Relation(self.relation(*predicate, arguments), sources(arguments))
+            }
+            Atom::Not { predicate, arguments } => {
+                Condition::Not(self.relation(*predicate, arguments), sources(arguments))
+            }
+            Atom::BuiltIn { built_in, arguments } => Condition::BuiltIn(*built_in, sources(arguments)),
+            Atom::Same(left, right) => Condition::Same((*left).into(), (*right).into()),
+            Atom::Different(left, right) => Condition::Different((*left).into(), (*right).into()),
+            Atom::Aggregate { .. } => return None,
+        })
+    }
+
+    /// `None` for atoms that cannot be concluded.
+    fn template(&mut self, atom: &Atom) -> Option<Template> {
+        let (predicate, terms) = match atom {
+            Atom::Relation { predicate, arguments } => (*predicate, arguments.clone()),
+            Atom::Same(left, right) => (self.symbols.name(SAME_AS), vec![*left, *right]),
+            Atom::Different(left, right) => (self.symbols.name(DIFFERENT_FROM), vec![*left, *right]),
+            Atom::Not { .. } | Atom::BuiltIn { .. } | Atom::Aggregate { .. } => return None,
+        };
+        Some(Template { relation: self.relation(predicate, &terms), arguments: sources(&terms) })
+    }
+
+    /// Adds the rule that concludes an aggregate's matches; `outside` holds the other conditions lowered so far.
+    fn aggregate(
+        &mut self,
+        position: usize,
+        rule: &Rule,
+        scope: &Scope,
+        outside: &[Option<Condition>],
+    ) -> Option<Condition> {
+        let Atom::Aggregate { aggregate, result, body } = &rule.body[scope.at] else { return None };
+        let variables = [scope.group.as_slice(), &scope.locals].concat();
+        let matches = self.anonymous(variables.len());
+        let mut conditions: Vec<Condition> = body.iter().filter_map(|atom| self.condition(atom)).collect();
+        conditions.extend(scope.context.iter().filter_map(|&at| outside[at].clone()));
+        let heads = vec![Template { relation: matches, arguments: columns(&variables) }];
+        let width = rule.variable_count().max(1);
+        self.lowered.push(Lowered { rule: position, width, heads, body: conditions });
+        let value = match aggregate.value() {
+            Some(Term::Variable(Variable(number))) => {
+                Source::Variable(variables.iter().position(|&v| v == number)? as u16)
+            }
+            Some(Term::Constant(symbol)) => Source::Constant(symbol),
+            None => Source::Variable(0),
+        };
+        let function = Function { aggregate: *aggregate, value };
+        Some(Condition::Aggregate {
+            matches,
+            function,
+            group: columns(&scope.group),
+            result: (*result).into(),
+        })
+    }
+}
