@@ -15,7 +15,7 @@ fn printed_rules_read_back_the_same() {
         -> ex:A(ex:a.b), not(ex:c) .
         [aggregates] ex:p(?x, ?y) ^ ?n = count { ex:q(?x, ?z) ^ not ex:r(?z) } ^ 0 = sum{?n|ex:s(?n, ?y)}
             ^ "1.5"^^xsd:decimal = min { ?w | ex:v(?x, ?w) } ^ ?n = max { 7 | ex:r(ex:a) } -> ex:A(?n) .
-        [range] ex:p(?x, ?y) ^ xsd:decimal(?y) ^ rdf:PlainLiteral(?x) -> ex:q(?x) .
+        [range] ex:p(?x, ?y) ^ xsd:decimal(?y) ^ rdf:PlainLiteral(?x) ^ not xsd:string(?x) -> ex:q(?x) .
         # the end
     "#;
     let odd = odd.replace("?x.1", "?x");

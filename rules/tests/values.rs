@@ -295,6 +295,8 @@ fn value_spaces_contain_their_values() {
         ("true", "boolean", "string"),
         ("\"2026-01-01T00:00:00Z\"^^xsd:dateTime", "dateTime dateTimeStamp", "date"),
         ("\"P1D\"^^xsd:duration", "duration dayTimeDuration", "yearMonthDuration"),
+        ("\"P1M\"^^xsd:duration", "duration yearMonthDuration", "dayTimeDuration string"),
+        ("\"P0M\"^^xsd:yearMonthDuration", "duration yearMonthDuration dayTimeDuration", "string"),
         ("\"nan\"^^xsd:decimal", "", "decimal string"),
     ] {
         let value = literal(text);

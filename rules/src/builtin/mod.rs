@@ -64,6 +64,9 @@ built_ins! {
     /// The first lies in the value space of the datatype whose IRI the second (an `xsd:anyURI`) is: SWRL's data range
     /// atom, not a member of `swrlb`. Rule text writes it `xsd:decimal(?x)`.
     DataRange "dataRange" 2..=2 Test,
+    /// The first is a literal outside the datatype's value space: the complement of a data range, which OWL has and SWRL
+    /// has not. Rule text writes it `not xsd:decimal(?x)`.
+    OutsideDataRange "outsideDataRange" 2..=2 Test,
     /// The values are equal.
     Equal "equal" 2..=2 Test,
     /// The values are comparable and not equal.
@@ -229,7 +232,8 @@ impl BuiltIn {
 
     /// The built-in of `swrlb` with this local name.
     pub fn from_name(local: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|&built_in| built_in.name() == local && built_in != Self::DataRange)
+        let is_swrls = |built_in: &Self| !matches!(built_in, Self::DataRange | Self::OutsideDataRange);
+        Self::ALL.iter().copied().find(|built_in| built_in.name() == local && is_swrls(built_in))
     }
 
     /// Whether it can take this many arguments.
@@ -266,6 +270,7 @@ impl BuiltIn {
         let order = || left.compare(right);
         match self {
             Self::DataRange => matches!(right, Literal::Uri(datatype) if left.is_in(datatype)),
+            Self::OutsideDataRange => matches!(right, Literal::Uri(datatype) if !left.is_in(datatype)),
             Self::Equal => order() == Some(Ordering::Equal),
             Self::NotEqual => order().is_some_and(|order| order != Ordering::Equal),
             Self::LessThan => order() == Some(Ordering::Less),

@@ -177,6 +177,8 @@ impl Literal {
             RDFS_LITERAL => true,
             OWL_REAL | OWL_RATIONAL => matches!(self, Self::Decimal(_)),
             _ => match (self, datatype_iri.strip_prefix(RDF)) {
+                // Zero has one spelling and lies in both kinds.
+                (Self::Duration(duration), _) => duration.is_in(datatype_iri),
                 (Self::Language { .. }, Some("langString" | "PlainLiteral"))
                 | (Self::String(_), Some("PlainLiteral")) => true,
                 (_, Some(_)) | (Self::Language { .. }, _) => false,

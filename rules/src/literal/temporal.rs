@@ -6,6 +6,7 @@
 use std::cmp::Ordering;
 use std::fmt;
 
+use super::XSD;
 use super::decimal::Decimal;
 use num_bigint::BigInt;
 use num_traits::Zero;
@@ -221,6 +222,15 @@ impl Duration {
     /// As long, in the other direction.
     pub(crate) fn negated(&self) -> Option<Self> {
         Some(Self { months: self.months.checked_neg()?, seconds: negate(&self.seconds) })
+    }
+
+    pub(super) fn is_in(&self, datatype: &str) -> bool {
+        match datatype.strip_prefix(XSD) {
+            Some("duration") => true,
+            Some("yearMonthDuration") => self.seconds == Decimal::from(0),
+            Some("dayTimeDuration") => self.months == 0,
+            _ => false,
+        }
     }
 
     pub(super) fn datatype(&self) -> &'static str {

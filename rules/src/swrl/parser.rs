@@ -246,6 +246,9 @@ impl Parser<'_> {
         }
         if negated {
             self.refuse_in_swrl("negation as failure", at)?;
+            if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
+                return Ok(self.data_range(BuiltIn::OutsideDataRange, *value, predicate));
+            }
             let predicate = self.symbols.name(&predicate);
             return Ok(Atom::Not { predicate, arguments });
         }
@@ -259,9 +262,7 @@ impl Parser<'_> {
             };
         }
         if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
-            let datatype = self.symbols.literal(Literal::Uri(predicate.into()));
-            let arguments = vec![*value, Term::Constant(datatype)];
-            return Ok(Atom::BuiltIn { built_in: BuiltIn::DataRange, arguments });
+            return Ok(self.data_range(BuiltIn::DataRange, *value, predicate));
         }
         let owl = predicate.strip_prefix("http://www.w3.org/2002/07/owl#");
         let word = match &name {
@@ -304,6 +305,11 @@ impl Parser<'_> {
         self.expect(&Token::CloseBrace, "`^`, `,` or `}`")?;
         self.refuse_in_swrl("an aggregate", at)?;
         Ok(Atom::Aggregate { aggregate, result, body })
+    }
+
+    fn data_range(&mut self, built_in: BuiltIn, value: Term, datatype: String) -> Atom {
+        let datatype = self.symbols.literal(Literal::Uri(datatype.into()));
+        Atom::BuiltIn { built_in, arguments: vec![value, Term::Constant(datatype)] }
     }
 
     fn refuse_in_swrl(&self, what: &'static str, (line, column): (u32, u32)) -> Parsed<()> {

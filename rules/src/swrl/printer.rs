@@ -44,8 +44,8 @@ impl Printer<'_> {
     }
 
     fn atom(&self, rule: &Rule, atom: &Atom) -> String {
-        if let Some((value, datatype)) = self.data_range(atom) {
-            return format!("{}({})", self.name(datatype), self.term(rule, value));
+        if let Some((negation, value, datatype)) = self.data_range(atom) {
+            return format!("{negation}{}({})", self.name(datatype), self.term(rule, value));
         }
         if let Atom::Aggregate { aggregate, result, body } = atom {
             let value = aggregate.value().map(|value| format!("{} | ", self.term(rule, value)));
@@ -66,11 +66,15 @@ impl Printer<'_> {
         format!("{name}({})", arguments.join(", "))
     }
 
-    fn data_range(&self, atom: &Atom) -> Option<(Term, &str)> {
-        let Atom::BuiltIn { built_in: BuiltIn::DataRange, arguments } = atom else { return None };
+    fn data_range(&self, atom: &Atom) -> Option<(&'static str, Term, &str)> {
+        let (negation, arguments) = match atom {
+            Atom::BuiltIn { built_in: BuiltIn::DataRange, arguments } => ("", arguments),
+            Atom::BuiltIn { built_in: BuiltIn::OutsideDataRange, arguments } => ("not ", arguments),
+            _ => return None,
+        };
         let [value, Term::Constant(datatype)] = arguments.as_slice() else { return None };
         match self.symbols.value(*datatype) {
-            Value::Literal(Literal::Uri(iri)) => Some((*value, iri)),
+            Value::Literal(Literal::Uri(iri)) => Some((negation, *value, iri)),
             _ => None,
         }
     }

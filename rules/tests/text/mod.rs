@@ -10,12 +10,16 @@ pub fn prefixes() -> Prefixes {
 /// `p(a, "x"), q(1)` as facts: the head of a rule without body.
 pub fn facts(symbols: &mut Symbols, text: &str) -> Vec<Fact> {
     let program = parse_rules(&format!("-> {text} ."), "facts", symbols, &prefixes()).expect("facts");
+    let [same, different] = ["sameAs", "differentFrom"]
+        .map(|name| symbols.name(&format!("http://www.w3.org/2002/07/owl#{name}")));
     let ground = |term| match term {
         Term::Constant(symbol) => symbol,
         Term::Variable(_) => panic!("a fact has no variables"),
     };
     let fact = |atom| match atom {
         Atom::Relation { predicate, arguments } => Fact::new(predicate, arguments.into_iter().map(ground)),
+        Atom::Same(left, right) => Fact::new(same, [ground(left), ground(right)]),
+        Atom::Different(left, right) => Fact::new(different, [ground(left), ground(right)]),
         other => panic!("{other:?} is no fact"),
     };
     program.rules.into_iter().flat_map(|rule| rule.head).map(fact).collect()

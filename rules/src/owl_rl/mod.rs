@@ -1,13 +1,19 @@
 //! OWL axioms to rules, by the tables of OWL 2 RL/RDF (section 4.3 of \[1\]), instantiated per axiom.
 //!
 //! A rule of the tables speaks of triples; here each class is a relation with one argument and each property one with
-//! two, so every axiom gives rules of its own and no join ever runs over all triples. The schema table (`scm-*`) has
-//! no counterpart: it derives axioms from axioms, and each assertion that a derived axiom yields follows from the
-//! chained rules of the axioms it comes from.
+//! two, so every axiom gives rules of its own and no join ever runs over all triples. The schema table (`scm-*`) derives
+//! axioms from axioms. Of these, only subclasses between restrictions (scm-svf1, scm-svf2, scm-avf1, scm-avf2) become
+//! rules: whatever assertion another derived axiom yields follows from the chained rules of the axioms it comes from.
+//!
+//! Not covered are rules without a counterpart here: `owl:Thing` and `owl:Nothing` as classes of their own, annotation
+//! properties, declarations (prp-ap, cls-thing, cls-nothing1, dt-type1, scm-cls, scm-op, scm-dp), and individuals that
+//! are equal as properties (eq-rep-p).
 //!
 //! Equality (table 4) is `owl:sameAs` as an equivalence under which every relation is closed. Datatype clashes need no rule: see [`crate::Engine::violations`].
 //!
 //! \[1\] W3C OWL 2 Web Ontology Language Profiles (Second Edition), 2012.
+
+mod schema;
 
 use std::collections::BTreeSet;
 
@@ -64,6 +70,8 @@ pub enum Axiom {
     Domain(Symbol, Symbol),
     /// What anything is related to is in the class (prp-rng).
     Range(Symbol, Symbol),
+    /// What anything is related to is in the datatype, an `xsd:anyURI` literal (prp-rng with dt-type2 and dt-not-type).
+    DataRange(Symbol, Symbol),
     /// At most one value, an individual (prp-fp).
     FunctionalObject(Symbol),
     /// At most one value, a literal (prp-fp, where two literals are never one).
@@ -98,7 +106,7 @@ pub enum Axiom {
 /// states or asks for `owl:sameAs` or `owl:differentFrom` under [`Names::Owl`].
 pub fn rules(axioms: &[Axiom], names: Names) -> Program {
     let mut program = Program::default();
-    for axiom in axioms {
+    for axiom in axioms.iter().chain(&schema::subclasses(axioms)) {
         let (text, parts) = template(axiom);
         let merges = text.contains("-> sameAs");
         if names == Names::Owl || !merges {
@@ -222,6 +230,7 @@ fn template(axiom: &Axiom) -> (String, Vec<Symbol>) {
         }
         A::Domain(p, c) => ("[prp-dom] a0(?x, ?y) -> a1(?x) .", vec![*p, *c]),
         A::Range(p, c) => ("[prp-rng] a0(?x, ?y) -> a1(?y) .", vec![*p, *c]),
+        A::DataRange(p, d) => ("[prp-rng] a0(?x, ?y) ^ not rdfs:Literal(?y) -> .", vec![*p, *d]),
         A::FunctionalObject(p) => {
             ("[prp-fp] a0(?x, ?y) ^ a0(?x, ?z) ^ differentFrom(?y, ?z) -> sameAs(?y, ?z) .", vec![*p])
         }
@@ -320,6 +329,12 @@ fn instantiate(text: &str, parts: &[Symbol], program: &mut Program) {
         Atom::Relation { predicate, arguments } => {
             let arguments = arguments.iter().copied().map(term);
             Atom::relation(part(*predicate).unwrap_or(*predicate), arguments)
+        }
+        // The datatype of a template is a place for that of the axiom, its second part.
+        Atom::BuiltIn { built_in, arguments } => {
+            let datatype = parts.get(1).copied().map(Term::Constant);
+            let arguments = arguments.iter().take(1).copied().chain(datatype).collect();
+            Atom::BuiltIn { built_in: *built_in, arguments }
         }
         other => other.clone(),
     };
