@@ -6,7 +6,7 @@
 
 use smallvec::SmallVec;
 
-use crate::lifted::{Effect, Expression, Formula, Lifted, Schema, Term};
+use crate::lifted::{Change, Expression, Formula, Lifted, Schema, Term};
 use crate::pddl::ast::Name;
 use crate::quantity::SlotSet;
 
@@ -65,11 +65,14 @@ fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
             expression_separable(lifted, left, parameter) && expression_separable(lifted, right, parameter)
         }
         other => !mentions(other, parameter) || is_static(lifted, other),
-    }) && effects.into_iter().all(|effect| match effect {
-        Effect::Add(_, terms) | Effect::Delete(_, terms) => !terms.iter().any(is),
-        Effect::Assign { terms, expression, .. } => {
-            !terms.iter().any(is) && expression_separable(lifted, expression, parameter)
-        }
+    }) && effects.into_iter().all(|effect| {
+        !mentions(&effect.condition, parameter)
+            && match &effect.change {
+                Change::Add(_, terms) | Change::Delete(_, terms) => !terms.iter().any(is),
+                Change::Assign { terms, expression, .. } => {
+                    !terms.iter().any(is) && expression_separable(lifted, expression, parameter)
+                }
+            }
     }) && schema.duration.as_ref().is_none_or(|duration| expression_separable(lifted, duration, parameter))
 }
 
@@ -86,6 +89,7 @@ fn expression_separable(lifted: &Lifted, expression: &Expression, parameter: u32
 pub(crate) fn is_static(lifted: &Lifted, formula: &Formula) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().all(|part| is_static(lifted, part)),
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => is_static(lifted, body),
         Formula::Literal { predicate, .. } => !lifted.predicates[predicate.index()].fluent,
         Formula::Equal { .. } => true,
         Formula::Compare(_, left, right, _) => {
@@ -143,8 +147,10 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     }
 }
 
-fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
+/// Calls `visit` with every term of a condition.
+pub(crate) fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
     match formula {
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => formula_terms(body, visit),
         Formula::And(parts) | Formula::Or(parts) => {
             for part in parts {
                 formula_terms(part, visit);

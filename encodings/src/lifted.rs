@@ -1,8 +1,10 @@
-//! The lifted task: PDDL with its names resolved to ids, quantifiers expanded and negation pushed inwards.
+//! The lifted task: PDDL with its names resolved to ids, and negation pushed inwards.
 //!
 //! Objects, predicates, functions and parameters are dense ids in the order of their declaration, so that
 //! nothing further on depends on how anything is named. A durative action keeps its two halves; `ground`
 //! composes them into one operator, because actions execute one after another.
+
+use std::sync::Arc;
 
 use num_rational::Ratio;
 
@@ -52,19 +54,23 @@ pub(crate) struct Lifted {
     pub(crate) predicates: Vec<Predicate>,
     pub(crate) functions: Vec<Function>,
     pub(crate) schemas: Vec<Schema>,
+    pub(crate) axioms: Vec<Axiom>,
     /// Initial facts in the order of the file, without repetitions.
     pub(crate) facts: Vec<(PredicateId, Arguments)>,
     pub(crate) values: Vec<(FunctionId, Arguments, Rational)>,
     pub(crate) goal: Formula,
+    /// How many variables the quantifiers of the goal bind.
+    pub(crate) goal_variables: usize,
     pub(crate) metric: Option<Metric>,
 }
 
-/// A predicate; it is a fluent if an action adds or deletes it, else static.
+/// A predicate; it is a fluent if an action adds or deletes it, or if it is derived from fluents; else static.
 #[derive(Debug, Clone)]
 pub(crate) struct Predicate {
     pub(crate) name: Name,
     pub(crate) arity: usize,
     pub(crate) fluent: bool,
+    pub(crate) derived: bool,
 }
 
 /// A numeric function; it is a fluent if an action changes it, else static.
@@ -79,6 +85,8 @@ pub(crate) struct Function {
 pub(crate) struct Schema {
     pub(crate) name: Name,
     pub(crate) parameters: Vec<Parameter>,
+    /// Parameters and the variables that quantifiers bind.
+    pub(crate) variables: usize,
     /// Must hold before the action.
     pub(crate) start_condition: Formula,
     pub(crate) start_effects: Vec<Effect>,
@@ -87,26 +95,46 @@ pub(crate) struct Schema {
     pub(crate) end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; none for an instantaneous action.
     pub(crate) duration: Option<Expression>,
+    pub(crate) place: Place,
+}
+
+/// A rule of a derived predicate: the atom over the parameters holds where the condition does.
+#[derive(Debug, Clone)]
+pub(crate) struct Axiom {
+    pub(crate) predicate: PredicateId,
+    pub(crate) parameters: Vec<Parameter>,
+    /// Parameters and the variables that quantifiers bind.
+    pub(crate) variables: usize,
+    pub(crate) condition: Formula,
 }
 
 /// A parameter and the objects that its type admits, ascending.
 #[derive(Debug, Clone)]
 pub(crate) struct Parameter {
-    pub(crate) candidates: Vec<ObjectId>,
+    pub(crate) candidates: Arc<[ObjectId]>,
 }
 
-/// A schema parameter or an object.
+/// A variable that a quantifier binds, numbered after the parameters, and the objects that it ranges over, ascending.
+#[derive(Debug, Clone)]
+pub(crate) struct Bound {
+    pub(crate) variable: u32,
+    pub(crate) candidates: Arc<[ObjectId]>,
+}
+
+/// A schema parameter or bound variable, or an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Term {
     Parameter(u32),
     Object(ObjectId),
 }
 
-/// A condition in negation normal form, without quantifiers.
+/// A condition in negation normal form.
 #[derive(Debug, Clone)]
 pub(crate) enum Formula {
     And(Vec<Formula>),
     Or(Vec<Formula>),
+    Exists(Vec<Bound>, Box<Formula>),
+    ForAll(Vec<Bound>, Box<Formula>),
     Literal { positive: bool, predicate: PredicateId, terms: Vec<Term> },
     Equal { positive: bool, left: Term, right: Term },
     Compare(Comparison, Expression, Expression, Place),
@@ -117,11 +145,47 @@ impl Formula {
     pub(crate) const fn truth() -> Self {
         Self::And(Vec::new())
     }
+
+    /// The negation, in negation normal form again.
+    pub(crate) fn negated(&self) -> Self {
+        use Comparison as Op;
+        let each = |parts: &[Self]| parts.iter().map(Self::negated).collect();
+        match self {
+            Self::And(parts) => Self::Or(each(parts)),
+            Self::Or(parts) => Self::And(each(parts)),
+            Self::Exists(bound, body) => Self::ForAll(bound.clone(), Box::new(body.negated())),
+            Self::ForAll(bound, body) => Self::Exists(bound.clone(), Box::new(body.negated())),
+            Self::Literal { positive, predicate, terms } => {
+                Self::Literal { positive: !positive, predicate: *predicate, terms: terms.clone() }
+            }
+            Self::Equal { positive, left, right } => {
+                Self::Equal { positive: !positive, left: *left, right: *right }
+            }
+            Self::Compare(comparison, left, right, place) => {
+                let with = |comparison| Self::Compare(comparison, left.clone(), right.clone(), *place);
+                match comparison {
+                    Op::Less => with(Op::GreaterOrEqual),
+                    Op::LessOrEqual => with(Op::Greater),
+                    Op::GreaterOrEqual => with(Op::Less),
+                    Op::Greater => with(Op::LessOrEqual),
+                    Op::Equal => Self::Or(vec![with(Op::Less), with(Op::Greater)]),
+                }
+            }
+        }
+    }
 }
 
-/// An effect without quantifiers.
+/// An effect: for all objects that the bound variables range over, the change if the condition holds.
 #[derive(Debug, Clone)]
-pub(crate) enum Effect {
+pub(crate) struct Effect {
+    pub(crate) bound: Vec<Bound>,
+    pub(crate) condition: Formula,
+    pub(crate) change: Change,
+}
+
+/// What an effect changes.
+#[derive(Debug, Clone)]
+pub(crate) enum Change {
     Add(PredicateId, Vec<Term>),
     Delete(PredicateId, Vec<Term>),
     Assign {

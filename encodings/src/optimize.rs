@@ -399,7 +399,7 @@ impl Run<'_> {
         if !self.task.numerics.is_empty() {
             return None;
         }
-        let sizes = self.task.variables.iter().map(|variable| variable.values.len());
+        let sizes = self.task.variables[..self.task.basic].iter().map(|variable| variable.values.len());
         sizes.into_iter().try_fold(1_usize, usize::checked_mul)
     }
 
@@ -477,7 +477,7 @@ impl Task {
                 operator.choices().any(|choice| {
                     operator.cost.at(&choice, &operator.sizes()) < 0
                         && operator.applicable(state, &choice)
-                        && operator.successor(state, &choice) == *state
+                        && self.successor(operator, state, &choice) == *state
                 })
             })
         })

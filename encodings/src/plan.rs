@@ -174,7 +174,7 @@ pub(crate) fn replay(task: &Task, plan: &[GroundStep]) -> Option<(Vec<State>, i6
             return None;
         }
         cost += operator.cost.at(&step.choice, &operator.sizes());
-        let next = operator.successor(state, &step.choice);
+        let next = task.successor(operator, state, &step.choice);
         states.push(next);
     }
     task.is_goal(states.last()?).then_some((states, cost))

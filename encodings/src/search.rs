@@ -16,7 +16,7 @@ use rustc_hash::FxHashMap;
 use crate::bounds::Bounds;
 use crate::limits::Limits;
 use crate::plan::{GroundPlan, GroundStep};
-use crate::task::{Operator, OperatorId, State, Task};
+use crate::task::{Fact, Operator, OperatorId, State, Task};
 
 /// How many states are stored at most.
 const STATE_LIMIT: usize = 400_000;
@@ -118,7 +118,7 @@ impl Search<'_> {
             for index in 0..self.choices[operator_id.index()].len() {
                 let (choice, step) = &self.choices[operator_id.index()][index];
                 if operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
-                    let next = operator.successor(&state, choice);
+                    let next = self.task.successor(operator, &state, choice);
                     self.push(next, cost + step, steps + 1, Some((id, operator_id, index as u32)));
                 }
             }
@@ -128,7 +128,7 @@ impl Search<'_> {
     fn push(&mut self, state: State, cost: i64, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
         let Some(estimate) = self.bounds.estimate(&state) else { return };
         let id = self.nodes.len() as u32;
-        match self.seen.entry(state.values.clone().into_boxed_slice()) {
+        match self.seen.entry(state.values[..self.task.basic].into()) {
             Entry::Vacant(entry) => {
                 entry.insert(vec![id]);
             }
@@ -170,10 +170,34 @@ impl Search<'_> {
     }
 }
 
-/// Whether more of any numeric variable can only help: it enters conditions and effects with factors ≥ 0.
+/// Whether more of any numeric variable can only help: it enters conditions and effects with factors ≥ 0, and
+/// whether a derived variable holds that depends on numbers is asked only where it helps.
 fn is_monotone(task: &Task) -> bool {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain([&task.goal]);
-    let comparisons = conditions.flat_map(|condition| &condition.comparisons);
+    let rules = || task.axioms.iter().flat_map(|layer| &layer.rules);
+    let conditions: Vec<_> = conditions.chain(rules().map(|rule| &rule.body)).collect();
+    let mut numeric = vec![false; task.variables.len()];
+    loop {
+        let depends = |rule: &&crate::task::Axiom| {
+            let depends = |fact: &Fact| numeric[fact.variable.index()];
+            !numeric[rule.head.variable.index()]
+                && (!rule.body.comparisons.is_empty() || rule.body.facts.iter().any(depends))
+        };
+        let Some(rule) = rules().find(depends) else { break };
+        numeric[rule.head.variable.index()] = true;
+    }
+    let helps =
+        |fact: &Fact, positive: bool| !numeric[fact.variable.index()] || positive == (fact.value == 0);
+    let asked = conditions.iter().all(|condition| {
+        condition.facts.iter().all(|fact| helps(fact, true))
+            && condition.clauses.iter().flatten().all(|literal| helps(&literal.fact, literal.positive))
+    });
+    let conditional = task.operators.iter().flat_map(|operator| &operator.conditional);
+    let mut triggers = conditional.flat_map(|effect| &effect.condition);
+    if !asked || triggers.any(|literal| numeric[literal.fact.variable.index()]) {
+        return false;
+    }
+    let comparisons = conditions.into_iter().flat_map(|condition| &condition.comparisons);
     let effects =
         task.operators.iter().flat_map(|operator| &operator.numeric_effects).map(|effect| &effect.value);
     comparisons.chain(effects).all(|linear| linear.coefficients.iter().all(|(_, factor)| *factor >= 0))

@@ -109,6 +109,27 @@ pub(crate) struct NumericEffect {
     pub(crate) value: Linear<i64>,
 }
 
+/// What an operator sets if all literals hold before it.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct ConditionalEffect {
+    pub(crate) condition: Vec<Literal>,
+    pub(crate) effects: Vec<Fact>,
+}
+
+/// A rule of a derived variable: it has the value of the head if the body holds, and its last value if no body does.
+#[derive(Debug, Clone)]
+pub(crate) struct Axiom {
+    pub(crate) head: Fact,
+    pub(crate) body: Condition,
+}
+
+/// Rules that depend on each other, or a single one; negated variables and those of other rules are in earlier layers.
+#[derive(Debug, Clone)]
+pub(crate) struct Layer {
+    pub(crate) rules: Vec<Axiom>,
+    pub(crate) recursive: bool,
+}
+
 /// An argument of an action: fixed, or the design of a slot (by position in the operator's slot list).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Argument {
@@ -129,6 +150,8 @@ pub(crate) struct Operator {
     pub(crate) condition: Condition,
     /// At most one value for each variable, ascending by variable.
     pub(crate) effects: Vec<Fact>,
+    /// In order: later ones prevail over earlier ones and over `effects`.
+    pub(crate) conditional: Vec<ConditionalEffect>,
     pub(crate) numeric_effects: Vec<NumericEffect>,
     /// In the task's cost unit; may be negative where the metric rewards.
     pub(crate) cost: Quantity<i64>,
@@ -159,7 +182,12 @@ pub struct Objective {
 pub struct Task {
     pub(crate) object_names: Vec<String>,
     pub(crate) schema_names: Vec<String>,
+    /// The basic variables, then the derived ones, which have two values: true (0) and false (1).
     pub(crate) variables: Vec<Variable>,
+    /// How many variables are basic.
+    pub(crate) basic: usize,
+    /// The rules of the derived variables, in the order of their evaluation.
+    pub(crate) axioms: Vec<Layer>,
     pub(crate) numerics: Vec<NumericVariable>,
     pub(crate) slots: Vec<Slot>,
     pub(crate) operators: Vec<Operator>,
@@ -245,22 +273,14 @@ impl Condition {
     }
 }
 
-impl Operator {
-    /// The state after this operator, which must be applicable with this combination of designs.
-    pub(crate) fn successor(&self, state: &State, choice: &[u16]) -> State {
-        let mut next = state.clone();
-        for effect in &self.effects {
-            next.values[effect.variable.index()] = effect.value;
-        }
-        if !self.numeric_effects.is_empty() {
-            let sizes = self.sizes();
-            for effect in &self.numeric_effects {
-                next.numbers[effect.variable.index()] = effect.value.value(&state.numbers, choice, &sizes);
-            }
-        }
-        next
+impl Literal {
+    /// Whether it holds.
+    pub(crate) fn holds(&self, values: &[u32]) -> bool {
+        (values[self.fact.variable.index()] == self.fact.value) == self.positive
     }
+}
 
+impl Operator {
     /// Whether the operator may be applied with this combination of designs.
     pub(crate) fn applicable(&self, state: &State, choice: &[u16]) -> bool {
         self.condition.holds_propositionally(&state.values)
@@ -273,5 +293,56 @@ impl Task {
     pub(crate) fn is_goal(&self, state: &State) -> bool {
         self.goal.holds_propositionally(&state.values)
             && self.goal.holds_numerically(&state.numbers, &[], &[])
+    }
+
+    /// The state after an operator, which must be applicable with this combination of designs.
+    pub(crate) fn successor(&self, operator: &Operator, state: &State, choice: &[u16]) -> State {
+        let mut next = state.clone();
+        for effect in &operator.effects {
+            next.values[effect.variable.index()] = effect.value;
+        }
+        for conditional in &operator.conditional {
+            if conditional.condition.iter().all(|literal| literal.holds(&state.values)) {
+                for effect in &conditional.effects {
+                    next.values[effect.variable.index()] = effect.value;
+                }
+            }
+        }
+        if !operator.numeric_effects.is_empty() {
+            let sizes = operator.sizes();
+            for effect in &operator.numeric_effects {
+                next.numbers[effect.variable.index()] = effect.value.value(&state.numbers, choice, &sizes);
+            }
+        }
+        self.close(&mut next);
+        next
+    }
+
+    /// Gives the derived variables their values: the least fixpoint of the rules, layer by layer.
+    pub(crate) fn close(&self, state: &mut State) {
+        if self.axioms.is_empty() {
+            return;
+        }
+        for (value, variable) in state.values[self.basic..].iter_mut().zip(&self.variables[self.basic..]) {
+            *value = variable.values.len() as u32 - 1;
+        }
+        for layer in &self.axioms {
+            loop {
+                let mut changed = false;
+                for rule in &layer.rules {
+                    let value = state.values[rule.head.variable.index()];
+                    if value != rule.head.value
+                        && rule.body.holds_propositionally(&state.values)
+                        && rule.body.holds_numerically(&state.numbers, &[], &[])
+                    {
+                        state.values[rule.head.variable.index()] = rule.head.value;
+                        changed = true;
+                    }
+                }
+                if !changed || !layer.recursive {
+                    break;
+                }
+            }
+        }
     }
 }

@@ -35,9 +35,10 @@ pub(crate) struct Window {
 
 impl Bounds {
     pub(crate) fn new(task: &Task, limits: &Limits) -> Self {
-        let goal_variables: Vec<_> = task.goal.facts.iter().map(|fact| fact.variable).collect();
+        let basic = |variable: &crate::task::VariableId| variable.index() < task.basic;
+        let goal_variables: Vec<_> = task.goal.facts.iter().map(|fact| fact.variable).filter(basic).collect();
         let mut patterns: Vec<Vec<_>> = goal_variables.iter().map(|variable| vec![*variable]).collect();
-        let mut others: Vec<_> = (0..task.variables.len() as u32).map(crate::task::VariableId).collect();
+        let mut others: Vec<_> = (0..task.basic as u32).map(crate::task::VariableId).collect();
         others.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
         for other in &others {
             for goal in &goal_variables {

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::task::{OperatorId, State, Task, VariableId};
+use crate::task::{ConditionalEffect, Literal, OperatorId, State, Task, VariableId};
 
 /// An operator leads from one abstract state to another.
 #[derive(Debug, Clone, Copy)]
@@ -48,11 +48,19 @@ impl Projection {
             let cost = operator.cost.minimum().max(0);
             let before = projection.required(&operator.condition.facts);
             let after = projection.required(&operator.effects);
-            let touched = before.iter().chain(&after).any(Option::is_some);
+            let conditional: Vec<_> = operator
+                .conditional
+                .iter()
+                .map(|effect| (effect, projection.required(&effect.effects)))
+                .filter(|(_, after)| after.iter().any(Option::is_some))
+                .collect();
+            let touched = !conditional.is_empty() || before.iter().chain(&after).any(Option::is_some);
             let mut transitions = Vec::new();
             if touched {
                 for source in projection.matching(&before) {
-                    transitions.push(Transition { source, target: projection.moved(source, &after) });
+                    for target in projection.targets(source, &after, &conditional) {
+                        transitions.push(Transition { source, target });
+                    }
                 }
             } else {
                 projection.idle_cost = Some(projection.idle_cost.map_or(cost, |known: i64| known.min(cost)));
@@ -107,10 +115,41 @@ impl Projection {
         states
     }
 
-    fn moved(&self, source: u32, effects: &[Option<u32>]) -> u32 {
+    /// Where an operator can lead: a conditional effect whose condition the abstract state leaves open may take
+    /// place or not.
+    fn targets(
+        &self,
+        source: u32,
+        effects: &[Option<u32>],
+        conditional: &[(&ConditionalEffect, Vec<Option<u32>>)],
+    ) -> Vec<u32> {
         let values = self.values(source);
-        let after = values.iter().zip(effects).map(|(old, new)| new.unwrap_or(*old));
-        self.sizes.iter().zip(after).fold(0, |index, (size, value)| index * *size as u32 + value)
+        let set = |values: &[u32], effects: &[Option<u32>]| -> Vec<u32> {
+            values.iter().zip(effects).map(|(old, new)| new.unwrap_or(*old)).collect()
+        };
+        let truth = |literal: &Literal| {
+            let position = self.pattern.iter().position(|variable| *variable == literal.fact.variable)?;
+            Some((values[position] == literal.fact.value) == literal.positive)
+        };
+        let mut reached = vec![set(&values, effects)];
+        for (effect, after) in conditional {
+            let truths: Vec<_> = effect.condition.iter().map(truth).collect();
+            if truths.contains(&Some(false)) {
+                continue;
+            }
+            let fired: Vec<_> = reached.iter().map(|values| set(values, after)).collect();
+            if truths.contains(&None) {
+                reached.extend(fired);
+                reached.sort_unstable();
+                reached.dedup();
+            } else {
+                reached = fired;
+            }
+        }
+        let index = |values: Vec<u32>| {
+            self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * *size as u32 + value)
+        };
+        reached.into_iter().map(index).collect()
     }
 
     fn costs_to_go(&self) -> Vec<Option<i64>> {

@@ -122,13 +122,20 @@ impl Encoding<'_> {
         for transition in transitions {
             let values = potential.values(transition.source);
             let known = |variable| operator.condition.facts.iter().any(|fact| fact.variable == variable);
-            let here: Vec<_> = potential
+            let mut here: Vec<_> = potential
                 .pattern
                 .iter()
                 .zip(values)
                 .filter(|(variable, _)| !known(**variable))
                 .map(|(variable, value)| self.values[step][variable.index()][value as usize])
                 .collect();
+            if !operator.conditional.is_empty() {
+                // Where the operator leads to is open: the state after it tells.
+                let after = potential.pattern.iter().zip(potential.values(transition.target));
+                here.extend(
+                    after.map(|(variable, value)| self.values[step + 1][variable.index()][value as usize]),
+                );
+            }
             match (potential.to_go(transition.source), potential.to_go(transition.target)) {
                 (Some(before), Some(after)) => alive.push((here, least + after - before)),
                 _ => self.formula.add(Family::Cost, here.iter().map(|state| !*state).chain([!literal])),

@@ -15,8 +15,12 @@ pub(crate) enum Family {
     Condition,
     /// Operators have their effects.
     Effect,
+    /// Conditional effects take place where their conditions hold.
+    Conditional,
     /// What no operator changes stays.
     Frame,
+    /// Derived variables are the least fixpoint of their rules.
+    Axiom,
     /// Each function in use has one design, and one that suits.
     Selection,
     /// Exact integers of numeric variables.
@@ -30,12 +34,14 @@ pub(crate) enum Family {
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Domain,
         Self::Sequence,
         Self::Condition,
         Self::Effect,
+        Self::Conditional,
         Self::Frame,
+        Self::Axiom,
         Self::Selection,
         Self::Numeric,
         Self::Cost,
@@ -50,7 +56,9 @@ impl Family {
             Self::Sequence => "sequence",
             Self::Condition => "condition",
             Self::Effect => "effect",
+            Self::Conditional => "conditional",
             Self::Frame => "frame",
+            Self::Axiom => "axiom",
             Self::Selection => "selection",
             Self::Numeric => "numeric",
             Self::Cost => "cost",
@@ -79,6 +87,12 @@ pub(crate) enum Meaning {
     CostAtLeast { amount: i64, step: u32, stage: u32 },
     /// The step adds at least the amount.
     Increment { amount: i64, step: u32, stage: u32 },
+    /// The conditional effect (by its position) of the operator takes place at the step.
+    Fires { operator: u32, effect: u32, step: u32 },
+    /// The body of a rule (by its position) of a layer of derived variables holds before the step.
+    Body { layer: u32, rule: u32, step: u32 },
+    /// The derived variable follows in more than so many rounds of its layer.
+    Later { variable: u32, rounds: u32, step: u32 },
     /// A bit of a number.
     Bit { bit: u32 },
     /// A helper of an at-most-one constraint.

@@ -7,6 +7,8 @@
 //! [1] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic search, AAAI 1996.
 
 mod arithmetic;
+mod axioms;
+mod conditional;
 mod cost;
 mod formula;
 mod groups;
@@ -23,6 +25,7 @@ use crate::bounds::Bounds;
 use crate::plan::GroundStep;
 use crate::sat::{Lit, Solver};
 use crate::task::{Fact, OperatorId, Task};
+use conditional::Fires;
 use cost::Cost;
 use formula::{Family, Formula};
 
@@ -40,6 +43,8 @@ pub(crate) struct Encoding<'a> {
     /// `designs[step][slot][design]`.
     designs: Vec<Vec<Vec<Lit>>>,
     groups: FxHashMap<(usize, Vec<OperatorId>), Lit>,
+    /// `fires[step]`: the conditional effects of the operators at the step, and whether they take place.
+    fires: Vec<Vec<Fires>>,
     cost: Option<Cost>,
 }
 
@@ -62,6 +67,7 @@ impl<'a> Encoding<'a> {
             values: Vec::new(),
             designs: Vec::new(),
             groups: FxHashMap::default(),
+            fires: Vec::new(),
             cost: None,
         };
         encoding.declare(allowed);
@@ -69,13 +75,17 @@ impl<'a> Encoding<'a> {
             encoding.domain(step);
             encoding.sequence(step);
             encoding.conditions(step);
+            encoding.conditional(step);
             encoding.effects(step);
             encoding.frame(step);
             encoding.selection(step);
         }
         encoding.domain(horizon);
         let numbers = encoding.numeric();
-        encoding.goal(&numbers);
+        for (step, numbers) in numbers.iter().enumerate() {
+            encoding.axioms(step, numbers);
+        }
+        encoding.goal(&numbers[horizon]);
         if let Some(cost) = cost {
             encoding.cost = Some(encoding.accumulate(&cost));
         }

@@ -29,13 +29,14 @@ struct Range {
 }
 
 impl Encoding<'_> {
-    /// Encodes all numeric variables; returns their values after the last step.
-    pub(super) fn numeric(&mut self) -> Vec<Bits> {
+    /// Encodes all numeric variables; returns their values before each step and after the last one.
+    pub(super) fn numeric(&mut self) -> Vec<Vec<Bits>> {
         let task = self.task;
         let mut ranges: Vec<Range> =
             task.initial.numbers.iter().map(|n| Range { low: *n, high: *n }).collect();
         let mut numbers: Vec<Bits> =
             task.initial.numbers.iter().map(|n| Arithmetic::constant(*n, width(*n, *n))).collect();
+        let mut all = vec![numbers.clone()];
         for step in 0..self.horizon {
             let next_ranges = self.next_ranges(step, &ranges);
             let mut next = Vec::with_capacity(numbers.len());
@@ -44,8 +45,9 @@ impl Encoding<'_> {
             }
             self.comparisons(step, &numbers, &next, &ranges);
             (numbers, ranges) = (next, next_ranges);
+            all.push(numbers.clone());
         }
-        numbers
+        all
     }
 
     fn next_ranges(&self, step: usize, ranges: &[Range]) -> Vec<Range> {
@@ -256,6 +258,14 @@ impl Encoding<'_> {
 
     /// The numeric part of the goal.
     pub(super) fn numeric_goal(&mut self, numbers: &[Bits]) {
+        for comparison in &self.task.goal.comparisons {
+            let holds = self.is_at_least_zero(comparison, numbers, Family::Goal);
+            self.formula.add(Family::Goal, [holds]);
+        }
+    }
+
+    /// Whether an expression that mentions no designs is at least 0.
+    pub(super) fn is_at_least_zero(&mut self, linear: &Linear<i64>, numbers: &[Bits], family: Family) -> Lit {
         let whole = Range { low: -(1 << 50), high: 1 << 50 };
         let ranges: Vec<Range> = numbers
             .iter()
@@ -264,17 +274,12 @@ impl Encoding<'_> {
                 Range { low: whole.low.max(-limit), high: whole.high.min(limit) }
             })
             .collect();
-        for comparison in &self.task.goal.comparisons {
-            let base = self.weighted(&comparison.coefficients, numbers, &ranges);
-            let range = linear_range(comparison, &ranges);
-            let width = width(range.low, range.high).max(base.len()) + 2;
-            let constant = comparison.quantity.constant;
-            let mut arithmetic = Arithmetic { formula: &mut self.formula, family: Family::Goal };
-            let sum = arithmetic.add(&base, &Arithmetic::constant(constant, width), width);
-            if let Some(sign) = sum.last() {
-                self.formula.add(Family::Goal, [!*sign]);
-            }
-        }
+        let base = self.weighted(&linear.coefficients, numbers, &ranges);
+        let range = linear_range(linear, &ranges);
+        let width = width(range.low, range.high).max(base.len()) + 2;
+        let mut arithmetic = Arithmetic { formula: &mut self.formula, family };
+        let sum = arithmetic.add(&base, &Arithmetic::constant(linear.quantity.constant, width), width);
+        sum.last().map_or(Formula::truth(), |sign| !*sign)
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! - sequence: at most one operator a step; `o@t → busy@t`, `busy@t → ⋁ o@t`, `busy@t+1 → busy@t`;
 //! - condition: `o@t → p@t` for each fact, `o@t → ⋁ l@t` for each clause;
-//! - effect: `o@t → e@t+1`.
+//! - effect: `o@t → e@t+1`, unless a conditional effect of the operator prevails.
 
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
@@ -56,7 +56,8 @@ impl Encoding<'_> {
             let (id, literal) = self.operators[step][index];
             for effect in &self.task.operators[id.index()].effects {
                 let fact = self.fact(*effect, step + 1);
-                self.formula.add(Family::Effect, [!literal, fact]);
+                let others: Vec<_> = self.prevailing(step, id, 0, *effect).collect();
+                self.formula.add(Family::Effect, others.into_iter().chain([!literal, fact]));
             }
         }
     }

@@ -21,6 +21,10 @@ impl Encoding<'_> {
         for (variable, value) in task.initial.values.iter().enumerate() {
             possible[variable][*value as usize] = true;
         }
+        // What derived variables hold follows from the others at every step.
+        for values in &mut possible[task.basic..] {
+            values.fill(true);
+        }
         self.declare_values(&possible, 0);
         for (step, allowed) in allowed.iter().enumerate() {
             let mut present = Vec::new();
@@ -32,7 +36,9 @@ impl Encoding<'_> {
                 }
             }
             for (id, _) in &present {
-                for effect in &task.operators[id.index()].effects {
+                let operator = &task.operators[id.index()];
+                let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+                for effect in operator.effects.iter().chain(conditional) {
                     possible[effect.variable.index()][effect.value as usize] = true;
                 }
             }
@@ -104,7 +110,12 @@ impl Encoding<'_> {
                 producers[effect.variable.index()][effect.value as usize].push(*literal);
             }
         }
-        for (variable, producers) in producers.iter().enumerate() {
+        for fires in &self.fires[step] {
+            for effect in &fires.effects {
+                producers[effect.variable.index()][effect.value as usize].push(fires.literal);
+            }
+        }
+        for (variable, producers) in producers.iter().enumerate().take(self.task.basic) {
             for (value, producers) in producers.iter().enumerate() {
                 let fact = Fact { variable: VariableId(variable as u32), value: value as u32 };
                 let (before, after) = (self.fact(fact, step), self.fact(fact, step + 1));

@@ -46,6 +46,9 @@ fn name(task: &Task, meaning: Meaning) -> String {
             }
             format!("({text})@{step}")
         }
+        Meaning::Fires { operator, effect, step } => format!("fires{effect} of {operator}@{step}"),
+        Meaning::Body { layer, rule, step } => format!("body{rule} of {layer}@{step}"),
+        Meaning::Later { variable, rounds, step } => format!("later{rounds} {variable}@{step}"),
         Meaning::Busy { step } => format!("busy@{step}"),
         Meaning::Value { variable, value, step } => {
             let text = &task.variables[variable as usize].values[value as usize];

@@ -1,14 +1,19 @@
-//! Conditions and expressions of a schema under a binding of its parameters.
+//! The world that grounding looks at, and expressions under a binding of their parameters.
 
 use indexmap::IndexMap;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 
 use crate::configuration::{SlotParameter, slots_of_expression};
 use crate::error::{Error, Place};
+use crate::ground::derived::Definitions;
+use crate::ground::join::JoinIndex;
+use crate::ground::reach::Reached;
+use crate::ground::relaxed::Candidates;
+use crate::ground::residual::Residual;
 use crate::lifted::{
-    Arguments, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term,
+    Arguments, Bound, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term,
 };
-use crate::pddl::ast::{Comparison, Name};
+use crate::pddl::ast::Name;
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet, Table};
 
 /// A ground atom over a fluent predicate.
@@ -28,28 +33,11 @@ pub(crate) struct World<'a> {
     pub(crate) lifted: &'a Lifted,
     facts: FxHashSet<(PredicateId, Arguments)>,
     pub(crate) values: FxHashMap<(FunctionId, Arguments), Rational>,
-    reached: &'a FxHashSet<(PredicateId, Arguments)>,
+    reached: &'a Reached,
     pub(crate) atoms: AtomIndex<PredicateId>,
     pub(crate) numerics: AtomIndex<FunctionId>,
-}
-
-/// What is left of a condition once everything static is decided.
-#[derive(Debug, Clone)]
-pub(crate) enum Residual {
-    True,
-    False,
-    And(Vec<Residual>),
-    Or(Vec<Residual>),
-    Literal {
-        atom: AtomId,
-        positive: bool,
-    },
-    /// The expression is ≥ 0, or > 0 if strict.
-    Compare {
-        linear: Linear<Rational>,
-        strict: bool,
-        place: Place,
-    },
+    pub(crate) joins: JoinIndex,
+    pub(crate) definitions: Definitions,
 }
 
 /// Why an expression has no value here.
@@ -71,15 +59,29 @@ pub(crate) struct Slots<'a> {
 }
 
 impl<'a> World<'a> {
-    pub(crate) fn new(lifted: &'a Lifted, reached: &'a FxHashSet<(PredicateId, Arguments)>) -> Self {
+    pub(crate) fn new(lifted: &'a Lifted, reached: &'a Reached) -> Self {
         Self {
             lifted,
-            facts: lifted.facts.iter().cloned().collect(),
+            facts: lifted.facts.iter().chain(&reached.derived).cloned().collect(),
             values: lifted.values.iter().map(|(f, args, value)| ((*f, args.clone()), *value)).collect(),
             reached,
             atoms: IndexMap::default(),
             numerics: IndexMap::default(),
+            joins: JoinIndex::default(),
+            definitions: Definitions::default(),
         }
+    }
+
+    /// The rows of a relation: of a static one those that hold, of a fluent one those that can ever hold.
+    pub(crate) fn relation(&self, predicate: PredicateId) -> Vec<Arguments> {
+        let facts =
+            if self.lifted.predicates[predicate.index()].fluent { &self.reached.atoms } else { &self.facts };
+        facts.iter().filter(|(own, _)| *own == predicate).map(|(_, arguments)| arguments.clone()).collect()
+    }
+
+    /// Whether a fluent atom holds in some state of the delete relaxation.
+    pub(crate) fn is_reached(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
+        self.reached.atoms.contains(&(predicate, arguments.clone()))
     }
 
     pub(crate) fn holds_initially(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
@@ -88,7 +90,7 @@ impl<'a> World<'a> {
 
     /// Whether an atom holds in some state of the delete relaxation.
     pub(crate) fn can_hold(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
-        self.holds_initially(predicate, arguments) || self.reached.contains(&(predicate, arguments.clone()))
+        self.holds_initially(predicate, arguments) || self.is_reached(predicate, arguments)
     }
 
     pub(crate) fn atom(&mut self, predicate: PredicateId, arguments: Arguments) -> AtomId {
@@ -123,63 +125,6 @@ impl<'a> World<'a> {
                 Term::Parameter(parameter) => binding[*parameter as usize],
             })
             .collect()
-    }
-
-    /// Evaluates a condition that mentions no open slot.
-    pub(crate) fn residual(&mut self, formula: &Formula, binding: &Binding) -> Result<Residual, Failure> {
-        match formula {
-            Formula::And(parts) => self.junction(parts, binding, true),
-            Formula::Or(parts) => self.junction(parts, binding, false),
-            Formula::Equal { positive, left, right } => {
-                let same = Self::arguments(&[*left], binding) == Self::arguments(&[*right], binding);
-                Ok(truth(same == *positive))
-            }
-            Formula::Literal { positive, predicate, terms } => {
-                let arguments = Self::arguments(terms, binding);
-                if !self.lifted.predicates[predicate.index()].fluent {
-                    return Ok(truth(self.holds_initially(*predicate, &arguments) == *positive));
-                }
-                if !self.reached.contains(&(*predicate, arguments.clone())) {
-                    return Ok(truth(!positive));
-                }
-                Ok(Residual::Literal { atom: self.atom(*predicate, arguments), positive: *positive })
-            }
-            Formula::Compare(comparison, left, right, place) => {
-                let difference = match (self.ground(left, binding), self.ground(right, binding)) {
-                    (Ok(left), Ok(right)) => (left, right),
-                    // PDDL 2.1: a comparison with an undefined value does not hold.
-                    (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) => {
-                        return Ok(Residual::False);
-                    }
-                    (Err(failure), _) | (_, Err(failure)) => return Err(failure),
-                };
-                Ok(compare(*comparison, difference.0, difference.1, *place))
-            }
-        }
-    }
-
-    fn junction(
-        &mut self,
-        parts: &[Formula],
-        binding: &Binding,
-        conjunction: bool,
-    ) -> Result<Residual, Failure> {
-        let mut kept = Vec::new();
-        for part in parts {
-            match (self.residual(part, binding)?, conjunction) {
-                (Residual::True, true) | (Residual::False, false) => {}
-                (Residual::False, true) => return Ok(Residual::False),
-                (Residual::True, false) => return Ok(Residual::True),
-                (Residual::And(more), true) | (Residual::Or(more), false) => kept.extend(more),
-                (other, _) => kept.push(other),
-            }
-        }
-        Ok(match (kept.len(), conjunction) {
-            (0, _) => truth(conjunction),
-            (1, _) => kept.swap_remove(0),
-            (_, true) => Residual::And(kept),
-            (_, false) => Residual::Or(kept),
-        })
     }
 
     /// Evaluates an expression that mentions no open slot.
@@ -350,44 +295,26 @@ fn multiply(
     Ok(scaled)
 }
 
-/// A comparison of two expressions as `difference ≥ 0` or `difference > 0`; decided if it is constant.
-pub(crate) fn compare(
-    comparison: Comparison,
-    left: Linear<Rational>,
-    right: Linear<Rational>,
-    place: Place,
-) -> Residual {
-    match comparison {
-        Comparison::Less => at_least_zero(right, left, true, place),
-        Comparison::LessOrEqual => at_least_zero(right, left, false, place),
-        Comparison::Greater => at_least_zero(left, right, true, place),
-        Comparison::GreaterOrEqual => at_least_zero(left, right, false, place),
-        Comparison::Equal => {
-            let above = at_least_zero(left.clone(), right.clone(), false, place);
-            match (above, at_least_zero(right, left, false, place)) {
-                (Residual::False, _) | (_, Residual::False) => Residual::False,
-                (Residual::True, other) | (other, Residual::True) => other,
-                (above, below) => Residual::And(vec![above, below]),
-            }
+/// The objects for which a static comparison holds, one for each variable.
+pub(super) fn satisfying(
+    lifted: &Lifted,
+    comparison: &Formula,
+    variables: &[u32],
+    candidates: &Candidates,
+) -> Vec<Arguments> {
+    let reached = Reached::default();
+    let mut world = World::new(lifted, &reached);
+    let bound: Vec<_> = variables
+        .iter()
+        .filter_map(|v| Some(Bound { variable: *v, candidates: candidates.get(v)?.clone() }))
+        .collect();
+    let mut binding = vec![None; variables.iter().max().map_or(0, |v| *v as usize + 1)];
+    let mut rows = Vec::new();
+    world.each_binding(&bound, &[], &mut binding, &mut |world, binding| {
+        if matches!(world.residual(comparison, binding), Ok(Residual::True)) {
+            rows.push(variables.iter().filter_map(|v| binding[*v as usize]).collect());
         }
-    }
-}
-
-fn at_least_zero(
-    mut linear: Linear<Rational>,
-    subtrahend: Linear<Rational>,
-    strict: bool,
-    place: Place,
-) -> Residual {
-    linear.add(&subtrahend.negated());
-    if linear.coefficients.is_empty() && linear.quantity.tables.is_empty() {
-        let value = linear.quantity.constant;
-        let zero = Rational::from_integer(0);
-        return truth(if strict { value > zero } else { value >= zero });
-    }
-    Residual::Compare { linear, strict, place }
-}
-
-fn truth(value: bool) -> Residual {
-    if value { Residual::True } else { Residual::False }
+        true
+    });
+    rows
 }

@@ -7,17 +7,18 @@ use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::error::Error;
+use crate::ground::derived::components;
 use crate::ground::evaluate::AtomId;
 use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::metric::initial_value;
 use crate::ground::mutex;
-use crate::ground::normal_form::GroundCondition;
-use crate::ground::prune::atom_name;
+use crate::ground::normal_form::{GroundCondition, GroundLiteral};
+use crate::ground::prune::{atom_name, read_atoms};
 use crate::lifted::{Lifted, ObjectId, Rational};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
-    Condition, Fact, Literal, NumericEffect, NumericVariable, Objective, Operator, Slot, SlotId, SlotUse,
-    State, Task, Variable, VariableId,
+    Axiom, Condition, ConditionalEffect, Fact, Layer, Literal, NumericEffect, NumericVariable, Objective,
+    Operator, Slot, SlotId, SlotUse, State, Task, Variable, VariableId,
 };
 
 /// Integers of a task stay below this, so that sums over a plan fit 64 bits.
@@ -53,6 +54,7 @@ pub(crate) fn finish(
             forbidden: operator.forbidden.clone(),
             condition: condition(&operator.condition, &atoms, &numbers)?,
             effects: atoms.effects(operator),
+            conditional: atoms.conditional(operator),
             numeric_effects: numbers.effects(operator)?,
             cost: integers(&operator.cost, cost_scale, "the metric")?,
             duration: integers(&operator.duration, time_scale, "durations")?,
@@ -68,10 +70,13 @@ pub(crate) fn finish(
     let exclusive =
         || contradictory(&goal).then(|| "the goal asks for atoms that exclude each other".to_owned());
     let unreachable = unreachable.or_else(exclusive);
-    Ok(Task {
+    let axioms = atoms.axioms(task, &numbers)?;
+    let mut task = Task {
         object_names: lifted.objects.iter().map(ToString::to_string).collect(),
         schema_names: lifted.schemas.iter().map(|schema| schema.name.to_string()).collect(),
+        basic: atoms.basic,
         variables: atoms.variables,
+        axioms,
         initial: State { values: atoms.initial, numbers: std::mem::take(&mut numbers.initial) },
         numerics: numbers.variables,
         slots,
@@ -84,12 +89,18 @@ pub(crate) fn finish(
         },
         time_scale,
         unreachable,
-    })
+    };
+    let mut initial = std::mem::replace(&mut task.initial, State { values: Vec::new(), numbers: Vec::new() });
+    task.close(&mut initial);
+    task.initial = initial;
+    Ok(task)
 }
 
 /// The finite-domain variables and where each atom went.
 struct Atoms {
     variables: Vec<Variable>,
+    /// How many of them are not derived.
+    basic: usize,
     initial: Vec<u32>,
     facts: FxHashMap<AtomId, Fact>,
     /// The value of each variable that stands for none of its atoms.
@@ -98,22 +109,23 @@ struct Atoms {
 
 impl Atoms {
     fn new(lifted: &Lifted, task: &GroundTask<'_>) -> Self {
-        let mut relevant = FxHashSet::default();
-        for condition in task.operators.iter().map(|operator| &operator.condition).chain(&task.goal) {
-            relevant.extend(
-                condition.literals.iter().chain(condition.clauses.iter().flatten()).map(|(atom, _)| *atom),
-            );
-        }
+        let mut relevant = read_atoms(task);
+        let mut derived: Vec<AtomId> =
+            relevant.iter().copied().filter(|atom| task.world.is_derived(*atom)).collect();
+        derived.sort_unstable();
+        relevant.retain(|atom| !task.world.is_derived(*atom));
         let mut groups = mutex::groups(task, &relevant);
         let grouped: FxHashSet<AtomId> = groups.iter().flatten().copied().collect();
         groups.extend(relevant.iter().filter(|atom| !grouped.contains(atom)).map(|atom| vec![*atom]));
         groups.sort_unstable();
         let mut atoms = Self {
             variables: Vec::new(),
+            basic: groups.len(),
             initial: Vec::new(),
             facts: FxHashMap::default(),
             none: Vec::new(),
         };
+        groups.extend(derived.into_iter().map(|atom| vec![atom]));
         for group in groups {
             let variable = VariableId(atoms.variables.len() as u32);
             let mut values: Vec<String> = group.iter().map(|atom| atom_name(lifted, task, *atom)).collect();
@@ -152,17 +164,66 @@ impl Atoms {
             }
         }
         let known = |fact: &Fact| {
+            let overridden =
+                operator.conditional.iter().flat_map(|effect| effect.adds.iter().chain(&effect.deletes));
+            let overridden = overridden.filter_map(|atom| self.facts.get(atom));
             operator
                 .condition
                 .literals
                 .iter()
                 .any(|(atom, positive)| *positive && self.facts.get(atom) == Some(fact))
+                && !overridden.into_iter().any(|other| other.variable == fact.variable)
         };
         let mut effects: Vec<_> =
             effects.into_iter().map(|(variable, value)| Fact { variable, value }).collect();
         effects.retain(|fact| !known(fact));
         effects.sort_unstable();
         effects
+    }
+
+    /// Conditional effects in the order in which they take place: what becomes false, then what becomes true. A
+    /// deletion where the operator sets the same variable anyway says nothing: of two atoms of one variable only one holds.
+    fn conditional(&self, operator: &GroundOperator) -> Vec<ConditionalEffect> {
+        let set: FxHashSet<VariableId> =
+            operator.adds.iter().filter_map(|atom| self.facts.get(atom)).map(|fact| fact.variable).collect();
+        let added: FxHashSet<&AtomId> = operator.adds.iter().collect();
+        let entry = |condition: &[GroundLiteral], mut effects: Vec<Fact>| {
+            effects.sort_unstable();
+            effects.dedup();
+            let condition = condition.iter().map(|literal| self.literal(*literal)).collect();
+            (!effects.is_empty()).then_some(ConditionalEffect { condition, effects })
+        };
+        let deletes = operator.conditional.iter().filter_map(|effect| {
+            let gone = effect.deletes.iter().filter_map(|atom| Some((atom, self.facts.get(atom)?)));
+            let gone = gone.filter(|(atom, fact)| added.contains(atom) || !set.contains(&fact.variable));
+            let none = |(_, fact): (_, &Fact)| Fact { value: self.none[fact.variable.index()], ..*fact };
+            entry(&effect.condition, gone.map(none).collect())
+        });
+        let adds = operator.conditional.iter().filter_map(|effect| {
+            entry(
+                &effect.condition,
+                effect.adds.iter().filter_map(|atom| self.facts.get(atom)).copied().collect(),
+            )
+        });
+        deletes.chain(adds).collect()
+    }
+
+    /// The rules of derived variables in layers: what a layer depends on comes before it.
+    fn axioms(&self, task: &GroundTask<'_>, numbers: &Numbers) -> Result<Vec<Layer>, Error> {
+        let axioms = &task.world.definitions.axioms;
+        let mut layers = Vec::new();
+        for component in components(axioms) {
+            let mut layer = Layer { rules: Vec::new(), recursive: component.len() > 1 };
+            for axiom in axioms.iter().filter(|axiom| component.binary_search(&axiom.head).is_ok()) {
+                let Some(head) = self.facts.get(&axiom.head) else { continue };
+                layer.recursive |= axiom.body.atoms().any(|atom| atom == axiom.head);
+                layer.rules.push(Axiom { head: *head, body: condition(&axiom.body, self, numbers)? });
+            }
+            if !layer.rules.is_empty() {
+                layers.push(layer);
+            }
+        }
+        Ok(layers)
     }
 }
 
@@ -183,6 +244,9 @@ impl Numbers {
         };
         for condition in task.operators.iter().map(|operator| &operator.condition).chain(&task.goal) {
             condition.comparisons.iter().for_each(|(linear, _)| note(linear));
+        }
+        for axiom in &task.world.definitions.axioms {
+            axiom.body.comparisons.iter().for_each(|(linear, _)| note(linear));
         }
         for operator in &task.operators {
             operator.numeric_effects.values().for_each(&mut note);

@@ -3,20 +3,24 @@
 //! A durative action is composed into one step: conditions of its middle and end that its start effects
 //! provide are dropped, those that they destroy make the instance impossible, and numeric conditions and effects of the
 //! end are rewritten in terms of the state before the start (sequential execution of PDDL 2.1, section 8).
+//!
+//! Conditional effects on atoms stay as they are. An instance whose numbers (cost among them) change under a
+//! condition becomes one operator for each case, and so does one whose start effects are conditional.
 
 use std::collections::BTreeMap;
 
 use crate::configuration::{SlotParameter, conjuncts, slots_of_expression, slots_of_formula};
 use crate::error::{Error, File, Place};
-use crate::ground::evaluate::{
-    AtomId, Binding, Failure, Residual, Slots, World, compare, for_each_combination,
-};
+use crate::ground::derived;
+use crate::ground::effects::cases;
+use crate::ground::evaluate::{AtomId, Binding, Failure, Slots, World, for_each_combination};
 use crate::ground::metric::GroundObjective;
-use crate::ground::normal_form::{GroundCondition, condition};
+use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::reach::Reached;
-use crate::lifted::{Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
+use crate::ground::residual::{Residual, compare};
+use crate::lifted::{Change, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::limits::Limits;
-use crate::pddl::ast::{Assignment, Span};
+use crate::pddl::ast::Span;
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet};
 use crate::task::{Argument, Forbidden};
 
@@ -33,9 +37,19 @@ pub(crate) struct GroundOperator {
     pub(crate) condition: GroundCondition,
     pub(crate) adds: Vec<AtomId>,
     pub(crate) deletes: Vec<AtomId>,
+    /// After `adds` and `deletes`, those of one entry at once, deletes first.
+    pub(crate) conditional: Vec<GroundConditional>,
     pub(crate) numeric_effects: BTreeMap<NumericId, Linear<Rational>>,
     pub(crate) cost: Quantity<Rational>,
     pub(crate) duration: Quantity<Rational>,
+}
+
+/// Atoms that change if a conjunction holds before the operator.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct GroundConditional {
+    pub(crate) condition: Vec<GroundLiteral>,
+    pub(crate) adds: Vec<AtomId>,
+    pub(crate) deletes: Vec<AtomId>,
 }
 
 /// The task over atoms.
@@ -58,8 +72,8 @@ pub(crate) fn instantiate<'a>(
     reached: &'a Reached,
     limits: &Limits,
 ) -> Result<GroundTask<'a>, Vec<Error>> {
-    let mut world = World::new(lifted, &reached.atoms);
-    let (mut operators, mut errors) = (Vec::new(), Vec::new());
+    let mut world = World::new(lifted, reached);
+    let (mut operators, mut errors): (Vec<GroundOperator>, _) = (Vec::new(), Vec::new());
     for (((schema, slots), instances), index) in
         lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0..)
     {
@@ -67,11 +81,13 @@ pub(crate) fn instantiate<'a>(
             if operators.len().is_multiple_of(256) && limits.reached() {
                 return Err(vec![Error::Interrupted]);
             }
-            match operator(&mut world, schema, index, slots, binding) {
-                Ok(mut operator) => {
-                    operator.configuration =
-                        configuration(&operator.arguments, &designs[index as usize], binding);
-                    operators.push(operator);
+            match instance(&mut world, schema, index, slots, binding) {
+                Ok(mut cases) => {
+                    for operator in &mut cases {
+                        operator.configuration =
+                            configuration(&operator.arguments, &designs[index as usize], binding);
+                    }
+                    operators.append(&mut cases);
                 }
                 Err(Failure::Undefined) => {}
                 Err(Failure::Error(error)) => {
@@ -81,7 +97,9 @@ pub(crate) fn instantiate<'a>(
             }
         }
     }
-    let goal = match world.residual(&lifted.goal, &Vec::new()).and_then(|goal| condition(&[goal])) {
+    let mut binding = vec![None; lifted.goal_variables];
+    let goal = world.residual(&lifted.goal, &mut binding).and_then(|goal| world.condition(&[goal]));
+    let goal = match goal.and_then(|goal| world.instantiate_axioms().map(|()| goal)) {
         Ok(goal) => Some(goal),
         Err(Failure::Undefined) => None,
         Err(Failure::Error(error)) => {
@@ -89,21 +107,22 @@ pub(crate) fn instantiate<'a>(
             None
         }
     };
-    if errors.is_empty() {
-        Ok(GroundTask { world, operators, goal, objective: GroundObjective::default() })
-    } else {
-        Err(errors)
+    if !errors.is_empty() {
+        return Err(errors);
     }
+    let mut task = GroundTask { world, operators, goal, objective: GroundObjective::default() };
+    derived::simplify(&mut task);
+    Ok(task)
 }
 
-/// One instance. `Failure::Undefined` says that it can never be applied.
-fn operator(
+/// The cases of one instance. `Failure::Undefined` says that it can never be applied.
+fn instance(
     world: &mut World<'_>,
     schema: &Schema,
     index: u32,
     parameters: &[SlotParameter],
     core: &Binding,
-) -> Result<GroundOperator, Failure> {
+) -> Result<Vec<GroundOperator>, Failure> {
     let mut binding = core.clone();
     let mut slots = Slots { parameters, designs: Vec::new() };
     for (slot, position) in parameters.iter().zip(0..) {
@@ -115,45 +134,37 @@ fn operator(
         binding[slot.parameter as usize] = None;
     }
     let mut build = Build { world, binding, slots, forbidden: Vec::new() };
-    let start = build.conditions(&schema.start_condition)?;
-    let (start_adds, start_deletes) = build.atoms(&schema.start_effects);
-    let start_numeric = build.numeric(&schema.start_effects, &BTreeMap::new())?;
+    let before = build.conditions(&schema.start_condition)?;
+    let start = build.moment(&schema.start_effects)?;
     let middle = build.conditions(&schema.middle_condition)?;
-    let (mut adds, mut deletes) = build.atoms(&schema.end_effects);
-    let mut numeric_effects = build.numeric(&schema.end_effects, &start_numeric)?;
-
-    let mut parts = start;
-    for part in middle {
-        parts.push(after_start(part, &start_adds, &start_deletes, &start_numeric));
-    }
-    adds.extend(start_adds.iter().filter(|atom| !deletes.contains(atom)).copied().collect::<Vec<_>>());
-    deletes.extend(start_deletes);
-    adds.sort_unstable();
-    adds.dedup();
-    deletes.sort_unstable();
-    deletes.dedup();
-    deletes.retain(|atom| !adds.contains(atom));
-    for (variable, value) in start_numeric {
-        numeric_effects.entry(variable).or_insert(value);
-    }
+    let end = build.moment(&schema.end_effects)?;
     let duration = match &schema.duration {
         Some(duration) => build.static_quantity(duration, schema)?,
         None => Quantity::constant(Rational::from_integer(0)),
     };
-    let condition = condition(&parts)?;
-    Ok(GroundOperator {
+    let template = GroundOperator {
         schema: index,
-        arguments: build.arguments(),
+        arguments: build.arguments(schema),
         slots: build.functions()?,
-        forbidden: build.forbidden,
+        forbidden: std::mem::take(&mut build.forbidden),
         configuration: Vec::new(),
-        condition,
-        adds,
-        deletes,
-        numeric_effects,
+        condition: GroundCondition::default(),
+        adds: Vec::new(),
+        deletes: Vec::new(),
+        conditional: Vec::new(),
+        numeric_effects: BTreeMap::new(),
         cost: Quantity::constant(Rational::from_integer(0)),
         duration,
-    })
+    };
+    let mut operators = Vec::new();
+    for case in cases(schema, &before, &start, &middle, &end)? {
+        match case.operator(build.world, &template) {
+            Ok(operator) => operators.push(operator),
+            Err(Failure::Undefined) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(operators)
 }
 
 fn configuration(
@@ -180,14 +191,17 @@ fn suitable_designs(
     let parameter = parameters[position as usize].parameter as usize;
     let all = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
     let conditions: Vec<_> = all.filter(|c| slots_of_formula(c, parameters) == only).collect();
-    let effects = schema.start_effects.iter().chain(&schema.end_effects).filter_map(|effect| match effect {
-        Effect::Assign { expression, .. } => Some(expression),
+    let effects = schema.start_effects.iter().chain(&schema.end_effects);
+    let unconditional =
+        effects.filter(|effect| effect.bound.is_empty() && conjuncts(&effect.condition).is_empty());
+    let effects = unconditional.filter_map(|effect| match &effect.change {
+        Change::Assign { expression, .. } => Some(expression),
         _ => None,
     });
     let expressions: Vec<_> =
         effects.chain(&schema.duration).filter(|e| slots_of_expression(e, parameters) == only).collect();
     let mut designs = Vec::new();
-    for design in &schema.parameters[parameter].candidates {
+    for design in schema.parameters[parameter].candidates.iter() {
         binding[parameter] = Some(*design);
         let mut suits = true;
         for condition in &conditions {
@@ -212,9 +226,10 @@ fn defined<T>(value: Result<T, Failure>) -> Result<bool, Failure> {
     }
 }
 
-struct Build<'w, 'a> {
-    world: &'w mut World<'a>,
-    binding: Binding,
+/// An instance under construction.
+pub(super) struct Build<'w, 'a> {
+    pub(super) world: &'w mut World<'a>,
+    pub(super) binding: Binding,
     slots: Slots<'w>,
     forbidden: Vec<Forbidden>,
 }
@@ -226,11 +241,11 @@ impl Build<'_, '_> {
         for conjunct in conjuncts(formula) {
             let mentioned = slots_of_formula(conjunct, self.slots.parameters);
             if mentioned.is_empty() {
-                parts.push(self.world.residual(conjunct, &self.binding)?);
-            } else if let Formula::Compare(comparison, left, right, place) = conjunct {
+                parts.push(self.world.residual(conjunct, &mut self.binding)?);
+            } else if let Formula::Compare(comparison, left, right, _) = conjunct {
                 let (left, right) = (self.open(left)?, self.open(right)?);
                 let static_part = left.coefficients.is_empty() && right.coefficients.is_empty();
-                match compare(*comparison, left, right, *place) {
+                match compare(*comparison, left, right) {
                     residual if static_part => self.forbid(&mentioned, &residual),
                     residual => parts.push(residual),
                 }
@@ -241,7 +256,7 @@ impl Build<'_, '_> {
         Ok(parts)
     }
 
-    fn open(&mut self, expression: &Expression) -> Result<Linear<Rational>, Failure> {
+    pub(super) fn open(&mut self, expression: &Expression) -> Result<Linear<Rational>, Failure> {
         let forbidden = &mut self.forbidden;
         let mut undefined = |slots: &SlotSet, combination: SlotSet| forbid(forbidden, slots, combination);
         self.world.open(expression, &mut self.binding, &self.slots, &mut undefined)
@@ -252,7 +267,7 @@ impl Build<'_, '_> {
         match residual {
             Residual::And(parts) => parts.iter().for_each(|part| self.forbid(mentioned, part)),
             Residual::False => self.forbid_where(mentioned, &|_| true),
-            Residual::Compare { linear, strict, .. } => {
+            Residual::Compare { linear, strict } => {
                 let sizes: Vec<_> = self.slots.designs.iter().map(Vec::len).collect();
                 self.forbid_where(mentioned, &|choice| {
                     let value = linear.quantity.at(choice, &sizes);
@@ -281,59 +296,13 @@ impl Build<'_, '_> {
         let (world, forbidden) = (&mut *self.world, &mut self.forbidden);
         let mut failure = None;
         for_each_combination(mentioned, &self.slots, &mut self.binding, &mut |binding, combination| {
-            match world.residual(conjunct, binding) {
+            match world.residual(conjunct, &mut binding.clone()) {
                 Ok(Residual::False) => forbid(forbidden, mentioned, SlotSet::from_slice(combination)),
                 Ok(_) => {}
                 Err(error) => failure = Some(error),
             }
         });
         failure.map_or(Ok(()), Err)
-    }
-
-    fn atoms(&mut self, effects: &[Effect]) -> (Vec<AtomId>, Vec<AtomId>) {
-        let (mut adds, mut deletes) = (Vec::new(), Vec::new());
-        for effect in effects {
-            match effect {
-                Effect::Add(predicate, terms) => {
-                    adds.push(self.world.atom(*predicate, World::arguments(terms, &self.binding)));
-                }
-                Effect::Delete(predicate, terms) => {
-                    deletes.push(self.world.atom(*predicate, World::arguments(terms, &self.binding)));
-                }
-                Effect::Assign { .. } => {}
-            }
-        }
-        (adds, deletes)
-    }
-
-    /// What numeric variables become, in terms of the state before the action; `before` are the changes that
-    /// the action has made already.
-    fn numeric(
-        &mut self,
-        effects: &[Effect],
-        before: &BTreeMap<NumericId, Linear<Rational>>,
-    ) -> Result<BTreeMap<NumericId, Linear<Rational>>, Failure> {
-        let mut changed: BTreeMap<NumericId, Linear<Rational>> = BTreeMap::new();
-        for effect in effects {
-            let Effect::Assign { assignment, function, terms, expression, place } = effect else { continue };
-            let variable = self.world.numeric(*function, World::arguments(terms, &self.binding), *place)?;
-            let mut operand = self.open(expression)?;
-            substitute(&mut operand, before);
-            let current = || {
-                let old = changed.get(&variable).or_else(|| before.get(&variable));
-                old.cloned().unwrap_or_else(|| Linear::variable(variable))
-            };
-            let value = match assignment {
-                Assignment::Assign => operand,
-                Assignment::Increase => sum(current(), &operand),
-                Assignment::Decrease => sum(current(), &operand.negated()),
-                Assignment::ScaleUp | Assignment::ScaleDown => {
-                    scaled(current(), &operand, *assignment == Assignment::ScaleDown, *place)?
-                }
-            };
-            changed.insert(variable, value);
-        }
-        Ok(changed)
     }
 
     fn static_quantity(
@@ -352,10 +321,10 @@ impl Build<'_, '_> {
         }))
     }
 
-    fn arguments(&self) -> Vec<Argument> {
+    fn arguments(&self, schema: &Schema) -> Vec<Argument> {
         let slot =
             |parameter: usize| self.slots.parameters.iter().position(|s| s.parameter as usize == parameter);
-        self.binding
+        self.binding[..schema.parameters.len()]
             .iter()
             .enumerate()
             .filter_map(|(parameter, object)| match object {
@@ -379,66 +348,6 @@ fn forbid(forbidden: &mut Vec<Forbidden>, slots: &SlotSet, combination: SlotSet)
         Some(rule) if rule.combinations.contains(&combination) => {}
         Some(rule) => rule.combinations.push(combination),
         None => forbidden.push(Forbidden { slots: slots.clone(), combinations: vec![combination] }),
-    }
-}
-
-fn sum(mut left: Linear<Rational>, right: &Linear<Rational>) -> Linear<Rational> {
-    left.add(right);
-    left
-}
-
-fn scaled(
-    mut value: Linear<Rational>,
-    factor: &Linear<Rational>,
-    inverse: bool,
-    place: Place,
-) -> Result<Linear<Rational>, Failure> {
-    if !factor.coefficients.is_empty() || !factor.quantity.tables.is_empty() {
-        return Err(Failure::Error(Error::NonLinear { place }));
-    }
-    let factor = factor.quantity.constant;
-    if inverse && factor == Rational::from_integer(0) {
-        return Err(Failure::Undefined);
-    }
-    value.scale(&if inverse { factor.recip() } else { factor });
-    Ok(value)
-}
-
-fn substitute(linear: &mut Linear<Rational>, before: &BTreeMap<NumericId, Linear<Rational>>) {
-    let variables: Vec<_> = linear.coefficients.iter().map(|(variable, _)| *variable).collect();
-    let mut result = linear.clone();
-    result.coefficients.clear();
-    for (variable, factor) in &linear.coefficients {
-        let mut value = before.get(variable).cloned().unwrap_or_else(|| Linear::variable(*variable));
-        value.scale(factor);
-        result.add(&value);
-    }
-    if variables.iter().any(|variable| before.contains_key(variable)) {
-        *linear = result;
-    }
-}
-
-/// A condition of the middle or end of a durative action in terms of the state before its start.
-fn after_start(
-    residual: Residual,
-    adds: &[AtomId],
-    deletes: &[AtomId],
-    numeric: &BTreeMap<NumericId, Linear<Rational>>,
-) -> Residual {
-    let recur = |parts: Vec<Residual>| {
-        parts.into_iter().map(|part| after_start(part, adds, deletes, numeric)).collect()
-    };
-    match residual {
-        Residual::And(parts) => Residual::And(recur(parts)),
-        Residual::Or(parts) => Residual::Or(recur(parts)),
-        Residual::Literal { atom, positive } if adds.contains(&atom) || deletes.contains(&atom) => {
-            if adds.contains(&atom) == positive { Residual::True } else { Residual::False }
-        }
-        Residual::Compare { mut linear, strict, place } => {
-            substitute(&mut linear, numeric);
-            Residual::Compare { linear, strict, place }
-        }
-        other => other,
     }
 }
 

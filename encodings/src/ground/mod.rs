@@ -6,14 +6,19 @@
 //!
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
+mod derived;
+mod effects;
 mod evaluate;
 mod finish;
 mod instantiate;
+mod join;
 mod metric;
 mod mutex;
 mod normal_form;
 mod prune;
 mod reach;
+mod relaxed;
+mod residual;
 
 use crate::configuration::{design_parameters, slot_parameters};
 use crate::error::Error;

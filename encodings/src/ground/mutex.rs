@@ -13,6 +13,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ground::evaluate::AtomId;
 use crate::ground::instantiate::{GroundOperator, GroundTask};
+use crate::ground::normal_form::GroundLiteral;
 use crate::lifted::{ObjectId, PredicateId};
 
 /// One predicate of a candidate: argument positions that make up the key, in order; one more may be counted.
@@ -118,31 +119,62 @@ fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Vec<Candid
     found
 }
 
+/// Conjuncts under which atoms are added and deleted together.
+struct Change<'o> {
+    conditions: [&'o [GroundLiteral]; 2],
+    adds: &'o [AtomId],
+    deletes: &'o [AtomId],
+}
+
+impl Change<'_> {
+    fn requires(&self, atom: AtomId) -> bool {
+        self.conditions.iter().any(|literals| literals.binary_search(&(atom, true)).is_ok())
+    }
+}
+
 /// The operator itself and a key whose weight it may increase (or decrease without anybody knowing).
 fn broken_by<'o>(
     task: &GroundTask<'_>,
     candidate: &Candidate,
     operator: &'o GroundOperator,
 ) -> Option<(&'o GroundOperator, Key)> {
-    let required = |atom: &AtomId| operator.condition.literals.binary_search(&(*atom, true)).is_ok();
-    let mut balance: FxHashMap<Key, i32> = FxHashMap::default();
-    for atom in operator.adds.iter().filter(|atom| !required(atom)) {
-        if let Some(key) = key_of(task, candidate, *atom) {
-            *balance.entry(key).or_default() += 1;
-        }
-    }
-    for atom in &operator.deletes {
-        if let Some(key) = key_of(task, candidate, *atom) {
-            if !required(atom) {
-                return Some((operator, key));
+    let literals = &operator.condition.literals[..];
+    let own = Change { conditions: [literals, &[]], adds: &operator.adds, deletes: &operator.deletes };
+    let conditional = operator.conditional.iter().map(|effect| Change {
+        conditions: [literals, &effect.condition],
+        adds: &effect.adds,
+        deletes: &effect.deletes,
+    });
+    let effects = operator.conditional.iter().flat_map(|effect| &effect.deletes);
+    let deleted: FxHashSet<_> = operator.deletes.iter().chain(effects).collect();
+    // Each entry has to keep the weight by itself, and no two of them may add to one key.
+    let mut adding: FxHashSet<Key> = FxHashSet::default();
+    for change in std::iter::once(own).chain(conditional) {
+        let mut added: FxHashSet<Key> = FxHashSet::default();
+        let mut balance: FxHashMap<Key, i32> = FxHashMap::default();
+        let comes = |atom: &&AtomId| !change.requires(**atom) || deleted.contains(atom);
+        for atom in change.adds.iter().filter(comes) {
+            if let Some(key) = key_of(task, candidate, *atom) {
+                added.insert(key.clone());
+                *balance.entry(key).or_default() += 1;
             }
-            *balance.entry(key).or_default() -= 1;
         }
+        for atom in change.deletes {
+            if let Some(key) = key_of(task, candidate, *atom) {
+                if !change.requires(*atom) {
+                    return Some((operator, key));
+                }
+                *balance.entry(key).or_default() -= 1;
+            }
+        }
+        let heavy = balance.into_iter().filter(|(_, weight)| *weight > 0).map(|(key, _)| key);
+        let twice = added.iter().filter(|key| adding.contains(*key)).cloned();
+        if let Some(key) = heavy.chain(twice).min() {
+            return Some((operator, key));
+        }
+        adding.extend(added);
     }
-    let mut heavy: Vec<_> =
-        balance.into_iter().filter(|(_, weight)| *weight > 0).map(|(key, _)| key).collect();
-    heavy.sort_unstable();
-    heavy.into_iter().next().map(|key| (operator, key))
+    None
 }
 
 /// The candidate plus one predicate that the operator requires and deletes, its arguments matched to the key.
@@ -154,7 +186,8 @@ fn refinements(
     arities: &BTreeMap<PredicateId, usize>,
 ) -> Vec<Candidate> {
     let mut refined = Vec::new();
-    for atom in &operator.deletes {
+    let conditional = operator.conditional.iter().flat_map(|effect| &effect.deletes);
+    for atom in operator.deletes.iter().chain(conditional) {
         let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index()) else { continue };
         if candidate.iter().any(|part| part.predicate == *predicate) || !arities.contains_key(predicate) {
             continue;

@@ -1,75 +1,146 @@
 //! Residual conditions to conjunctive normal form.
+//!
+//! A disjunction of literals is a clause. Small ones of conjunctions are multiplied out; all others, and comparisons of
+//! numbers inside disjunctions, get a name: a derived atom that holds where the part does. So no condition grows by more than a
+//! constant factor.
 
-use crate::error::{Error, File, Place};
-use crate::ground::evaluate::{AtomId, Failure, Residual};
+use crate::ground::derived::GroundAxiom;
+use crate::ground::evaluate::{AtomId, Failure, World};
+use crate::ground::residual::Residual;
 use crate::lifted::Rational;
-use crate::pddl::ast::Span;
 use crate::quantity::Linear;
 
+/// Disjunctions with more clauses than this are named rather than multiplied out.
+const CLAUSE_LIMIT: usize = 16;
+
+/// An atom or its negation.
+pub(crate) type GroundLiteral = (AtomId, bool);
+
 /// A conjunction of literals, clauses and comparisons.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(crate) struct GroundCondition {
-    pub(crate) literals: Vec<(AtomId, bool)>,
-    pub(crate) clauses: Vec<Vec<(AtomId, bool)>>,
+    pub(crate) literals: Vec<GroundLiteral>,
+    pub(crate) clauses: Vec<Vec<GroundLiteral>>,
     pub(crate) comparisons: Vec<(Linear<Rational>, bool)>,
 }
 
-/// Conjunctive normal form; `Failure::Undefined` if the condition is false.
-pub(crate) fn condition(parts: &[Residual]) -> Result<GroundCondition, Failure> {
-    let mut condition = GroundCondition::default();
-    for part in parts {
-        conjoin(part, &mut condition)?;
+impl GroundCondition {
+    /// Sorts and removes repetitions; false if literals contradict each other.
+    pub(crate) fn tidy(&mut self) -> bool {
+        self.literals.sort_unstable();
+        self.literals.dedup();
+        self.clauses.sort_unstable();
+        self.clauses.dedup();
+        self.literals.windows(2).all(|pair| pair[0].0 != pair[1].0)
     }
-    condition.literals.sort_unstable();
-    condition.literals.dedup();
-    condition.clauses.sort_unstable();
-    condition.clauses.dedup();
-    let contradictory = condition.literals.windows(2).any(|pair| pair[0].0 == pair[1].0);
-    if contradictory { Err(Failure::Undefined) } else { Ok(condition) }
+
+    /// All atoms that occur.
+    pub(crate) fn atoms(&self) -> impl Iterator<Item = AtomId> + '_ {
+        self.literals.iter().chain(self.clauses.iter().flatten()).map(|(atom, _)| *atom)
+    }
 }
 
-fn conjoin(residual: &Residual, condition: &mut GroundCondition) -> Result<(), Failure> {
-    match residual {
-        Residual::True => {}
-        Residual::False => return Err(Failure::Undefined),
-        Residual::And(parts) => {
-            for part in parts {
-                conjoin(part, condition)?;
-            }
+impl World<'_> {
+    /// Conjunctive normal form; `Failure::Undefined` if the condition is false.
+    pub(crate) fn condition(&mut self, parts: &[Residual]) -> Result<GroundCondition, Failure> {
+        let mut condition = GroundCondition::default();
+        for part in parts {
+            self.conjoin(part, &mut condition)?;
         }
-        Residual::Literal { atom, positive } => condition.literals.push((*atom, *positive)),
-        Residual::Compare { linear, strict, .. } => condition.comparisons.push((linear.clone(), *strict)),
-        Residual::Or(_) => {
-            for clause in clauses(residual)? {
-                match clause[..] {
-                    [] => return Err(Failure::Undefined),
-                    [literal] => condition.literals.push(literal),
-                    _ => condition.clauses.push(clause),
+        if condition.tidy() { Ok(condition) } else { Err(Failure::Undefined) }
+    }
+
+    fn conjoin(&mut self, residual: &Residual, condition: &mut GroundCondition) -> Result<(), Failure> {
+        match residual {
+            Residual::True => {}
+            Residual::False => return Err(Failure::Undefined),
+            Residual::And(parts) => {
+                for part in parts {
+                    self.conjoin(part, condition)?;
+                }
+            }
+            Residual::Literal { atom, positive } => condition.literals.push((*atom, *positive)),
+            Residual::Compare { linear, strict } => condition.comparisons.push((linear.clone(), *strict)),
+            Residual::Or(parts) => {
+                let multiplied = clauses(residual);
+                for clause in multiplied.unwrap_or_else(|| vec![self.clause(parts)]) {
+                    match clause[..] {
+                        [] => return Err(Failure::Undefined),
+                        [literal] => condition.literals.push(literal),
+                        _ => condition.clauses.push(clause),
+                    }
                 }
             }
         }
+        Ok(())
     }
-    Ok(())
+
+    /// A clause with a literal for each part.
+    fn clause(&mut self, parts: &[Residual]) -> Vec<GroundLiteral> {
+        let mut clause: Vec<_> = parts.iter().map(|part| self.literal(part)).collect();
+        clause.sort_unstable();
+        clause.dedup();
+        clause
+    }
+
+    /// A literal that holds where the condition does: the condition itself, or a derived atom.
+    pub(crate) fn literal(&mut self, residual: &Residual) -> GroundLiteral {
+        if let Residual::Literal { atom, positive } = residual {
+            return (*atom, *positive);
+        }
+        if let Some(atom) = self.definitions.named(residual) {
+            return (atom, true);
+        }
+        let atom = self.name(residual.clone());
+        self.define(atom, residual);
+        (atom, true)
+    }
+
+    /// Adds rules by which an atom holds where the condition does.
+    pub(crate) fn define(&mut self, head: AtomId, residual: &Residual) {
+        if let Residual::Or(parts) = residual {
+            for part in parts {
+                self.define(head, part);
+            }
+            return;
+        }
+        let parts =
+            if let Residual::And(parts) = residual { &parts[..] } else { std::slice::from_ref(residual) };
+        let mut body = GroundCondition::default();
+        for part in parts {
+            match part {
+                Residual::True => {}
+                Residual::False => return,
+                Residual::Compare { linear, strict } => body.comparisons.push((linear.clone(), *strict)),
+                _ => body.literals.push(self.literal(part)),
+            }
+        }
+        if body.tidy() {
+            self.definitions.axioms.push(GroundAxiom { head, body });
+        }
+    }
 }
 
-/// The clauses of a condition, by distribution; tautologies are left out.
-fn clauses(residual: &Residual) -> Result<Vec<Vec<(AtomId, bool)>>, Failure> {
-    const LIMIT: usize = 10_000;
+/// The clauses of a condition without numbers, by distribution; tautologies are left out. None if there are many.
+fn clauses(residual: &Residual) -> Option<Vec<Vec<GroundLiteral>>> {
     match residual {
-        Residual::True => Ok(Vec::new()),
-        Residual::False => Ok(vec![Vec::new()]),
-        Residual::Literal { atom, positive } => Ok(vec![vec![(*atom, *positive)]]),
+        Residual::True => Some(Vec::new()),
+        Residual::False => Some(vec![Vec::new()]),
+        Residual::Literal { atom, positive } => Some(vec![vec![(*atom, *positive)]]),
         Residual::And(parts) => {
             let mut all = Vec::new();
             for part in parts {
                 all.extend(clauses(part)?);
             }
-            Ok(all)
+            Some(all)
         }
         Residual::Or(parts) => {
-            let mut product: Vec<Vec<(AtomId, bool)>> = vec![Vec::new()];
+            let mut product: Vec<Vec<GroundLiteral>> = vec![Vec::new()];
             for part in parts {
                 let more = clauses(part)?;
+                if product.len() * more.len() > CLAUSE_LIMIT {
+                    return None;
+                }
                 let pairs = product.iter().flat_map(|left| more.iter().map(move |right| (left, right)));
                 let mut next = Vec::new();
                 for (left, right) in pairs {
@@ -79,23 +150,11 @@ fn clauses(residual: &Residual) -> Result<Vec<Vec<(AtomId, bool)>>, Failure> {
                     if clause.windows(2).all(|pair| pair[0].0 != pair[1].0) {
                         next.push(clause);
                     }
-                    if next.len() > LIMIT {
-                        return Err(Failure::Error(unsupported_disjunction(None)));
-                    }
                 }
                 product = next;
             }
-            Ok(product)
+            Some(product)
         }
-        Residual::Compare { place, .. } => Err(Failure::Error(unsupported_disjunction(Some(*place)))),
-    }
-}
-
-fn unsupported_disjunction(place: Option<Place>) -> Error {
-    let nowhere = Place { file: File::Domain, span: Span::default() };
-    Error::Unsupported {
-        construct: "a numeric comparison (or thousands of alternatives) inside a disjunction".into(),
-        instead: "one action for each alternative".into(),
-        place: place.unwrap_or(nowhere),
+        Residual::Compare { .. } => None,
     }
 }

@@ -8,7 +8,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::configuration::conjuncts;
 use crate::ground::evaluate::{AtomId, World};
 use crate::ground::instantiate::{GroundOperator, GroundTask};
-use crate::ground::normal_form::GroundCondition;
+use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::lifted::{Arguments, Formula, Lifted, PredicateId, Rational};
 use crate::quantity::NumericId;
 
@@ -57,7 +57,11 @@ pub(crate) fn atom_name(lifted: &Lifted, task: &GroundTask<'_>, atom: AtomId) ->
 }
 
 fn name(lifted: &Lifted, predicate: PredicateId, arguments: &Arguments) -> String {
-    let mut text = format!("({}", lifted.predicates[predicate.index()].name);
+    let Some(symbol) = lifted.predicates.get(predicate.index()) else {
+        let number = arguments.first().map_or(0, |number| number.0);
+        return format!("condition {number}");
+    };
+    let mut text = format!("({}", symbol.name);
     for object in arguments {
         text.push(' ');
         text.push_str(lifted.objects[object.index()].as_str());
@@ -66,15 +70,17 @@ fn name(lifted: &Lifted, predicate: PredicateId, arguments: &Arguments) -> Strin
     text
 }
 
-/// Removes operators that are not reachable in the delete relaxation; returns the atoms that are.
+/// Removes operators and rules that are not reachable in the delete relaxation; returns the atoms that are.
 fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
+    let axioms = &task.world.definitions.axioms;
+    let operators = task.operators.iter().map(|operator| &operator.condition);
+    let conditions = operators.chain(axioms.iter().map(|axiom| &axiom.body));
     let mut readers: FxHashMap<AtomId, Vec<usize>> = FxHashMap::default();
-    let mut missing = Vec::with_capacity(task.operators.len());
+    let mut missing = Vec::with_capacity(task.operators.len() + axioms.len());
     let mut reached = initially.to_vec();
     let mut open: Vec<usize> = Vec::new();
-    for (index, operator) in task.operators.iter().enumerate() {
-        let needs =
-            operator.condition.literals.iter().filter(|(atom, positive)| *positive && !reached[atom.index()]);
+    for (index, condition) in conditions.enumerate() {
+        let needs = condition.literals.iter().filter(|(atom, positive)| *positive && !reached[atom.index()]);
         let count = needs.map(|(atom, _)| readers.entry(*atom).or_default().push(index)).count();
         missing.push(count);
         if count == 0 {
@@ -82,25 +88,37 @@ fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
         }
     }
     while let Some(index) = open.pop() {
-        for atom in &task.operators[index].adds {
+        let mut reach = |atom: AtomId| {
             if std::mem::replace(&mut reached[atom.index()], true) {
-                continue;
+                return;
             }
-            for reader in readers.get(atom).into_iter().flatten() {
+            for reader in readers.get(&atom).into_iter().flatten() {
                 missing[*reader] -= 1;
                 if missing[*reader] == 0 {
                     open.push(*reader);
                 }
             }
+        };
+        match task.operators.get(index) {
+            Some(operator) => {
+                let conditional = operator.conditional.iter().flat_map(|effect| &effect.adds);
+                operator.adds.iter().chain(conditional).for_each(|atom| reach(*atom));
+            }
+            None => reach(axioms[index - task.operators.len()].head),
         }
     }
     let mut keep = missing.iter().map(|count| *count == 0);
     task.operators.retain(|_| keep.next().unwrap_or(true));
-    let possible = |&(atom, positive): &(AtomId, bool)| !positive || reached[atom.index()];
+    task.world.definitions.axioms.retain(|_| keep.next().unwrap_or(true));
+    let possible = |&(atom, positive): &GroundLiteral| !positive || reached[atom.index()];
     task.operators
         .retain(|operator| operator.condition.clauses.iter().all(|clause| clause.iter().any(possible)));
     for operator in &mut task.operators {
         operator.deletes.retain(|atom| reached[atom.index()]);
+        operator.conditional.retain(|effect| effect.condition.iter().all(possible));
+        for effect in &mut operator.conditional {
+            effect.deletes.retain(|atom| reached[atom.index()]);
+        }
     }
     reached
 }
@@ -108,7 +126,8 @@ fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
 /// Removes effects on numeric variables that no condition depends on; the metric has been made of them already.
 fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
-    let comparisons = conditions.flat_map(|condition| &condition.comparisons);
+    let bodies = task.world.definitions.axioms.iter().map(|axiom| &axiom.body);
+    let comparisons = conditions.chain(bodies).flat_map(|condition| &condition.comparisons);
     let mut open: Vec<NumericId> = comparisons
         .flat_map(|(linear, _)| linear.coefficients.iter().map(|(variable, _)| *variable))
         .collect();
@@ -126,16 +145,20 @@ fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     }
 }
 
-/// Removes effects on atoms that nothing reads, and operators that do nothing and earn nothing.
+/// Removes rules of atoms that nothing reads, effects on such atoms, and operators that do nothing and earn nothing.
 fn backward(task: &mut GroundTask<'_>) {
     loop {
-        let mut read: FxHashSet<AtomId> = FxHashSet::default();
-        let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
-        conditions.for_each(|condition| read.extend(atoms(condition)));
+        let read = read_atoms(task);
         let before = task.operators.len();
+        task.world.definitions.axioms.retain(|axiom| read.contains(&axiom.head));
         for operator in &mut task.operators {
             operator.adds.retain(|atom| read.contains(atom));
             operator.deletes.retain(|atom| read.contains(atom));
+            for effect in &mut operator.conditional {
+                effect.adds.retain(|atom| read.contains(atom));
+                effect.deletes.retain(|atom| read.contains(atom));
+            }
+            operator.conditional.retain(|effect| !effect.adds.is_empty() || !effect.deletes.is_empty());
         }
         task.operators.retain(|operator| !is_idle(operator));
         if task.operators.len() == before {
@@ -144,8 +167,23 @@ fn backward(task: &mut GroundTask<'_>) {
     }
 }
 
-fn atoms(condition: &GroundCondition) -> impl Iterator<Item = AtomId> + '_ {
-    condition.literals.iter().chain(condition.clauses.iter().flatten()).map(|(atom, _)| *atom)
+/// The atoms that conditions read, directly or through rules.
+pub(crate) fn read_atoms(task: &GroundTask<'_>) -> FxHashSet<AtomId> {
+    let mut read: FxHashSet<AtomId> = FxHashSet::default();
+    let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
+    conditions.for_each(|condition| read.extend(condition.atoms()));
+    let conditional = task.operators.iter().flat_map(|operator| &operator.conditional);
+    read.extend(conditional.flat_map(|effect| effect.condition.iter().map(|(atom, _)| *atom)));
+    let mut bodies: FxHashMap<AtomId, Vec<&GroundCondition>> = FxHashMap::default();
+    for axiom in &task.world.definitions.axioms {
+        bodies.entry(axiom.head).or_default().push(&axiom.body);
+    }
+    let mut open: Vec<AtomId> = read.iter().copied().collect();
+    while let Some(atom) = open.pop() {
+        let below = bodies.get(&atom).into_iter().flatten().flat_map(|body| body.atoms());
+        open.extend(below.filter(|atom| read.insert(*atom)));
+    }
+    read
 }
 
 /// Whether the operator changes nothing and cannot lower the cost of a plan.
@@ -155,6 +193,7 @@ fn is_idle(operator: &GroundOperator) -> bool {
     let lowest = lowest.fold(operator.cost.constant, |sum, value| sum + value);
     operator.adds.iter().all(|atom| known.contains(&(*atom, true)))
         && operator.deletes.iter().all(|atom| known.contains(&(*atom, false)))
+        && operator.conditional.is_empty()
         && operator.numeric_effects.iter().all(|(variable, value)| {
             value.quantity.is_zero() && value.coefficients[..] == [(*variable, Rational::from_integer(1))]
         })

@@ -4,22 +4,31 @@
 //! relation for each slot, which says for which other arguments *some* design fits; the designs themselves never
 //! enter the relation of the schema, so its size does not depend on how many designs there are.
 //!
+//! Static derived predicates are rules of the same program, with stratified negation: the engine evaluates them once,
+//! and from then on they are facts. Derived fluents are relaxed like everything else that changes.
+//!
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
-use rules::{Atom, Engine, Fact, Program, Rule, RuleIdentity, Symbol, Symbols, Term as RuleTerm, Variable};
+use rules::{Atom, Engine, Program, Symbol};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::configuration::{SlotParameter, conjuncts};
+use crate::configuration::{SlotParameter, conjuncts, formula_terms};
 use crate::error::Error;
 use crate::ground::evaluate::Binding;
-use crate::lifted::{Arguments, Effect, Formula, Lifted, ObjectId, PredicateId, Schema, Term};
+use crate::ground::relaxed::{Builder, Candidates};
+use crate::lifted::{
+    Arguments, Axiom, Bound, Change, Effect, Formula, Lifted, ObjectId, PredicateId, Schema, Term,
+};
 
 /// What relaxed reachability finds.
+#[derive(Default)]
 pub(crate) struct Reached {
     /// For each schema the bindings of its parameters apart from slots, ascending.
     pub(crate) instances: Vec<Vec<Binding>>,
     /// The fluent atoms that can become true.
     pub(crate) atoms: FxHashSet<(PredicateId, Arguments)>,
+    /// What follows by static derived predicates.
+    pub(crate) derived: Vec<(PredicateId, Arguments)>,
 }
 
 /// Runs the relaxed task to its fixpoint.
@@ -28,27 +37,30 @@ pub(crate) struct Reached {
 /// `Error::Rules` if the rule engine refuses the program.
 pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Reached, Error> {
     let mut builder = Builder::new(lifted);
-    let applicable: Vec<_> = lifted
-        .schemas
-        .iter()
-        .zip(slots)
-        .map(|(schema, slots)| builder.schema(lifted, schema, slots))
-        .collect();
-    let predicates = builder.predicates.clone();
+    for axiom in &lifted.axioms {
+        builder.axiom(axiom);
+    }
+    let applicable: Vec<_> =
+        lifted.schemas.iter().zip(slots).map(|(schema, slots)| builder.schema(schema, slots)).collect();
+    let (symbols, rules, facts) = builder.finish();
     let objects: FxHashMap<Symbol, ObjectId> =
-        builder.objects.iter().copied().zip((0..).map(ObjectId)).collect();
-    let engine =
-        Engine::new(builder.symbols, Program { rules: builder.rules }, builder.facts).map_err(|errors| {
-            Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-        })?;
+        symbols.objects.iter().copied().zip((0..).map(ObjectId)).collect();
+    let engine = Engine::new(symbols.table, Program { rules }, facts).map_err(|errors| {
+        Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+    })?;
     let read = |row: &[Symbol]| -> Arguments {
         row.iter().filter_map(|symbol| objects.get(symbol)).copied().collect()
     };
 
-    let mut atoms = FxHashSet::default();
-    for (predicate, id) in lifted.predicates.iter().zip((0..).map(PredicateId)).filter(|(p, _)| p.fluent) {
+    let (mut atoms, mut derived) = (FxHashSet::default(), Vec::new());
+    for (predicate, id) in lifted.predicates.iter().zip((0..).map(PredicateId)) {
         let any = vec![None; predicate.arity];
-        atoms.extend(engine.matching(predicates[id.index()], &any).map(|row| (id, read(row))));
+        let rows = engine.matching(symbols.predicates[id.index()], &any).map(|row| (id, read(row)));
+        match (predicate.fluent, predicate.derived) {
+            (true, _) => atoms.extend(rows),
+            (false, true) => derived.extend(rows),
+            (false, false) => {}
+        }
     }
     let mut instances = Vec::new();
     for ((schema, slots), (symbol, core)) in lifted.schemas.iter().zip(slots).zip(applicable) {
@@ -57,7 +69,7 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
         let mut bindings: Vec<Binding> = engine
             .matching(symbol, &any)
             .map(|row| {
-                let mut binding = vec![None; schema.parameters.len()];
+                let mut binding = vec![None; schema.variables];
                 for (parameter, object) in core.iter().zip(read(row).iter()) {
                     binding[*parameter as usize] = Some(*object);
                 }
@@ -67,150 +79,149 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
         bindings.sort_unstable();
         instances.push(bindings);
     }
-    Ok(Reached { instances, atoms })
+    Ok(Reached { instances, atoms, derived })
 }
 
-struct Builder {
-    symbols: Symbols,
-    objects: Vec<Symbol>,
-    predicates: Vec<Symbol>,
-    types: FxHashMap<Vec<ObjectId>, Symbol>,
-    facts: Vec<Fact>,
-    rules: Vec<Rule>,
-}
-
-impl Builder {
-    fn new(lifted: &Lifted) -> Self {
-        let mut symbols = Symbols::new();
-        let objects: Vec<_> =
-            (0..lifted.objects.len()).map(|i| symbols.name(&format!("object {i}"))).collect();
-        let predicates: Vec<_> =
-            (0..lifted.predicates.len()).map(|i| symbols.name(&format!("predicate {i}"))).collect();
-        let facts = lifted
-            .facts
-            .iter()
-            .map(|(predicate, arguments)| Fact {
-                predicate: predicates[predicate.index()],
-                arguments: arguments.iter().map(|object| objects[object.index()]).collect(),
-            })
-            .collect();
-        Self { symbols, objects, predicates, types: FxHashMap::default(), facts, rules: Vec::new() }
-    }
-
-    /// The unary relation that holds the candidates of a parameter.
-    fn candidates(&mut self, candidates: &[ObjectId]) -> Symbol {
-        if let Some(symbol) = self.types.get(candidates) {
-            return *symbol;
-        }
-        let symbol = self.symbols.name(&format!("type {}", self.types.len()));
-        for object in candidates {
-            let arguments = std::iter::once(self.objects[object.index()]).collect();
-            self.facts.push(Fact { predicate: symbol, arguments });
-        }
-        self.types.insert(candidates.to_vec(), symbol);
-        symbol
-    }
-
-    fn atom(&self, predicate: PredicateId, terms: &[Term]) -> Atom {
-        let arguments = terms
-            .iter()
-            .map(|term| match term {
-                Term::Parameter(parameter) => RuleTerm::Variable(Variable(*parameter as u16)),
-                Term::Object(object) => RuleTerm::Constant(self.objects[object.index()]),
-            })
-            .collect();
-        Atom::Relation { predicate: self.predicates[predicate.index()], arguments }
-    }
-
-    fn relation(predicate: Symbol, parameters: &[u32]) -> Atom {
-        let arguments = parameters.iter().map(|p| RuleTerm::Variable(Variable(*p as u16))).collect();
-        Atom::Relation { predicate, arguments }
-    }
-
-    fn rule(&mut self, head: Vec<Atom>, body: Vec<Atom>) {
-        let identity = RuleIdentity::new("relaxed reachability", self.rules.len() as u32);
-        self.rules.push(Rule::new(identity, head, body));
+impl Builder<'_> {
+    /// Adds the rules of a derived predicate: exact if it is static, else relaxed.
+    fn axiom(&mut self, axiom: &Axiom) {
+        let parameters: Vec<u32> = (0..axiom.parameters.len() as u32).collect();
+        let candidates: Candidates =
+            parameters.iter().copied().zip(axiom.parameters.iter().map(|p| p.candidates.clone())).collect();
+        let is_static = !self.lifted.predicates[axiom.predicate.index()].fluent;
+        let mut body = self.types(&parameters, &candidates);
+        self.body(&axiom.condition, &candidates, is_static, &mut body);
+        let head =
+            self.atom(axiom.predicate, &parameters.iter().map(|p| Term::Parameter(*p)).collect::<Vec<_>>());
+        self.rule(vec![head], body);
     }
 
     /// Adds the rules of a schema; returns the relation of its instances and the parameters that it ranges over.
-    fn schema(&mut self, lifted: &Lifted, schema: &Schema, slots: &[SlotParameter]) -> (Symbol, Vec<u32>) {
-        let number = self.rules.len();
+    fn schema(&mut self, schema: &Schema, slots: &[SlotParameter]) -> (Symbol, Vec<u32>) {
+        let number = self.fresh("applicable");
         let is_slot = |parameter: &u32| slots.iter().any(|slot| slot.parameter == *parameter);
-        let core: Vec<u32> = (0..schema.parameters.len() as u32).filter(|p| !is_slot(p)).collect();
-        let literals = positive_literals(lifted, schema);
-        let mentions =
-            |terms: &[Term], slot: &SlotParameter| terms.contains(&Term::Parameter(slot.parameter));
+        let all: Vec<u32> = (0..schema.parameters.len() as u32).collect();
+        let core: Vec<u32> = all.iter().copied().filter(|p| !is_slot(p)).collect();
+        let candidates: Candidates =
+            all.iter().copied().zip(schema.parameters.iter().map(|p| p.candidates.clone())).collect();
+        let needs = needs(self.lifted, schema);
 
-        let mut body = Vec::new();
-        for (slot, position) in slots.iter().zip(0..) {
-            let own: Vec<_> = literals
-                .iter()
-                .filter(|(_, terms)| {
-                    mentions(terms, slot) && slots.iter().filter(|s| mentions(terms, s)).count() == 1
-                })
-                .collect();
-            let mut others: Vec<u32> = own
-                .iter()
-                .flat_map(|(_, terms)| terms.iter())
-                .copied()
-                .filter_map(parameter)
-                .filter(|p| !is_slot(p))
-                .collect();
+        let mut body = self.types(&core, &candidates);
+        for slot in slots {
+            let own: Vec<_> =
+                needs.iter().filter(|formula| slots_in(formula, slots) == [slot.parameter]).collect();
+            let mut others: Vec<u32> =
+                own.iter().flat_map(|formula| free(formula)).filter(|p| !is_slot(p)).collect();
             others.sort_unstable();
             others.dedup();
-            let relation = self.symbols.name(&format!("slot {position} of {number}"));
-            let mut fits: Vec<_> =
-                own.iter().map(|(predicate, terms)| self.atom(*predicate, terms)).collect();
-            let candidates = self.candidates(&schema.parameters[slot.parameter as usize].candidates);
-            fits.push(Self::relation(candidates, &[slot.parameter]));
+            let mut ranging = others.clone();
+            ranging.push(slot.parameter);
+            let mut fits = self.types(&ranging, &candidates);
+            for formula in own {
+                self.body(formula, &candidates, false, &mut fits);
+            }
+            let relation = self.fresh("slot");
             body.push(Self::relation(relation, &others));
             self.rule(vec![Self::relation(relation, &others)], fits);
         }
-        for (predicate, terms) in &literals {
-            if !slots.iter().any(|slot| mentions(terms, slot)) {
-                body.push(self.atom(*predicate, terms));
+        for formula in needs.iter().filter(|formula| slots_in(formula, slots).is_empty()) {
+            self.body(formula, &candidates, false, &mut body);
+        }
+        self.rule(vec![Self::relation(number, &core)], body);
+        self.effects(schema, Self::relation(number, &core), &candidates);
+        (number, core)
+    }
+
+    /// What instances add; all that they add without a condition in one rule.
+    fn effects(&mut self, schema: &Schema, applicable: Atom, candidates: &Candidates) {
+        let mut plain = Vec::new();
+        for Effect { bound, condition, change } in schema.start_effects.iter().chain(&schema.end_effects) {
+            let Change::Add(predicate, terms) = change else { continue };
+            let head = self.atom(*predicate, terms);
+            if bound.is_empty() && conjuncts(condition).is_empty() {
+                plain.push(head);
+                continue;
             }
+            let (variables, candidates) = with_bound(candidates, bound);
+            let mut body = vec![applicable.clone()];
+            body.extend(self.types(&variables, &candidates));
+            self.body(condition, &candidates, false, &mut body);
+            self.rule(vec![head], body);
         }
-        for parameter in &core {
-            let candidates = self.candidates(&schema.parameters[*parameter as usize].candidates);
-            body.push(Self::relation(candidates, &[*parameter]));
+        if !plain.is_empty() {
+            self.rule(plain, vec![applicable]);
         }
-        let applicable = self.symbols.name(&format!("applicable {number}"));
-        self.rule(vec![Self::relation(applicable, &core)], body);
-        let added: Vec<_> = schema
-            .start_effects
-            .iter()
-            .chain(&schema.end_effects)
-            .filter_map(|e| {
-                if let Effect::Add(predicate, terms) = e { Some(self.atom(*predicate, terms)) } else { None }
-            })
-            .collect();
-        if !added.is_empty() {
-            self.rule(added, vec![Self::relation(applicable, &core)]);
-        }
-        (applicable, core)
     }
 }
 
-fn parameter(term: Term) -> Option<u32> {
-    if let Term::Parameter(parameter) = term { Some(parameter) } else { None }
+/// The variables that a quantifier binds, and all candidates in its scope.
+pub(super) fn with_bound(candidates: &Candidates, bound: &[Bound]) -> (Vec<u32>, Candidates) {
+    let mut inner = candidates.clone();
+    inner.extend(bound.iter().map(|b| (b.variable, b.candidates.clone())));
+    (bound.iter().map(|b| b.variable).collect(), inner)
 }
 
-/// The atoms that every instance needs before it starts: positive conjuncts, apart from those of the middle
-/// condition that its own start effects may provide.
-fn positive_literals<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<(PredicateId, &'a [Term])> {
+/// The variables of a condition that no quantifier in it binds, ascending.
+pub(super) fn free(formula: &Formula) -> Vec<u32> {
+    fn bound_in(formula: &Formula, out: &mut Vec<u32>) {
+        match formula {
+            Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| bound_in(part, out)),
+            Formula::Exists(bound, body) | Formula::ForAll(bound, body) => {
+                out.extend(bound.iter().map(|b| b.variable));
+                bound_in(body, out);
+            }
+            _ => {}
+        }
+    }
+    let mut bound = Vec::new();
+    bound_in(formula, &mut bound);
+    let mut free = Vec::new();
+    formula_terms(formula, &mut |term| {
+        if let Term::Parameter(variable) = term
+            && !bound.contains(&variable)
+        {
+            free.push(variable);
+        }
+    });
+    free.sort_unstable();
+    free.dedup();
+    free
+}
+
+fn slots_in(formula: &Formula, slots: &[SlotParameter]) -> Vec<u32> {
+    free(formula)
+        .into_iter()
+        .filter(|variable| slots.iter().any(|slot| slot.parameter == *variable))
+        .collect()
+}
+
+/// What every instance needs before it starts: its conjuncts, apart from those of the middle condition that its own
+/// start effects may provide.
+fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
     let provided: Vec<_> = schema
         .start_effects
         .iter()
-        .filter_map(|effect| if let Effect::Add(predicate, _) = effect { Some(*predicate) } else { None })
+        .filter_map(
+            |effect| if let Change::Add(predicate, _) = effect.change { Some(predicate) } else { None },
+        )
         .collect();
-    let literal = |formula: &'a Formula| match formula {
-        Formula::Literal { positive: true, predicate, terms } => Some((*predicate, terms.as_slice())),
-        _ => None,
-    };
-    let middle =
-        conjuncts(&schema.middle_condition).into_iter().filter_map(literal).filter(|(predicate, _)| {
-            !lifted.predicates[predicate.index()].fluent || !provided.contains(predicate)
-        });
-    conjuncts(&schema.start_condition).into_iter().filter_map(literal).chain(middle).collect()
+    let middle = conjuncts(&schema.middle_condition);
+    let middle = middle
+        .into_iter()
+        .filter(|formula| provided.is_empty() || !mentions_fluent(lifted, formula, &provided));
+    conjuncts(&schema.start_condition).into_iter().chain(middle).collect()
+}
+
+/// Whether a condition mentions one of the given predicates, or a derived one.
+fn mentions_fluent(lifted: &Lifted, formula: &Formula, predicates: &[PredicateId]) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => {
+            parts.iter().any(|part| mentions_fluent(lifted, part, predicates))
+        }
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => mentions_fluent(lifted, body, predicates),
+        Formula::Literal { predicate, .. } => {
+            predicates.contains(predicate) || lifted.predicates[predicate.index()].derived
+        }
+        Formula::Equal { .. } | Formula::Compare(..) => false,
+    }
 }

@@ -1,20 +1,24 @@
-//! Syntax tree to lifted task: names become ids, quantifiers are expanded over the objects of their type,
-//! negation moves inwards to the atoms, and the two times of durative conditions and effects are sorted apart.
+//! Syntax tree to lifted task: names become ids, negation moves inwards to the atoms, and the two times of
+//! durative conditions and effects are sorted apart.
 //!
-//! The files have passed `pddl::check`; what the planner does not handle yet (conditional effects, derived
-//! predicates, timed initial literals, duration inequalities) is refused here, with its place.
+//! The files have passed `pddl::check`; what the planner does not handle (timed initial literals, durations that
+//! effects depend on and that are not fixed) is refused here, with its place.
 
+mod condition;
+mod duration;
 mod objects;
 
 use num_rational::BigRational;
 use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::configuration::is_static;
 use crate::error::{Error, File, Place};
 use crate::lifted::{
-    Effect, Expression, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter, Predicate,
+    Axiom, Change, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter, Predicate,
     PredicateId, Rational, Schema, Term,
 };
+use crate::normalize::duration::Duration;
 use crate::pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypedName};
 
 /// Resolves and simplifies a domain and a problem.
@@ -23,22 +27,17 @@ use crate::pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, 
 /// All constructs that the planner does not handle, and all names that are declared nowhere.
 pub(crate) fn normalize(domain: &ast::Domain, problem: &ast::Problem) -> Result<Lifted, Vec<Error>> {
     let mut normalizer = Normalizer::new(domain, problem);
-    let schemas = domain.actions.iter().map(|action| normalizer.schema(action)).collect();
-    for axiom in &domain.derived {
-        normalizer.unsupported(
-            "a derived predicate",
-            "the same condition written into the actions",
-            File::Domain,
-            axiom.span,
-        );
-    }
-    let (facts, values) = normalizer.initial_state(problem);
-    let goal = normalizer.condition(&problem.goal, true, &mut Scope::new(File::Problem));
     let metric = problem.metric.as_ref().map(|metric| Metric {
         direction: metric.direction,
         expression: normalizer.expression(&metric.expression, &mut Scope::new(File::Problem)),
         place: Place { file: File::Problem, span: metric.span },
     });
+    normalizer.longest = duration::is_rewarded(metric.as_ref());
+    let schemas = domain.actions.iter().map(|action| normalizer.schema(action)).collect();
+    let axioms = domain.derived.iter().map(|axiom| normalizer.axiom(axiom)).collect();
+    let (facts, values) = normalizer.initial_state(problem);
+    let mut scope = Scope::new(File::Problem);
+    let goal = normalizer.condition(&problem.goal, true, &mut scope);
     if !normalizer.errors.is_empty() {
         return Err(normalizer.errors);
     }
@@ -47,25 +46,39 @@ pub(crate) fn normalize(domain: &ast::Domain, problem: &ast::Problem) -> Result<
         predicates: normalizer.predicates,
         functions: normalizer.functions,
         schemas,
+        axioms,
         facts,
         values,
         goal,
+        goal_variables: scope.bound as usize,
         metric,
     };
     mark_fluents(&mut lifted);
     Ok(lifted)
 }
 
-/// A predicate or function is a fluent if some action changes it.
+/// A predicate or function is a fluent if some action changes it, and a derived predicate if it depends on a fluent.
 fn mark_fluents(lifted: &mut Lifted) {
     for effect in
         lifted.schemas.iter().flat_map(|schema| schema.start_effects.iter().chain(&schema.end_effects))
     {
-        match effect {
-            Effect::Add(predicate, _) | Effect::Delete(predicate, _) => {
+        match &effect.change {
+            Change::Add(predicate, _) | Change::Delete(predicate, _) => {
                 lifted.predicates[predicate.index()].fluent = true;
             }
-            Effect::Assign { function, .. } => lifted.functions[function.index()].fluent = true,
+            Change::Assign { function, .. } => lifted.functions[function.index()].fluent = true,
+        }
+    }
+    loop {
+        let depends = |axiom: &&Axiom| {
+            !lifted.predicates[axiom.predicate.index()].fluent && !is_static(lifted, &axiom.condition)
+        };
+        let more: Vec<_> = lifted.axioms.iter().filter(depends).map(|axiom| axiom.predicate).collect();
+        if more.is_empty() {
+            return;
+        }
+        for predicate in more {
+            lifted.predicates[predicate.index()].fluent = true;
         }
     }
 }
@@ -74,13 +87,15 @@ fn mark_fluents(lifted: &mut Lifted) {
 struct Scope {
     file: File,
     variables: Vec<(Name, Term)>,
+    /// How many variables have been bound so far, in sight or not.
+    bound: u32,
     /// What `?duration` stands for.
-    duration: Option<Expression>,
+    duration: Duration,
 }
 
 impl Scope {
     fn new(file: File) -> Self {
-        Self { file, variables: Vec::new(), duration: None }
+        Self { file, variables: Vec::new(), bound: 0, duration: Duration::Instantaneous }
     }
 
     fn place(&self, span: Span) -> Place {
@@ -97,6 +112,8 @@ struct Normalizer {
     predicate_ids: FxHashMap<Name, PredicateId>,
     functions: Vec<Function>,
     function_ids: FxHashMap<Name, FunctionId>,
+    /// Whether the metric rewards time, so that actions should take as long as they may.
+    longest: Option<bool>,
     errors: Vec<Error>,
 }
 
@@ -109,6 +126,10 @@ impl Normalizer {
                 name: declared.identifier.name.clone(),
                 arity: declared.parameters.len(),
                 fluent: false,
+                derived: domain
+                    .derived
+                    .iter()
+                    .any(|axiom| axiom.head.identifier.name == declared.identifier.name),
             })
             .collect();
         let mut functions: Vec<_> = domain
@@ -132,6 +153,7 @@ impl Normalizer {
             predicate_ids,
             functions,
             function_ids,
+            longest: None,
             errors: Vec::new(),
         };
         normalizer.declare_objects(domain, problem);
@@ -153,19 +175,16 @@ impl Normalizer {
 
     fn schema(&mut self, action: &ast::Action) -> Schema {
         let mut scope = Scope::new(File::Domain);
-        let mut parameters = Vec::new();
-        for (parameter, index) in action.parameters.iter().zip(0..) {
-            scope.variables.push((parameter.identifier.name.clone(), Term::Parameter(index)));
-            parameters.push(Parameter { candidates: self.candidates(&parameter.r#type) });
-        }
         let mut schema = Schema {
             name: action.identifier.name.clone(),
-            parameters,
+            parameters: self.parameters(&action.parameters, &mut scope),
+            variables: 0,
             start_condition: Formula::truth(),
             start_effects: Vec::new(),
             middle_condition: Formula::truth(),
             end_effects: Vec::new(),
             duration: None,
+            place: scope.place(action.span),
         };
         match &action.body {
             ast::ActionBody::Instantaneous { precondition, effect } => {
@@ -173,9 +192,8 @@ impl Normalizer {
                 self.effect(effect, &mut scope, &mut schema.end_effects);
             }
             ast::ActionBody::Durative { duration, conditions, effects } => {
-                schema.duration = Some(self.duration(duration, action, &mut scope));
-                scope.duration.clone_from(&schema.duration);
                 let (mut start, mut middle) = (Vec::new(), Vec::new());
+                schema.duration = Some(self.duration(duration, action, &mut scope, &mut start));
                 for (time, condition) in conditions {
                     let formula = self.condition(condition, true, &mut scope);
                     if *time == ConditionTime::AtStart { &mut start } else { &mut middle }.push(formula);
@@ -191,185 +209,24 @@ impl Normalizer {
                 }
             }
         }
+        schema.variables = scope.bound as usize;
         schema
     }
 
-    fn duration(
-        &mut self,
-        bounds: &[ast::DurationConstraint],
-        action: &ast::Action,
-        scope: &mut Scope,
-    ) -> Expression {
-        if let [bound] = bounds
-            && bound.operator == ast::Comparison::Equal
-            && bound.time == EffectTime::AtStart
-        {
-            return self.expression(&bound.expression, scope);
-        }
-        let span = bounds.first().map_or(action.span, |bound| bound.span);
-        self.unsupported(
-            "a duration that is not fixed at the start",
-            "one `(= ?duration …)`",
-            File::Domain,
-            span,
-        );
-        Expression::Number(Rational::from_integer(0))
+    fn axiom(&mut self, axiom: &ast::Derived) -> Axiom {
+        let mut scope = Scope::new(File::Domain);
+        let parameters = self.parameters(&axiom.head.parameters, &mut scope);
+        let predicate = self.predicate_ids.get(&axiom.head.identifier.name).copied().unwrap_or_else(|| {
+            self.unknown("predicate", &axiom.head.identifier, File::Domain);
+            PredicateId(0)
+        });
+        let condition = self.condition(&axiom.condition, true, &mut scope);
+        Axiom { predicate, parameters, variables: scope.bound as usize, condition }
     }
 
-    fn condition(&mut self, condition: &ast::Condition, positive: bool, scope: &mut Scope) -> Formula {
-        use ast::Condition as C;
-        let all = |parts| if positive { Formula::And(parts) } else { Formula::Or(parts) };
-        let any = |parts| if positive { Formula::Or(parts) } else { Formula::And(parts) };
-        match condition {
-            C::And(parts) => all(parts.iter().map(|part| self.condition(part, positive, scope)).collect()),
-            C::Or(parts) => any(parts.iter().map(|part| self.condition(part, positive, scope)).collect()),
-            C::Not(inner) => self.condition(inner, !positive, scope),
-            C::Imply(premise, conclusion) => any(vec![
-                self.condition(premise, !positive, scope),
-                self.condition(conclusion, positive, scope),
-            ]),
-            C::ForAll(variables, body) => {
-                all(self.expand(variables, scope, &mut |this, scope| this.condition(body, positive, scope)))
-            }
-            C::Exists(variables, body) => {
-                any(self.expand(variables, scope, &mut |this, scope| this.condition(body, positive, scope)))
-            }
-            C::Atom(atom) => {
-                let predicate = self.predicate(atom, scope.file);
-                Formula::Literal { positive, predicate, terms: self.terms(atom, scope) }
-            }
-            C::Equal(left, right, _) => {
-                Formula::Equal { positive, left: self.term(left, scope), right: self.term(right, scope) }
-            }
-            C::Compare(comparison, left, right, span) => {
-                self.comparison(*comparison, left, right, *span, positive, scope)
-            }
-        }
-    }
-
-    fn comparison(
-        &mut self,
-        comparison: ast::Comparison,
-        left: &ast::Expression,
-        right: &ast::Expression,
-        span: Span,
-        positive: bool,
-        scope: &mut Scope,
-    ) -> Formula {
-        use ast::Comparison as Op;
-        let (left, right) = (self.expression(left, scope), self.expression(right, scope));
-        let place = scope.place(span);
-        let negated = match comparison {
-            _ if positive => comparison,
-            Op::Less => Op::GreaterOrEqual,
-            Op::LessOrEqual => Op::Greater,
-            Op::GreaterOrEqual => Op::Less,
-            Op::Greater => Op::LessOrEqual,
-            Op::Equal => {
-                let less = Formula::Compare(Op::Less, left.clone(), right.clone(), place);
-                return Formula::Or(vec![less, Formula::Compare(Op::Greater, left, right, place)]);
-            }
-        };
-        Formula::Compare(negated, left, right, place)
-    }
-
-    /// What `each` makes of every assignment of objects to the variables.
-    fn expand<T>(
-        &mut self,
-        variables: &[TypedName],
-        scope: &mut Scope,
-        each: &mut dyn FnMut(&mut Self, &mut Scope) -> T,
-    ) -> Vec<T> {
-        let Some((first, rest)) = variables.split_first() else {
-            return vec![each(self, scope)];
-        };
-        let mut all = Vec::new();
-        for object in self.candidates(&first.r#type) {
-            scope.variables.push((first.identifier.name.clone(), Term::Object(object)));
-            all.extend(self.expand(rest, scope, each));
-            scope.variables.pop();
-        }
-        all
-    }
-
-    fn effect(&mut self, effect: &ast::Effect, scope: &mut Scope, out: &mut Vec<Effect>) {
-        match effect {
-            ast::Effect::And(parts) => parts.iter().for_each(|part| self.effect(part, scope, out)),
-            ast::Effect::Add(atom) => {
-                let predicate = self.predicate(atom, scope.file);
-                out.push(Effect::Add(predicate, self.terms(atom, scope)));
-            }
-            ast::Effect::Delete(atom) => {
-                let predicate = self.predicate(atom, scope.file);
-                out.push(Effect::Delete(predicate, self.terms(atom, scope)));
-            }
-            ast::Effect::ForAll(variables, body) => {
-                let parts = self.expand(variables, scope, &mut |this, scope| {
-                    let mut parts = Vec::new();
-                    this.effect(body, scope, &mut parts);
-                    parts
-                });
-                out.extend(parts.into_iter().flatten());
-            }
-            ast::Effect::When(_, inner) => {
-                let span = effect_span(inner);
-                self.unsupported("a conditional effect", "one action for each case", scope.file, span);
-            }
-            ast::Effect::Assign(assignment, atom, expression, span) => {
-                let function = self.function(atom, scope.file);
-                let terms = self.terms(atom, scope);
-                let expression = self.expression(expression, scope);
-                out.push(Effect::Assign {
-                    assignment: *assignment,
-                    function,
-                    terms,
-                    expression,
-                    place: scope.place(*span),
-                });
-            }
-        }
-    }
-
-    fn expression(&mut self, expression: &ast::Expression, scope: &mut Scope) -> Expression {
-        use ast::Arithmetic as Op;
-        match expression {
-            ast::Expression::Number(number, span) => {
-                Expression::Number(self.number(number, scope.place(*span)))
-            }
-            ast::Expression::Fluent(atom) => {
-                let function = self.function(atom, scope.file);
-                Expression::Function(function, self.terms(atom, scope), scope.place(atom.span))
-            }
-            ast::Expression::Duration(span) => scope.duration.clone().unwrap_or_else(|| {
-                self.unsupported(
-                    "`?duration`",
-                    "a number: the action has no duration here",
-                    scope.file,
-                    *span,
-                );
-                Expression::Number(Rational::from_integer(0))
-            }),
-            ast::Expression::TotalTime(_) => Expression::TotalTime,
-            ast::Expression::Operation(op, operands, span) => {
-                let place = scope.place(*span);
-                let mut operands: Vec<_> =
-                    operands.iter().map(|operand| self.expression(operand, scope)).collect();
-                match op {
-                    Op::Add => Expression::Sum(operands),
-                    Op::Multiply => Expression::Product(operands, place),
-                    Op::Subtract => {
-                        let negated = operands.split_off(usize::from(operands.len() > 1));
-                        operands
-                            .extend(negated.into_iter().map(|operand| Expression::Negate(Box::new(operand))));
-                        Expression::Sum(operands)
-                    }
-                    Op::Divide => operands
-                        .into_iter()
-                        .reduce(|left, right| Expression::Quotient(Box::new(left), Box::new(right), place))
-                        .unwrap_or(Expression::Sum(Vec::new())),
-                }
-            }
-        }
+    fn parameters(&mut self, written: &[TypedName], scope: &mut Scope) -> Vec<Parameter> {
+        let bound = self.bind(written, scope);
+        bound.into_iter().map(|bound| Parameter { candidates: bound.candidates }).collect()
     }
 
     fn number(&mut self, number: &BigRational, place: Place) -> Rational {
@@ -454,15 +311,5 @@ impl Normalizer {
             .iter()
             .filter_map(|term| if let Term::Object(object) = term { Some(*object) } else { None })
             .collect()
-    }
-}
-
-/// Where an effect stands: the span of the first atom in it.
-fn effect_span(effect: &ast::Effect) -> Span {
-    match effect {
-        ast::Effect::And(parts) => parts.first().map_or(Span::default(), effect_span),
-        ast::Effect::Add(atom) | ast::Effect::Delete(atom) => atom.span,
-        ast::Effect::ForAll(_, inner) | ast::Effect::When(_, inner) => effect_span(inner),
-        ast::Effect::Assign(_, _, _, span) => *span,
     }
 }

@@ -1,5 +1,7 @@
 //! Objects and types: which objects a parameter or a quantified variable of some type ranges over.
 
+use std::sync::Arc;
+
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::lifted::ObjectId;
@@ -35,7 +37,7 @@ impl Normalizer {
         }
     }
 
-    pub(super) fn candidates(&self, expression: &TypeExpression) -> Vec<ObjectId> {
+    pub(super) fn candidates(&self, expression: &TypeExpression) -> Arc<[ObjectId]> {
         let object = Identifier { name: Name::new("object"), span: Span::default() };
         let alternatives = if expression.alternatives.is_empty() {
             std::slice::from_ref(&object)
@@ -46,6 +48,6 @@ impl Normalizer {
             alternatives.iter().filter_map(|t| self.members.get(&t.name)).flatten().copied().collect();
         all.sort_unstable();
         all.dedup();
-        all
+        all.into()
     }
 }

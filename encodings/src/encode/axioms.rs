@@ -1,0 +1,104 @@
+//! Derived variables: the least fixpoint of their rules, by completion and levels.
+//!
+//! - body: `b@t ↔ ⋀ l@t` for each rule;
+//! - completion: `h@t ↔ ⋁ b@t` over the rules with head h [1];
+//! - levels: in a layer of n variables that depend on each other, `h@t` needs a rule whose own variables of the
+//!   layer follow in fewer rounds: `h@t → ⋁ s@t`, `s@t → b@t`, `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` with r in order encoding [2].
+//!
+//! \[1\] K. Clark: Negation as failure, Logic and Data Bases, 1978.
+//! \[2\] T. Janhunen: Representing normal programs with clauses, ECAI 2004.
+
+use std::collections::BTreeMap;
+
+use crate::encode::Encoding;
+use crate::encode::arithmetic::Bits;
+use crate::encode::formula::{Family, Formula, Meaning};
+use crate::sat::Lit;
+use crate::task::{Layer, VariableId};
+
+impl Encoding<'_> {
+    /// What derived variables hold before a step; `numbers` are the numeric variables then.
+    pub(super) fn axioms(&mut self, step: usize, numbers: &[Bits]) {
+        let task = self.task;
+        for (layer, index) in task.axioms.iter().zip(0..) {
+            let mut bodies: BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>> = BTreeMap::new();
+            let heads: Vec<VariableId> = layer.rules.iter().map(|rule| rule.head.variable).collect();
+            for (rule, position) in layer.rules.iter().zip(0..) {
+                let mut premises: Vec<_> =
+                    rule.body.facts.iter().map(|fact| self.fact(*fact, step)).collect();
+                for clause in &rule.body.clauses {
+                    let literals = clause.iter().map(|literal| {
+                        let fact = self.fact(literal.fact, step);
+                        if literal.positive { fact } else { !fact }
+                    });
+                    premises.extend(literals);
+                }
+                for comparison in &rule.body.comparisons {
+                    premises.push(self.is_at_least_zero(comparison, numbers, Family::Axiom));
+                }
+                let meaning = Meaning::Body { layer: index, rule: position, step: step as u32 };
+                let body = self.equivalent(meaning, &premises, Family::Axiom);
+                let own = rule.body.facts.iter().filter(|fact| fact.value == 0).map(|fact| fact.variable);
+                let own = own.filter(|variable| heads.contains(variable)).collect();
+                bodies.entry(rule.head.variable).or_default().push((body, own));
+            }
+            for (variable, bodies) in &bodies {
+                let head = self.values[step][variable.index()][0];
+                for (body, _) in bodies {
+                    self.formula.add(Family::Axiom, [!*body, head]);
+                }
+                self.formula.add(Family::Axiom, bodies.iter().map(|(body, _)| *body).chain([!head]));
+            }
+            if layer.recursive {
+                self.levels(step, layer, &bodies);
+            }
+        }
+    }
+
+    /// Variables of a layer must not hold because of each other alone.
+    fn levels(
+        &mut self,
+        step: usize,
+        layer: &Layer,
+        bodies: &BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>>,
+    ) {
+        let rounds = bodies.len() as u32;
+        // `later[v][k]`: v follows in more than k + 1 rounds; it follows in at most `rounds`.
+        let mut later: BTreeMap<VariableId, Vec<Lit>> = BTreeMap::new();
+        for variable in bodies.keys() {
+            let literals: Vec<_> = (1..rounds)
+                .map(|rounds| {
+                    self.formula.fresh(Meaning::Later { variable: variable.0, rounds, step: step as u32 })
+                })
+                .collect();
+            for pair in literals.windows(2) {
+                self.formula.add(Family::Axiom, [!pair[1], pair[0]]);
+            }
+            later.insert(*variable, literals);
+        }
+        debug_assert!(layer.recursive);
+        for (variable, bodies) in bodies {
+            let head = self.values[step][variable.index()][0];
+            let mut supports = vec![!head];
+            for (body, own) in bodies {
+                if own.is_empty() {
+                    supports.push(*body);
+                    continue;
+                }
+                let support = self.formula.fresh(Meaning::Ladder);
+                self.formula.add(Family::Axiom, [!support, *body]);
+                for below in own {
+                    // In one round nothing of the layer can have come before.
+                    let first = later[variable].first().copied().unwrap_or(!Formula::truth());
+                    self.formula.add(Family::Axiom, [!support, first]);
+                    for k in 1..=later[variable].len() {
+                        let above = later[variable].get(k).copied().unwrap_or(!Formula::truth());
+                        self.formula.add(Family::Axiom, [!support, above, !later[below][k - 1]]);
+                    }
+                }
+                supports.push(support);
+            }
+            self.formula.add(Family::Axiom, supports);
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! Derived atoms: those of derived predicates, and names for parts of conditions.
+//!
+//! They stay rules over the state [1]: which of them hold follows from the other variables, as the least fixpoint of
+//! their rules, those that are negated first. What is always or never true is folded, and an atom with one rule
+//! is replaced by the body of that rule where it occurs.
+//!
+//! [1] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence 168, 2005.
+
+use petgraph::algo::tarjan_scc;
+use petgraph::graph::DiGraph;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::ground::evaluate::{AtomId, Binding, Failure, World};
+use crate::ground::instantiate::GroundTask;
+use crate::ground::normal_form::{GroundCondition, GroundLiteral};
+use crate::ground::residual::Residual;
+use crate::lifted::{ObjectId, PredicateId};
+
+/// A rule: the head holds where the body does. The body has no clauses.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct GroundAxiom {
+    pub(crate) head: AtomId,
+    pub(crate) body: GroundCondition,
+}
+
+/// Parts of conditions that have a name, and the rules of all derived atoms.
+#[derive(Debug, Default)]
+pub(crate) struct Definitions {
+    named: FxHashMap<Residual, AtomId>,
+    pub(crate) axioms: Vec<GroundAxiom>,
+}
+
+impl Definitions {
+    pub(crate) fn named(&self, residual: &Residual) -> Option<AtomId> {
+        self.named.get(residual).copied()
+    }
+}
+
+impl World<'_> {
+    /// A fresh atom for a part of a condition.
+    pub(crate) fn name(&mut self, residual: Residual) -> AtomId {
+        let predicate = PredicateId(self.lifted.predicates.len() as u32);
+        let number = ObjectId(self.definitions.named.len() as u32);
+        let atom = self.atom(predicate, [number].into());
+        self.definitions.named.insert(residual, atom);
+        atom
+    }
+
+    /// Whether an atom follows from others.
+    pub(crate) fn is_derived(&self, atom: AtomId) -> bool {
+        let predicate = self.atoms.get_index(atom.index()).map(|((predicate, _), ())| *predicate);
+        predicate.is_none_or(|predicate| {
+            self.lifted.predicates.get(predicate.index()).is_none_or(|predicate| predicate.derived)
+        })
+    }
+
+    /// The rules of all derived atoms that have been met, and of those that their bodies lead to.
+    pub(crate) fn instantiate_axioms(&mut self) -> Result<(), Failure> {
+        let lifted = self.lifted;
+        let mut next = 0;
+        while let Some(((predicate, arguments), ())) = self.atoms.get_index(next) {
+            let (predicate, arguments, head) = (*predicate, arguments.clone(), AtomId(next as u32));
+            next += 1;
+            for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
+                let suits = axiom.parameters.iter().zip(arguments.iter());
+                if !suits.into_iter().all(|(p, object)| p.candidates.binary_search(object).is_ok()) {
+                    continue;
+                }
+                let mut binding: Binding = arguments.iter().map(|object| Some(*object)).collect();
+                binding.resize(axiom.variables, None);
+                let body = self.residual(&axiom.condition, &mut binding)?;
+                self.define(head, &body);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Folds what is always or never true, and replaces atoms with one rule.
+pub(crate) fn simplify(task: &mut GroundTask<'_>) {
+    let mut axioms = std::mem::take(&mut task.world.definitions.axioms);
+    let mut seen = FxHashSet::default();
+    axioms.retain(|axiom| seen.insert(axiom.clone()));
+    fold(task, &mut axioms);
+    let bodies = single_bodies(&axioms);
+    let mut kept = Vec::with_capacity(axioms.len());
+    for mut axiom in axioms {
+        if inline(&mut axiom.body, &bodies) {
+            kept.push(axiom);
+        }
+    }
+    task.operators.retain_mut(|operator| {
+        let conditions = operator.conditional.iter_mut().flat_map(|effect| &mut effect.condition);
+        conditions.for_each(|literal| rename(literal, &bodies));
+        inline(&mut operator.condition, &bodies)
+    });
+    if task.goal.as_mut().is_some_and(|goal| !inline(goal, &bodies)) {
+        task.goal = None;
+    }
+    task.world.definitions.axioms = kept;
+}
+
+/// Whether each derived atom is known to be true or false, as long as that leads to more.
+fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) {
+    let world = &task.world;
+    let derived: Vec<AtomId> =
+        (0..world.atoms.len() as u32).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
+    let mut known: FxHashMap<AtomId, bool> = FxHashMap::default();
+    loop {
+        let before = known.len();
+        let mut has_rule = FxHashSet::default();
+        for axiom in axioms.iter() {
+            has_rule.insert(axiom.head);
+            if axiom.body == GroundCondition::default() {
+                known.insert(axiom.head, true);
+            }
+        }
+        for atom in derived.iter().filter(|atom| !has_rule.contains(*atom)) {
+            known.entry(*atom).or_insert(false);
+        }
+        if known.len() == before {
+            break;
+        }
+        axioms.retain_mut(|axiom| !known.contains_key(&axiom.head) && substitute(&mut axiom.body, &known));
+    }
+    task.operators.retain_mut(|operator| {
+        operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &known));
+        substitute(&mut operator.condition, &known)
+    });
+    if task.goal.as_mut().is_some_and(|goal| !substitute(goal, &known)) {
+        task.goal = None;
+    }
+}
+
+/// Removes decided literals from a conjunction; false if one of them fails.
+fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool>) -> bool {
+    let fails =
+        literals.iter().any(|(atom, positive)| known.get(atom).is_some_and(|value| value != positive));
+    literals.retain(|(atom, _)| !known.contains_key(atom));
+    !fails
+}
+
+/// Removes decided literals from a condition; false if it fails.
+fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) -> bool {
+    if !conjunction(&mut condition.literals, known) {
+        return false;
+    }
+    let satisfied = |(atom, positive): &GroundLiteral| known.get(atom).is_some_and(|value| value == positive);
+    condition.clauses.retain(|clause| !clause.iter().any(satisfied));
+    for clause in &mut condition.clauses {
+        clause.retain(|(atom, _)| !known.contains_key(atom));
+    }
+    if condition.clauses.iter().any(Vec::is_empty) {
+        return false;
+    }
+    let (units, clauses) = std::mem::take(&mut condition.clauses).into_iter().partition(|c| c.len() == 1);
+    condition.clauses = clauses;
+    let units: Vec<Vec<GroundLiteral>> = units;
+    condition.literals.extend(units.into_iter().flatten());
+    condition.tidy()
+}
+
+/// The body of each atom that has exactly one rule and does not depend on itself, free of such atoms.
+fn single_bodies(axioms: &[GroundAxiom]) -> FxHashMap<AtomId, GroundCondition> {
+    let mut count: FxHashMap<AtomId, usize> = FxHashMap::default();
+    for axiom in axioms {
+        *count.entry(axiom.head).or_default() += 1;
+    }
+    let mut bodies: FxHashMap<AtomId, GroundCondition> = FxHashMap::default();
+    for component in components(axioms) {
+        let [only] = component[..] else { continue };
+        for axiom in axioms.iter().filter(|axiom| axiom.head == only && count[&only] == 1) {
+            let mut body = axiom.body.clone();
+            let depends_on_itself = body.atoms().any(|atom| atom == only);
+            if !depends_on_itself && inline(&mut body, &bodies) {
+                bodies.insert(only, body);
+            }
+        }
+    }
+    bodies
+}
+
+/// Derived atoms in components of mutual dependence, what a component depends on before it.
+pub(crate) fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
+    let mut graph: DiGraph<AtomId, ()> = DiGraph::new();
+    let mut nodes: FxHashMap<AtomId, _> = FxHashMap::default();
+    for axiom in axioms {
+        nodes.entry(axiom.head).or_insert_with(|| graph.add_node(axiom.head));
+    }
+    for axiom in axioms {
+        for atom in axiom.body.atoms() {
+            if let Some(node) = nodes.get(&atom) {
+                graph.add_edge(nodes[&axiom.head], *node, ());
+            }
+        }
+    }
+    // Tarjan's algorithm yields components in reverse topological order: what has no successors first.
+    let sorted = |component: Vec<_>| {
+        let mut atoms: Vec<AtomId> = component.into_iter().map(|node| graph[node]).collect();
+        atoms.sort_unstable();
+        atoms
+    };
+    tarjan_scc(&graph).into_iter().map(sorted).collect()
+}
+
+/// Replaces literals over atoms with one rule by its body; false if the condition contradicts itself then.
+fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCondition>) -> bool {
+    let mut literals = Vec::with_capacity(condition.literals.len());
+    for mut literal in std::mem::take(&mut condition.literals) {
+        match bodies.get(&literal.0) {
+            Some(body) if literal.1 => {
+                literals.extend(&body.literals);
+                condition.comparisons.extend(body.comparisons.iter().cloned());
+            }
+            _ => {
+                rename(&mut literal, bodies);
+                literals.push(literal);
+            }
+        }
+    }
+    condition.literals = literals;
+    condition.clauses.iter_mut().flatten().for_each(|literal| rename(literal, bodies));
+    condition.tidy()
+}
+
+/// Replaces a literal by the only literal of its atom's only rule.
+fn rename(literal: &mut GroundLiteral, bodies: &FxHashMap<AtomId, GroundCondition>) {
+    if let Some(body) = bodies.get(&literal.0)
+        && let [(atom, positive)] = body.literals[..]
+        && body.comparisons.is_empty()
+    {
+        *literal = (atom, positive == literal.1);
+    }
+}

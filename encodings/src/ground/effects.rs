@@ -1,0 +1,316 @@
+//! What an instance changes, by case and by moment.
+
+use std::collections::BTreeMap;
+
+use crate::error::{Error, Place};
+use crate::ground::evaluate::{AtomId, Failure, World};
+use crate::ground::instantiate::{Build, GroundConditional, GroundOperator};
+use crate::ground::join::guards_of_exists;
+use crate::ground::residual::{Residual, constant_comparison};
+use crate::lifted::{Change, Effect, Rational, Schema};
+use crate::pddl::ast::Assignment;
+use crate::quantity::{Linear, NumericId};
+
+/// An instance becomes at most this many operators.
+const CASE_LIMIT: usize = 64;
+
+type Numbers = BTreeMap<NumericId, Linear<Rational>>;
+
+/// What the start or the end of an instance changes, each change under a condition.
+pub(super) struct Moment {
+    changes: Vec<(Residual, GroundChange)>,
+}
+
+#[derive(Clone)]
+enum GroundChange {
+    Atom(AtomId, bool),
+    Number {
+        variable: NumericId,
+        assignment: Assignment,
+        /// None if it is undefined: the operator does not exist where the change would be made.
+        operand: Option<Linear<Rational>>,
+        place: Place,
+    },
+}
+
+/// One way in which the conditions of an instance can turn out, all its conditions in terms of the state before it.
+pub(super) struct Case {
+    parts: Vec<Residual>,
+    start: Vec<GroundChange>,
+    end: Vec<(Residual, GroundChange)>,
+}
+
+impl Build<'_, '_> {
+    /// The changes of effects that happen at once.
+    pub(super) fn moment(&mut self, effects: &[Effect]) -> Result<Moment, Failure> {
+        let mut changes = Vec::new();
+        for effect in effects {
+            let guards = guards_of_exists(&effect.condition);
+            let mut bindings = Vec::new();
+            self.world.each_binding(&effect.bound, &guards, &mut self.binding, &mut |_, binding| {
+                bindings.push(binding.clone());
+                true
+            });
+            let own = std::mem::take(&mut self.binding);
+            for binding in bindings {
+                self.binding = binding;
+                let condition = self.world.residual(&effect.condition, &mut self.binding)?;
+                if condition != Residual::False {
+                    let change = self.change(&effect.change)?;
+                    changes.push((condition, change));
+                }
+            }
+            self.binding = own;
+        }
+        Ok(Moment { changes })
+    }
+
+    fn change(&mut self, change: &Change) -> Result<GroundChange, Failure> {
+        Ok(match change {
+            Change::Add(predicate, terms) | Change::Delete(predicate, terms) => {
+                let atom = self.world.atom(*predicate, World::arguments(terms, &self.binding));
+                GroundChange::Atom(atom, matches!(change, Change::Add(..)))
+            }
+            Change::Assign { assignment, function, terms, expression, place } => {
+                let variable =
+                    self.world.numeric(*function, World::arguments(terms, &self.binding), *place)?;
+                let operand = match self.open(expression) {
+                    Ok(operand) => Some(operand),
+                    Err(Failure::Undefined) => None,
+                    Err(error) => return Err(error),
+                };
+                GroundChange::Number { variable, assignment: *assignment, operand, place: *place }
+            }
+        })
+    }
+}
+
+/// The cases of an instance: one, unless its start is conditional or its numbers are.
+pub(super) fn cases(
+    schema: &Schema,
+    before: &[Residual],
+    start: &Moment,
+    middle: &[Residual],
+    end: &Moment,
+) -> Result<Vec<Case>, Failure> {
+    let mut all = Vec::new();
+    for (decided, chosen) in split(schema, start.changes.iter().map(|(condition, _)| condition))? {
+        let holds = |(condition, _): &&(Residual, GroundChange)| {
+            *condition == Residual::True || chosen.contains(&condition)
+        };
+        let start: Vec<_> = start.changes.iter().filter(holds).map(|(_, change)| change.clone()).collect();
+        let (adds, deletes) = atoms(start.iter());
+        let numbers = numbers(start.iter(), &Numbers::new())?;
+        let after = |residual: &Residual| after_start(residual, &adds, &deletes, &numbers);
+        let mut parts: Vec<_> = before.iter().cloned().chain(decided).collect();
+        parts.extend(middle.iter().map(after));
+        let end: Vec<_> = end
+            .changes
+            .iter()
+            .map(|(condition, change)| (after(condition), change.clone()))
+            .filter(|(condition, _)| *condition != Residual::False)
+            .collect();
+        let numeric = end.iter().filter(|(_, change)| matches!(change, GroundChange::Number { .. }));
+        let numeric: Vec<_> = numeric.map(|(condition, _)| condition.clone()).collect();
+        for (decided, chosen) in split(schema, numeric.iter())? {
+            let settle = |(condition, change): &(Residual, GroundChange)| {
+                let settled = if chosen.contains(&condition) {
+                    Residual::True
+                } else if numeric.contains(condition) && *condition != Residual::True {
+                    Residual::False
+                } else {
+                    condition.clone()
+                };
+                (settled, change.clone())
+            };
+            all.push(Case {
+                parts: parts.iter().cloned().chain(decided).collect(),
+                start: start.clone(),
+                end: end.iter().map(settle).filter(|(condition, _)| *condition != Residual::False).collect(),
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// Every way in which conditions can turn out: what must hold then, and which of them hold.
+#[allow(clippy::type_complexity)]
+fn split<'r>(
+    schema: &Schema,
+    conditions: impl Iterator<Item = &'r Residual>,
+) -> Result<Vec<(Vec<Residual>, Vec<&'r Residual>)>, Failure> {
+    let mut distinct: Vec<&Residual> = Vec::new();
+    for condition in conditions.filter(|condition| **condition != Residual::True) {
+        if !distinct.contains(&condition) {
+            distinct.push(condition);
+        }
+    }
+    let mut all: Vec<(Vec<Residual>, Vec<&Residual>)> = vec![(Vec::new(), Vec::new())];
+    for condition in distinct {
+        if all.len() * 2 > CASE_LIMIT {
+            return Err(Failure::Error(Error::Unsupported {
+                construct: format!("an instance of `{}` with more than {CASE_LIMIT} cases", schema.name),
+                instead: "fewer conditions on which its numbers or its start effects depend".into(),
+                place: schema.place,
+            }));
+        }
+        let mut longer = Vec::with_capacity(2 * all.len());
+        for (decided, chosen) in all {
+            let with = |part: Residual| decided.iter().cloned().chain([part]).collect::<Vec<_>>();
+            longer.push((with(condition.clone()), chosen.iter().copied().chain([condition]).collect()));
+            longer.push((with(condition.negated()), chosen));
+        }
+        all = longer;
+    }
+    Ok(all)
+}
+
+impl Case {
+    /// The operator of this case; everything but conditions and effects is that of the template.
+    pub(super) fn operator(
+        self,
+        world: &mut World<'_>,
+        template: &GroundOperator,
+    ) -> Result<GroundOperator, Failure> {
+        let (start_adds, start_deletes) = atoms(self.start.iter());
+        let start_numbers = numbers(self.start.iter(), &Numbers::new())?;
+        let certain = || self.end.iter().filter(|(condition, _)| *condition == Residual::True);
+        let (end_adds, end_deletes) = atoms(certain().map(|(_, change)| change));
+        let mut numeric_effects = numbers(certain().map(|(_, change)| change), &start_numbers)?;
+        for (variable, value) in start_numbers {
+            numeric_effects.entry(variable).or_insert(value);
+        }
+        let mut conditional: Vec<GroundConditional> = Vec::new();
+        for (condition, change) in self.end.iter().filter(|(condition, _)| *condition != Residual::True) {
+            let GroundChange::Atom(atom, positive) = change else { continue };
+            let gone = start_deletes.contains(atom) && !start_adds.contains(atom);
+            if !positive && (gone || end_adds.contains(atom)) {
+                continue;
+            }
+            let condition = literals(world, condition);
+            let position = conditional.iter().position(|known| known.condition == condition);
+            let position = position.unwrap_or_else(|| {
+                conditional.push(GroundConditional { condition, adds: Vec::new(), deletes: Vec::new() });
+                conditional.len() - 1
+            });
+            let entry = &mut conditional[position];
+            if *positive { &mut entry.adds } else { &mut entry.deletes }.push(*atom);
+        }
+        for entry in &mut conditional {
+            entry.deletes.retain(|atom| !entry.adds.contains(atom));
+        }
+        let mut adds = end_adds;
+        adds.extend(start_adds.iter().filter(|atom| !end_deletes.contains(atom)));
+        adds.sort_unstable();
+        adds.dedup();
+        let mut deletes: Vec<_> = end_deletes.into_iter().chain(start_deletes).collect();
+        deletes.sort_unstable();
+        deletes.dedup();
+        deletes.retain(|atom| !adds.contains(atom));
+        let condition = world.condition(&self.parts)?;
+        Ok(GroundOperator { condition, adds, deletes, conditional, numeric_effects, ..template.clone() })
+    }
+}
+
+/// The literals of a conjunction; parts that are none get a name.
+fn literals(world: &mut World<'_>, condition: &Residual) -> Vec<(AtomId, bool)> {
+    let parts =
+        if let Residual::And(parts) = condition { &parts[..] } else { std::slice::from_ref(condition) };
+    let mut literals: Vec<_> = parts.iter().map(|part| world.literal(part)).collect();
+    literals.sort_unstable();
+    literals.dedup();
+    literals
+}
+
+/// The atoms that changes make true, and those that they make false; what is both becomes true.
+fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, Vec<AtomId>) {
+    let (mut adds, mut deletes) = (Vec::new(), Vec::new());
+    for change in changes {
+        if let GroundChange::Atom(atom, positive) = change {
+            if *positive { &mut adds } else { &mut deletes }.push(*atom);
+        }
+    }
+    deletes.retain(|atom| !adds.contains(atom));
+    (adds, deletes)
+}
+
+/// What numeric variables become, in terms of the state before the action; `before` are the changes that
+/// the action has made already.
+fn numbers<'c>(
+    changes: impl Iterator<Item = &'c GroundChange>,
+    before: &Numbers,
+) -> Result<Numbers, Failure> {
+    let mut changed = Numbers::new();
+    for change in changes {
+        let GroundChange::Number { variable, assignment, operand, place } = change else { continue };
+        let mut operand = operand.clone().ok_or(Failure::Undefined)?;
+        substitute(&mut operand, before);
+        let current = || {
+            let old = changed.get(variable).or_else(|| before.get(variable));
+            old.cloned().unwrap_or_else(|| Linear::variable(*variable))
+        };
+        let value = match assignment {
+            Assignment::Assign => operand,
+            Assignment::Increase => sum(current(), &operand),
+            Assignment::Decrease => sum(current(), &operand.negated()),
+            Assignment::ScaleUp | Assignment::ScaleDown => {
+                scaled(current(), &operand, *assignment == Assignment::ScaleDown, *place)?
+            }
+        };
+        changed.insert(*variable, value);
+    }
+    Ok(changed)
+}
+
+fn sum(mut left: Linear<Rational>, right: &Linear<Rational>) -> Linear<Rational> {
+    left.add(right);
+    left
+}
+
+fn scaled(
+    mut value: Linear<Rational>,
+    factor: &Linear<Rational>,
+    inverse: bool,
+    place: Place,
+) -> Result<Linear<Rational>, Failure> {
+    if !factor.coefficients.is_empty() || !factor.quantity.tables.is_empty() {
+        return Err(Failure::Error(Error::NonLinear { place }));
+    }
+    let factor = factor.quantity.constant;
+    if inverse && factor == Rational::from_integer(0) {
+        return Err(Failure::Undefined);
+    }
+    value.scale(&if inverse { factor.recip() } else { factor });
+    Ok(value)
+}
+
+fn substitute(linear: &mut Linear<Rational>, before: &BTreeMap<NumericId, Linear<Rational>>) {
+    let variables: Vec<_> = linear.coefficients.iter().map(|(variable, _)| *variable).collect();
+    let mut result = linear.clone();
+    result.coefficients.clear();
+    for (variable, factor) in &linear.coefficients {
+        let mut value = before.get(variable).cloned().unwrap_or_else(|| Linear::variable(*variable));
+        value.scale(factor);
+        result.add(&value);
+    }
+    if variables.iter().any(|variable| before.contains_key(variable)) {
+        *linear = result;
+    }
+}
+
+/// A condition of the middle or end of a durative action in terms of the state before its start.
+fn after_start(residual: &Residual, adds: &[AtomId], deletes: &[AtomId], numbers: &Numbers) -> Residual {
+    if adds.is_empty() && deletes.is_empty() && numbers.is_empty() {
+        return residual.clone();
+    }
+    residual.clone().mapped(&|leaf| match leaf {
+        Residual::Literal { atom, positive } if adds.contains(&atom) || deletes.contains(&atom) => {
+            if adds.contains(&atom) == positive { Residual::True } else { Residual::False }
+        }
+        Residual::Compare { mut linear, strict } => {
+            substitute(&mut linear, numbers);
+            constant_comparison(&linear, strict).unwrap_or(Residual::Compare { linear, strict })
+        }
+        other => other,
+    })
+}

@@ -1,0 +1,216 @@
+//! Conditions as bodies of rules: relaxed, or exact where everything is static.
+//!
+//! A relaxed body holds wherever the condition can: fluents are never false, numbers never stand in the way. Disjunctions
+//! and negated quantifiers become auxiliary relations over their free variables.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term as RuleTerm, Variable};
+use rustc_hash::FxHashMap;
+
+use crate::configuration::is_static;
+use crate::ground::reach::{free, with_bound};
+use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Term};
+
+/// What variables range over.
+pub(super) type Candidates = BTreeMap<u32, Arc<[ObjectId]>>;
+
+/// The symbols of a program.
+pub(super) struct Names {
+    pub(super) table: Symbols,
+    pub(super) objects: Vec<Symbol>,
+    pub(super) predicates: Vec<Symbol>,
+}
+
+/// A program under construction.
+pub(super) struct Builder<'a> {
+    pub(super) lifted: &'a Lifted,
+    names: Names,
+    types: FxHashMap<Arc<[ObjectId]>, Symbol>,
+    facts: Vec<Fact>,
+    rules: Vec<Rule>,
+    relations: usize,
+}
+
+impl<'a> Builder<'a> {
+    pub(super) fn new(lifted: &'a Lifted) -> Self {
+        let mut table = Symbols::new();
+        let objects: Vec<_> = (0..lifted.objects.len()).map(|i| table.name(&format!("object {i}"))).collect();
+        let predicates: Vec<_> =
+            (0..lifted.predicates.len()).map(|i| table.name(&format!("predicate {i}"))).collect();
+        let facts = lifted
+            .facts
+            .iter()
+            .map(|(predicate, arguments)| Fact {
+                predicate: predicates[predicate.index()],
+                arguments: arguments.iter().map(|object| objects[object.index()]).collect(),
+            })
+            .collect();
+        let names = Names { table, objects, predicates };
+        Self { lifted, names, types: FxHashMap::default(), facts, rules: Vec::new(), relations: 0 }
+    }
+
+    pub(super) fn finish(self) -> (Names, Vec<Rule>, Vec<Fact>) {
+        (self.names, self.rules, self.facts)
+    }
+
+    /// A relation that nothing else uses.
+    pub(super) fn fresh(&mut self, kind: &str) -> Symbol {
+        self.relations += 1;
+        self.names.table.name(&format!("{kind} {}", self.relations))
+    }
+
+    /// Atoms that keep variables to what they range over.
+    pub(super) fn types(&mut self, variables: &[u32], candidates: &Candidates) -> Vec<Atom> {
+        variables
+            .iter()
+            .filter_map(|variable| {
+                let symbol = self.candidates(candidates.get(variable)?);
+                Some(Self::relation(symbol, &[*variable]))
+            })
+            .collect()
+    }
+
+    /// The unary relation that holds some objects.
+    fn candidates(&mut self, candidates: &Arc<[ObjectId]>) -> Symbol {
+        if let Some(symbol) = self.types.get(candidates) {
+            return *symbol;
+        }
+        let symbol = self.fresh("type");
+        for object in candidates.iter() {
+            let arguments = std::iter::once(self.names.objects[object.index()]).collect();
+            self.facts.push(Fact { predicate: symbol, arguments });
+        }
+        self.types.insert(candidates.clone(), symbol);
+        symbol
+    }
+
+    fn term(&self, term: Term) -> RuleTerm {
+        match term {
+            Term::Parameter(parameter) => RuleTerm::Variable(Variable(parameter as u16)),
+            Term::Object(object) => RuleTerm::Constant(self.names.objects[object.index()]),
+        }
+    }
+
+    pub(super) fn atom(&self, predicate: PredicateId, terms: &[Term]) -> Atom {
+        let arguments = terms.iter().map(|term| self.term(*term)).collect();
+        Atom::Relation { predicate: self.names.predicates[predicate.index()], arguments }
+    }
+
+    pub(super) fn relation(predicate: Symbol, parameters: &[u32]) -> Atom {
+        let arguments = parameters.iter().map(|p| RuleTerm::Variable(Variable(*p as u16))).collect();
+        Atom::Relation { predicate, arguments }
+    }
+
+    pub(super) fn rule(&mut self, head: Vec<Atom>, body: Vec<Atom>) {
+        let identity = RuleIdentity::new("relaxed reachability", self.rules.len() as u32);
+        self.rules.push(Rule::new(identity, head, body));
+    }
+
+    /// Adds the atoms that a condition needs. `exact` asks for the condition itself, which must be static then; else
+    /// for something that it implies.
+    pub(super) fn body(
+        &mut self,
+        formula: &Formula,
+        candidates: &Candidates,
+        exact: bool,
+        out: &mut Vec<Atom>,
+    ) {
+        match formula {
+            Formula::And(parts) => parts.iter().for_each(|part| self.body(part, candidates, exact, out)),
+            Formula::Literal { positive, predicate, terms } => match self.atom(*predicate, terms) {
+                atom if *positive => out.push(atom),
+                Atom::Relation { predicate: symbol, arguments }
+                    if !self.lifted.predicates[predicate.index()].fluent =>
+                {
+                    out.push(Atom::Not { predicate: symbol, arguments });
+                }
+                _ => {}
+            },
+            Formula::Equal { positive, left, right } => {
+                let (left, right) = (self.term(*left), self.term(*right));
+                out.push(if *positive { Atom::Same(left, right) } else { Atom::Different(left, right) });
+            }
+            Formula::Exists(bound, body) => {
+                let (variables, candidates) = with_bound(candidates, bound);
+                out.extend(self.types(&variables, &candidates));
+                self.body(body, &candidates, exact, out);
+            }
+            Formula::Or(parts) => {
+                if exact || !parts.iter().any(|part| self.may_be_free(part)) {
+                    let relation = self.auxiliary(formula, parts, candidates, exact);
+                    out.push(Self::relation(relation, &free(formula)));
+                }
+            }
+            Formula::ForAll(..) => {
+                if exact || (is_static(self.lifted, formula) && !has_numbers(formula)) {
+                    let relation = self.auxiliary(formula, &[formula.negated()], candidates, true);
+                    let arguments = free(formula).into_iter().map(|v| RuleTerm::Variable(Variable(v as u16)));
+                    out.push(Atom::Not { predicate: relation, arguments: arguments.collect() });
+                }
+            }
+            Formula::Compare(..) => {
+                if exact {
+                    let relation = self.comparison(formula, candidates);
+                    out.push(Self::relation(relation, &free(formula)));
+                }
+            }
+        }
+    }
+
+    /// A relation over the free variables of a condition that holds where one of the parts does.
+    fn auxiliary(
+        &mut self,
+        formula: &Formula,
+        parts: &[Formula],
+        candidates: &Candidates,
+        exact: bool,
+    ) -> Symbol {
+        let relation = self.fresh("auxiliary");
+        let variables = free(formula);
+        for part in parts {
+            let mut body = self.types(&variables, candidates);
+            self.body(part, candidates, exact, &mut body);
+            self.rule(vec![Self::relation(relation, &variables)], body);
+        }
+        relation
+    }
+
+    /// Whether a relaxed condition holds without asking for anything.
+    fn may_be_free(&self, formula: &Formula) -> bool {
+        match formula {
+            Formula::And(parts) => parts.iter().all(|part| self.may_be_free(part)),
+            Formula::Or(parts) => parts.iter().any(|part| self.may_be_free(part)),
+            Formula::Exists(_, body) => self.may_be_free(body),
+            Formula::ForAll(..) => !is_static(self.lifted, formula) || has_numbers(formula),
+            Formula::Literal { positive, predicate, .. } => {
+                !positive && self.lifted.predicates[predicate.index()].fluent
+            }
+            Formula::Equal { .. } => false,
+            Formula::Compare(..) => true,
+        }
+    }
+
+    /// The relation of a static comparison: the objects for which it holds.
+    fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Symbol {
+        let relation = self.fresh("comparison");
+        let variables = free(formula);
+        let rows = crate::ground::evaluate::satisfying(self.lifted, formula, &variables, candidates);
+        for row in rows {
+            let arguments = row.iter().map(|object| self.names.objects[object.index()]).collect();
+            self.facts.push(Fact { predicate: relation, arguments });
+        }
+        relation
+    }
+}
+
+/// Whether a condition compares numbers.
+fn has_numbers(formula: &Formula) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(has_numbers),
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => has_numbers(body),
+        Formula::Compare(..) => true,
+        Formula::Literal { .. } | Formula::Equal { .. } => false,
+    }
+}

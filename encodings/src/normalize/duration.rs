@@ -1,0 +1,120 @@
+//! Durations that are constrained rather than fixed.
+//!
+//! Actions execute one after another, and nothing happens by itself. So an action may as well take as little time
+//! as it must, or as much as it may where the metric rewards time, provided that no effect depends on how long it takes.
+
+use crate::error::File;
+use crate::lifted::{Expression, Formula, Metric, Rational};
+use crate::normalize::{Normalizer, Scope};
+use crate::pddl::ast::{self, Comparison, Direction};
+
+/// What `?duration` stands for.
+pub(super) enum Duration {
+    /// The action has none.
+    Instantaneous,
+    Fixed(Expression),
+    /// The planner chooses it.
+    Open,
+}
+
+/// Whether the metric rewards time; nothing if that cannot be told from the metric alone.
+pub(super) fn is_rewarded(metric: Option<&Metric>) -> Option<bool> {
+    let Some(metric) = metric else { return Some(false) };
+    let factor = time_factor(&metric.expression)?;
+    let zero = Rational::from_integer(0);
+    Some(match metric.direction {
+        Direction::Minimize => factor < zero,
+        Direction::Maximize => factor > zero,
+    })
+}
+
+/// The factor of total time in an expression.
+fn time_factor(expression: &Expression) -> Option<Rational> {
+    let number = |expression: &Expression| match expression {
+        Expression::Number(number) => Some(*number),
+        _ => None,
+    };
+    match expression {
+        Expression::TotalTime => Some(Rational::from_integer(1)),
+        Expression::Number(_) | Expression::Function(..) => Some(Rational::from_integer(0)),
+        Expression::Sum(parts) => parts.iter().map(time_factor).sum(),
+        Expression::Negate(inner) => time_factor(inner).map(|factor| -factor),
+        Expression::Product(parts, _) => {
+            let factors = parts.iter().map(time_factor).collect::<Option<Vec<_>>>()?;
+            let timed: Vec<_> =
+                (0..parts.len()).filter(|i| factors[*i] != Rational::from_integer(0)).collect();
+            match timed[..] {
+                [] => Some(Rational::from_integer(0)),
+                [only] => (0..parts.len())
+                    .filter(|i| *i != only)
+                    .map(|i| number(&parts[i]))
+                    .try_fold(factors[only], |product, number| Some(product * number?)),
+                _ => None,
+            }
+        }
+        Expression::Quotient(left, right, _) => match (time_factor(left)?, number(right)) {
+            (factor, _) if factor == Rational::from_integer(0) => Some(factor),
+            (factor, Some(divisor)) if divisor != Rational::from_integer(0) => Some(factor / divisor),
+            _ => None,
+        },
+    }
+}
+
+impl Normalizer {
+    /// The duration of an action, chosen if it is not fixed; what the choice rests on joins `conditions`.
+    pub(super) fn duration(
+        &mut self,
+        constraints: &[ast::DurationConstraint],
+        action: &ast::Action,
+        scope: &mut Scope,
+        conditions: &mut Vec<Formula>,
+    ) -> Expression {
+        let mut bounds = [Vec::new(), Vec::new()];
+        let mut fixed = Vec::new();
+        for constraint in constraints {
+            let expression = self.expression(&constraint.expression, scope);
+            match constraint.operator {
+                Comparison::Equal => fixed.push((expression, constraint.span)),
+                Comparison::Greater | Comparison::GreaterOrEqual => bounds[0].push((expression, constraint)),
+                Comparison::Less | Comparison::LessOrEqual => bounds[1].push((expression, constraint)),
+            }
+        }
+        if let [(duration, _)] = &fixed[..]
+            && bounds.iter().all(Vec::is_empty)
+        {
+            scope.duration = Duration::Fixed(duration.clone());
+            return duration.clone();
+        }
+        scope.duration = Duration::Open;
+        let [lower, upper] = bounds;
+        let span = constraints.first().map_or(action.span, |constraint| constraint.span);
+        let chosen = match self.longest {
+            Some(longest) if fixed.is_empty() => match if longest { &upper[..] } else { &lower[..] } {
+                [(expression, constraint)]
+                    if matches!(
+                        constraint.operator,
+                        Comparison::GreaterOrEqual | Comparison::LessOrEqual
+                    ) =>
+                {
+                    Some(expression.clone())
+                }
+                _ => None,
+            },
+            _ => None,
+        };
+        let Some(chosen) = chosen else {
+            self.unsupported(
+                "a duration without one bound that the metric makes it take",
+                "one `(= ?duration …)`, or one `(>= ?duration …)` and a metric that does not reward time",
+                File::Domain,
+                span,
+            );
+            return Expression::Number(Rational::from_integer(0));
+        };
+        for (bound, constraint) in lower.into_iter().chain(upper) {
+            let place = scope.place(constraint.span);
+            conditions.push(Formula::Compare(constraint.operator, chosen.clone(), bound, place));
+        }
+        chosen
+    }
+}
