@@ -1,7 +1,7 @@
 //! Rules to conditions and templates that name relations. The atoms of an aggregate become a rule of their own, which
 //! concludes one row for each match in a relation without a name: first the group, then what is local.
 
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::aggregate::Function;
 use crate::network::{DIFFERENT_FROM, SAME_AS};
@@ -19,6 +19,8 @@ pub(crate) struct Lowering<'a> {
     constraints: &'a mut Vec<(RelationId, usize)>,
     /// Relations without a name that are in use.
     taken: FxHashSet<RelationId>,
+    /// By arity, the number below which no relation without a name is free.
+    tried: FxHashMap<usize, u32>,
     pub lowered: Vec<Lowered>,
 }
 
@@ -37,7 +39,7 @@ impl<'a> Lowering<'a> {
         constraints: &'a mut Vec<(RelationId, usize)>,
         taken: FxHashSet<RelationId>,
     ) -> Self {
-        Self { symbols, store, constraints, taken, lowered: Vec::new() }
+        Self { symbols, store, constraints, taken, tried: FxHashMap::default(), lowered: Vec::new() }
     }
 
     /// Lowers the rule at a position of the program, the rules of its aggregates first.
@@ -60,7 +62,9 @@ impl<'a> Lowering<'a> {
     }
 
     fn anonymous(&mut self, arity: usize) -> RelationId {
-        let relation = self.store.anonymous(arity, |id| self.taken.contains(&id));
+        let tried = self.tried.entry(arity).or_default();
+        let relation = self.store.anonymous(arity, *tried, |id| self.taken.contains(&id));
+        *tried = relation.0 + 1;
         self.taken.insert(relation);
         relation
     }

@@ -72,12 +72,12 @@ impl Store {
     }
 
     /// A relation that belongs to no predicate: the matches of an integrity constraint or of an aggregate. One that is
-    /// empty and not taken is used again.
-    pub fn anonymous(&mut self, arity: usize, taken: impl Fn(RelationId) -> bool) -> RelationId {
+    /// empty and not taken is used again, if its number is not below `first`.
+    pub fn anonymous(&mut self, arity: usize, first: u32, taken: impl Fn(RelationId) -> bool) -> RelationId {
         let fits = |relation: &Relation| {
             relation.predicate.is_none() && relation.arity == arity && relation.len() == 0
         };
-        let mut ids = (0..self.relations.len() as u32).map(RelationId);
+        let mut ids = (first..self.relations.len() as u32).map(RelationId);
         let unused = ids.find(|&id| fits(self.get(id)) && !taken(id));
         unused.unwrap_or_else(|| self.push(Relation::new(None, arity)))
     }
