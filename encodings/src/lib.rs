@@ -25,6 +25,7 @@ mod optimize;
 mod plan;
 mod sat;
 mod search;
+mod transitions;
 
 pub use error::{Error, File, Place};
 pub use ground::{Config as GroundConfig, ground};
@@ -32,3 +33,4 @@ pub use limits::Limits;
 pub use optimize::{Config, Improvement, Proof, Solution, Statistics, Status, Unbounded, optimize};
 pub use plan::{Exact, Plan, Step};
 pub use task::Task;
+pub use transitions::{Situation, Transition};

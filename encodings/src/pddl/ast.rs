@@ -93,7 +93,7 @@ pub struct Identifier {
     pub span: Span,
 }
 
-/// The type of a typed-list entry: one name, or `either` of several; empty means `object`.
+/// The type of a typed-list entry: one name, or `either` of several; empty means `object`, written or not.
 #[derive(Debug, Clone, Default)]
 pub struct TypeExpression {
     /// The alternatives.

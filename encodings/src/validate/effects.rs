@@ -169,12 +169,9 @@ impl Changes {
         Ok(())
     }
 
-    /// Whether nothing changes.
-    pub(super) fn is_empty(&self) -> bool {
-        self.added.is_empty() && self.deleted.is_empty() && self.numeric.values().all(is_neutral)
+    /// Whether the state stays as it is, if the changes can be applied at all.
+    pub(super) fn is_neutral(&self) -> bool {
+        let is_zero = |change: &Change| matches!(change, Change::Add(value) if value.is_zero());
+        self.added.is_empty() && self.deleted.is_empty() && self.numeric.values().all(is_zero)
     }
-}
-
-fn is_neutral(change: &Change) -> bool {
-    matches!(change, Change::Add(value) if value.is_zero())
 }

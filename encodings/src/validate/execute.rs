@@ -258,12 +258,12 @@ impl<'e, 'p> Execution<'e, 'p> {
         time: &BigRational,
         changes: Changes,
     ) -> Result<(), Box<Violation>> {
-        if changes.is_empty() {
-            return Ok(());
-        }
+        let is_neutral = changes.is_neutral();
         let applied = changes.apply(self.world, &mut self.state);
         applied.map_err(|error| self.effect_violation(step, time, &error))?;
-        close(self.world, &mut self.state);
+        if !is_neutral {
+            close(self.world, &mut self.state);
+        }
         Ok(())
     }
 

@@ -54,7 +54,7 @@ impl Parser<'_> {
             self.sink
                 .warning("P107", dash.span(), format!("`-{glued}` is read as `- {glued}`"))
                 .help("put a space behind the dash: other planners read one name here");
-            return TypeExpression { alternatives: vec![self.identifier(glued, span)] };
+            return self.one_type(glued, span);
         }
         let Some(item) = items.next() else {
             self.sink.error("P107", dash.span(), "a type is missing behind this `-`");
@@ -65,13 +65,26 @@ impl Parser<'_> {
 
     /// One type or `(either …)`.
     fn type_expression(&mut self, item: Item<'_>) -> TypeExpression {
-        let mut alternatives = Vec::new();
-        if item.is_headed("either") {
-            alternatives.extend(item.rest().filter_map(|item| self.name_item(item, "a type")));
-        } else {
-            alternatives.extend(self.name_item(item, "a type"));
+        if !item.is_headed("either") {
+            let name = self.name_item(item, "a type");
+            return name
+                .map_or_else(TypeExpression::default, |name| self.one_type(name.name.as_str(), name.span));
         }
-        TypeExpression { alternatives }
+        if item.rest().next().is_none() {
+            self.sink
+                .error("P108", item.span(), "`either` names no type")
+                .help("write `(either place robot)`");
+        }
+        let alternatives = item.rest().filter_map(|item| self.name_item(item, "a type"));
+        TypeExpression { alternatives: alternatives.collect() }
+    }
+
+    /// The type with a name; that of everything is the same as none.
+    fn one_type(&mut self, name: &str, span: Span) -> TypeExpression {
+        if name.eq_ignore_ascii_case("object") {
+            return TypeExpression::default();
+        }
+        TypeExpression { alternatives: vec![self.identifier(name, span)] }
     }
 
     fn entry(&mut self, item: Item<'_>, symbol: &str, entries: Entries) -> Option<Identifier> {

@@ -1,0 +1,333 @@
+//! The meaning of a lifted task, as plainly as it can be said: nothing is compiled, indexed or remembered.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use num_rational::Ratio;
+
+use crate::model::{
+    Action, Atom, DERIVED, Effect, Expression, Formula, Number, PREDICATES, Task, Term, UPPER, Way,
+};
+
+/// What holds, what functions are worth, and how much time has passed.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct State {
+    pub facts: BTreeSet<Atom>,
+    pub values: BTreeMap<Atom, Number>,
+    pub time: Number,
+    /// How many timed literals have taken place.
+    timed: usize,
+}
+
+/// One step of a plan: an action, its objects, and its duration where the plan has to say it.
+pub type Step = (usize, Vec<usize>, Option<Number>);
+
+/// True, false, or undefined because a function has no value.
+type Truth = Option<bool>;
+
+fn conjunction(parts: impl Iterator<Item = Truth>) -> Truth {
+    let parts: Vec<_> = parts.collect();
+    if parts.contains(&Some(false)) {
+        return Some(false);
+    }
+    if parts.contains(&None) { None } else { Some(true) }
+}
+
+fn negation(truth: Truth) -> Truth {
+    truth.map(|truth| !truth)
+}
+
+fn disjunction(parts: impl Iterator<Item = Truth>) -> Truth {
+    negation(conjunction(parts.map(negation)))
+}
+
+/// A state with what follows in it, and the variables around a condition.
+struct View<'a> {
+    state: &'a State,
+    derived: BTreeSet<Atom>,
+    duration: Option<Number>,
+}
+
+fn objects(terms: &[Term], scope: &[usize]) -> Vec<usize> {
+    let object = |term: &Term| match term {
+        Term::Object(object) => *object,
+        Term::Variable(variable) => scope[*variable],
+    };
+    terms.iter().map(object).collect()
+}
+
+fn with(scope: &[usize], object: usize) -> Vec<usize> {
+    scope.iter().copied().chain([object]).collect()
+}
+
+/// All ways to choose objects, one from each list.
+pub fn choices(lists: &[&[usize]]) -> Vec<Vec<usize>> {
+    lists.iter().fold(vec![Vec::new()], |all, list| {
+        all.iter().flat_map(|known| list.iter().map(|object| with(known, *object))).collect()
+    })
+}
+
+impl<'a> View<'a> {
+    fn new(task: &Task, state: &'a State, duration: Option<Number>) -> Self {
+        let mut view = Self { state, derived: BTreeSet::new(), duration };
+        for layer in [DERIVED.as_slice(), &[UPPER]] {
+            loop {
+                let mut found = BTreeSet::new();
+                for (head, body) in task.axioms.iter().filter(|(head, _)| layer.contains(head)) {
+                    for scope in choices(&vec![&[0, 1, 2][..]; PREDICATES[*head].1]) {
+                        if view.truth(body, &scope) == Some(true) {
+                            found.insert((*head, scope));
+                        }
+                    }
+                }
+                let before = view.derived.len();
+                view.derived.extend(found);
+                if view.derived.len() == before {
+                    break;
+                }
+            }
+        }
+        view
+    }
+
+    fn holds(&self, formula: &Formula, scope: &[usize]) -> bool {
+        self.truth(formula, scope) == Some(true)
+    }
+
+    fn truth(&self, formula: &Formula, scope: &[usize]) -> Truth {
+        match formula {
+            Formula::Fact(predicate, terms) => {
+                let atom = (*predicate, objects(terms, scope));
+                Some(self.state.facts.contains(&atom) || self.derived.contains(&atom))
+            }
+            Formula::Equal(left, right) => Some(objects(&[*left], scope) == objects(&[*right], scope)),
+            Formula::Compare(sign, left, right) => {
+                Some(sign.holds(self.value(left, scope)?, self.value(right, scope)?))
+            }
+            Formula::Not(inner) => negation(self.truth(inner, scope)),
+            Formula::And(parts) => conjunction(parts.iter().map(|part| self.truth(part, scope))),
+            Formula::Or(parts) => disjunction(parts.iter().map(|part| self.truth(part, scope))),
+            Formula::Imply(left, right) => {
+                disjunction([negation(self.truth(left, scope)), self.truth(right, scope)].into_iter())
+            }
+            Formula::Exists(range, body) => {
+                disjunction(range.objects().iter().map(|object| self.truth(body, &with(scope, *object))))
+            }
+            Formula::ForAll(range, body) => {
+                conjunction(range.objects().iter().map(|object| self.truth(body, &with(scope, *object))))
+            }
+        }
+    }
+
+    fn value(&self, expression: &Expression, scope: &[usize]) -> Option<Number> {
+        let value = |expression: &Expression| self.value(expression, scope);
+        Some(match expression {
+            Expression::Number(number) => *number,
+            Expression::Function(function, terms) => {
+                *self.state.values.get(&(*function, objects(terms, scope)))?
+            }
+            Expression::Duration => self.duration?,
+            Expression::TotalTime => self.state.time,
+            Expression::Sum(parts) => parts.iter().map(value).sum::<Option<Number>>()?,
+            Expression::Difference(left, right) => value(left)? - value(right)?,
+            Expression::Negative(inner) => -value(inner)?,
+            Expression::Product(left, right) => value(left)? * value(right)?,
+            Expression::Quotient(left, right) => {
+                let (left, right) = (value(left)?, value(right)?);
+                if right == Ratio::from_integer(0) {
+                    return None;
+                }
+                left / right
+            }
+        })
+    }
+
+    /// Notes what an effect changes; nothing where that is undefined or contradicts another change.
+    fn collect(&self, effect: &Effect, scope: &[usize], changes: &mut Changes) -> Option<()> {
+        match effect {
+            Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, scope, changes))?,
+            Effect::Add(predicate, terms) => {
+                changes.added.insert((*predicate, objects(terms, scope)));
+            }
+            Effect::Delete(predicate, terms) => {
+                changes.deleted.insert((*predicate, objects(terms, scope)));
+            }
+            Effect::Change(way, function, terms, value) => {
+                let value = self.value(value, scope)?;
+                let change = match way {
+                    Way::Assign => Change::Assign(value),
+                    Way::Increase => Change::Add(value),
+                    Way::Decrease => Change::Add(-value),
+                    Way::ScaleUp => Change::Scale(value),
+                    Way::ScaleDown if value == Ratio::from_integer(0) => return None,
+                    Way::ScaleDown => Change::Scale(value.recip()),
+                };
+                changes.record((*function, objects(terms, scope)), change)?;
+            }
+            Effect::When(condition, body) => {
+                if self.truth(condition, scope)? {
+                    self.collect(body, scope, changes)?;
+                }
+            }
+            Effect::ForAll(range, body) => {
+                for object in range.objects() {
+                    self.collect(body, &with(scope, *object), changes)?;
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Change {
+    Assign(Number),
+    Add(Number),
+    Scale(Number),
+}
+
+#[derive(Debug, Default)]
+struct Changes {
+    added: BTreeSet<Atom>,
+    deleted: BTreeSet<Atom>,
+    values: BTreeMap<Atom, Change>,
+}
+
+impl Changes {
+    fn record(&mut self, target: Atom, change: Change) -> Option<()> {
+        let combined = match (self.values.get(&target), change) {
+            (None, change) => change,
+            (Some(Change::Add(one)), Change::Add(other)) => Change::Add(one + other),
+            (Some(Change::Scale(one)), Change::Scale(other)) => Change::Scale(one * other),
+            (Some(Change::Assign(one)), Change::Assign(other)) if *one == other => change,
+            _ => return None,
+        };
+        self.values.insert(target, combined);
+        Some(())
+    }
+}
+
+impl State {
+    pub fn initial(task: &Task) -> Self {
+        Self {
+            facts: task.facts.clone(),
+            values: task.values.clone(),
+            time: Ratio::from_integer(0),
+            timed: 0,
+        }
+    }
+
+    fn changed(
+        &self,
+        task: &Task,
+        effects: &[Effect],
+        scope: &[usize],
+        duration: Option<Number>,
+    ) -> Option<Self> {
+        let view = View::new(task, self, duration);
+        let mut changes = Changes::default();
+        effects.iter().try_for_each(|effect| view.collect(effect, scope, &mut changes))?;
+        let mut after = self.clone();
+        for (target, change) in changes.values {
+            let before = self.values.get(&target);
+            let value = match change {
+                Change::Assign(value) => value,
+                Change::Add(value) => before? + value,
+                Change::Scale(value) => before? * value,
+            };
+            after.values.insert(target, value);
+        }
+        after.facts.retain(|fact| !changes.deleted.contains(fact));
+        after.facts.extend(changes.added);
+        Some(after)
+    }
+
+    /// Lets the timed literals that are due take place.
+    fn pass(&mut self, task: &Task, is_due: impl Fn(Number) -> bool) {
+        while let Some((time, atom, holds)) = task.timed.get(self.timed).filter(|(time, ..)| is_due(*time)) {
+            let _ = time;
+            if *holds {
+                self.facts.insert(atom.clone());
+            } else {
+                self.facts.remove(atom);
+            }
+            self.timed += 1;
+        }
+    }
+
+    /// The duration of an action here: the stated one where the bounds admit it, or the only possible one.
+    fn duration(
+        &self,
+        task: &Task,
+        action: &Action,
+        scope: &[usize],
+        stated: Option<Number>,
+    ) -> Option<Number> {
+        let Some(bounds) = &action.duration else { return Some(Ratio::from_integer(0)) };
+        let view = View::new(task, self, None);
+        let mut exact = None;
+        for (_, sign, value) in bounds.iter().filter(|(at_end, ..)| !at_end) {
+            let value = view.value(value, scope)?;
+            if *sign == crate::model::Sign::Equal && exact.is_none() {
+                exact = Some(value);
+            }
+            if stated.is_some_and(|stated| !sign.holds(stated, value)) {
+                return None;
+            }
+        }
+        exact.or(stated).filter(|duration| *duration >= Ratio::from_integer(0))
+    }
+
+    /// The state after a step, begun as soon as the one before has ended; nothing if it cannot be executed.
+    pub fn after(&self, task: &Task, (action, scope, stated): &Step) -> Option<Self> {
+        let action = &task.actions[*action];
+        let start = self.time;
+        let mut state = self.clone();
+        state.pass(task, |time| time <= start);
+        let duration = state.duration(task, action, scope, *stated)?;
+        let end = start + duration;
+        if !View::new(task, &state, Some(duration)).holds(&action.at_start, scope) {
+            return None;
+        }
+        state = state.changed(task, &action.start_effects, scope, Some(duration))?;
+        if let Some(bounds) = &action.duration {
+            let holds = |state: &Self, formula| View::new(task, state, Some(duration)).holds(formula, scope);
+            if !holds(&state, &action.over_all) {
+                return None;
+            }
+            while let Some((time, ..)) = task.timed.get(state.timed).filter(|(time, ..)| *time < end) {
+                state.pass(task, |due| due <= *time);
+                if !holds(&state, &action.over_all) {
+                    return None;
+                }
+            }
+            if !holds(&state, &action.at_end) {
+                return None;
+            }
+            let view = View::new(task, &state, Some(duration));
+            for (_, sign, value) in bounds.iter().filter(|(at_end, ..)| *at_end) {
+                if !sign.holds(duration, view.value(value, scope)?) {
+                    return None;
+                }
+            }
+            state = state.changed(task, &action.end_effects, scope, Some(duration))?;
+        }
+        state.time = end;
+        Some(state)
+    }
+
+    /// What holds and what follows from it.
+    pub fn all_facts(&self, task: &Task) -> BTreeSet<Atom> {
+        let derived = View::new(task, self, None).derived;
+        self.facts.iter().cloned().chain(derived).collect()
+    }
+
+    pub fn is_goal(&self, task: &Task) -> bool {
+        View::new(task, self, None).holds(&task.goal, &[])
+    }
+
+    /// What the metric is worth in this state; without a metric nothing.
+    pub fn metric(&self, task: &Task) -> Option<Number> {
+        let (_, value) = task.metric.as_ref()?;
+        View::new(task, self, None).value(value, &[])
+    }
+}

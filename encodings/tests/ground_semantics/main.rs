@@ -1,0 +1,90 @@
+//! Random lifted tasks with all that the language has, against an interpreter that shares nothing with the library:
+//! printing and reading, the validator, and the ground task.
+
+mod generate;
+mod ground;
+mod interpret;
+mod model;
+mod text;
+
+use proptest::prelude::*;
+
+use generate::{ALL, Draw, PLANNED};
+
+fn bytes() -> impl Strategy<Value = Vec<u8>> {
+    prop::collection::vec(any::<u8>(), 0..600)
+}
+
+fn check_text(bytes: &[u8]) -> bool {
+    let mut draw = Draw::new(bytes, ALL);
+    let task = draw.task();
+    let trees = text::trees(&task);
+    text::check_printing(&trees.0, &trees.1);
+    let plan = draw.plan(&task);
+    text::check_plan(&task, &trees, &plan)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn printing_is_undone_by_reading_and_plans_are_judged_alike(bytes in bytes()) {
+        check_text(&bytes);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    #[ignore = "takes minutes"]
+    fn many_are_judged_alike(bytes in bytes()) {
+        check_text(&bytes);
+    }
+}
+
+/// Whether the task could be ground.
+fn check_ground(bytes: &[u8]) -> bool {
+    let task = Draw::new(bytes, PLANNED).task();
+    ground::check(&task, &text::trees(&task)).is_some()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_ground_task_does_what_the_lifted_task_does(bytes in bytes()) {
+        check_ground(&bytes);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 50_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    #[ignore = "takes minutes"]
+    fn many_ground_tasks_do_what_the_lifted_tasks_do(bytes in bytes()) {
+        check_ground(&bytes);
+    }
+}
+
+/// Bytes that are always the same (`SplitMix64`).
+fn fixed_bytes(seed: u64) -> Vec<u8> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    };
+    (0..75).flat_map(|_| next().to_le_bytes()).collect()
+}
+
+#[test]
+fn generated_tasks_are_not_trivial() {
+    let seeds = 0..120;
+    let valid = seeds.clone().filter(|seed| check_text(&fixed_bytes(*seed))).count();
+    let ground = seeds.filter(|seed| check_ground(&fixed_bytes(*seed))).count();
+    assert!(valid > 10 && ground > 60, "{valid} plans are valid, {ground} tasks are ground");
+}
