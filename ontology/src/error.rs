@@ -218,10 +218,15 @@ pub enum Warning {
         import: String,
     },
     /// O301: an axiom outside the profile that is turned into rules.
-    #[error("warning[O301]: {axiom} is left out ({reason}); conclusions that need it are not drawn")]
+    #[error(
+        "warning[O301]: {axiom} is {} ({reason}); conclusions that need {} are not drawn",
+        if *partly { "used in part" } else { "left out" }, if *partly { "the rest" } else { "it" }
+    )]
     OutsideProfile {
         /// The axiom in functional-style syntax.
         axiom: String,
+        /// Whether a part of it is used.
+        partly: bool,
         /// What is not supported.
         reason: String,
     },

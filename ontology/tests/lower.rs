@@ -141,6 +141,37 @@ fn axioms_forbid() {
         (&restricted("[ a rdfs:Datatype ; owl:oneOf ( \"OK\" \"ERROR\" ) ]"), "\"OK\" .", "\"ok\" ."),
         (&restricted(bounded), "2 .", "1 ."),
         (&restricted("[ a rdfs:Datatype ; owl:unionOf ( xsd:integer xsd:string ) ]"), "\"x\" .", "true ."),
+        (
+            &restricted("[ a rdfs:Datatype ; owl:intersectionOf ( xsd:integer xsd:nonNegativeInteger ) ]"),
+            "0 .",
+            "-1 .",
+        ),
+        (&restricted("[ a rdfs:Datatype ; owl:datatypeComplementOf xsd:string ]"), "true .", "\"x\" ."),
+        (
+            &restricted(
+                "[ a rdfs:Datatype ; owl:datatypeComplementOf [ a rdfs:Datatype ; owl:oneOf ( 1 2 ) ] ]",
+            ),
+            "3 .",
+            "2.0 .",
+        ),
+        (
+            &restricted("xsd:dateTime"),
+            "\"2026-01-01T00:00:00Z\"^^xsd:dateTime .",
+            "\"2026-01-01\"^^xsd:date .",
+        ),
+        (&restricted("xsd:float"), "\"1.5\"^^xsd:float .", "1.5 ."),
+        (&restricted("xsd:double"), "1.5e0 .", "\"1.5\"^^xsd:float ."),
+        (&restricted("xsd:byte"), "127 .", "128 ."),
+        (&restricted("xsd:unsignedInt"), "4294967295 .", "4294967296 ."),
+        (&restricted("xsd:anyURI"), "\"http://x\"^^xsd:anyURI .", "\"http://x\" ."),
+        (&restricted("owl:real"), "1.5 .", "1.5e0 ."),
+        (&restricted("rdf:PlainLiteral"), "\"x\"@en .", "1 ."),
+        (":u a rdfs:Datatype ; owl:equivalentClass xsd:byte . :d rdfs:range :u . :i :d ", "1 .", "1000 ."),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :d ; owl:allValuesFrom xsd:float ] . :i a :A ; :d ",
+            "\"1\"^^xsd:float .",
+            "1 .",
+        ),
         (":d rdfs:range xsd:boolean . :i :d ", "true .", "\"False\"^^xsd:boolean ."),
     ] {
         for (more, expected) in [(consistent, true), (inconsistent, false)] {
@@ -164,17 +195,53 @@ fn what_has_no_rule_form_is_reported_once() {
             "ReflexiveObjectProperty(<http://e/#p>) is left out (a statement about all individuals)",
         ),
         (
-            ":d rdfs:range xsd:dateTime .",
-            "DataPropertyRange(<http://e/#d> <http://www.w3.org/2001/XMLSchema#dateTime>) is left out (a datatype that is not tested)",
+            ":u a rdfs:Datatype . :d rdfs:range :u .",
+            "DataPropertyRange(<http://e/#d> <http://e/#u>) is left out (a datatype whose values are not known)",
+        ),
+        (
+            ":d rdfs:range [ a rdfs:Datatype ; owl:onDatatype xsd:string ; owl:withRestrictions ( [ xsd:pattern \"a*\" ] ) ] .",
+            "DataPropertyRange(<http://e/#d> DatatypeRestriction(<http://www.w3.org/2001/XMLSchema#string> \
+             <http://www.w3.org/2001/XMLSchema#pattern> \"a*\")) is left out (a facet other than a bound)",
         ),
         (
             ":A owl:disjointUnionOf ( :B :C ) .",
-            "DisjointUnion(<http://e/#A> <http://e/#B> <http://e/#C>) is left out (that the parts cover the class)",
+            "DisjointUnion(<http://e/#A> <http://e/#B> <http://e/#C>) is used in part (that the parts cover the class)",
+        ),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:qualifiedCardinality \
+             \"1\"^^xsd:nonNegativeInteger ; owl:onClass :B ] .",
+            "SubClassOf(<http://e/#A> ObjectExactCardinality(1 <http://e/#p> <http://e/#B>)) is used in part \
+             (an existential restriction as a conclusion)",
         ),
     ] {
         let (_, warnings) = engine(text);
         let [warning] = &warnings[..] else { panic!("{text}: {warnings:?}") };
         assert!(warning.starts_with(&format!("warning[O301]: {expected}")), "{warning}");
+    }
+}
+
+/// What has a rule form of an axiom is used, although the rest has none.
+#[test]
+fn axioms_are_used_in_part() {
+    let some = "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :C ]";
+    let not = "[ a owl:Class ; owl:complementOf :C ]";
+    for (text, expected) in [
+        (
+            format!(":A owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :B {some} ) ] . :i a :A . :j a :B ; :p :k . :k a :C ."),
+            &["i a B", "j a A"][..],
+        ),
+        (format!("[ a owl:Class ; owl:unionOf ( :B {not} ) ] rdfs:subClassOf :A . :i a :B ."), &["i a A"]),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:cardinality \"1\"^^xsd:nonNegativeInteger ] .
+             :i a :A ; :p :j , :k ."
+                .to_owned(),
+            &["j owl:sameAs k", "k owl:sameAs j"],
+        ),
+    ] {
+        let (engine, warnings) = engine(&text);
+        assert_eq!(derived(&engine), expected.iter().map(ToString::to_string).collect(), "{text}");
+        let [warning] = &warnings[..] else { panic!("{text}: {warnings:?}") };
+        assert!(warning.contains("is used in part"), "{warning}");
     }
 }
 

@@ -1,7 +1,5 @@
 //! Axioms to rules (OWL 2 RL, table by table) and assertions to facts.
 
-use std::collections::HashMap;
-
 use rules::{Atom, RuleIdentity, Term};
 
 use super::class;
@@ -18,16 +16,17 @@ type Outside = Result<(), &'static str>;
 
 /// Adds the rules of all axioms that are not plain assertions.
 pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
-    let definitions = definitions(axioms);
     for (position, annotated) in axioms.iter().enumerate() {
         let axiom = &annotated.axiom;
         if is_assertion(axiom) {
             continue;
         }
-        let mut lowering =
-            Lowering { identity: identity(axiom, position), definitions: &definitions, context };
-        if let Err(reason) = lowering.axiom(axiom) {
-            context.outside(axiom, reason);
+        let before = context.rules.len();
+        let mut lowering = Lowering { identity: identity(axiom, position), context };
+        let result = lowering.axiom(axiom);
+        if let Err(reason) = context.take_gaps().and(result) {
+            let partly = context.rules.len() > before;
+            context.outside(axiom, partly, reason);
         }
     }
 }
@@ -50,15 +49,6 @@ fn is_assertion(axiom: &Axiom) -> bool {
             | Axiom::DifferentIndividuals(_)
             | Axiom::DatatypeDefinition(..)
     )
-}
-
-/// Named data ranges.
-fn definitions(axioms: &[AnnotatedAxiom]) -> HashMap<Iri, DataRange> {
-    let defined = axioms.iter().filter_map(|annotated| match &annotated.axiom {
-        Axiom::DatatypeDefinition(name, range) => Some((name.clone(), range.clone())),
-        _ => None,
-    });
-    defined.collect()
 }
 
 /// Adds the facts of an assertion about named classes and properties; nothing for any other axiom.
@@ -106,13 +96,12 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
 }
 
 /// One axiom on its way.
-struct Lowering<'c, 'a, 'd> {
+struct Lowering<'c, 'a> {
     identity: RuleIdentity,
-    definitions: &'d HashMap<Iri, DataRange>,
     context: &'c mut Context<'a>,
 }
 
-impl Lowering<'_, '_, '_> {
+impl Lowering<'_, '_> {
     fn rule(&mut self, body: Conjunction, head: Vec<Atom>, variables: &Variables) {
         self.context.rule(&self.identity, head, body, variables);
     }
@@ -121,18 +110,24 @@ impl Lowering<'_, '_, '_> {
         match axiom {
             Axiom::SubClassOf(sub, sup) => self.sub_class(sub, sup),
             Axiom::EquivalentClasses(classes) => self.equivalent_classes(classes),
-            Axiom::DisjointClasses(classes) => self.disjoint_classes(classes),
+            Axiom::DisjointClasses(classes) => {
+                self.disjoint_classes(classes);
+                Ok(())
+            }
             Axiom::DisjointUnion(class, parts) => self.disjoint_union(class, parts),
             Axiom::ClassAssertion(class, individual) => {
                 let x = self.context.constant(individual);
                 let mut variables = Variables::default();
-                let conclusions = class::conclusions(self.context, class, x, &mut variables)?;
+                let conclusions = class::conclusions(self.context, class, x, &mut variables);
                 for (body, head) in conclusions {
                     self.rule(body, head, &variables);
                 }
                 Ok(())
             }
-            Axiom::HasKey(class, objects, data) => self.key(class, objects, data),
+            Axiom::HasKey(class, objects, data) => {
+                self.key(class, objects, data);
+                Ok(())
+            }
             Axiom::ObjectPropertyCharacteristic(characteristic, property) => {
                 self.characteristic(*characteristic, property)
             }
@@ -168,9 +163,9 @@ impl Lowering<'_, '_, '_> {
                 let inverse = Property::Inverse(second.clone());
                 self.equivalent_properties(&[one(first), inverse]);
             }
-            Axiom::ObjectPropertyDomain(property, class) => return self.end(property, class, true),
-            Axiom::ObjectPropertyRange(property, class) => return self.end(property, class, false),
-            Axiom::DataPropertyDomain(property, class) => return self.end(&one(property), class, true),
+            Axiom::ObjectPropertyDomain(property, class) => self.end(property, class, true),
+            Axiom::ObjectPropertyRange(property, class) => self.end(property, class, false),
+            Axiom::DataPropertyDomain(property, class) => self.end(&one(property), class, true),
             Axiom::DataPropertyRange(property, range) => return self.data_range(property, range),
             Axiom::FunctionalDataProperty(property) => {
                 let mut v = Variables::default();
@@ -187,8 +182,8 @@ impl Lowering<'_, '_, '_> {
     fn sub_class(&mut self, sub: &ClassExpression, sup: &ClassExpression) -> Outside {
         let mut variables = Variables::default();
         let x = variables.fresh("x");
-        let bodies = class::condition(self.context, sub, x, &mut variables)?;
-        let conclusions = class::conclusions(self.context, sup, x, &mut variables)?;
+        let bodies = class::condition(self.context, sub, x, &mut variables);
+        let conclusions = class::conclusions(self.context, sup, x, &mut variables);
         for body in &bodies {
             for (more, head) in &conclusions {
                 let body: Conjunction = body.iter().chain(more).cloned().collect();
@@ -208,19 +203,18 @@ impl Lowering<'_, '_, '_> {
         results.into_iter().collect()
     }
 
-    fn disjoint_classes(&mut self, classes: &[ClassExpression]) -> Outside {
+    fn disjoint_classes(&mut self, classes: &[ClassExpression]) {
         for (place, first) in classes.iter().enumerate() {
             for second in &classes[place + 1..] {
                 let mut variables = Variables::default();
                 let x = variables.fresh("x");
-                let left = class::condition(self.context, first, x, &mut variables)?;
-                let right = class::condition(self.context, second, x, &mut variables)?;
+                let left = class::condition(self.context, first, x, &mut variables);
+                let right = class::condition(self.context, second, x, &mut variables);
                 for body in class::cross(&left, &right) {
                     self.rule(body, Vec::new(), &variables);
                 }
             }
         }
-        Ok(())
     }
 
     fn disjoint_union(&mut self, class: &Iri, parts: &[ClassExpression]) -> Outside {
@@ -228,16 +222,16 @@ impl Lowering<'_, '_, '_> {
         for part in parts {
             self.sub_class(part, &class)?;
         }
-        self.disjoint_classes(parts)?;
+        self.disjoint_classes(parts);
         Err("that the parts cover the class")
     }
 
     /// Two named members that agree on all key properties are one.
-    fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) -> Outside {
+    fn key(&mut self, class: &ClassExpression, objects: &[Property], data: &[Iri]) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
-        let left = class::condition(self.context, class, x, &mut variables)?;
-        let right = class::condition(self.context, class, y, &mut variables)?;
+        let left = class::condition(self.context, class, x, &mut variables);
+        let right = class::condition(self.context, class, y, &mut variables);
         let mut keys = Vec::new();
         for property in objects {
             let value = variables.fresh("v");
@@ -250,7 +244,6 @@ impl Lowering<'_, '_, '_> {
         for body in class::cross(&class::cross(&left, &right), &[keys]) {
             self.context.merge(&self.identity, [x, y], body, &variables);
         }
-        Ok(())
     }
 
     fn sub_property(&mut self, sub: &Property, sup: &Property) {
@@ -295,23 +288,18 @@ impl Lowering<'_, '_, '_> {
     }
 
     /// Domain (of the subject) or range (of the object).
-    fn end(&mut self, property: &Property, class: &ClassExpression, subject: bool) -> Outside {
+    fn end(&mut self, property: &Property, class: &ClassExpression, subject: bool) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
         let edge = self.context.property(property, x, y);
         let end = if subject { x } else { y };
-        for (more, head) in class::conclusions(self.context, class, end, &mut variables)? {
+        for (more, head) in class::conclusions(self.context, class, end, &mut variables) {
             let body = std::iter::once(edge.clone()).chain(more).collect();
             self.rule(body, head, &variables);
         }
-        Ok(())
     }
 
     fn data_range(&mut self, property: &Iri, range: &DataRange) -> Outside {
-        let range = match range {
-            DataRange::Datatype(name) => self.definitions.get(name).unwrap_or(range),
-            _ => range,
-        };
         let mut variables = Variables::default();
         let (x, value) = (variables.fresh("x"), variables.fresh("v"));
         let edge = self.context.relation(property, [x, value]);

@@ -10,29 +10,29 @@ use crate::vocab::owl;
 /// What follows from being in a class: for each part, further conditions and then heads (none for a contradiction).
 pub(crate) type Conclusions = Vec<(Conjunction, Vec<Atom>)>;
 
-/// The ways in which `x` can be seen to be in `class`: any of the conjunctions. `Err` says what cannot be seen.
+/// The ways in which `x` can be seen to be in `class`: any of the conjunctions. What cannot be seen is a gap.
 pub(crate) fn condition(
     context: &mut Context,
     class: &ClassExpression,
     x: Term,
     variables: &mut Variables,
-) -> Result<Vec<Conjunction>, &'static str> {
+) -> Vec<Conjunction> {
     use ClassExpression as C;
-    Ok(match class {
+    match class {
         C::Class(iri) if &**iri == owl::THING => vec![Vec::new()],
         C::Class(iri) if &**iri == owl::NOTHING => Vec::new(),
         C::Class(iri) => vec![vec![context.relation(iri, [x])]],
         C::IntersectionOf(classes) => {
             let mut product = vec![Vec::new()];
             for class in classes {
-                product = cross(&product, &condition(context, class, x, variables)?);
+                product = cross(&product, &condition(context, class, x, variables));
             }
             product
         }
         C::UnionOf(classes) => {
             let mut any = Vec::new();
             for class in classes {
-                any.extend(condition(context, class, x, variables)?);
+                any.extend(condition(context, class, x, variables));
             }
             any
         }
@@ -42,7 +42,7 @@ pub(crate) fn condition(
         C::SomeValuesFrom(property, filler) | C::Cardinality(Bound::Min, 1, property, filler) => {
             let y = variables.fresh("y");
             let edge = vec![vec![context.property(property, x, y)]];
-            cross(&edge, &condition(context, filler, y, variables)?)
+            cross(&edge, &condition(context, filler, y, variables))
         }
         C::HasValue(property, individual) => {
             let value = context.constant(individual);
@@ -52,18 +52,23 @@ pub(crate) fn condition(
         C::DataSomeValuesFrom(property, range) | C::DataCardinality(Bound::Min, 1, property, range) => {
             let value = variables.fresh("v");
             let edge = vec![vec![context.relation(property, [x, value])]];
-            cross(&edge, &range::condition(context, range, value)?)
+            cross(&edge, &range_condition(context, range, value))
         }
         C::DataHasValue(property, literal) => {
             let value = Term::Constant(context.literal(literal));
             vec![vec![context.relation(property, [x, value])]]
         }
-        C::ComplementOf(_) => return Err("a complement as a condition"),
+        C::ComplementOf(_) => context.gap("a complement as a condition"),
         C::AllValuesFrom(..) | C::DataAllValuesFrom(..) => {
-            return Err("a universal restriction as a condition");
+            context.gap("a universal restriction as a condition")
         }
-        C::Cardinality(..) | C::DataCardinality(..) => return Err("a cardinality as a condition"),
-    })
+        C::Cardinality(..) | C::DataCardinality(..) => context.gap("a cardinality as a condition"),
+    }
+}
+
+/// As [`condition`], for a data range.
+fn range_condition(context: &mut Context, range: &DataRange, value: Term) -> Vec<Conjunction> {
+    range::condition(context, range, value).unwrap_or_else(|reason| context.gap(reason))
 }
 
 /// Every conjunction of the first with every one of the second.
@@ -71,23 +76,23 @@ pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunct
     left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
 
-/// What follows from `x` being in `class`. `Err` says what cannot be concluded by rules.
+/// What follows from `x` being in `class`. What cannot be concluded by rules is a gap.
 pub(crate) fn conclusions(
     context: &mut Context,
     class: &ClassExpression,
     x: Term,
     variables: &mut Variables,
-) -> Result<Conclusions, &'static str> {
+) -> Conclusions {
     use ClassExpression as C;
     let heads = |atom| vec![(Vec::new(), vec![atom])];
-    Ok(match class {
+    match class {
         C::Class(iri) if &**iri == owl::THING => Vec::new(),
         C::Class(iri) if &**iri == owl::NOTHING => vec![(Vec::new(), Vec::new())],
         C::Class(iri) => heads(context.relation(iri, [x])),
         C::IntersectionOf(classes) => {
             let mut all = Vec::new();
             for class in classes {
-                all.extend(conclusions(context, class, x, variables)?);
+                all.extend(conclusions(context, class, x, variables));
             }
             all
         }
@@ -104,46 +109,74 @@ pub(crate) fn conclusions(
             heads(context.relation(property, [x, value]))
         }
         C::ComplementOf(class) => {
-            let forbidden = condition(context, class, x, variables)?;
+            let forbidden = condition(context, class, x, variables);
             forbidden.into_iter().map(|body| (body, Vec::new())).collect()
         }
         C::AllValuesFrom(property, filler) => {
             let y = variables.fresh("y");
             let edge = context.property(property, x, y);
-            let inner = conclusions(context, filler, y, variables)?;
+            let inner = conclusions(context, filler, y, variables);
             inner.into_iter().map(|(body, head)| (with(edge.clone(), body), head)).collect()
         }
         C::DataAllValuesFrom(property, range) => {
             let value = variables.fresh("v");
             let edge = context.relation(property, [x, value]);
-            range::violations(context, range, &[edge], value)?
-                .into_iter()
-                .map(|body| (body, Vec::new()))
-                .collect()
+            let bodies = range::violations(context, range, &[edge], value);
+            let bodies = bodies.unwrap_or_else(|reason| context.gap(reason));
+            bodies.into_iter().map(|body| (body, Vec::new())).collect()
         }
         C::Cardinality(Bound::Max, 0, property, filler) => {
             let y = variables.fresh("y");
             let edge = vec![vec![context.property(property, x, y)]];
-            let forbidden = cross(&edge, &condition(context, filler, y, variables)?);
+            let forbidden = cross(&edge, &condition(context, filler, y, variables));
             forbidden.into_iter().map(|body| (body, Vec::new())).collect()
         }
         C::Cardinality(Bound::Max, 1, property, filler) => {
             let (y, z) = (variables.fresh("y"), variables.fresh("z"));
             let edges = vec![vec![context.property(property, x, y), context.property(property, x, z)]];
-            let bodies = cross(&edges, &condition(context, filler, y, variables)?);
-            let bodies = cross(&bodies, &condition(context, filler, z, variables)?);
+            let bodies = cross(&edges, &condition(context, filler, y, variables));
+            let bodies = cross(&bodies, &condition(context, filler, z, variables));
             bodies.into_iter().map(|body| (body, vec![Atom::Same(y, z)])).collect()
         }
         C::DataCardinality(Bound::Max, most @ (0 | 1), property, range) => {
-            at_most(context, *most, property, range, x, variables)?
+            at_most(context, *most, property, range, x, variables)
         }
-        C::UnionOf(_) | C::OneOf(_) => return Err("a union as a conclusion"),
-        C::SomeValuesFrom(..) | C::DataSomeValuesFrom(..) => {
-            return Err("an existential restriction as a conclusion");
+        C::Cardinality(Bound::Exact, n @ (0 | 1), property, filler) => {
+            let most = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
+            let all = conclusions(context, &most, x, variables);
+            if *n == 1 {
+                context.gap::<()>(EXISTS);
+            }
+            all
         }
-        C::Cardinality(..) | C::DataCardinality(..) => return Err("a cardinality as a conclusion"),
-    })
+        C::DataCardinality(Bound::Exact, n @ (0 | 1), property, range) => {
+            let all = at_most(context, *n, property, range, x, variables);
+            if *n == 1 {
+                context.gap::<()>(EXISTS);
+            }
+            all
+        }
+        C::Cardinality(Bound::Min, 0, ..) | C::DataCardinality(Bound::Min, 0, ..) => Vec::new(),
+        C::SomeValuesFrom(property, filler) | C::Cardinality(Bound::Min, 1, property, filler) => {
+            match &**filler {
+                C::OneOf(individuals) if individuals.len() == 1 => {
+                    let value = context.constant(&individuals[0]);
+                    heads(context.property(property, x, value))
+                }
+                _ => context.gap(EXISTS),
+            }
+        }
+        C::DataSomeValuesFrom(property, DataRange::OneOf(values)) if values.len() == 1 => {
+            let value = Term::Constant(context.literal(&values[0]));
+            heads(context.relation(property, [x, value]))
+        }
+        C::DataSomeValuesFrom(..) | C::DataCardinality(Bound::Min, 1, ..) => context.gap(EXISTS),
+        C::UnionOf(_) | C::OneOf(_) => context.gap("a union as a conclusion"),
+        C::Cardinality(..) | C::DataCardinality(..) => context.gap("a cardinality as a conclusion"),
+    }
 }
+
+const EXISTS: &str = "an existential restriction as a conclusion";
 
 /// A contradiction where `x` has more than `most` (0 or 1) values in a range.
 fn at_most(
@@ -153,16 +186,16 @@ fn at_most(
     range: &DataRange,
     x: Term,
     variables: &mut Variables,
-) -> Result<Conclusions, &'static str> {
+) -> Conclusions {
     let value = variables.fresh("v");
     let edge = vec![vec![context.relation(property, [x, value])]];
-    let mut bodies = cross(&edge, &range::condition(context, range, value)?);
+    let mut bodies = cross(&edge, &range_condition(context, range, value));
     if most == 1 {
         let other = variables.fresh("w");
         let second = vec![vec![context.relation(property, [x, other]), Atom::Different(value, other)]];
-        bodies = cross(&bodies, &cross(&second, &range::condition(context, range, other)?));
+        bodies = cross(&bodies, &cross(&second, &range_condition(context, range, other)));
     }
-    Ok(bodies.into_iter().map(|body| (body, Vec::new())).collect())
+    bodies.into_iter().map(|body| (body, Vec::new())).collect()
 }
 
 fn with(atom: Atom, mut body: Conjunction) -> Conjunction {

@@ -1,10 +1,12 @@
 //! What lowering collects, and the small vocabulary in which the other files of this folder write rules.
 
+use std::collections::HashMap;
+
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term, Variable};
 
 use super::{AXIOM_SOURCE, Equality, INTERNAL};
 use crate::error::Warning;
-use crate::owl::{Axiom, DataRange, Iri, Literal, ObjectPropertyExpression};
+use crate::owl::{AnnotatedAxiom, Axiom, DataRange, Iri, Literal, ObjectPropertyExpression};
 use crate::vocab::{local_name, owl};
 
 /// Atoms that must all hold.
@@ -17,6 +19,10 @@ pub(crate) struct Context<'a> {
     pub facts: Vec<Fact>,
     pub warnings: Vec<Warning>,
     pub equality: Equality,
+    /// Named data ranges.
+    pub definitions: HashMap<Iri, DataRange>,
+    /// Why parts of what is lowered now have no rule form.
+    gaps: Vec<&'static str>,
 }
 
 /// The variables of one rule.
@@ -57,8 +63,33 @@ pub(crate) fn identity(axiom: &Axiom, position: usize) -> RuleIdentity {
 }
 
 impl<'a> Context<'a> {
-    pub(crate) fn new(symbols: &'a mut Symbols, equality: Equality) -> Self {
-        Self { symbols, rules: Vec::new(), facts: Vec::new(), warnings: Vec::new(), equality }
+    pub(crate) fn new(symbols: &'a mut Symbols, equality: Equality, axioms: &[AnnotatedAxiom]) -> Self {
+        let definitions = axioms.iter().filter_map(|annotated| match &annotated.axiom {
+            Axiom::DatatypeDefinition(name, range) => Some((name.clone(), range.clone())),
+            _ => None,
+        });
+        Self {
+            symbols,
+            rules: Vec::new(),
+            facts: Vec::new(),
+            warnings: Vec::new(),
+            equality,
+            definitions: definitions.collect(),
+            gaps: Vec::new(),
+        }
+    }
+
+    /// Notes that a part of what is lowered now has no rule form; what is returned for it concludes nothing.
+    pub(crate) fn gap<T: Default>(&mut self, reason: &'static str) -> T {
+        self.gaps.push(reason);
+        T::default()
+    }
+
+    /// What had no rule form since the last call, if anything: the first reason.
+    pub(crate) fn take_gaps(&mut self) -> Result<(), &'static str> {
+        let first = self.gaps.first().copied();
+        self.gaps.clear();
+        first.map_or(Ok(()), Err)
     }
 
     pub(crate) fn name(&mut self, iri: &str) -> Symbol {
@@ -140,7 +171,8 @@ impl<'a> Context<'a> {
     }
 
     /// Reports an axiom, or a part of one, that is left out.
-    pub(crate) fn outside(&mut self, axiom: &Axiom, reason: &str) {
-        self.warnings.push(Warning::OutsideProfile { axiom: axiom.to_string(), reason: reason.to_owned() });
+    pub(crate) fn outside(&mut self, axiom: &Axiom, partly: bool, reason: &str) {
+        let (axiom, reason) = (axiom.to_string(), reason.to_owned());
+        self.warnings.push(Warning::OutsideProfile { axiom, partly, reason });
     }
 }

@@ -19,7 +19,7 @@ mod equality;
 mod range;
 mod swrl;
 
-use rules::{Error, Fact, Program, Rule, RuleIdentity, Symbols};
+use rules::{Atom, Error, Fact, Program, Rule, RuleIdentity, Symbols};
 
 use crate::error::Warning;
 use crate::owl::Ontology;
@@ -52,7 +52,7 @@ pub fn lower(ontology: &Ontology, symbols: &mut Symbols) -> Lowered {
 
 /// As [`lower()`], under the given semantics of names.
 pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols) -> Lowered {
-    let mut context = Context::new(symbols, equality);
+    let mut context = Context::new(symbols, equality, &ontology.axioms);
     let duplicates = swrl::lower(&ontology.rules, &mut context);
     axiom::lower_rules(&ontology.axioms, &mut context);
     context.drop_unusable();
@@ -67,9 +67,14 @@ pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols
 }
 
 impl Context<'_> {
-    /// Takes out the rules that the engine rejects (unsafe variables, for one): it would reject the whole program.
+    /// Takes out the rules that the engine rejects (unsafe variables, for one): it would reject the whole program. A
+    /// rule for an axiom binds its variables by the relations of its body.
     fn drop_unusable(&mut self) {
-        let program = Program { rules: self.rules.clone() };
+        let is_bound = |rule: &&Rule| {
+            let mut atoms = rule.body.iter();
+            *rule.identity.source == *AXIOM_SOURCE && atoms.any(|atom| matches!(atom, Atom::Relation { .. }))
+        };
+        let program = Program { rules: self.rules.iter().filter(|rule| !is_bound(rule)).cloned().collect() };
         let Err(errors) = rules::Engine::new(self.symbols.clone(), program, []) else { return };
         for error in errors {
             let Some(identity) = culprit(&error) else { continue };

@@ -1,126 +1,127 @@
 //! Data ranges as conditions on a value, and as constraints on the values of a property.
 //!
-//! The engine has no test for a datatype, and needs none: its functions compare a result by identity, so
-//! `subtract(0, ?v, ?v)` holds of decimals only (for a float the result is the float zero), and
-//! `stringConcat(?v, ?v, "")` of strings only. Enumerations are relations that hold their members as facts.
+//! The engine tests whether a literal lies in the value space of a datatype, and compares values; enumerations are
+//! relations that hold their members as facts. A complement is moved inwards until it is one of these tests.
 
-use rules::{Atom, BuiltIn, Literal, RuleIdentity, Term};
+use rules::{Atom, BuiltIn, Literal, Term};
 
-use super::context::{Conjunction, Context, Variables};
+use super::context::{Conjunction, Context};
 use crate::owl::DataRange;
-use crate::vocab::{rdfs, xsd};
+use crate::vocab::{owl, rdf, rdfs, xsd};
+
+/// Datatypes may be defined by each other so deep; deeper, or in a circle, they are not tested.
+const DEPTH: usize = 16;
+
+/// The datatypes whose value spaces the engine knows, by local name in the XML Schema namespace. Of others nothing is
+/// known but that they have values.
+const DATATYPES: &str = " string normalizedString token language Name NCName NMTOKEN boolean decimal integer \
+    nonNegativeInteger positiveInteger nonPositiveInteger negativeInteger long int short byte unsignedLong unsignedInt \
+    unsignedShort unsignedByte float double dateTime dateTimeStamp date time duration dayTimeDuration \
+    yearMonthDuration anyURI ";
+
+type Tests = Result<Vec<Conjunction>, &'static str>;
 
 /// The ways in which `value` can be seen to be in `range`. `Err` says what cannot be tested.
-pub(crate) fn condition(
-    context: &mut Context,
-    range: &DataRange,
-    value: Term,
-) -> Result<Vec<Conjunction>, &'static str> {
-    Ok(match range {
-        DataRange::Datatype(iri) => datatype(context, iri, value)?,
-        DataRange::OneOf(literals) => {
-            let relation = context.members_of(range);
-            for literal in literals {
-                let member = context.literal(literal);
-                context.state(relation, [member]);
-            }
-            vec![vec![Atom::relation(relation, [value])]]
-        }
-        DataRange::IntersectionOf(ranges) => {
-            let mut product = vec![Vec::new()];
-            for range in ranges {
-                product = super::class::cross(&product, &condition(context, range, value)?);
-            }
-            product
-        }
-        DataRange::UnionOf(ranges) => {
-            let mut any = Vec::new();
-            for range in ranges {
-                any.extend(condition(context, range, value)?);
-            }
-            any
-        }
-        DataRange::Restriction(iri, facets) => {
-            let mut tests = Vec::new();
-            for (facet, bound) in facets {
-                let bound = Term::Constant(context.literal(bound));
-                tests.push(Atom::BuiltIn { built_in: comparison(facet)?, arguments: vec![value, bound] });
-            }
-            super::class::cross(&datatype(context, iri, value)?, &[tests])
-        }
-        DataRange::ComplementOf(_) => return Err("the complement of a data range"),
-    })
-}
-
-fn comparison(facet: &str) -> Result<BuiltIn, &'static str> {
-    match facet.strip_prefix(xsd::NS) {
-        Some("minInclusive") => Ok(BuiltIn::GreaterThanOrEqual),
-        Some("minExclusive") => Ok(BuiltIn::GreaterThan),
-        Some("maxInclusive") => Ok(BuiltIn::LessThanOrEqual),
-        Some("maxExclusive") => Ok(BuiltIn::LessThan),
-        _ => Err("a facet other than a bound"),
-    }
-}
-
-fn datatype(context: &mut Context, iri: &str, value: Term) -> Result<Vec<Conjunction>, &'static str> {
-    if iri == rdfs::LITERAL {
-        return Ok(vec![Vec::new()]);
-    }
-    let mut constant = |literal| Term::Constant(context.symbols.literal(literal));
-    let test = |built_in, arguments: Vec<Term>| Atom::BuiltIn { built_in, arguments };
-    let is_decimal = test(BuiltIn::Subtract, vec![constant(Literal::integer(0)), value, value]);
-    let integer = |bound: Option<(BuiltIn, Term)>| {
-        let mut tests = vec![is_decimal.clone(), test(BuiltIn::Floor, vec![value, value])];
-        tests.extend(bound.map(|(built_in, bound)| test(built_in, vec![value, bound])));
-        vec![tests]
-    };
-    let zero = constant(Literal::integer(0));
-    Ok(match iri.strip_prefix(xsd::NS) {
-        Some("decimal") => vec![vec![is_decimal]],
-        Some("integer") => integer(None),
-        Some("nonNegativeInteger") => integer(Some((BuiltIn::GreaterThanOrEqual, zero))),
-        Some("positiveInteger") => integer(Some((BuiltIn::GreaterThan, zero))),
-        Some("nonPositiveInteger") => integer(Some((BuiltIn::LessThanOrEqual, zero))),
-        Some("negativeInteger") => integer(Some((BuiltIn::LessThan, zero))),
-        Some("string") => {
-            vec![vec![test(BuiltIn::StringConcat, vec![value, value, constant(Literal::string(""))])]]
-        }
-        Some("boolean") => {
-            let relation = context.members_of(&DataRange::Datatype(iri.into()));
-            for truth in [Literal::Boolean(true), Literal::Boolean(false)] {
-                let member = context.symbols.literal(truth);
-                context.state(relation, [member]);
-            }
-            vec![vec![Atom::relation(relation, [value])]]
-        }
-        _ => return Err("a datatype that is not tested"),
-    })
+pub(crate) fn condition(context: &mut Context, range: &DataRange, value: Term) -> Tests {
+    Lowering { context, value }.tests(range, true, DEPTH)
 }
 
 /// The bodies that hold where `edges` do and `value` is outside `range`.
-pub(crate) fn violations(
-    context: &mut Context,
-    range: &DataRange,
-    edges: &[Atom],
+pub(crate) fn violations(context: &mut Context, range: &DataRange, edges: &[Atom], value: Term) -> Tests {
+    let outside = Lowering { context, value }.tests(range, false, DEPTH)?;
+    Ok(outside.into_iter().map(|tests| edges.iter().cloned().chain(tests).collect()).collect())
+}
+
+struct Lowering<'c, 'a> {
+    context: &'c mut Context<'a>,
     value: Term,
-) -> Result<Vec<Conjunction>, &'static str> {
-    let inside = condition(context, range, value)?;
-    if inside.iter().any(Vec::is_empty) {
-        return Ok(Vec::new());
-    }
-    let predicate = match &inside[..] {
-        [only] if let [Atom::Relation { predicate, .. }] = &only[..] => *predicate,
-        _ => {
-            let relation = context.members_of(range);
-            let label = Some(range.to_string().into());
-            let identity = RuleIdentity { source: super::AXIOM_SOURCE.into(), label, position: 0 };
-            for tests in inside {
-                let body = edges.iter().cloned().chain(tests).collect();
-                context.rule(&identity, vec![Atom::relation(relation, [value])], body, &Variables::default());
-            }
-            relation
+}
+
+impl Lowering<'_, '_> {
+    /// The conjunctions of tests of which one holds where the value is in `range` (or is outside it).
+    fn tests(&mut self, range: &DataRange, inside: bool, depth: usize) -> Tests {
+        if depth == 0 {
+            return Err("datatypes that are defined by each other");
         }
-    };
-    let absent = Atom::Not { predicate, arguments: vec![value] };
-    Ok(vec![edges.iter().cloned().chain([absent]).collect()])
+        match range {
+            DataRange::Datatype(iri) => match self.context.definitions.get(iri).cloned() {
+                Some(definition) => self.tests(&definition, inside, depth - 1),
+                None => self.datatype(iri, inside),
+            },
+            DataRange::OneOf(literals) => {
+                let predicate = self.context.members_of(range);
+                for literal in literals {
+                    let member = self.context.literal(literal);
+                    self.context.state(predicate, [member]);
+                }
+                let arguments = vec![self.value];
+                let member = if inside {
+                    Atom::Relation { predicate, arguments }
+                } else {
+                    Atom::Not { predicate, arguments }
+                };
+                Ok(vec![vec![member]])
+            }
+            DataRange::IntersectionOf(ranges) if inside => self.all(ranges, inside, depth),
+            DataRange::IntersectionOf(ranges) => self.any(ranges, inside, depth),
+            DataRange::UnionOf(ranges) if inside => self.any(ranges, inside, depth),
+            DataRange::UnionOf(ranges) => self.all(ranges, inside, depth),
+            DataRange::ComplementOf(range) => self.tests(range, !inside, depth - 1),
+            DataRange::Restriction(iri, facets) => {
+                let mut within = self.datatype(iri, true)?;
+                let mut outside = self.datatype(iri, false)?;
+                for (facet, bound) in facets {
+                    let outer = self.facet(facet, bound, false)?;
+                    outside.extend(super::class::cross(&within, &[vec![outer]]));
+                    within = super::class::cross(&within, &[vec![self.facet(facet, bound, true)?]]);
+                }
+                Ok(if inside { within } else { outside })
+            }
+        }
+    }
+
+    fn all(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
+        let mut product = vec![Vec::new()];
+        for range in ranges {
+            product = super::class::cross(&product, &self.tests(range, inside, depth - 1)?);
+        }
+        Ok(product)
+    }
+
+    fn any(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
+        let mut any = Vec::new();
+        for range in ranges {
+            any.extend(self.tests(range, inside, depth - 1)?);
+        }
+        Ok(any)
+    }
+
+    fn datatype(&mut self, iri: &str, inside: bool) -> Tests {
+        if iri == rdfs::LITERAL {
+            return Ok(if inside { vec![Vec::new()] } else { Vec::new() });
+        }
+        let known = match iri.strip_prefix(xsd::NS) {
+            Some(local) => DATATYPES.contains(&format!(" {local} ")),
+            None => [owl::REAL, owl::RATIONAL, rdf::PLAIN_LITERAL].contains(&iri),
+        };
+        if !known {
+            return Err("a datatype whose values are not known");
+        }
+        let datatype = Term::Constant(self.context.symbols.literal(Literal::Uri(iri.into())));
+        let built_in = if inside { BuiltIn::DataRange } else { BuiltIn::OutsideDataRange };
+        Ok(vec![vec![Atom::BuiltIn { built_in, arguments: vec![self.value, datatype] }]])
+    }
+
+    /// The test that a value of the restricted datatype keeps a facet, or breaks it.
+    fn facet(&mut self, facet: &str, bound: &crate::owl::Literal, keeps: bool) -> Result<Atom, &'static str> {
+        let built_in = match (facet.strip_prefix(xsd::NS), keeps) {
+            (Some("minInclusive"), true) | (Some("maxExclusive"), false) => BuiltIn::GreaterThanOrEqual,
+            (Some("minExclusive"), true) | (Some("maxInclusive"), false) => BuiltIn::GreaterThan,
+            (Some("maxInclusive"), true) | (Some("minExclusive"), false) => BuiltIn::LessThanOrEqual,
+            (Some("maxExclusive"), true) | (Some("minInclusive"), false) => BuiltIn::LessThan,
+            _ => return Err("a facet other than a bound"),
+        };
+        let bound = Term::Constant(self.context.literal(bound));
+        Ok(Atom::BuiltIn { built_in, arguments: vec![self.value, bound] })
+    }
 }

@@ -23,7 +23,8 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
         };
         let position = context.rules.len();
         let (ontology, label) = (rule.ontology.to_string(), rule.label.as_ref().map(ToString::to_string));
-        if let Err(reason) = lower_rule(rule, &identity, context) {
+        let result = lower_rule(rule, &identity, context);
+        if let Err(reason) = context.take_gaps().map_err(str::to_owned).and(result) {
             context.rules.truncate(position);
             context.warnings.push(Warning::UnusableRule { ontology, position: rule.position, label, reason });
             continue;
@@ -123,7 +124,7 @@ fn condition(
         Atom::Class(ClassExpression::Class(iri), _) if &**iri == owl::THING => vec![Vec::new()],
         Atom::Class(class, argument) => {
             let x = term(context, argument, variables);
-            class::condition(context, class, x, variables)?
+            class::condition(context, class, x, variables)
         }
         Atom::DataRange(range, argument) => {
             let value = term(context, argument, variables);
@@ -162,7 +163,7 @@ fn conclusions(
     match atom {
         Atom::Class(class, argument) => {
             let x = term(context, argument, variables);
-            Ok(class::conclusions(context, class, x, variables)?)
+            Ok(class::conclusions(context, class, x, variables))
         }
         Atom::DataRange(..) => Err("a data range as a conclusion".to_owned()),
         Atom::BuiltIn(..) => Err("a built-in as a conclusion".to_owned()),

@@ -3,7 +3,7 @@
 //! A functional value is replaced in one [`Delta`], so that no engine ever sees two of them. Retraction does the
 //! rest: a status that was concluded from the old value goes with it.
 
-use rules::{Atom, Delta, Engine, Fact, Literal, Symbol, Symbols, Term as Argument};
+use rules::{Atom, BuiltIn, Delta, Engine, Fact, Literal, Symbol, Symbols, Term as Argument};
 
 use super::facts::Facts;
 use super::terms::{self, beside};
@@ -154,20 +154,33 @@ pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option
     Delta { insert: new.into_iter().collect(), delete }
 }
 
-/// Whether no constraint of the program forbids a value that lies outside an enumerated range of the property.
+/// Whether no constraint of the program forbids a value because it lies outside the property's range: outside an
+/// enumeration, or in another datatype.
 fn allows(engine: &Engine, property: Symbol, value: Symbol) -> bool {
-    let ranges = engine.program().rules.iter().filter(|rule| rule.head.is_empty()).filter_map(|rule| {
-        match &rule.body[..] {
-            [Atom::Relation { predicate, arguments }, Atom::Not { predicate: range, arguments: tested }]
-                if *predicate == property && arguments.get(1) == tested.first() =>
-            {
-                Some(*range)
-            }
-            _ => None,
+    let symbols = engine.symbols();
+    let forbids = |test: &Atom, tested: &Argument| match test {
+        Atom::Not { predicate, arguments } if arguments.first() == Some(tested) => {
+            is_enumeration(engine, *predicate) && !engine.holds(&Fact::new(*predicate, [value]))
         }
+        Atom::BuiltIn { built_in: BuiltIn::OutsideDataRange, arguments } => match arguments[..] {
+            [first, Argument::Constant(datatype)] if first == *tested => {
+                match (symbols.value(value).as_literal(), symbols.value(datatype).as_literal()) {
+                    (Some(value), Some(Literal::Uri(datatype))) => !value.is_in(datatype),
+                    _ => false,
+                }
+            }
+            _ => false,
+        },
+        _ => false,
+    };
+    let constraints = engine.program().rules.iter().filter(|rule| rule.head.is_empty());
+    let mut tests = constraints.filter_map(|rule| match &rule.body[..] {
+        [Atom::Relation { predicate, arguments }, test] if *predicate == property => {
+            Some((arguments.get(1)?, test))
+        }
+        _ => None,
     });
-    let mut ranges = ranges.filter(|range| is_enumeration(engine, *range));
-    ranges.all(|range| engine.holds(&Fact::new(range, [value])))
+    !tests.any(|(tested, test)| forbids(test, tested))
 }
 
 /// Whether a range lists its members, and is not computed from the values that occur.

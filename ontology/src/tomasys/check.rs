@@ -10,8 +10,8 @@ use super::facts::Facts;
 use super::terms::{self, Term};
 use crate::error::Warning;
 use crate::owl::{
-    Argument, Atom, Axiom, Characteristic, DataRange, Iri, Literal, ObjectPropertyExpression as Property,
-    Ontology,
+    AnnotatedAxiom, Argument, Atom, Axiom, Characteristic, DataRange, Iri, Literal,
+    ObjectPropertyExpression as Property, Ontology,
 };
 
 /// Checks a model: the ontology, and an engine that holds what follows from it. Sorted.
@@ -86,47 +86,54 @@ fn measurements(facts: Facts) -> Vec<Warning> {
 
 /// Individuals with several stated values of a functional property. Numbers are compared by value.
 fn several_values(ontology: &Ontology) -> Vec<Warning> {
-    let functional: BTreeSet<&Iri> =
-        ontology
-            .axioms
-            .iter()
-            .filter_map(|annotated| match &annotated.axiom {
-                Axiom::FunctionalDataProperty(property)
-                | Axiom::ObjectPropertyCharacteristic(
-                    Characteristic::Functional,
-                    Property::Property(property),
-                ) => Some(property),
-                _ => None,
-            })
-            .collect();
-    let mut individuals = BTreeMap::<(&Iri, &Iri), BTreeSet<String>>::new();
-    let mut literals = BTreeMap::<(&Iri, &Iri), BTreeSet<String>>::new();
-    for annotated in &ontology.axioms {
-        match &annotated.axiom {
-            Axiom::ObjectPropertyAssertion(Property::Property(property), from, to)
-                if functional.contains(property) =>
-            {
-                individuals.entry((from, property)).or_default().insert(format!("<{to}>"));
-            }
-            Axiom::DataPropertyAssertion(property, from, to) if functional.contains(property) => {
-                literals.entry((from, property)).or_default().insert(value(to).to_string());
-            }
-            _ => {}
-        }
-    }
-    let one = "they are taken for one individual";
-    let contradiction = "this is a contradiction";
-    let kinds = [(individuals, one), (literals, contradiction)];
-    let all =
-        kinds.into_iter().flat_map(|(kind, consequence)| kind.into_iter().map(move |v| (v, consequence)));
-    all.filter(|((_, values), _)| values.len() > 1)
-        .map(|(((subject, property), values), consequence)| Warning::SeveralValues {
+    let functional: BTreeSet<&Iri> = ontology.axioms.iter().filter_map(functional).collect();
+    // Axioms are sorted, so that the values of one property of one individual are neighbours.
+    let neighbours = ontology.axioms.chunk_by(|a, b| edge(a).is_some_and(|edge| Some(edge) == self::edge(b)));
+    let several = neighbours.filter(|axioms| axioms.len() > 1).filter_map(|axioms| {
+        let (property, subject) = edge(&axioms[0]).filter(|(property, _)| functional.contains(property))?;
+        let values: BTreeSet<String> = axioms.iter().filter_map(object).collect();
+        let individuals = matches!(axioms[0].axiom, Axiom::ObjectPropertyAssertion(..));
+        (values.len() > 1).then(|| Warning::SeveralValues {
             subject: subject.to_string(),
             property: property.to_string(),
             values: values.into_iter().collect(),
-            consequence,
+            consequence: if individuals {
+                "they are taken for one individual"
+            } else {
+                "this is a contradiction"
+            },
         })
-        .collect()
+    });
+    several.collect()
+}
+
+/// The property that an axiom says is functional.
+fn functional(annotated: &AnnotatedAxiom) -> Option<&Iri> {
+    match &annotated.axiom {
+        Axiom::FunctionalDataProperty(property)
+        | Axiom::ObjectPropertyCharacteristic(Characteristic::Functional, Property::Property(property)) => {
+            Some(property)
+        }
+        _ => None,
+    }
+}
+
+/// Property and subject of an assertion.
+fn edge(annotated: &AnnotatedAxiom) -> Option<(&Iri, &Iri)> {
+    match &annotated.axiom {
+        Axiom::ObjectPropertyAssertion(Property::Property(property), subject, _)
+        | Axiom::DataPropertyAssertion(property, subject, _) => Some((property, subject)),
+        _ => None,
+    }
+}
+
+/// The value of an assertion, as N-Triples writes it.
+fn object(annotated: &AnnotatedAxiom) -> Option<String> {
+    match &annotated.axiom {
+        Axiom::ObjectPropertyAssertion(_, _, to) => Some(format!("<{to}>")),
+        Axiom::DataPropertyAssertion(_, _, to) => Some(value(to).to_string()),
+        _ => None,
+    }
 }
 
 fn value(literal: &Literal) -> Value {
@@ -146,22 +153,26 @@ fn kind(value: &Value) -> &'static str {
 fn statuses(ontology: &Ontology) -> Vec<Warning> {
     let properties =
         [terms::STATUS, terms::OBJECTIVE_STATUS, terms::GROUNDING_STATUS, terms::REALISABILITY].concat();
-    let mut warnings = Vec::new();
+    let mut expected = BTreeMap::<&str, &'static str>::new();
     for property in properties {
         let ranges = ranges(ontology, property);
-        let expected = if ranges.is_empty() { tested(ontology, property) } else { ranges };
-        let &[expected] = expected.iter().collect::<Vec<_>>().as_slice() else { continue };
-        for annotated in &ontology.axioms {
-            let Axiom::DataPropertyAssertion(stated, subject, status) = &annotated.axiom else { continue };
-            let status = value(status);
-            if &**stated == property && kind(&status) != *expected {
-                warnings.push(Warning::StatusDatatype {
-                    subject: subject.to_string(),
-                    property: property.to_owned(),
-                    value: status.to_string(),
-                    expected,
-                });
-            }
+        let kinds = if ranges.is_empty() { tested(ontology, property) } else { ranges };
+        if let &[kind] = kinds.iter().collect::<Vec<_>>().as_slice() {
+            expected.insert(property, kind);
+        }
+    }
+    let mut warnings = Vec::new();
+    for annotated in &ontology.axioms {
+        let Axiom::DataPropertyAssertion(property, subject, status) = &annotated.axiom else { continue };
+        let Some(expected) = expected.get(&**property) else { continue };
+        let status = value(status);
+        if kind(&status) != *expected {
+            warnings.push(Warning::StatusDatatype {
+                subject: subject.to_string(),
+                property: property.to_string(),
+                value: status.to_string(),
+                expected,
+            });
         }
     }
     warnings
