@@ -23,7 +23,10 @@ impl Encoding<'_> {
         }
         // What derived variables hold follows from the others at every step.
         for values in &mut possible[task.basic..] {
-            values.fill(true);
+            values[1] = true;
+        }
+        for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
+            possible[rule.head.variable.index()][rule.head.value as usize] = true;
         }
         self.declare_values(&possible, 0);
         for (step, allowed) in allowed.iter().enumerate() {

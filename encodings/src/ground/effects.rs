@@ -188,6 +188,9 @@ impl Case {
                 continue;
             }
             let condition = literals(world, condition);
+            if condition.windows(2).any(|pair| pair[0].0 == pair[1].0) {
+                continue;
+            }
             let position = conditional.iter().position(|known| known.condition == condition);
             let position = position.unwrap_or_else(|| {
                 conditional.push(GroundConditional { condition, adds: Vec::new(), deletes: Vec::new() });

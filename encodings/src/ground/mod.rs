@@ -11,6 +11,7 @@ mod effects;
 mod evaluate;
 mod finish;
 mod instantiate;
+mod intervals;
 mod join;
 mod metric;
 mod mutex;

@@ -6,8 +6,10 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::configuration::conjuncts;
+use crate::ground::derived::simplify;
 use crate::ground::evaluate::{AtomId, World};
 use crate::ground::instantiate::{GroundOperator, GroundTask};
+use crate::ground::intervals::{goal_can_hold, prune_by_numbers};
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::lifted::{Arguments, Formula, Lifted, PredicateId, Rational};
 use crate::quantity::NumericId;
@@ -20,13 +22,22 @@ pub(crate) fn prune(lifted: &Lifted, task: &mut GroundTask<'_>) -> Option<String
         .keys()
         .map(|(predicate, arguments)| task.world.holds_initially(*predicate, arguments))
         .collect();
-    let reached = forward(task, &initially);
+    let mut reached = forward(task, &initially);
+    while prune_by_numbers(task) {
+        simplify(task);
+        reached = forward(task, &initially);
+    }
     let goal_atoms: Vec<AtomId> = match &task.goal {
         None => return Some(why_goal_is_false(lifted, task)),
         Some(goal) => goal.literals.iter().filter(|(_, positive)| *positive).map(|(atom, _)| *atom).collect(),
     };
     if let Some(atom) = goal_atoms.into_iter().find(|atom| !reached[atom.index()]) {
         return Some(never_true(&atom_name(lifted, task, atom)));
+    }
+    if !goal_can_hold(task) {
+        return Some(
+            "the numbers that the goal asks for are out of reach, even if nothing is ever deleted".into(),
+        );
     }
     drop_unread_numerics(task);
     backward(task);

@@ -1,0 +1,110 @@
+//! Which values numeric variables can have at all: interval reachability.
+//!
+//! The relaxation of Hoffmann's Metric-FF [1] with an upper and a lower end for each variable: an operator whose comparisons
+//! can hold somewhere in the intervals widens those of the variables that it changes. An end that still moves
+//! after a few rounds is taken to be unbounded, so that the iteration ends.
+//!
+//! [1] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003.
+
+use num_traits::Zero;
+
+use crate::ground::instantiate::GroundTask;
+use crate::ground::metric::initial_value;
+use crate::ground::normal_form::GroundCondition;
+use crate::lifted::Rational;
+use crate::quantity::{Linear, NumericId, Quantity};
+
+/// Ends of intervals move freely for this many rounds.
+const ROUNDS: usize = 3;
+
+/// A range of numbers; an end that is missing is unbounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Interval {
+    low: Option<Rational>,
+    high: Option<Rational>,
+}
+
+/// Removes operators and rules whose comparisons can never hold. Returns whether there were any.
+pub(crate) fn prune_by_numbers(task: &mut GroundTask<'_>) -> bool {
+    let conditions = task.operators.iter().map(|operator| &operator.condition);
+    let bodies = task.world.definitions.axioms.iter().map(|axiom| &axiom.body);
+    if conditions.chain(bodies).all(|condition| condition.comparisons.is_empty()) {
+        return false;
+    }
+    let intervals = reachable(task);
+    let (operators, axioms) = (task.operators.len(), task.world.definitions.axioms.len());
+    task.operators.retain(|operator| can_hold(&operator.condition, &intervals));
+    task.world.definitions.axioms.retain(|axiom| can_hold(&axiom.body, &intervals));
+    operators != task.operators.len() || axioms != task.world.definitions.axioms.len()
+}
+
+/// Whether the numeric part of the goal can hold.
+pub(crate) fn goal_can_hold(task: &GroundTask<'_>) -> bool {
+    let Some(goal) = task.goal.as_ref().filter(|goal| !goal.comparisons.is_empty()) else { return true };
+    can_hold(goal, &reachable(task))
+}
+
+fn reachable(task: &GroundTask<'_>) -> Vec<Interval> {
+    let variables = (0..task.world.numerics.len() as u32).map(NumericId);
+    let mut intervals: Vec<Interval> = variables
+        .map(|variable| {
+            let initial = initial_value(&task.world, variable);
+            Interval { low: Some(initial), high: Some(initial) }
+        })
+        .collect();
+    let changing: Vec<_> =
+        task.operators.iter().filter(|operator| !operator.numeric_effects.is_empty()).collect();
+    let mut round = 0;
+    loop {
+        let before = intervals.clone();
+        for operator in changing.iter().filter(|operator| can_hold(&operator.condition, &before)) {
+            for (variable, value) in &operator.numeric_effects {
+                let range = range(value, &before);
+                let own = &mut intervals[variable.index()];
+                own.low = own.low.zip(range.low).map(|(a, b)| a.min(b));
+                own.high = own.high.zip(range.high).map(|(a, b)| a.max(b));
+            }
+        }
+        if intervals == before {
+            return intervals;
+        }
+        round += 1;
+        if round > ROUNDS {
+            for (interval, before) in intervals.iter_mut().zip(&before) {
+                interval.low = interval.low.filter(|low| before.low == Some(*low));
+                interval.high = interval.high.filter(|high| before.high == Some(*high));
+            }
+        }
+    }
+}
+
+fn can_hold(condition: &GroundCondition, intervals: &[Interval]) -> bool {
+    condition.comparisons.iter().all(|(linear, strict)| match range(linear, intervals).high {
+        Some(high) if *strict => high > Rational::zero(),
+        Some(high) => high >= Rational::zero(),
+        None => true,
+    })
+}
+
+/// The values that an expression can have.
+fn range(linear: &Linear<Rational>, intervals: &[Interval]) -> Interval {
+    let mut low = Some(extreme(&linear.quantity, Iterator::min));
+    let mut high = Some(extreme(&linear.quantity, Iterator::max));
+    for (variable, factor) in &linear.coefficients {
+        let own = intervals[variable.index()];
+        let (least, most) =
+            if *factor > Rational::zero() { (own.low, own.high) } else { (own.high, own.low) };
+        low = low.zip(least).map(|(sum, value)| sum + factor * value);
+        high = high.zip(most).map(|(sum, value)| sum + factor * value);
+    }
+    Interval { low, high }
+}
+
+/// The sum of the extreme entries of all tables: a bound for every combination of designs.
+fn extreme<'q>(
+    quantity: &'q Quantity<Rational>,
+    pick: impl Fn(std::slice::Iter<'q, Rational>) -> Option<&'q Rational>,
+) -> Rational {
+    let tables = quantity.tables.iter().filter_map(|table| pick(table.values.iter()));
+    tables.fold(quantity.constant, |sum, value| sum + value)
+}

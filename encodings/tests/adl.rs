@@ -1,0 +1,294 @@
+//! Plans with conditional effects, derived predicates, quantifiers and disjunctions: known optima, and random tasks on
+//! which the quick search and the SAT solver alone must agree. (That ground tasks mean what the files mean is
+//! checked elsewhere, against an interpreter of the files.)
+
+use std::fmt::Write as _;
+
+use metaplan_encodings::pddl::{Source, read};
+use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, ground, optimize};
+
+/// Solves a task with the quick search, or with the SAT solver alone.
+fn solve(domain: &str, problem: &str, quick_search: bool) -> Solution {
+    let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
+        .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
+    let task = ground(&domain, &problem, &GroundConfig::default())
+        .unwrap_or_else(|errors| panic!("{errors:?}\n{domain:?}"));
+    let limits = Limits::none();
+    optimize(&task, &Config { horizon: None, quick_search, limits }, &mut |_| {})
+}
+
+/// Both ways find the cost; none stands for "no plan exists".
+fn check(name: &str, domain: &str, problem: &str, expected: Option<&str>) {
+    for quick_search in [true, false] {
+        let solution = solve(domain, problem, quick_search);
+        let found = solution.plan.map(|plan| plan.cost.to_string());
+        assert_eq!(found.as_deref(), expected, "{name}, quick search {quick_search}");
+        let status = if expected.is_some() { Status::Optimal } else { Status::Unsolvable };
+        assert_eq!(solution.status, status, "{name}, quick search {quick_search}");
+    }
+}
+
+const BRIEFCASE: &str = "(define (domain briefcase)
+ (:types place item)
+ (:predicates (at ?i - item ?l - place) (in ?i - item) (is-at ?l - place))
+ (:functions (total-cost) (weight ?i - item))
+ (:action move :parameters (?m ?l - place)
+  :precondition (and (is-at ?m) (not (= ?m ?l)))
+  :effect (and (is-at ?l) (not (is-at ?m)) (increase (total-cost) 1)
+    (forall (?x - item) (when (in ?x)
+      (and (at ?x ?l) (not (at ?x ?m)) (increase (total-cost) (weight ?x)))))))
+ (:action take-out :parameters (?x - item) :precondition (in ?x)
+  :effect (and (not (in ?x)) (increase (total-cost) 0.25)))
+ (:action put-in :parameters (?x - item ?l - place)
+  :precondition (and (not (in ?x)) (at ?x ?l) (is-at ?l)) :effect (and (in ?x) (increase (total-cost) 0.25))))";
+
+#[test]
+fn conditional_and_universal_effects() {
+    // Carry a there (1 + 2) and b back (1 + 3), four times a hand in the briefcase.
+    let problem = |goal: &str| {
+        format!(
+            "(define (problem p) (:domain briefcase) (:objects home office - place a b - item)
+             (:init (is-at home) (at a home) (at b office) (= (weight a) 2) (= (weight b) 3) (= (total-cost) 0))
+             (:goal {goal}) (:metric minimize (total-cost)))"
+        )
+    };
+    let swap = problem("(and (at a office) (at b home) (forall (?x - item) (not (in ?x))))");
+    check("swap", BRIEFCASE, &swap, Some("8"));
+    check("carry", BRIEFCASE, &problem("(exists (?x - item) (and (at ?x office) (in ?x)))"), Some("1.25"));
+    check("both places", BRIEFCASE, &problem("(and (at a home) (at a office))"), None);
+}
+
+const NETWORK: &str = "(define (domain network)
+ (:types node)
+ (:predicates (link ?a ?b - node) (up ?a ?b - node) (reaches ?a ?b - node) (isolated ?a - node)
+   (neighbours ?a ?b - node) (done))
+ (:functions (power) (total-cost))
+ (:derived (reaches ?a ?b - node) (or (up ?a ?b) (exists (?c - node) (and (up ?a ?c) (reaches ?c ?b)))))
+ (:derived (isolated ?a - node) (forall (?b - node) (not (reaches ?b ?a))))
+ (:derived (neighbours ?a ?b - node) (or (link ?a ?b) (link ?b ?a)))
+ (:action switch :parameters (?a ?b - node)
+   :precondition (and (neighbours ?a ?b) (not (up ?a ?b)) (or (>= (power) 2) (isolated ?b)))
+   :effect (and (up ?a ?b) (decrease (power) 1) (increase (total-cost) 1)))
+ (:action cut :parameters (?a ?b - node) :precondition (up ?a ?b)
+   :effect (and (not (up ?a ?b)) (increase (total-cost) 1)))
+ (:action charge :parameters () :precondition (< (power) 2)
+   :effect (and (assign (power) 3) (increase (total-cost) 5))))";
+
+#[test]
+fn derived_predicates_and_numbers_in_disjunctions() {
+    let problem = |goal: &str| {
+        format!(
+            "(define (problem p) (:domain network) (:objects a b c - node)
+             (:init (link a b) (link b c) (link c a) (= (power) 0) (= (total-cost) 0))
+             (:goal {goal}) (:metric minimize (total-cost)))"
+        )
+    };
+    let check = |name, goal, expected| check(name, NETWORK, &problem(goal), expected);
+    check("a path", "(reaches a c)", Some("1"));
+    check("a cycle", "(reaches a a)", Some("2"));
+    // The second line to a needs power.
+    check("in twice", "(and (up b a) (up c a))", Some("7"));
+    // Two up and down again are no more than nothing.
+    check("isolated", "(forall (?x - node) (isolated ?x))", Some("0"));
+    check("one but not back", "(and (reaches a c) (not (reaches c a)) (reaches b c))", Some("2"));
+    check("never", "(and (reaches a b) (isolated b))", None);
+}
+
+const DURATIVE: &str = "(define (domain rooms)
+ (:requirements :durative-actions)
+ (:predicates (lit) (warm) (dark) (inside) (done))
+ (:functions (heat))
+ (:durative-action enter :parameters () :duration (and (>= ?duration 2) (<= ?duration 5))
+   :condition (and (at start (not (inside))) (over all (or (lit) (warm))))
+   :effect (and (at start (inside)) (at start (when (dark) (lit))) (at end (when (lit) (done)))
+     (at end (when (not (dark)) (done)))))
+ (:durative-action heat-up :parameters () :duration (= ?duration 3)
+   :condition (at start (< (heat) 4)) :effect (and (at end (increase (heat) 2)) (at end (when (>= (heat) 2) (warm))))))";
+
+#[test]
+fn durative_actions_with_cases() {
+    let problem = |init: &str| {
+        format!(
+            "(define (problem p) (:domain rooms) (:init (= (heat) 0) {init}) (:goal (done)) (:metric minimize (total-time)))"
+        )
+    };
+    // In the dark the light goes on as the robot enters.
+    check("dark", DURATIVE, &problem("(dark)"), Some("2"));
+    // Else it must be warm: the second heating finds it at 2.
+    check("cold", DURATIVE, &problem(""), Some("8"));
+    check("inside", DURATIVE, &problem("(dark) (inside)"), None);
+}
+
+/// A small deterministic generator of numbers (`SplitMix64`).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        (z ^ (z >> 31)) % limit
+    }
+
+    fn pick<'t>(&mut self, all: &[&'t str]) -> &'t str {
+        all[self.below(all.len() as u64) as usize]
+    }
+
+    fn term(&mut self, variables: &[&'static str]) -> &'static str {
+        let constants = ["o1", "o2"];
+        if variables.is_empty() || self.below(4) == 0 {
+            constants[self.below(2) as usize]
+        } else {
+            variables[self.below(variables.len() as u64) as usize]
+        }
+    }
+
+    /// A condition over basic predicates p, q and r, derived ones up to `derived`, and the number n.
+    fn condition(&mut self, depth: u64, variables: &[&'static str], derived: u64) -> String {
+        let connective = if depth == 0 { 0 } else { self.below(8) };
+        let more = |own: &'static str| variables.iter().copied().chain([own]).collect::<Vec<_>>();
+        let quantified = ["?u", "?v", "?w"][depth.min(2) as usize];
+        match connective {
+            4 => format!(
+                "(and {} {})",
+                self.condition(depth - 1, variables, derived),
+                self.condition(depth - 1, variables, derived)
+            ),
+            5 => format!(
+                "(or {} {})",
+                self.condition(depth - 1, variables, derived),
+                self.condition(depth - 1, variables, derived)
+            ),
+            6 => format!("(exists ({quantified}) {})", self.condition(depth - 1, &more(quantified), derived)),
+            7 => format!("(forall ({quantified}) {})", self.condition(depth - 1, &more(quantified), derived)),
+            _ => {
+                let atom = match self.below(5 + 2 * derived) {
+                    0 | 1 => format!("(p {})", self.term(variables)),
+                    2 => format!("(q {} {})", self.term(variables), self.term(variables)),
+                    3 => "(r)".into(),
+                    4 => format!("({} (n) {})", self.pick(&["<", "<=", ">=", ">"]), self.below(3)),
+                    5 | 6 => format!("(d1 {})", self.term(variables)),
+                    _ => format!("(d2 {})", self.term(variables)),
+                };
+                if self.below(3) == 0 { format!("(not {atom})") } else { atom }
+            }
+        }
+    }
+
+    fn effect(&mut self, variables: &[&'static str]) -> String {
+        let atom = match self.below(5) {
+            0 | 1 => format!("(p {})", self.term(variables)),
+            2 => format!("(q {} {})", self.term(variables), self.term(variables)),
+            3 => "(r)".into(),
+            // The number stays between 0 and 3, so that the search ends.
+            _ => {
+                let change = [
+                    "(when (< (n) 3) (increase (n) 1))",
+                    "(when (> (n) 0) (decrease (n) 1))",
+                    "(when (r) (assign (n) 2))",
+                    "(assign (n) 3)",
+                ];
+                return self.pick(&change).into();
+            }
+        };
+        if self.below(3) == 0 { format!("(not {atom})") } else { atom }
+    }
+
+    fn domain(&mut self) -> String {
+        let mut text = String::from(
+            "(define (domain d) (:constants o1 o2) (:predicates (p ?x) (q ?x ?y) (r) (d1 ?x) (d2 ?x)) (:functions (n) (total-cost))",
+        );
+        // d1 is recursive and positive, d2 may negate it.
+        let seed = self.condition(1, &["?x"], 0);
+        let _ = write!(
+            text,
+            "(:derived (d1 ?x) {seed}) (:derived (d1 ?x) (exists (?y) (and (q ?x ?y) (d1 ?y))))"
+        );
+        let condition = self.condition(2, &["?x"], 1);
+        let _ = write!(text, "(:derived (d2 ?x) {condition})");
+        for action in 0..3 + self.below(2) {
+            let variables: &[&'static str] = if self.below(2) == 0 { &["?a"] } else { &[] };
+            let precondition = self.condition(2, variables, 2);
+            let _ = write!(
+                text,
+                "(:action a{action} :parameters ({}) :precondition {precondition} :effect (and (increase (total-cost) {})",
+                variables.join(" "),
+                1 + self.below(3)
+            );
+            for _ in 0..1 + self.below(3) {
+                match self.below(4) {
+                    0 | 1 => {
+                        let effect = self.effect(variables);
+                        let _ = write!(text, " {effect}");
+                    }
+                    2 => {
+                        let (condition, effect) = (self.condition(1, variables, 2), self.effect(variables));
+                        let _ = write!(text, " (when {condition} {effect})");
+                    }
+                    _ => {
+                        let mut more = variables.to_vec();
+                        more.push("?e");
+                        let condition = self.condition(1, &more, 2);
+                        let effect = format!("(p {})", self.term(&more));
+                        let effect = if self.below(2) == 0 { format!("(not {effect})") } else { effect };
+                        let _ = write!(text, " (forall (?e) (when {condition} {effect}))");
+                    }
+                }
+            }
+            text.push_str("))");
+        }
+        text.push(')');
+        text
+    }
+
+    fn problem(&mut self) -> String {
+        let mut text =
+            String::from("(define (problem p) (:domain d) (:objects o3) (:init (= (n) 1) (= (total-cost) 0)");
+        for fact in ["(p o1)", "(p o3)", "(q o1 o2)", "(q o2 o3)", "(q o3 o1)", "(r)"] {
+            if self.below(3) == 0 {
+                let _ = write!(text, " {fact}");
+            }
+        }
+        let goal = format!("(and {} {})", self.condition(2, &[], 2), self.condition(1, &[], 2));
+        let _ = write!(text, ") (:goal {goal}) (:metric minimize (total-cost)))");
+        text
+    }
+}
+
+/// Plans of at most this many steps are compared: the solver alone has no proof that there is no plan of any length.
+const HORIZON: usize = 4;
+
+fn agree(seeds: std::ops::Range<u64>) {
+    let (mut solved, mut longest) = (0, 0);
+    for seed in seeds {
+        let mut random = Random(seed);
+        let (domain, problem) = (random.domain(), random.problem());
+        let (parsed, goal, _) = read(&Source::new("domain", &domain), &Source::new("problem", &problem))
+            .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}\n{domain}\n{problem}"));
+        let task = ground(&parsed, &goal, &GroundConfig::default())
+            .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}\n{domain}\n{problem}"));
+        let run = |quick_search| {
+            let config = Config { horizon: Some(HORIZON), quick_search, limits: Limits::none() };
+            optimize(&task, &config, &mut |_| {})
+        };
+        let (quick, sat) = (run(true), run(false));
+        let cost = |solution: &Solution| solution.plan.as_ref().map(|plan| plan.cost.to_string());
+        assert_eq!(cost(&quick), cost(&sat), "seed {seed}\n{domain}\n{problem}\n{quick:?}\n{sat:?}");
+        solved += usize::from(cost(&quick).is_some());
+        longest = longest.max(quick.plan.map_or(0, |plan| plan.steps.len()));
+    }
+    println!("{solved} solved, the longest plan has {longest} steps");
+    assert!(solved > 0 && longest > 1, "{solved} solved, the longest plan has {longest} steps");
+}
+
+#[test]
+fn search_and_solver_agree() {
+    agree(0..60);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn search_and_solver_agree_on_many() {
+    agree(1_000..4_000);
+}
