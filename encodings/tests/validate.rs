@@ -157,6 +157,7 @@ fn temporal_plans_one_after_another() {
         &[
             ("(prepare)\n(work)", "valid time=10/3 metric=50/3 (level)=20/3"),
             ("0.000: (prepare)\n0.001: (work) [3.333]", "valid time=10/3 metric=50/3 (level)=20/3"),
+            ("0.0: (PREPARE) [0]\n0.001: (WORK)[3.333])", "valid time=10/3 metric=50/3 (level)=20/3"),
             // The order is that of the times, not of the lines.
             ("1: (work) [3.333]\n0: (prepare) [0.001]", "valid time=10/3 metric=50/3 (level)=20/3"),
             (

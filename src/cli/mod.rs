@@ -1,6 +1,7 @@
 //! Arguments to calls of the library, answers to standard output, everything else to standard error.
 
 mod convert;
+mod export;
 mod output;
 mod plan;
 mod reason;
@@ -97,6 +98,8 @@ enum Command {
     Reason(reason::Arguments),
     /// A knowledge base with its imports as one document in another syntax.
     Convert(convert::Arguments),
+    /// A mission for other planners, with what the knowledge base has contributed.
+    Export(export::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
     Validate(validate::Arguments),
 }
@@ -272,6 +275,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Plan(arguments) => plan::run(arguments, &cli.common),
         Command::Reason(arguments) => reason::run(arguments, &cli.common),
         Command::Convert(arguments) => convert::run(arguments, &cli.common),
+        Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),
     }
 }

@@ -24,6 +24,19 @@ pub struct Arguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
+    /// Actions may overlap, by the rules of PDDL 2.1; without it they are executed one after another.
+    #[arg(long)]
+    concurrent: bool,
+    /// How far times may lie from the exact ones, and how far apart actions that interfere must begin and end.
+    #[arg(long, value_name = "TIME", default_value = "0.001", value_parser = time)]
+    tolerance: BigRational,
+}
+
+fn time(text: &str) -> Result<BigRational, String> {
+    let value = text.parse::<serde_json::Number>().ok().and_then(|number| decimal(&Value::Number(number)));
+    value
+        .filter(|value| *value >= BigRational::default())
+        .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
 /// Runs the command.
@@ -41,7 +54,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
     let plan = read_plan(&source(plan)?)?;
-    let verdict = validate(mission.domain(), &problem, &plan, &Options::default());
+    let options = Options { concurrent: arguments.concurrent, tolerance: arguments.tolerance.clone() };
+    let verdict = validate(mission.domain(), &problem, &plan, &options);
     match common.format {
         Format::Json => output::json_answer(&json(&verdict)),
         _ => output::answer(&text(&verdict)),

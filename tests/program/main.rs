@@ -2,6 +2,7 @@
 
 mod cli;
 mod common;
+mod export;
 mod real;
 mod reason;
 mod reference;

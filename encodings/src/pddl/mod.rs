@@ -9,6 +9,7 @@ pub mod diagnostic;
 pub(crate) mod names;
 pub(crate) mod number;
 pub mod parse;
+mod portable;
 pub mod print;
 mod sexp;
 pub mod source;
@@ -18,6 +19,7 @@ pub(crate) mod types;
 pub use check::{check, check_domain};
 pub use diagnostic::{Diagnostic, Severity, has_errors, render};
 pub use parse::{parse_domain, parse_problem};
+pub use portable::portable;
 pub use print::{print_domain, print_problem};
 pub use source::{Position, Source};
 

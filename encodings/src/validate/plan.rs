@@ -89,7 +89,11 @@ fn step(line: &str) -> Result<PlanStep, String> {
     let duration = match after.trim() {
         "" => None,
         bracket => {
-            let inner = bracket.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
+            // LPG closes a parenthesis that it has not opened: `[5.0000])`.
+            let inner = bracket
+                .trim_end_matches([')', ' '])
+                .strip_prefix('[')
+                .and_then(|rest| rest.strip_suffix(']'));
             let inner = inner.ok_or("expected a duration such as `[5.000]` behind the action")?;
             Some(number(inner.trim().trim_start_matches("D:").split(';').next().unwrap_or_default().trim())?)
         }

@@ -1,0 +1,60 @@
+//! `metaplan export`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use encodings::pddl::{portable, print_domain, print_problem};
+use metaplan::message::Message;
+use serde_json::json;
+
+use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission's manifest, or a PDDL domain and a PDDL problem.
+    #[arg(required = true, num_args = 1..=2, value_name = "MISSION | DOMAIN PROBLEM")]
+    inputs: Vec<PathBuf>,
+    /// What to write.
+    #[arg(long = "to", value_enum, value_name = "FORMAT")]
+    target: Target,
+    #[command(flatten)]
+    situation: Situation,
+    /// A directory for `domain.pddl` and `problem.pddl`, made if it is not there; standard output by default.
+    #[arg(long, short, value_name = "DIR")]
+    output: Option<PathBuf>,
+}
+
+/// What a mission can be written as.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Target {
+    /// The domain and the problem as they are planned, availability and values filled in, in a form that other
+    /// planners accept.
+    Pddl,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let Target::Pddl = arguments.target;
+    let mission = arguments.situation.mission(&arguments.inputs)?;
+    let (problem, warnings) = mission.filled()?;
+    output::warnings(common, mission.warnings().chain(&warnings));
+    let (domain, problem) = portable(mission.domain(), &problem);
+    let (domain, problem) = (print_domain(&domain), print_problem(&problem));
+    match &arguments.output {
+        Some(directory) => {
+            std::fs::create_dir_all(directory).map_err(|error| {
+                let text = format!("cannot be made: {}", error.kind());
+                Message::at("M109", &directory.display().to_string(), None, text)
+            })?;
+            output::write_file(&directory.join("domain.pddl"), &domain)?;
+            output::write_file(&directory.join("problem.pddl"), &problem)?;
+        }
+        None if common.format == Format::Json => {
+            let answer = json!({ "format": "metaplan-export/1", "domain": domain, "problem": problem });
+            output::json_answer(&answer);
+        }
+        None => output::answer(&format!("{domain}\n{problem}")),
+    }
+    Ok(Exit::Done)
+}

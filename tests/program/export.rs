@@ -1,0 +1,130 @@
+//! `export`: what other planners get, and that it is the same mission.
+
+use crate::common::{metaplan, metaplan_in, root};
+
+const MISSIONS: [(&str, &[&str], i64); 4] = [
+    ("missions/ugv.toml", &[], 408),
+    ("missions/ugv.toml", &["--scenario", "kinect_failure"], 412),
+    ("missions/uuv.toml", &[], 28),
+    ("missions/uuv.toml", &["--set", "battery=15"], 60),
+];
+
+#[test]
+fn what_is_exported_has_the_same_optimum_without_the_knowledge_base() {
+    for (mission, situation, cost) in MISSIONS {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let target = directory.path().join("new/folder");
+        let target = target.to_str().expect("UTF-8");
+        let arguments = [&["export", mission, "--to", "pddl", "-o", target], situation].concat();
+        let outcome = metaplan(&arguments);
+        assert_eq!((outcome.status, outcome.stdout.as_str()), (0, ""), "{outcome:#?}");
+        let plan =
+            metaplan_in(target.as_ref(), &["plan", "domain.pddl", "problem.pddl", "--format", "json"], "");
+        assert_eq!((plan.status, plan.json()["cost"].as_i64()), (0, Some(cost)), "{plan:#?}");
+        assert_eq!(plan.stderr, "", "what is exported is clean");
+        let verdict = metaplan_in(&root(), &[&["validate", mission, "-"], situation].concat(), &plan.stdout);
+        assert_eq!(verdict.status, 0, "{verdict:#?}");
+    }
+}
+
+#[test]
+fn availability_and_values_are_filled_in() {
+    let outcome = metaplan(&["export", "missions/ugv.toml", "--to", "pddl", "--fail", "c_kinect"]);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    for fact in ["(fd_available fd_amcl_lidar)", "(= (battery_usage fd_amcl_lidar) 4)", "(robot_at wp1)"] {
+        assert!(outcome.stdout.contains(fact), "{fact} in {}", outcome.stdout);
+    }
+    assert!(!outcome.stdout.contains("(fd_available fd_amcl_kinect)"), "{}", outcome.stdout);
+}
+
+const DOMAIN: &str = "(define (domain d) (:types dock - place) (:constants home - dock)
+ (:predicates (at ?x -place) (seen ?x - ghost))
+ (:derived (seen ?x) (at ?x))
+ (:action go :parameters (?x ?y - place) :precondition (and (at ?x) (not (= ?x ?y)) (exists (?z) (seen ?z)))
+  :effect (and (not (at ?x)) (at ?y) (increase (total-cost) 1.5) (when (at home) (at a)))))";
+const PROBLEM: &str =
+    "(define (problem p) (:domain other) (:requirements :typing) (:objects home - dock a - place)
+ (:init (at a) (at a) (not (at home)) (= (total-cost) 0)) (:goal (at home)) (:metric minimize (total-cost)))";
+
+#[test]
+fn quirks_are_gone() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    std::fs::write(directory.path().join("d.pddl"), DOMAIN).expect("a file");
+    std::fs::write(directory.path().join("p.pddl"), PROBLEM).expect("a file");
+    // The domain uses `a`, which is an object of the problem.
+    let arguments = ["export", "d.pddl", "p.pddl", "--to", "pddl", "--quiet", "--format", "json"];
+    let outcome = metaplan_in(directory.path(), &arguments, "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let answer = outcome.json();
+    assert_eq!(answer["format"], "metaplan-export/1");
+    let text = |key: &str| {
+        let words: Vec<_> = answer[key].as_str().unwrap_or_default().split_whitespace().collect();
+        words.join(" ").replace(" )", ")")
+    };
+    assert_eq!(
+        text("domain"),
+        "(define (domain d) (:requirements :action-costs :conditional-effects :derived-predicates :equality \
+         :existential-preconditions :negative-preconditions :strips :typing) (:types dock - place place) \
+         (:constants home - dock a - place) (:predicates (at ?x - place) (seen ?x)) (:functions (total-cost)) \
+         (:derived (seen ?x) (at ?x)) (:action go :parameters (?x ?y - place) \
+         :precondition (and (at ?x) (not (= ?x ?y)) (exists (?z) (seen ?z))) \
+         :effect (and (not (at ?x)) (at ?y) (increase (total-cost) 1.5) (when (at home) (at a)))))"
+    );
+    assert_eq!(
+        text("problem"),
+        "(define (problem p) (:domain d) (:init (at a) (= (total-cost) 0)) \
+         (:goal (at home)) (:metric minimize (total-cost)))"
+    );
+}
+
+#[test]
+fn what_cannot_be_written_is_said() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let file = directory.path().join("file");
+    std::fs::write(&file, "").expect("a file");
+    let file = file.to_str().expect("UTF-8");
+    let outcome = metaplan(&["export", "missions/ugv.toml", "--to", "pddl", "-o", file]);
+    assert_eq!(outcome.status, 3, "{outcome:#?}");
+    assert!(outcome.stderr.contains("M109"), "{outcome:#?}");
+    assert_eq!(metaplan(&["export", "missions/ugv.toml"]).status, 2);
+}
+
+/// Plans of LPG and the reader of the unified planning framework, on what is exported. Needs a Python with both
+/// (`python3 -m venv peers; peers/bin/pip install unified-planning up-lpg`), named by `METAPLAN_PEERS=peers/bin/python`.
+#[test]
+#[ignore = "needs peers"]
+fn peers_read_what_is_exported() {
+    let Ok(python) = std::env::var("METAPLAN_PEERS") else { panic!("METAPLAN_PEERS names no Python") };
+    let run = |script: &str, directory: &std::path::Path| {
+        let output = std::process::Command::new(&python).args(["-c", script]).current_dir(directory).output();
+        let output = output.expect("Python starts");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    };
+    let lpg = "import importlib.util as u, subprocess as s, os
+lpg = os.path.join(os.path.dirname(u.find_spec('up_lpg').origin), 'lpg')
+s.run([lpg, '-o', 'domain.pddl', '-f', 'problem.pddl', '-n', '1', '-out', 'plan'], check=True)";
+    let reader = "from unified_planning.io import PDDLReader
+assert PDDLReader().parse_problem('domain.pddl', 'problem.pddl').actions";
+    for (mission, situation, cost) in MISSIONS {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let target = directory.path().to_str().expect("UTF-8");
+        let outcome = metaplan(&[&["export", mission, "--to", "pddl", "-o", target], situation].concat());
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        // The framework has no metric over time and a fluent together.
+        if mission.contains("uuv") {
+            run(reader, directory.path());
+        }
+        run(lpg, directory.path());
+        let arguments = ["validate", "domain.pddl", "problem.pddl", "plan_1.SOL", "--format", "json"];
+        let verdict = metaplan_in(directory.path(), &arguments, "");
+        assert_eq!(verdict.status, 0, "{verdict:#?}");
+        assert!(verdict.json()["metric"].as_i64().is_some_and(|found| found >= cost), "{verdict:#?}");
+        let concurrent = [&arguments[..], &["--concurrent", "--tolerance", "0.0001"]].concat();
+        assert_eq!(metaplan_in(directory.path(), &concurrent, "").status, 0);
+        assert_eq!(
+            metaplan_in(directory.path(), &[&arguments[..], &["--tolerance", "-1"]].concat(), "").status,
+            2
+        );
+    }
+}
