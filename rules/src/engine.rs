@@ -9,15 +9,17 @@
 
 use std::sync::Arc;
 
+use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
+use crate::equality::Equality;
 use crate::error::Error;
-use crate::fact::Fact;
+use crate::fact::{Arguments, Fact};
 use crate::maintain::{Maintenance, state_change};
-use crate::network::{Network, compile};
+use crate::network::{Network, SAME_AS, compile};
 use crate::record::Records;
 use crate::rule::{Program, Rule};
-use crate::store::{Record, Store, columns, state};
+use crate::store::{Store, columns, state};
 use crate::symbol::{Symbol, Symbols};
 
 /// How many partial matches one update may extend, unless the caller says otherwise.
@@ -51,6 +53,8 @@ pub struct Engine {
     pub(crate) budget: u64,
     /// Rules that are switched off.
     pub(crate) disabled: Vec<Rule>,
+    /// Where `owl:sameAs` is equality, the names of each individual; the store then knows one of each.
+    pub(crate) equality: Option<Box<Equality>>,
 }
 
 impl Engine {
@@ -76,22 +80,38 @@ impl Engine {
         facts: impl IntoIterator<Item = Fact>,
         budget: u64,
     ) -> Result<Self, Vec<Error>> {
-        let (mut symbols, mut store) = (symbols, Store::default());
-        for fact in facts {
-            check_fact(&fact, &symbols).map_err(|error| vec![error])?;
-            let relation = store.relation(fact.predicate, fact.arguments.len());
-            let relation = store.get_mut(relation);
-            if relation.find(&fact.arguments).is_none() {
-                relation.insert(&fact.arguments, state::ASSERTED, Record::NONE);
-            }
+        let facts: Vec<Fact> = facts.into_iter().collect();
+        if let Some(error) = facts.iter().find_map(|fact| check_fact(fact, &symbols).err()) {
+            return Err(vec![error]);
         }
-        let network = compile(&program, &mut symbols, &mut store)?;
-        let records = Records::new(&network);
-        let (program, network) = (Arc::new(program), Arc::new(network));
-        let symbols = Arc::new(symbols);
-        let mut engine = Self { symbols, program, network, store, records, budget, disabled: Vec::new() };
-        Maintenance::new(&mut engine).derive_all().map_err(|error| vec![error])?;
+        let mut symbols = symbols;
+        let same = program.equality.then(|| symbols.name(SAME_AS));
+        let (program, symbols) = (Arc::new(program), Arc::new(symbols));
+        let equality = same.map(|same| Box::new(Equality::new(same, &program)));
+        let (network, store, records) = (Arc::default(), Store::default(), Records::default());
+        let mut engine =
+            Self { symbols, program, network, store, records, budget, disabled: Vec::new(), equality };
+        engine.build(facts)?;
         Ok(engine)
+    }
+
+    /// Derives everything from stated facts, in an engine that holds nothing.
+    fn build(&mut self, facts: Vec<Fact>) -> Result<(), Vec<Error>> {
+        let mut evaluated = Arc::clone(&self.program);
+        if self.equality.is_some() {
+            self.begin(facts);
+        } else {
+            self.store.state(facts);
+        }
+        if let Some(equality) = &mut self.equality {
+            evaluated = Arc::new(equality.normal_program(&self.program));
+            equality.program = Arc::clone(&evaluated);
+        }
+        let network = compile(&evaluated, Arc::make_mut(&mut self.symbols), &mut self.store)?;
+        self.records = Records::new(&network);
+        self.network = Arc::new(network);
+        Maintenance::new(self).derive_all().map_err(|error| vec![error])?;
+        self.settle().map_err(|error| vec![error])
     }
 
     /// Changes which facts are stated and returns the net change of all facts that hold, stated or derived, sorted.
@@ -103,6 +123,9 @@ impl Engine {
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         for fact in delta.insert.iter().chain(&delta.delete) {
             check_fact(fact, &self.symbols)?;
+        }
+        if let Some(equality) = self.equality.take() {
+            return self.apply_equally(equality, &delta);
         }
         self.replan();
         let stated = state_change(self, delta);
@@ -116,6 +139,15 @@ impl Engine {
         }
     }
 
+    /// As [`Engine::apply`], for rows of the store, which is in no defined state after an error.
+    pub(crate) fn apply_rows(&mut self, delta: Delta) -> Result<Delta, Error> {
+        self.replan();
+        let stated = state_change(self, delta);
+        let mut maintenance = Maintenance::new(self);
+        maintenance.update(&stated)?;
+        Ok(maintenance.finish())
+    }
+
     /// Plans the joins anew once there are many more facts than they were planned for.
     fn replan(&mut self) {
         if self.store.len() > REPLAN_FACTOR * self.network.planned_for.max(REPLAN_FROM) {
@@ -125,45 +157,68 @@ impl Engine {
 
     /// Derives everything anew after an update that was stopped, from what was stated before.
     pub(crate) fn restore(&mut self, undo: &Delta) {
-        let kept = self.facts_with(state::ASSERTED).filter(|fact| !undo.delete.contains(fact));
+        let (stated, gone) = (self.stated(), FxHashSet::from_iter(&undo.delete));
+        let kept = stated.into_iter().filter(|fact| !gone.contains(fact));
         let facts: Vec<Fact> = kept.chain(undo.insert.iter().cloned()).collect();
-        for relation in &mut self.store.relations {
-            Arc::make_mut(relation).clear_all();
-        }
-        self.records = Records::new(&self.network);
-        for fact in facts {
-            let relation = self.store.relation(fact.predicate, fact.arguments.len());
-            self.store.get_mut(relation).insert(&fact.arguments, state::ASSERTED, Record::NONE);
-        }
         let budget = std::mem::replace(&mut self.budget, u64::MAX);
-        // It ended within the budget before, and so does now without one.
-        let _ = Maintenance::new(self).derive_all();
+        if let Some(equality) = &mut self.equality {
+            **equality = equality.emptied(&self.program);
+            self.store = Store::default();
+            // It was without errors and ended within the budget before, and so does now without one.
+            let _ = self.build(facts);
+        } else {
+            for relation in &mut self.store.relations {
+                Arc::make_mut(relation).clear_all();
+            }
+            self.records = Records::new(&self.network);
+            self.store.state(facts);
+            let _ = Maintenance::new(self).derive_all();
+        }
         self.budget = budget;
+    }
+
+    /// Everything that is stated.
+    pub(crate) fn stated(&self) -> Vec<Fact> {
+        match &self.equality {
+            Some(equality) => equality.stated(self),
+            None => self.rows_with(state::ASSERTED).collect(),
+        }
     }
 
     /// Whether a fact holds.
     pub fn holds(&self, fact: &Fact) -> bool {
-        self.state_of(fact).is_some()
+        match &self.equality {
+            Some(equality) => equality.holds(self, fact),
+            None => self.row_state(fact).is_some(),
+        }
     }
 
     /// Whether a fact is stated, whether or not it would also be derived.
     pub fn is_asserted(&self, fact: &Fact) -> bool {
-        self.state_of(fact).is_some_and(|state| state & state::ASSERTED != 0)
+        match &self.equality {
+            Some(equality) => equality.is_stated(self, fact),
+            None => self.row_state(fact).is_some_and(|state| state & state::ASSERTED != 0),
+        }
     }
 
-    fn state_of(&self, fact: &Fact) -> Option<u8> {
-        let relation = self.store.get(self.store.find(fact.predicate, fact.arguments.len())?);
-        Some(relation.state(relation.find(&fact.arguments)?))
+    /// The state of a row, where it is in the store.
+    pub(crate) fn row_state(&self, row: &Fact) -> Option<u8> {
+        let relation = self.store.get(self.store.find(row.predicate, row.arguments.len())?);
+        Some(relation.state(relation.find(&row.arguments)?))
     }
 
     /// Everything that holds, in the order of symbols.
     pub fn facts(&self) -> impl Iterator<Item = Fact> {
-        let mut facts: Vec<Fact> = self.facts_with(0).collect();
+        let mut facts: Vec<Fact> = match &self.equality {
+            Some(equality) => equality.facts(self),
+            None => self.rows_with(0).collect(),
+        };
         facts.sort_unstable();
         facts.into_iter()
     }
 
-    pub(crate) fn facts_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
+    /// The rows of the store with these state bits, those of constraints and aggregates left out.
+    pub(crate) fn rows_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
         let named = self.store.relations.iter().filter_map(|relation| Some((relation, relation.predicate?)));
         named.flat_map(move |(relation, predicate)| {
             let rows = relation.scan().filter(move |&row| relation.state(row) & bits == bits);
@@ -177,11 +232,24 @@ impl Engine {
         &'a self,
         predicate: Symbol,
         pattern: &'a [Option<Symbol>],
+    ) -> impl Iterator<Item = Arguments> {
+        let equality = self.equality.as_ref();
+        let named = equality.map(|equality| equality.matching(self, predicate, pattern));
+        let rows = named.is_none().then(|| self.matching_rows(predicate, pattern));
+        let rows = rows.into_iter().flatten().map(Arguments::from_slice);
+        named.into_iter().flatten().chain(rows)
+    }
+
+    /// As [`Engine::matching`], for rows of the store.
+    pub(crate) fn matching_rows<'a>(
+        &'a self,
+        predicate: Symbol,
+        pattern: &[Option<Symbol>],
     ) -> impl Iterator<Item = &'a [Symbol]> {
+        let pattern: SmallVec<[Option<Symbol>; 4]> = SmallVec::from_slice(pattern);
         let relation = self.store.find(predicate, pattern.len()).map(|id| self.store.get(id));
-        let fits =
-            move |row: &&[Symbol]| row.iter().zip(pattern).all(|(&v, wanted)| wanted.is_none_or(|w| w == v));
         relation.into_iter().flat_map(move |relation| {
+            let pattern = pattern.clone();
             let bound = (0..pattern.len()).filter(|&c| pattern[c].is_some()).fold(0, |mask, c| mask | 1 << c);
             let rows: Box<dyn Iterator<Item = u32>> = match relation.best_index(bound) {
                 Some((index, mask)) => {
@@ -191,7 +259,8 @@ impl Engine {
                 }
                 None => Box::new(relation.scan()),
             };
-            rows.map(|row| relation.row(row)).filter(fits)
+            rows.map(|row| relation.row(row))
+                .filter(move |row| row.iter().zip(&pattern).all(|(&v, wanted)| wanted.is_none_or(|w| w == v)))
         })
     }
 

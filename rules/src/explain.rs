@@ -7,8 +7,9 @@ use rustc_hash::FxHashMap;
 use crate::engine::Engine;
 use crate::fact::Fact;
 use crate::fixpoint::resolve;
+use crate::network::{DIFFERENT_FROM, SAME_AS};
 use crate::plan::{Condition, Source};
-use crate::rule::{Rule, RuleIdentity, Variable};
+use crate::rule::{Atom, Rule, RuleIdentity, Variable};
 use crate::safety::bound_variables;
 use crate::store::{Record, RelationId, Row, state};
 use crate::symbol::{Symbol, Symbols};
@@ -35,6 +36,12 @@ pub struct DerivationStep {
 pub enum Reason {
     /// It is stated.
     Asserted,
+    /// The same holds of other names of the individuals.
+    Equality {
+        /// The positions in [`Derivation::steps`] of that fact and of the pairs of names; for a pair of names, of the
+        /// pairs between them.
+        supports: Vec<usize>,
+    },
     /// A rule concludes it.
     Rule {
         /// Which rule.
@@ -77,6 +84,8 @@ pub enum Cause {
     Constraint(RuleIdentity),
     /// A literal whose lexical form its datatype forbids.
     IllTyped(Symbol),
+    /// A literal that would be the same as another literal or as an individual.
+    Clash,
 }
 
 impl Derivation {
@@ -102,7 +111,11 @@ impl fmt::Display for DisplayDerivation<'_> {
             let repeated = std::mem::replace(&mut printed[position], true);
             match &step.reason {
                 Reason::Asserted => writeln!(f, " is stated")?,
-                Reason::Rule { .. } if repeated => writeln!(f, ", as above")?,
+                Reason::Rule { .. } | Reason::Equality { .. } if repeated => writeln!(f, ", as above")?,
+                Reason::Equality { supports } => {
+                    writeln!(f, " by equality")?;
+                    stack.extend(supports.iter().rev().map(|&support| (support, depth + 1)));
+                }
                 Reason::Rule { identity, supports, absent, aggregates, .. } => {
                     writeln!(f, " by rule {identity}")?;
                     for fact in absent {
@@ -128,6 +141,9 @@ impl Engine {
     /// Why a fact holds: the derivation by which it was first concluded, down to what is stated. `None` where it does
     /// not hold. Takes time proportional to the answer. A fact that is stated and derived is reported as stated.
     pub fn why(&self, fact: &Fact) -> Option<Derivation> {
+        if let Some(equality) = &self.equality {
+            return equality.holds(self, fact).then(|| equality.why(self, fact));
+        }
         let relation = self.store.find(fact.predicate, fact.arguments.len())?;
         let row = self.store.get(relation).find(&fact.arguments)?;
         let mut search = Search { engine: self, positions: FxHashMap::default(), queue: Vec::new() };
@@ -153,9 +169,16 @@ impl Engine {
                     let rows = self.group(matches, &key).map(|(row, _)| self.store.get(matches).record(row));
                     supports.extend(rows.flat_map(|record| self.body_facts(record, false)));
                 }
+                if let Some(equality) = &self.equality {
+                    supports = equality.witnesses(self, supports);
+                }
                 let cause = Cause::Constraint(self.program.rules[position].identity.clone());
                 violations.push(Violation { cause, supports });
             }
+        }
+        if let Some(equality) = &self.equality {
+            let clashes = equality.clashes(self).into_iter();
+            violations.extend(clashes.map(|fact| Violation { cause: Cause::Clash, supports: vec![fact] }));
         }
         if self.symbols.any_ill_typed() {
             violations.extend(self.ill_typed());
@@ -174,7 +197,7 @@ impl Engine {
     }
 
     /// The ground relation atoms of a recorded derivation's body, or its negated ones.
-    fn body_facts(&self, record: Record, negated: bool) -> Vec<Fact> {
+    pub(crate) fn body_facts(&self, record: Record, negated: bool) -> Vec<Fact> {
         let bound = self.records.get(record);
         self.body(record, negated)
             .filter_map(|(relation, sources)| {
@@ -184,8 +207,23 @@ impl Engine {
             .collect()
     }
 
+    /// The fact that a head atom concludes under the bindings of a record.
+    pub(crate) fn concluded(&self, head: &Atom, bound: &[Symbol]) -> Option<Fact> {
+        let predicate = match head {
+            Atom::Relation { predicate, .. } => *predicate,
+            Atom::Same(..) => self.symbols.find_name(SAME_AS)?,
+            Atom::Different(..) => self.symbols.find_name(DIFFERENT_FROM)?,
+            Atom::Not { .. } | Atom::BuiltIn { .. } | Atom::Aggregate { .. } => return None,
+        };
+        let arguments = head.terms().into_iter().map(|term| resolve(term.into(), bound));
+        Some(Fact::new(predicate, arguments))
+    }
+
     /// The aggregates of a recorded derivation's body: what they run over, their group and their result.
-    fn aggregates(&self, record: Record) -> impl Iterator<Item = (RelationId, Vec<Symbol>, Symbol)> {
+    pub(crate) fn aggregates(
+        &self,
+        record: Record,
+    ) -> impl Iterator<Item = (RelationId, Vec<Symbol>, Symbol)> {
         let bound = self.records.get(record);
         let rule = self.network.rules.get(record.rule as usize);
         rule.into_iter().flat_map(|rule| &rule.body).filter_map(|condition| match condition {
@@ -223,7 +261,7 @@ impl Engine {
         visible.map(|row| (row, relation.row(row))).filter(move |(_, row)| row[..key.len()] == key[..])
     }
 
-    fn rule_of(&self, record: Record) -> Option<&Rule> {
+    pub(crate) fn rule_of(&self, record: Record) -> Option<&Rule> {
         Some(&self.program.rules[self.network.rules.get(record.rule as usize)?.rule])
     }
 }

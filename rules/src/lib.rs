@@ -5,6 +5,7 @@ mod aggregate;
 mod builtin;
 mod cost;
 mod engine;
+mod equality;
 mod error;
 mod explain;
 mod fact;

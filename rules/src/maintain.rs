@@ -369,6 +369,9 @@ impl<'a> Maintenance<'a> {
             for head in &rule.heads {
                 arguments.clear();
                 arguments.extend(head.arguments.iter().map(|&source| resolve(source, bound)));
+                if Some(head.relation) == network.same && arguments[0] == arguments[1] {
+                    continue;
+                }
                 let relation = store.get_mut(head.relation);
                 match relation.find(&arguments) {
                     None => {

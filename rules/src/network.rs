@@ -28,6 +28,8 @@ pub(crate) struct Network {
     pub strata: Vec<Stratum>,
     /// The stratum of each relation, dependencies first; strata without rules are not in `strata`.
     stratum_of: Vec<usize>,
+    /// The relation of equality, where equality is more than a relation.
+    pub same: Option<RelationId>,
     /// How many facts there were when the plans were made.
     pub planned_for: usize,
     /// By relation: the strata that a change of it concerns.
@@ -62,7 +64,8 @@ pub(crate) fn compile(
     if !errors.is_empty() {
         return Err(errors);
     }
-    let mut network = Network::default();
+    let same = program.equality.then(|| store.relation(symbols.name(SAME_AS), 2));
+    let mut network = Network { same, ..Network::default() };
     let mut seen = FxHashSet::default();
     let mut lowering = Lowering::new(symbols, store, &mut network.constraints, FxHashSet::default());
     for (position, rule) in program.rules.iter().enumerate() {
@@ -71,7 +74,7 @@ pub(crate) fn compile(
         }
     }
     let lowered = lowering.lowered;
-    network.stratum_of = stratify(program, symbols, store, &lowered)?;
+    network.stratum_of = stratify(program, symbols, store, &lowered, network.same)?;
     network.rules = split_by_stratum(lowered, &network.stratum_of);
     network.widths = network.rules.iter().map(|rule| rule.width).collect();
     network.plan(store, false);
@@ -135,7 +138,7 @@ pub(crate) fn revise(
     }
     let lowered = lowering.lowered;
     let all: Vec<Lowered> = revised.rules.iter().chain(&lowered).cloned().collect();
-    revised.stratum_of = stratify(new, symbols, store, &all)?;
+    revised.stratum_of = stratify(new, symbols, store, &all, revised.same)?;
     if split_by_stratum(revised.rules.clone(), &revised.stratum_of).len() != revised.live_rules() {
         return Ok(None);
     }
@@ -168,12 +171,14 @@ fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     Some(Error::UnknownSymbol { index: unknown.index() })
 }
 
-/// The stratum of each relation.
+/// The stratum of each relation. Every relation depends on equality, but needs no stratum after it, since rows are
+/// rewritten where equality changes.
 fn stratify(
     program: &Program,
     symbols: &Symbols,
     store: &Store,
     rules: &[Lowered],
+    same: Option<RelationId>,
 ) -> Result<Vec<usize>, Vec<Error>> {
     let mut successors = vec![Vec::new(); store.relations.len()];
     for rule in rules {
@@ -184,7 +189,13 @@ fn stratify(
             }
         }
     }
-    let strata = components(&successors);
+    let mut strata = components(&successors);
+    let own = strata.clone();
+    if let Some(same) = same {
+        let named = |relation: &usize| store.relations[*relation].predicate.is_some();
+        successors[same.0 as usize].extend((0..store.relations.len()).filter(named));
+        strata = components(&successors);
+    }
     let mut errors = Vec::new();
     for rule in rules {
         for condition in &rule.body {
@@ -205,7 +216,7 @@ fn stratify(
             });
         }
     }
-    if errors.is_empty() { Ok(strata) } else { Err(errors) }
+    if errors.is_empty() { Ok(own) } else { Err(errors) }
 }
 
 /// A rule whose heads lie in several strata becomes one rule per stratum.

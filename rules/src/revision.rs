@@ -2,7 +2,8 @@
 //!
 //! The rules that stay keep their recorded derivations. What a removed rule concluded loses its support, as if a fact
 //! of its body had gone, and is rederived where another rule concludes it too; a new rule is evaluated once over
-//! everything that holds. Only where the strata of the rules that stay fall apart is everything derived anew.
+//! everything that holds. Only where the strata of the rules that stay fall apart, or under equality, is everything derived
+//! anew.
 
 use std::sync::Arc;
 
@@ -12,9 +13,10 @@ use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::Fact;
 use crate::maintain::Maintenance;
-use crate::network::{Revision, revise};
+use crate::network::{Revision, compile, revise};
+use crate::record::Records;
 use crate::rule::{Program, Rule, RuleIdentity};
-use crate::store::{RelationId, state};
+use crate::store::{RelationId, Store, state};
 
 impl Engine {
     /// Replaces the rules and returns the net change of all facts that hold, sorted. The cost depends on the rules in
@@ -23,12 +25,19 @@ impl Engine {
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
     pub fn set_program(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
+        if self.equality.is_some() || program.equality {
+            return self.rebuild(program);
+        }
         let symbols = Arc::make_mut(&mut self.symbols);
         let revision = revise(&self.network, &self.program, &program, symbols, &mut self.store)?;
-        match revision {
-            Some(revision) => self.revise(revision, program).map_err(|error| vec![error]),
-            None => self.rebuild(program),
-        }
+        let Some(revision) = revision else { return self.rebuild(program) };
+        let old = (Arc::clone(&self.network), Arc::clone(&self.program));
+        self.program = Arc::new(program);
+        self.revise(revision).map_err(|error| {
+            (self.network, self.program) = old;
+            self.restore(&Delta::default());
+            vec![error]
+        })
     }
 
     /// Adds rules and returns the net change of all facts that hold, sorted.
@@ -77,35 +86,47 @@ impl Engine {
         &self.disabled
     }
 
-    fn revise(&mut self, revision: Revision, program: Program) -> Result<Delta, Error> {
+    /// Exchanges the rules over representatives and returns the net change of rows. After an error the engine is in no
+    /// defined state.
+    pub(crate) fn replace_rules(&mut self, old: &Program, new: &Program) -> Result<Delta, Error> {
+        let symbols = Arc::make_mut(&mut self.symbols);
+        let revision = revise(&self.network, old, new, symbols, &mut self.store).map_err(first)?;
+        if let Some(revision) = revision {
+            return self.revise(revision);
+        }
+        let before: FxHashSet<Fact> = self.rows_with(0).collect();
+        let stated = self.rows_with(state::ASSERTED).collect();
+        self.store = Store::default();
+        self.store.state(stated);
+        let network = compile(new, Arc::make_mut(&mut self.symbols), &mut self.store).map_err(first)?;
+        self.records = Records::new(&network);
+        self.network = Arc::new(network);
+        Maintenance::new(self).derive_all()?;
+        let after: FxHashSet<Fact> = self.rows_with(0).collect();
+        let insert = after.difference(&before).cloned().collect();
+        Ok(Delta { insert, delete: before.difference(&after).cloned().collect() })
+    }
+
+    fn revise(&mut self, revision: Revision) -> Result<Delta, Error> {
         let Revision { network, removed, added } = revision;
         let heads: FxHashSet<RelationId> = removed
             .iter()
             .flat_map(|&number| &self.network.rules[number as usize].heads)
             .map(|head| head.relation)
             .collect();
-        let old = (Arc::clone(&self.network), Arc::clone(&self.program));
         // The bindings of removed rules are needed until what they concluded is gone.
         self.records.revise(&network, |_| false);
-        (self.network, self.program) = (Arc::new(network), Arc::new(program));
+        self.network = Arc::new(network);
         let mut maintenance = Maintenance::new(self);
-        match maintenance.change_rules(&removed, &heads, &added) {
-            Ok(()) => {
-                let change = maintenance.finish();
-                let network = Arc::clone(&self.network);
-                self.records.revise(&network, |number| removed.contains(&number));
-                Ok(change)
-            }
-            Err(error) => {
-                (self.network, self.program) = old;
-                self.restore(&Delta::default());
-                Err(error)
-            }
-        }
+        maintenance.change_rules(&removed, &heads, &added)?;
+        let change = maintenance.finish();
+        let network = Arc::clone(&self.network);
+        self.records.revise(&network, |number| removed.contains(&number));
+        Ok(change)
     }
 
     fn rebuild(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
-        let stated: Vec<Fact> = self.facts_with(state::ASSERTED).collect();
+        let stated = self.stated();
         let mut engine = Self::with_step_budget(self.symbols().clone(), program, stated, self.budget)?;
         engine.disabled.clone_from(&self.disabled);
         let insert = engine.facts().filter(|fact| !self.holds(fact)).collect();
@@ -113,4 +134,9 @@ impl Engine {
         *self = engine;
         Ok(Delta { insert, delete })
     }
+}
+
+/// Rules that were compiled before give at most the error that they no longer fit together.
+fn first(errors: Vec<Error>) -> Error {
+    errors.into_iter().next().unwrap_or(Error::UnknownSymbol { index: 0 })
 }

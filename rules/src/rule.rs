@@ -86,6 +86,16 @@ impl Aggregate {
         }
     }
 
+    /// The aggregate of another term.
+    pub(crate) fn map(self, term: &impl Fn(Term) -> Term) -> Self {
+        match self {
+            Self::Count => Self::Count,
+            Self::Sum(value) => Self::Sum(term(value)),
+            Self::Min(value) => Self::Min(term(value)),
+            Self::Max(value) => Self::Max(term(value)),
+        }
+    }
+
     /// What is summed or compared.
     pub fn value(self) -> Option<Term> {
         match self {
@@ -162,6 +172,9 @@ impl Rule {
 pub struct Program {
     /// In any order.
     pub rules: Vec<Rule>,
+    /// Whether `owl:sameAs` is equality, as [`crate::owl_rl::with_equality`] has it: what holds of an individual holds
+    /// of all its names. Otherwise it is a relation like any other, and every name stands for an individual of its own.
+    pub equality: bool,
 }
 
 impl Term {

@@ -71,6 +71,17 @@ impl Store {
         id
     }
 
+    /// Adds rows that are stated, where they are not there yet.
+    pub fn state(&mut self, facts: Vec<Fact>) {
+        for fact in facts {
+            let relation = self.relation(fact.predicate, fact.arguments.len());
+            let relation = self.get_mut(relation);
+            if relation.find(&fact.arguments).is_none() {
+                relation.insert(&fact.arguments, state::ASSERTED, Record::NONE);
+            }
+        }
+    }
+
     /// A relation that belongs to no predicate: the matches of an integrity constraint or of an aggregate. One that is
     /// empty and not taken is used again, if its number is not below `first`.
     pub fn anonymous(&mut self, arity: usize, first: u32, taken: impl Fn(RelationId) -> bool) -> RelationId {
@@ -252,6 +263,10 @@ impl Relation {
         self.states[row as usize] = state::FREE;
         self.records[row as usize] = Record::NONE;
         self.free.push(row);
+    }
+
+    pub fn has_index(&self, columns: u32) -> bool {
+        self.indexes.iter().any(|index| index.columns == columns)
     }
 
     /// The number of the index on these columns, built on first use.

@@ -144,6 +144,8 @@ impl Engine {
     pub fn why_not(&self, fact: &Fact) -> Vec<NearMiss> {
         let relation = self.store.find(fact.predicate, fact.arguments.len());
         let Some(relation) = relation.filter(|_| !self.holds(fact)) else { return Vec::new() };
+        let normal = self.equality.as_ref().map(|equality| equality.normal(fact));
+        let fact = normal.as_ref().unwrap_or(fact);
         let mut misses = Vec::new();
         for lowered in &self.network.rules {
             for head in lowered.heads.iter().filter(|head| head.relation == relation) {
@@ -249,7 +251,7 @@ impl Search<'_> {
         let Some(predicate) = self.engine.store.get(relation).predicate else { return };
         let arguments: Vec<Option<Symbol>> =
             sources.iter().map(|&source| value(source, &state.bound)).collect();
-        let mut rows: Vec<&[Symbol]> = self.engine.matching(predicate, &arguments).collect();
+        let mut rows: Vec<&[Symbol]> = self.engine.matching_rows(predicate, &arguments).collect();
         rows.sort_unstable();
         for row in rows {
             if self.is_over() {
@@ -274,7 +276,7 @@ impl Search<'_> {
                 let predicate = self.engine.store.get(*relation).predicate;
                 if let (Some(arguments), Some(predicate)) = (arguments, predicate) {
                     let fact = Fact::new(predicate, arguments);
-                    if self.engine.holds(&fact) {
+                    if self.engine.row_state(&fact).is_some() {
                         state.obstacles.push(Obstacle::Present(fact));
                     }
                 }

@@ -1,20 +1,17 @@
-//! Equality and difference of individuals as rules: table 4 of OWL 2 RL, instantiated for the relations in use.
+//! Equality and difference of individuals: table 4 of OWL 2 RL.
 //!
 //! OWL makes no unique-name assumption: two names may stand for one individual, and a functional property with two
-//! values says that they do. `sameAs` is then an equivalence (eq-sym, eq-trans) under which every relation is closed
-//! (eq-rep-s, eq-rep-o). Pairs of one name with itself are not derived; nothing needs them. `differentFrom` is what
-//! is stated, and what follows from disjoint classes and from different values of functional properties; it is
-//! derived only where some rule asks for it.
+//! values says that they do. The engine then treats `sameAs` as equality. `differentFrom` is what is stated, and what
+//! follows from disjoint classes and from different values of functional properties; it is derived only where some rule
+//! asks for it.
 //!
-//! The engine itself compares symbols. So under the unique-name assumption of [`Equality::UniqueNames`] no rule of
-//! this file is needed: a functional object property then concludes nothing, and any two names differ.
+//! Under the unique-name assumption of [`Equality::UniqueNames`] no rule of this file is needed: a functional object
+//! property then concludes nothing, and any two names differ.
 
-use std::collections::BTreeSet;
+use rules::{Atom, Rule, RuleIdentity, Term};
 
-use rules::{Atom, Rule, RuleIdentity, Symbol, Term};
-
+use super::AXIOM_SOURCE;
 use super::context::{Context, Variables};
-use super::{AXIOM_SOURCE, INTERNAL};
 use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression};
 use crate::vocab::owl;
 
@@ -28,9 +25,8 @@ pub enum Equality {
     UniqueNames,
 }
 
-/// Adds the rules for equality, if anything concludes or states that two names are one, and for difference, if
-/// anything asks.
-pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) {
+/// Whether anything concludes or states that two names are one; adds the rules for difference, if anything asks.
+pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     let (same, different) = (context.name(owl::SAME_AS), context.name(owl::DIFFERENT_FROM));
     let heads = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));
     let asks = |rule: &Rule| {
@@ -43,52 +39,16 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) {
         difference(axioms, context);
     }
     if merges {
-        equality(context, same, different);
+        let mut variables = Variables::default();
+        let x = variables.fresh("x");
+        let clash = Atom::relation(different, [x, x]);
+        context.rule(&identity("eq-diff1", 0), Vec::new(), vec![clash], &variables);
     }
+    merges
 }
 
 fn identity(label: &str, position: usize) -> RuleIdentity {
     RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: position as u32 }
-}
-
-/// `sameAs` is an equivalence, no two individuals are both same and different, and relations respect `sameAs`.
-fn equality(context: &mut Context, same: Symbol, different: Symbol) {
-    let mut v = Variables::default();
-    let (x, y, z) = (v.fresh("x"), v.fresh("y"), v.fresh("z"));
-    let atom = |predicate, first, second| Atom::relation(predicate, [first, second]);
-    let is = |first, second| atom(same, first, second);
-    context.rule(&identity("eq-sym", 0), vec![is(y, x)], vec![is(x, y)], &v);
-    let chain = vec![is(x, y), is(y, z), Atom::Different(x, z)];
-    context.rule(&identity("eq-trans", 0), vec![is(x, z)], chain, &v);
-    context.rule(&identity("eq-diff1", 0), Vec::new(), vec![is(x, y), atom(different, x, y)], &v);
-    context.rule(&identity("eq-diff1", 1), Vec::new(), vec![atom(different, x, x)], &v);
-    for (relation, arity) in relations(context, same) {
-        let position = relation.index();
-        if arity == 1 {
-            let body = vec![Atom::relation(relation, [x]), is(x, y)];
-            context.rule(&identity("eq-rep-c", position), vec![Atom::relation(relation, [y])], body, &v);
-        } else {
-            let edge = || atom(relation, x, y);
-            let subject = vec![edge(), is(x, z)];
-            context.rule(&identity("eq-rep-s", position), vec![atom(relation, z, y)], subject, &v);
-            let object = vec![edge(), is(y, z)];
-            context.rule(&identity("eq-rep-o", position), vec![atom(relation, x, z)], object, &v);
-        }
-    }
-}
-
-/// Classes and properties that rules and facts mention, in a fixed order.
-fn relations(context: &Context, same: Symbol) -> BTreeSet<(Symbol, usize)> {
-    let atoms = context.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
-    let mentioned = atoms.filter_map(|atom| match atom {
-        Atom::Relation { predicate, arguments } => Some((*predicate, arguments.len())),
-        _ => None,
-    });
-    let stated = context.facts.iter().map(|fact| (fact.predicate, fact.arguments.len()));
-    let internal =
-        |symbol| context.symbols.value(symbol).as_name().is_none_or(|name| name.starts_with(INTERNAL));
-    let all = mentioned.chain(stated).filter(|(symbol, _)| *symbol != same && !internal(*symbol));
-    all.collect()
 }
 
 /// What makes two individuals different without saying so.

@@ -57,13 +57,11 @@ pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols
     axiom::lower_rules(&ontology.axioms, &mut context);
     context.drop_unusable();
     axiom::lower_assertions(&ontology.axioms, &mut context);
-    if equality == Equality::Owl {
-        equality::lower(&ontology.axioms, &mut context);
-    }
+    let equality = equality == Equality::Owl && equality::lower(&ontology.axioms, &mut context);
     let Context { rules, facts, mut warnings, .. } = context;
     warnings.sort();
     warnings.dedup();
-    Lowered { program: Program { rules }, facts, duplicates, warnings }
+    Lowered { program: Program { rules, equality }, facts, duplicates, warnings }
 }
 
 impl Context<'_> {
@@ -74,7 +72,8 @@ impl Context<'_> {
             let mut atoms = rule.body.iter();
             *rule.identity.source == *AXIOM_SOURCE && atoms.any(|atom| matches!(atom, Atom::Relation { .. }))
         };
-        let program = Program { rules: self.rules.iter().filter(|rule| !is_bound(rule)).cloned().collect() };
+        let rules = self.rules.iter().filter(|rule| !is_bound(rule)).cloned().collect();
+        let program = Program { rules, ..Program::default() };
         let Err(errors) = rules::Engine::new(self.symbols.clone(), program, []) else { return };
         for error in errors {
             let Some(identity) = culprit(&error) else { continue };

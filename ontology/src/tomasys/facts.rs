@@ -35,7 +35,7 @@ impl<'a> Facts<'a> {
         let mut found = Vec::new();
         for predicate in term.iter().filter_map(|name| self.engine.symbols().find_name(name)) {
             let rows = self.engine.matching(predicate, pattern);
-            let counts = |row: &&[Symbol]| {
+            let counts = |row: &rules::Arguments| {
                 !self.stated || self.engine.is_asserted(&Fact::new(predicate, row.iter().copied()))
             };
             found.extend(rows.filter(counts).map(|row| row[column]));

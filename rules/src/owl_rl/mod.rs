@@ -9,13 +9,12 @@
 //! properties, declarations (prp-ap, cls-thing, cls-nothing1, dt-type1, scm-cls, scm-op, scm-dp), and individuals that
 //! are equal as properties (eq-rep-p).
 //!
-//! Equality (table 4) is `owl:sameAs` as an equivalence under which every relation is closed. Datatype clashes need no rule: see [`crate::Engine::violations`].
+//! Equality (table 4) is evaluated by representatives, see [`with_equality`]. Datatype clashes need no rule: see
+//! [`crate::Engine::violations`].
 //!
 //! \[1\] W3C OWL 2 Web Ontology Language Profiles (Second Edition), 2012.
 
 mod schema;
-
-use std::collections::BTreeSet;
 
 use crate::network::{DIFFERENT_FROM, SAME_AS};
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Term};
@@ -127,20 +126,15 @@ pub fn difference(axioms: &[Axiom], symbols: &mut Symbols) -> Program {
     program
 }
 
-/// A program under [`Names::Owl`]: [`close_under_equality`], and `differentFrom` in bodies asks for what is entailed,
-/// where it would compare names.
+/// A program under [`Names::Owl`]: `owl:sameAs` is equality ([`Program::equality`]), and `differentFrom` in bodies asks
+/// for what is entailed, where it would compare names.
 ///
-/// `sameAs` in a body goes on comparing names where one of its terms is a variable that other atoms bind: what holds
-/// of an individual holds of all its names, so that a match under one name finds every conclusion. Between two
-/// constants, or two variables that nothing else binds, it asks for facts; then no name is the same as itself unless
-/// it is stated.
-pub fn with_equality(
-    program: &Program,
-    relations: impl IntoIterator<Item = (Symbol, usize)>,
-    symbols: &mut Symbols,
-) -> Program {
+/// `sameAs` in a body compares individuals where one of its terms is a variable that other atoms bind. Between two constants,
+/// or two variables that nothing else binds, it asks for pairs of names of individuals that have several; an individual with
+/// one name is then not the same as itself unless that is stated.
+pub fn with_equality(program: &Program, symbols: &mut Symbols) -> Program {
     let (same, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
-    let mut result = program.clone();
+    let mut result = Program { equality: true, ..program.clone() };
     for rule in result.rules.iter_mut().filter(|rule| &*rule.identity.source != SOURCE) {
         let bound = bound_variables(rule);
         let is_bound = |term: Term| term.as_variable().is_some_and(|v| bound[usize::from(v.0)]);
@@ -154,49 +148,11 @@ pub fn with_equality(
             }
         }
     }
-    close_under_equality(&result, relations, symbols)
-}
-
-/// Adds the axioms of equality (table 4) to a program: `owl:sameAs` is an equivalence, under which the relations of
-/// the program's rules and those given (name and number of arguments: what facts use) are closed;
-/// `owl:differentFrom` is symmetric and excludes it. Pairs of a name with itself are not derived (eq-ref).
-pub fn close_under_equality(
-    program: &Program,
-    relations: impl IntoIterator<Item = (Symbol, usize)>,
-    symbols: &mut Symbols,
-) -> Program {
-    let (same, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
-    let mut result = program.clone();
-    let mentioned = program.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
-    let mentioned = mentioned.filter_map(|atom| match atom {
-        Atom::Relation { predicate, arguments } | Atom::Not { predicate, arguments } => {
-            Some((*predicate, arguments.len()))
-        }
-        _ => None,
-    });
-    let mut closed: BTreeSet<(Symbol, usize)> = mentioned.chain(relations).chain([(different, 2)]).collect();
-    closed.remove(&(same, 2));
-    instantiate(EQUALITY, &[same, different], &mut result);
-    for (relation, arity) in closed {
-        let all: Vec<String> = (0..arity).map(|column| format!("?x{column}")).collect();
-        for column in 0..arity {
-            let mut replaced = all.clone();
-            replaced[column] = "?y".into();
-            let (all, replaced) = (all.join(", "), replaced.join(", "));
-            let text = format!("[eq-rep] a0({all}) ^ a1(?x{column}, ?y) -> a0({replaced}) .");
-            instantiate(&text, &[relation, same], &mut result);
-        }
-    }
+    instantiate(EQUALITY, &[different], &mut result);
     result
 }
 
-const EQUALITY: &str = "
-    [eq-sym] a0(?x, ?y) -> a0(?y, ?x) .
-    [eq-trans] a0(?x, ?y) ^ a0(?y, ?z) ^ differentFrom(?x, ?z) -> a0(?x, ?z) .
-    [eq-diff-sym] a1(?x, ?y) -> a1(?y, ?x) .
-    [eq-diff1] a0(?x, ?y) ^ a1(?x, ?y) -> .
-    [eq-diff1] a1(?x, ?x) -> .
-";
+const EQUALITY: &str = "[eq-diff-sym] a0(?x, ?y) -> a0(?y, ?x) . [eq-diff1] a0(?x, ?x) -> .";
 
 /// Rule text in which `a0`, `a1`, … stand for the parts of an axiom.
 fn template(axiom: &Axiom) -> (String, Vec<Symbol>) {

@@ -17,10 +17,10 @@ pub fn naive(
     symbols: &mut Symbols,
     stated: &BTreeSet<Fact>,
     level: impl Fn(Symbol) -> usize,
-    close: impl Fn(&mut BTreeSet<Fact>),
+    close: impl Fn(&Symbols, &mut BTreeSet<Fact>),
 ) -> BTreeSet<Fact> {
     let mut facts = stated.clone();
-    close(&mut facts);
+    close(symbols, &mut facts);
     let heads = program.rules.iter().flat_map(|rule| rule.head.iter().map(move |head| (rule, head)));
     let heads: Vec<(usize, &Rule, &Atom)> =
         heads.map(|(rule, head)| (level(predicate(head)), rule, head)).collect();
@@ -32,7 +32,7 @@ pub fn naive(
             }
             let before = facts.len();
             facts.append(&mut new);
-            close(&mut facts);
+            close(symbols, &mut facts);
             if facts.len() == before {
                 break;
             }
@@ -41,23 +41,60 @@ pub fn naive(
     facts
 }
 
-/// Closes facts under equality: finds the classes of individuals that `same` relates, then puts each member of a class
-/// in the place of each other. Facts of `same` itself relate all pairs of different members.
-pub fn close_under(same: Symbol, facts: &mut BTreeSet<Fact>) {
+const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
+
+/// The classes of names that pairs of names relate; literals are never one with anything.
+fn classes(symbols: &Symbols, facts: &BTreeSet<Fact>) -> Vec<BTreeSet<Symbol>> {
     let mut classes: Vec<BTreeSet<Symbol>> = Vec::new();
-    for fact in facts.iter().filter(|fact| fact.predicate == same) {
+    let Some(same) = symbols.find_name(SAME_AS) else { return classes };
+    for fact in facts.iter().filter(|fact| is_pair(fact, same, symbols)) {
         let (mut joined, others): (Vec<_>, Vec<_>) =
             classes.into_iter().partition(|class| fact.arguments.iter().any(|symbol| class.contains(symbol)));
         joined.push(fact.arguments.iter().copied().collect());
         classes = others;
         classes.push(joined.into_iter().flatten().collect());
     }
+    classes
+}
+
+fn is_pair(fact: &Fact, same: Symbol, symbols: &Symbols) -> bool {
+    let is_name = |&symbol: &Symbol| symbols.value(symbol).as_name().is_some();
+    fact.predicate == same && fact.arguments.iter().all(is_name)
+}
+
+/// The first name of each name's class.
+pub fn representatives(symbols: &Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<Symbol, Symbol> {
+    let classes = classes(symbols, facts);
+    let first = |class: &BTreeSet<Symbol>| *class.first().expect("a name");
+    classes
+        .iter()
+        .flat_map(|class| class.iter().map(|&name| (name, first(class))).collect::<Vec<_>>())
+        .collect()
+}
+
+/// The binding of representatives.
+pub fn normal(binding: &Binding, representatives: &BTreeMap<Symbol, Symbol>) -> Binding {
+    let find = |symbol| representatives.get(&symbol).copied().unwrap_or(symbol);
+    binding.iter().map(|(&variable, &symbol)| (variable, find(symbol))).collect()
+}
+
+/// Whether a fact relates a symbol to itself by equality.
+pub fn is_reflexive(symbols: &Symbols, fact: &Fact) -> bool {
+    symbols.find_name(SAME_AS) == Some(fact.predicate) && fact.arguments[0] == fact.arguments[1]
+}
+
+/// Closes facts under equality: puts each member of a class in the place of each other. Pairs relate all members of a
+/// class; a name without others is related to itself only where that is stated.
+pub fn close_under_equality(symbols: &Symbols, stated: &BTreeSet<Fact>, facts: &mut BTreeSet<Fact>) {
+    let Some(same) = symbols.find_name(SAME_AS) else { return };
+    facts.retain(|fact| !is_reflexive(symbols, fact) || stated.contains(fact));
+    let classes = classes(symbols, facts);
     let class_of = |symbol: Symbol| {
         let class = classes.iter().find(|class| class.contains(&symbol));
         class.map_or_else(|| vec![symbol], |class| class.iter().copied().collect())
     };
     let mut closed = BTreeSet::new();
-    for fact in facts.iter().filter(|fact| fact.predicate != same) {
+    for fact in facts.iter().filter(|fact| !is_pair(fact, same, symbols)) {
         let mut rows = vec![Vec::new()];
         for &symbol in &fact.arguments {
             let members = class_of(symbol);
@@ -71,7 +108,8 @@ pub fn close_under(same: Symbol, facts: &mut BTreeSet<Fact>) {
     }
     for class in &classes {
         let pairs = class.iter().flat_map(|&a| class.iter().map(move |&b| [a, b]));
-        closed.extend(pairs.filter(|[a, b]| a != b).map(|pair| Fact::new(same, pair)));
+        let pairs = pairs.filter(|_| class.len() > 1);
+        closed.extend(pairs.map(|pair| Fact::new(same, pair)));
     }
     facts.append(&mut closed);
 }
@@ -185,6 +223,8 @@ pub fn aggregate(
     let mut group = binding.clone();
     group.retain(|variable, _| outside.contains(&Term::Variable(*variable)));
     let found = extensions(body, group, symbols, facts);
+    let representatives = representatives(symbols, facts);
+    let found: BTreeSet<Binding> = found.iter().map(|binding| normal(binding, &representatives)).collect();
     let values = found.iter().map(|binding| literal(aggregate.value()?, binding, symbols)?.as_rational());
     if let Aggregate::Count = aggregate {
         return Some(Literal::integer(found.len() as i64));
@@ -216,7 +256,11 @@ fn filter(
         }
         Atom::Not { .. } => (!facts.contains(&ground(atom, &binding))).then_some(binding),
         Atom::Same(left, right) => match (value(*left, &binding), value(*right, &binding)) {
-            (Some(a), Some(b)) => (a == b).then_some(binding),
+            (Some(a), Some(b)) => {
+                let names = representatives(symbols, facts);
+                let find = |symbol| names.get(&symbol).copied().unwrap_or(symbol);
+                (find(a) == find(b)).then_some(binding)
+            }
             (Some(known), None) => bind(*right, known, binding),
             (None, Some(known)) => bind(*left, known, binding),
             (None, None) => panic!("an unsafe equality"),

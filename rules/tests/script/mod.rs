@@ -8,7 +8,10 @@ use metaplan_rules::{
     RuleIdentity, Symbol, Symbols, Term, Variable, owl_rl,
 };
 
-use crate::oracle::{self, Binding, close_under, ground, holds, matches, naive, value};
+use crate::oracle::{
+    self, Binding, close_under_equality, ground, holds, is_reflexive, matches, naive, normal,
+    representatives, value,
+};
 
 const PREDICATES: u8 = 9;
 /// Predicates of one level, with one, two and three arguments.
@@ -16,6 +19,9 @@ const PER_LEVEL: u8 = 3;
 /// The predicate that is `owl:sameAs` in scripts with equality.
 const EQUALITY: u8 = 1;
 const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
+/// The predicate that is `owl:differentFrom` in scripts with equality.
+const DIFFERENCE: u8 = 4;
+const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
 const VARIABLES: u8 = 4;
 const CONSTANTS: u8 = 4;
 /// Which predicates changes and heads take: few, so that conclusions meet.
@@ -37,13 +43,17 @@ struct World {
     symbols: Symbols,
     predicates: Vec<Symbol>,
     constants: Vec<Symbol>,
+    equality: bool,
 }
 
 impl World {
     fn new(equality: bool) -> Self {
         let mut symbols = Symbols::new();
-        let name =
-            |number| if equality && number == EQUALITY { SAME_AS.into() } else { format!("p{number}") };
+        let name = |number| match number {
+            EQUALITY if equality => SAME_AS.into(),
+            DIFFERENCE if equality => DIFFERENT_FROM.into(),
+            _ => format!("p{number}"),
+        };
         let predicates = (0..PREDICATES).map(|number| symbols.name(&name(number))).collect();
         for name in ["integer", "string"] {
             let iri = format!("http://www.w3.org/2001/XMLSchema#{name}");
@@ -51,12 +61,7 @@ impl World {
         }
         let names = ["a", "b"].map(|name| symbols.name(name));
         let numbers = [1, 2].map(|number| symbols.literal(Literal::integer(number)));
-        Self { symbols, predicates, constants: names.into_iter().chain(numbers).collect() }
-    }
-
-    /// All relations with their numbers of arguments.
-    fn relations(&self) -> impl Iterator<Item = (Symbol, usize)> {
-        (0..PREDICATES).map(|number| (self.predicates[usize::from(number)], arity(number)))
+        Self { symbols, predicates, equality, constants: names.into_iter().chain(numbers).collect() }
     }
 
     fn level(&self, predicate: Symbol) -> usize {
@@ -115,6 +120,8 @@ impl World {
                     built_in: if p % 2 == 0 { BuiltIn::LessThan } else { BuiltIn::NotEqual },
                     arguments: vec![left, right],
                 }),
+                // Under equality that asks for a relation of level 1.
+                8 if p % 2 == 0 && self.equality && level == 0 => {}
                 8 if p % 2 == 0 => atoms.push(Atom::Different(left, right)),
                 8 => {
                     let result = Term::Variable(Variable(u16::from(c % VARIABLES)));
@@ -186,6 +193,7 @@ impl World {
     fn is_below(&self, atom: &Atom, level: u8) -> bool {
         match atom {
             Atom::Relation { predicate, .. } => self.level(*predicate) < usize::from(level),
+            Atom::Different(..) => !self.equality || level > 1,
             _ => true,
         }
     }
@@ -200,6 +208,7 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
         for (position, step) in derivation.steps.iter().enumerate() {
             supported[position] |= match &step.reason {
                 Reason::Asserted => engine.is_asserted(&step.fact),
+                Reason::Equality { supports } => supports.iter().all(|&support| supported[support]),
                 Reason::Rule { supports, aggregates, .. } => {
                     let matched = aggregates.iter().flat_map(|aggregate| aggregate.matches.iter().flatten());
                     supports.iter().chain(matched).all(|&support| supported[support])
@@ -208,6 +217,13 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
         }
     }
     assert!(supported.iter().all(|&supported| supported), "circular: {derivation:?}");
+    assert!(derivation.steps.iter().all(|step| facts.contains(&step.fact)), "{derivation:?}");
+    let names = representatives(engine.symbols(), facts);
+    let find = |symbol: Symbol| names.get(&symbol).copied().unwrap_or(symbol);
+    if let Reason::Equality { supports } = &derivation.steps[0].reason {
+        let supporting: Vec<&Fact> = supports.iter().map(|&at| &derivation.steps[at].fact).collect();
+        check_equality(engine, &derivation.steps[0].fact, &supporting);
+    }
     for step in &derivation.steps[..1] {
         let Reason::Rule { identity, bindings, supports, absent, aggregates } = &step.reason else {
             continue;
@@ -237,7 +253,9 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
             assert!(match atom {
                 Atom::BuiltIn { built_in, arguments } =>
                     holds(*built_in, arguments, &values, engine.symbols()),
-                Atom::Same(left, right) => value(*left, &values) == value(*right, &values),
+                Atom::Same(left, right) => {
+                    value(*left, &values).map(find) == value(*right, &values).map(find)
+                }
                 Atom::Different(left, right) => value(*left, &values) != value(*right, &values),
                 Atom::Aggregate { aggregate, result, .. } => {
                     let found = aggregates.next().expect("one for each");
@@ -255,35 +273,60 @@ fn check_derivation(engine: &Engine, derivation: &Derivation, facts: &BTreeSet<F
     }
 }
 
+/// A fact follows from the same fact about other names, or a pair of names from pairs between them.
+fn check_equality(engine: &Engine, fact: &Fact, supporting: &[&Fact]) {
+    let same = engine.symbols().find_name(SAME_AS).expect("a name");
+    let is_name = |&symbol: &Symbol| engine.symbols().value(symbol).as_name().is_some();
+    let is_pair = |fact: &Fact| fact.predicate == same && fact.arguments.iter().all(is_name);
+    let (first, pairs) =
+        if is_pair(fact) { (None, supporting) } else { (Some(supporting[0]), &supporting[1..]) };
+    assert!(pairs.iter().all(|pair| is_pair(pair)));
+    let mut pairs: BTreeSet<Fact> = pairs.iter().map(|&pair| pair.clone()).collect();
+    close_under_equality(engine.symbols(), &BTreeSet::new(), &mut pairs);
+    let are_one = |a: Symbol, b: Symbol| a == b || pairs.contains(&Fact::new(same, [a, b]));
+    match first {
+        None => assert!(are_one(fact.arguments[0], fact.arguments[1])),
+        Some(other) => {
+            assert_eq!(fact.predicate, other.predicate);
+            assert!(fact.arguments.iter().zip(&other.arguments).all(|(&a, &b)| are_one(a, b)));
+        }
+    }
+}
+
 /// The constraints that fire, with how many matches each has.
 fn violations(program: &Program, symbols: &mut Symbols, facts: &BTreeSet<Fact>) -> BTreeMap<u32, usize> {
-    let random = program.rules.iter().filter(|rule| &*rule.identity.source == "random");
+    let random = program.rules.iter().filter(|rule| is_random(rule));
     let constraints = random.filter(|rule| rule.head.is_empty());
-    let counts = constraints.map(|rule| (rule.identity.position, matches(rule, symbols, facts).len()));
+    let names = representatives(symbols, facts);
+    let counts = constraints.map(|rule| {
+        let found = matches(rule, symbols, facts);
+        let individuals: BTreeSet<Binding> = found.iter().map(|binding| normal(binding, &names)).collect();
+        (rule.identity.position, individuals.len())
+    });
     counts.filter(|&(_, count)| count > 0).collect()
 }
 
 fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTreeSet<Fact> {
     let mut symbols = engine.symbols().clone();
-    let of_equality = |rule: &&Rule| &*rule.identity.source == owl_rl::SOURCE;
-    let random = engine.program().rules.iter().filter(|rule| !of_equality(rule)).cloned().collect();
-    let same = world.predicates[usize::from(EQUALITY)];
-    let equality = symbols.value(same).as_name() == Some(SAME_AS);
-    let close = |facts: &mut BTreeSet<Fact>| {
-        if equality {
-            close_under(same, facts);
+    let close = |symbols: &Symbols, facts: &mut BTreeSet<Fact>| {
+        if world.equality {
+            close_under_equality(symbols, stated, facts);
         }
     };
     let level = |predicate| world.level(predicate);
-    let expected = naive(&Program { rules: random }, &mut symbols, stated, level, close);
+    let rules = engine.program().rules.iter().filter(|rule| !rule.head.is_empty()).cloned().collect();
+    let program = Program { rules, ..Program::default() };
+    let expected = naive(&program, &mut symbols, stated, level, close);
     let facts: BTreeSet<Fact> = engine.facts().collect();
-    assert_eq!(facts, expected);
+    // Pairs of a name with itself are shown only where they are stated.
+    let is_shown = |fact: &&Fact| !is_reflexive(&symbols, fact) || stated.contains(fact);
+    assert_eq!(facts, expected.iter().filter(is_shown).cloned().collect());
     for fact in &facts {
         assert_eq!(engine.is_asserted(fact), stated.contains(fact));
-        check_derivation(engine, &engine.why(fact).expect("a derivation of what holds"), &facts);
+        check_derivation(engine, &engine.why(fact).expect("a derivation of what holds"), &expected);
         let pattern: Vec<Option<Symbol>> =
             fact.arguments.iter().enumerate().map(|(at, &symbol)| (at != 1).then_some(symbol)).collect();
-        assert!(engine.matching(fact.predicate, &pattern).any(|row| row == fact.arguments.as_slice()));
+        assert!(engine.matching(fact.predicate, &pattern).any(|row| row == fact.arguments));
     }
     for (predicate, constant) in (0..PREDICATES).step_by(3).flat_map(|p| (0..CONSTANTS).map(move |c| (p, c)))
     {
@@ -297,29 +340,35 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
     for violation in engine.violations() {
         if let Cause::Constraint(identity) = violation.cause {
             assert!(violation.supports.iter().all(|fact| facts.contains(fact)));
-            *counts.entry(identity.position).or_insert(0) += 1;
+            if &*identity.source == "random" {
+                *counts.entry(identity.position).or_insert(0) += 1;
+            }
         }
     }
-    assert_eq!(counts, violations(engine.program(), &mut symbols, &facts));
+    assert_eq!(counts, violations(engine.program(), &mut symbols, &expected));
     facts
 }
 
 /// Runs a script of changes and compares with the oracle after every step.
 pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], equality: bool) {
     let world = World::new(equality);
-    let program = Program { rules: rules.iter().enumerate().map(|(at, raw)| world.rule(at, raw)).collect() };
+    let rules = program(rules.iter().enumerate().map(|(at, raw)| world.rule(at, raw)).collect());
     // Identical rules are evaluated once, under the first one's identity.
     let mut seen = BTreeSet::new();
     let distinct = |rule: &Rule| seen.insert(format!("{:?}{:?}", rule.head, rule.body));
-    let program = Program { rules: program.rules.into_iter().filter(distinct).collect() };
+    let program = program(rules.rules.into_iter().filter(distinct).collect());
     let program = renumber(program);
     let mut symbols = world.symbols.clone();
     let complete = |program: Program, symbols: &mut Symbols| {
-        if equality { owl_rl::close_under_equality(&program, world.relations(), symbols) } else { program }
+        if equality { owl_rl::with_equality(&program, symbols) } else { program }
     };
     let mut stated: BTreeSet<Fact> =
         start.iter().map(|&(_, p, arguments)| world.fact(p, arguments)).collect();
-    let full = complete(program.clone(), &mut symbols);
+    let full = complete(program, &mut symbols);
+    let program = Program {
+        rules: full.rules.iter().filter(|rule| is_random(rule)).cloned().collect(),
+        ..full.clone()
+    };
     let mut engine = Engine::new(symbols, full, stated.iter().cloned()).expect("safe rules");
     let mut before = check_state(&engine, &world, &stated);
     let mut absent = BTreeSet::new();
@@ -349,7 +398,7 @@ pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], 
     }
     let active = program.rules.into_iter().filter(|rule| !absent.contains(&rule.identity.position));
     let mut symbols = engine.symbols().clone();
-    let reversed = complete(renumber(Program { rules: active.rev().collect() }), &mut symbols);
+    let reversed = complete(renumber(self::program(active.rev().collect())), &mut symbols);
     let engine = Engine::new(symbols, reversed, stated.into_iter().rev()).expect("safe rules");
     assert_eq!(engine.facts().collect::<BTreeSet<_>>(), before);
 }
@@ -385,17 +434,25 @@ fn switch(
             if comes {
                 rules.insert(0, rule.clone());
             }
-            engine.set_program(Program { rules })
+            engine.set_program(Program { rules, ..engine.program().clone() })
         }
     };
-    let random = engine.program().rules.iter().filter(|rule| &*rule.identity.source == "random");
+    let random = engine.program().rules.iter().filter(|rule| is_random(rule));
     let active: BTreeSet<u32> = random.map(|rule| rule.identity.position).collect();
     let expected = program.rules.iter().map(|rule| rule.identity.position).filter(|n| !absent.contains(n));
     assert_eq!(active, expected.collect());
     change.expect("safe rules")
 }
 
-fn renumber(program: Program) -> Program {
+fn is_random(rule: &Rule) -> bool {
+    &*rule.identity.source == "random"
+}
+
+fn program(rules: Vec<Rule>) -> Program {
+    Program { rules, ..Program::default() }
+}
+
+fn renumber(rules: Program) -> Program {
     let number = |(position, rule)| Rule { identity: RuleIdentity::new("random", position as u32), ..rule };
-    Program { rules: program.rules.into_iter().enumerate().map(number).collect() }
+    program(rules.rules.into_iter().enumerate().map(number).collect())
 }

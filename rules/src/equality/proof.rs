@@ -1,0 +1,302 @@
+//! Why a fact about names holds, and why two names are one.
+//!
+//! A derivation that the engine recorded speaks of representatives, which are names, too; a fact about other names of the
+//! same individuals follows from it by equality. Each equality keeps the derivation by which it came about, which uses
+//! earlier ones only. Where a fact occurs in several derivations, the earliest explains it, so that none supports itself.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
+
+use super::Equality;
+use super::classes::{Edge, EdgeId};
+use crate::engine::Engine;
+use crate::explain::{Aggregated, Derivation, DerivationStep, Reason};
+use crate::fact::Fact;
+use crate::fixpoint::resolve;
+use crate::rule::{Atom, Term, Variable};
+use crate::safety::bound_variables;
+use crate::store::{Record, state};
+
+/// A fact and what makes it hold, where an equality that has a derivation of its own counts as stated.
+pub(super) type Step = DerivationStep;
+
+/// The edge of a concluded pair.
+pub(super) fn edge_of(engine: &Engine, equality: &Equality, pair: &Fact) -> Edge {
+    let proof = Builder::new(engine, equality).prove_derived(pair);
+    let leaves = proof.iter().filter(|step| step.reason == Reason::Asserted).map(|step| &step.fact);
+    let (pairs, facts): (Vec<&Fact>, Vec<&Fact>) = leaves
+        .partition(|fact| equality.is_pair(fact, &engine.symbols) && fact.arguments[0] != fact.arguments[1]);
+    let classes = &equality.classes;
+    let edges =
+        pairs.iter().flat_map(|pair| classes.path(pair.arguments[0], pair.arguments[1], classes.now()));
+    let facts = facts.into_iter().cloned().collect();
+    Edge { left: pair.arguments[0], right: pair.arguments[1], facts, edges: edges.collect(), proof }
+}
+
+/// A fact's reason by facts.
+#[derive(Clone)]
+struct Ground<'a> {
+    reason: &'a Reason,
+    steps: &'a [Step],
+}
+
+impl Equality {
+    /// Why a fact holds that does.
+    pub fn why(&self, engine: &Engine, fact: &Fact) -> Derivation {
+        let own = Builder::new(engine, self).prove(fact);
+        let edges = self.edges_in(engine, &own);
+        let mut grounds: FxHashMap<Fact, Ground> = FxHashMap::default();
+        let stated = Reason::Asserted;
+        let is_edge = |step: &Step| step.reason == Reason::Asserted && self.is_edge(engine, &step.fact);
+        for edge in edges.values() {
+            if edge.proof.is_empty() {
+                let pair = Fact::new(self.same, [edge.left, edge.right]);
+                grounds.entry(pair).or_insert(Ground { reason: &stated, steps: &[] });
+            }
+            for step in edge.proof.iter().filter(|step| !is_edge(step)) {
+                let ground = Ground { reason: &step.reason, steps: &edge.proof };
+                grounds.entry(step.fact.clone()).or_insert(ground);
+            }
+        }
+        for step in own.iter().filter(|step| !is_edge(step)) {
+            grounds.entry(step.fact.clone()).or_insert(Ground { reason: &step.reason, steps: &own });
+        }
+        let mut queue = vec![fact.clone()];
+        let mut positions = FxHashMap::from_iter([(fact.clone(), 0)]);
+        let mut steps: Vec<Step> = Vec::new();
+        while let Some(fact) = queue.get(steps.len()).cloned() {
+            let reason = match grounds.get(&fact) {
+                Some(ground) => rebased(ground, |fact| {
+                    *positions.entry(fact.clone()).or_insert_with(|| {
+                        queue.push(fact.clone());
+                        queue.len() - 1
+                    })
+                }),
+                None => Reason::Asserted,
+            };
+            steps.push(DerivationStep { fact, reason });
+        }
+        Derivation { steps }
+    }
+
+    fn is_edge(&self, engine: &Engine, fact: &Fact) -> bool {
+        self.is_pair(fact, &engine.symbols) && fact.arguments[0] != fact.arguments[1]
+    }
+
+    /// The edges that steps and the derivations of these edges use.
+    fn edges_in(&self, engine: &Engine, steps: &[Step]) -> BTreeMap<EdgeId, &Edge> {
+        let mut found: BTreeMap<EdgeId, &Edge> = BTreeMap::new();
+        let mut open: Vec<EdgeId> = Vec::new();
+        for step in
+            steps.iter().filter(|step| step.reason == Reason::Asserted && self.is_edge(engine, &step.fact))
+        {
+            let (left, right) = (step.fact.arguments[0], step.fact.arguments[1]);
+            open.extend(self.classes.path(left, right, self.classes.now()));
+        }
+        while let Some(id) = open.pop() {
+            if let Some(edge) = self.classes.edges.get(&id)
+                && found.insert(id, edge).is_none()
+            {
+                open.extend(&edge.edges);
+            }
+        }
+        found
+    }
+
+    /// A stated fact that a row stands for, if the row is stated.
+    pub fn witness(&self, engine: &Engine, row: &Fact) -> Option<Fact> {
+        match self.originals.get(row) {
+            Some(facts) => facts.first().cloned(),
+            None => engine.row_state(row).filter(|bits| bits & state::ASSERTED != 0).map(|_| row.clone()),
+        }
+    }
+
+    /// Rows that a violation rests on, as facts about names: stated ones where there are any, with the equalities that
+    /// make them one.
+    pub fn witnesses(&self, engine: &Engine, rows: Vec<Fact>) -> Vec<Fact> {
+        let mut facts = Vec::new();
+        for row in rows {
+            let fact = if self.is_reflexive(&row) {
+                let class = self.classes.class(row.arguments[0]);
+                let other = class.get(1).copied().unwrap_or(row.arguments[0]);
+                Fact::new(self.same, [class[0], other])
+            } else {
+                self.witness(engine, &row).unwrap_or_else(|| row.clone())
+            };
+            for (at, &name) in fact.arguments.iter().enumerate() {
+                let others = fact.arguments[at + 1..].iter().filter(|&&other| other != name);
+                let equal = others.filter(|&&other| self.classes.find(other) == self.classes.find(name));
+                facts.extend(equal.map(|&other| Fact::new(self.same, [name, other])));
+            }
+            facts.push(fact);
+        }
+        let mut seen = rustc_hash::FxHashSet::default();
+        facts.retain(|fact| seen.insert(fact.clone()));
+        facts
+    }
+}
+
+/// A reason whose supports are numbered anew.
+fn rebased(ground: &Ground, mut position: impl FnMut(&Fact) -> usize) -> Reason {
+    let mut moved =
+        |supports: &[usize]| supports.iter().map(|&at| position(&ground.steps[at].fact)).collect::<Vec<_>>();
+    match ground.reason {
+        Reason::Asserted => Reason::Asserted,
+        Reason::Equality { supports } => Reason::Equality { supports: moved(supports) },
+        Reason::Rule { identity, bindings, supports, absent, aggregates } => Reason::Rule {
+            identity: identity.clone(),
+            bindings: bindings.clone(),
+            supports: moved(supports),
+            absent: absent.clone(),
+            aggregates: aggregates
+                .iter()
+                .map(|aggregated| Aggregated {
+                    result: aggregated.result,
+                    matches: aggregated.matches.iter().map(|found| moved(found)).collect(),
+                })
+                .collect(),
+        },
+    }
+}
+
+/// Builds a derivation from what is recorded now.
+struct Builder<'a> {
+    engine: &'a Engine,
+    equality: &'a Equality,
+    positions: FxHashMap<Fact, usize>,
+    queue: Vec<Fact>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(engine: &'a Engine, equality: &'a Equality) -> Self {
+        Self { engine, equality, positions: FxHashMap::default(), queue: Vec::new() }
+    }
+
+    fn position(&mut self, fact: &Fact) -> usize {
+        let queue = &mut self.queue;
+        *self.positions.entry(fact.clone()).or_insert_with(|| {
+            queue.push(fact.clone());
+            queue.len() - 1
+        })
+    }
+
+    fn prove(mut self, fact: &Fact) -> Vec<Step> {
+        self.position(fact);
+        self.finish(Vec::new())
+    }
+
+    /// The derivation of a pair whose names are not one yet.
+    fn prove_derived(mut self, pair: &Fact) -> Vec<Step> {
+        self.position(pair);
+        let reason = self.derived(pair, pair).unwrap_or(Reason::Asserted);
+        self.finish(vec![DerivationStep { fact: pair.clone(), reason }])
+    }
+
+    fn finish(mut self, mut steps: Vec<Step>) -> Vec<Step> {
+        while let Some(fact) = self.queue.get(steps.len()).cloned() {
+            let reason = self.reason(&fact);
+            steps.push(DerivationStep { fact, reason });
+        }
+        steps
+    }
+
+    fn reason(&mut self, fact: &Fact) -> Reason {
+        let (engine, equality) = (self.engine, self.equality);
+        if equality.is_stated(engine, fact) {
+            return Reason::Asserted;
+        }
+        let row = equality.classes.normal(fact);
+        if equality.is_reflexive(&row) {
+            return self.pair(fact);
+        }
+        match equality.witness(engine, &row) {
+            Some(witness) => self.renamed(fact, &witness),
+            None => self.derived(fact, &row).unwrap_or(Reason::Asserted),
+        }
+    }
+
+    /// A pair by the edges between its names.
+    fn pair(&mut self, pair: &Fact) -> Reason {
+        let (classes, same) = (&self.equality.classes, self.equality.same);
+        let (from, mut to) = (pair.arguments[0], pair.arguments[1]);
+        if from == to {
+            // An individual of several names is itself because it has another name.
+            to = classes.class(from).iter().copied().find(|&name| name != from).unwrap_or(to);
+        }
+        let path = classes.path(from, to, classes.now());
+        let pairs: Vec<Fact> = path
+            .iter()
+            .filter_map(|edge| classes.edges.get(edge))
+            .map(|edge| Fact::new(same, [edge.left, edge.right]))
+            .collect();
+        if pairs.as_slice() == std::slice::from_ref(pair) {
+            return Reason::Asserted;
+        }
+        Reason::Equality { supports: pairs.iter().map(|pair| self.position(pair)).collect() }
+    }
+
+    /// A fact by the same fact about other names.
+    fn renamed(&mut self, fact: &Fact, other: &Fact) -> Reason {
+        let mut supports = vec![self.position(other)];
+        for (&name, &other) in fact.arguments.iter().zip(&other.arguments) {
+            if name != other {
+                let at = self.position(&Fact::new(self.equality.same, [name, other]));
+                if !supports.contains(&at) {
+                    supports.push(at);
+                }
+            }
+        }
+        Reason::Equality { supports }
+    }
+
+    /// A fact by the rule that is recorded for its row.
+    fn derived(&mut self, fact: &Fact, row: &Fact) -> Option<Reason> {
+        let engine = self.engine;
+        let relation = engine.store.get(engine.store.find(row.predicate, row.arguments.len())?);
+        let record = relation.record(relation.find(&row.arguments)?);
+        let rule = engine.rule_of(record)?;
+        let bound = engine.records.get(record);
+        let heads = rule.head.iter().filter_map(|head| engine.concluded(head, bound));
+        let concluded = heads.into_iter().find(|head| self.equality.classes.normal(head) == *row)?;
+        if concluded != *fact {
+            return Some(self.renamed(fact, &concluded));
+        }
+        let used =
+            (0..).zip(bound_variables(rule)).filter(|&(_, is_bound)| is_bound).map(|(v, _)| Variable(v));
+        let bindings = used.map(|v| (rule.variable_name(v), bound[usize::from(v.0)])).collect();
+        let atoms = |negated: bool| {
+            let ground = rule.body.iter().filter_map(move |atom| match atom {
+                Atom::Relation { predicate, arguments } if !negated => Some((*predicate, arguments)),
+                Atom::Not { predicate, arguments } if negated => Some((*predicate, arguments)),
+                _ => None,
+            });
+            let value = |&term: &Term| resolve(term.into(), bound);
+            ground.map(|(predicate, terms)| Fact::new(predicate, terms.iter().map(value))).collect::<Vec<_>>()
+        };
+        let supports = atoms(false).iter().map(|fact| self.position(fact)).collect();
+        let aggregates = self.aggregates(record);
+        Some(Reason::Rule {
+            identity: rule.identity.clone(),
+            bindings,
+            supports,
+            absent: atoms(true),
+            aggregates,
+        })
+    }
+
+    fn aggregates(&mut self, record: Record) -> Vec<Aggregated> {
+        let engine = self.engine;
+        let mut aggregates = Vec::new();
+        for (relation, key, result) in engine.aggregates(record) {
+            let mut rows: Vec<_> = engine.group(relation, &key).map(|(row, _)| row).collect();
+            rows.sort_unstable();
+            let found = rows.into_iter().map(|row| {
+                let facts = engine.body_facts(engine.store.get(relation).record(row), false);
+                facts.iter().map(|fact| self.position(fact)).collect()
+            });
+            aggregates.push(Aggregated { result, matches: found.collect() });
+        }
+        aggregates
+    }
+}

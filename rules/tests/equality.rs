@@ -1,0 +1,110 @@
+//! Individuals with several names: what holds of each name, before and after changes.
+
+mod text;
+
+use std::collections::BTreeSet;
+
+use metaplan_rules::{Delta, Engine, Symbols, owl_rl, parse_rules};
+use text::{fact, facts, prefixes, show_violation};
+
+fn engine(rules: &str, stated: &str) -> Engine {
+    let mut symbols = Symbols::new();
+    let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
+    let facts = if stated.is_empty() { Vec::new() } else { facts(&mut symbols, stated) };
+    let program = owl_rl::with_equality(&program, &mut symbols);
+    Engine::new(symbols, program, facts).expect("safe rules")
+}
+
+fn shown(engine: &Engine) -> BTreeSet<String> {
+    let short = |text: String| text.replace("http://www.w3.org/2002/07/owl#", "").replace(['<', '>'], "");
+    engine.facts().map(|fact| short(fact.display(engine.symbols()).to_string())).collect()
+}
+
+/// Each script line is `+fact`, `-fact`, or `= facts`: all that hold besides pairs of names.
+fn check(rules: &str, stated: &str, script: &[&str]) {
+    let mut engine = engine(rules, stated);
+    for line in script {
+        let (verb, text) = line.split_at(1);
+        if verb == "=" {
+            let mut found = shown(&engine);
+            assert!(!found.contains("sameAs(b, b)"), "{found:?}");
+            found.retain(|fact| !fact.starts_with("sameAs"));
+            let expected: BTreeSet<String> = text.split(" ^ ").map(|fact| fact.trim().to_string()).collect();
+            assert_eq!(found, expected, "{script:?} {line}");
+            continue;
+        }
+        let before = engine.facts().collect::<BTreeSet<_>>();
+        let fact = fact(&mut engine, text);
+        let change = match verb {
+            "+" => Delta { insert: vec![fact], delete: vec![] },
+            _ => Delta { insert: vec![], delete: vec![fact] },
+        };
+        let change = engine.apply(change).expect(line);
+        let after = engine.facts().collect::<BTreeSet<_>>();
+        assert_eq!(change.insert, after.difference(&before).cloned().collect::<Vec<_>>(), "{line}");
+        assert_eq!(change.delete, before.difference(&after).cloned().collect::<Vec<_>>(), "{line}");
+    }
+}
+
+#[test]
+fn pairs_come_and_go() {
+    let script = [
+        "= p(a, b)",
+        "+sameAs(b, c)",
+        "= p(a, b) ^ p(a, c)",
+        "+sameAs(c, d)",
+        "= p(a, b) ^ p(a, c) ^ p(a, d)",
+    ];
+    check(
+        "",
+        "p(a, b)",
+        &[&script[..], &["-sameAs(b, c)", "= p(a, b)", "-sameAs(c, d)", "= p(a, b)"]].concat(),
+    );
+    check(
+        "-> sameAs(a, b)",
+        "p(a)",
+        &["= p(a) ^ p(b)", "+sameAs(a, b)", "= p(a) ^ p(b)", "-sameAs(a, b)", "= p(a) ^ p(b)"],
+    );
+    check(
+        "sameAs(?x, b) -> sameAs(a, ?x)",
+        "p(a), sameAs(a, b)",
+        &["= p(a) ^ p(b)", "-sameAs(a, b)", "= p(a) ^ p(b)", "+sameAs(a, b)", "+q(b)", "-sameAs(a, b)"],
+    );
+    check(
+        "q(?x) ^ sameAs(?x, a) -> sameAs(?x, b)",
+        "p(a)",
+        &["= p(a)", "+q(a)", "= p(a) ^ p(b) ^ q(a) ^ q(b)"],
+    );
+}
+
+#[test]
+fn equality_does_not_support_itself() {
+    let rules = "[fp] p(?x, ?y) ^ p(?x, ?z) ^ differentFrom(?y, ?z) -> sameAs(?y, ?z) .
+        [ifp] p(?x, ?z) ^ p(?y, ?z) ^ differentFrom(?x, ?y) -> sameAs(?x, ?y) .";
+    let mut symbols = Symbols::new();
+    let axioms = [symbols.name("p")]
+        .map(|p| [owl_rl::Axiom::FunctionalObject(p), owl_rl::Axiom::InverseFunctional(p)]);
+    assert_eq!(rules.lines().count(), axioms[0].len());
+    let program = owl_rl::with_equality(&owl_rl::rules(&axioms[0], owl_rl::Names::Owl), &mut symbols);
+    let stated = facts(&mut symbols, "p(a, b), p(c, d), sameAs(a, c), q(a)");
+    let mut engine = Engine::new(symbols, program, stated).expect("safe rules");
+    let same = fact(&mut engine, "sameAs(b, d)");
+    assert!(engine.holds(&same));
+    let delete = vec![fact(&mut engine, "sameAs(a, c)")];
+    engine.apply(Delta { insert: vec![], delete }).expect("no budget needed");
+    assert!(!engine.holds(&same));
+    assert_eq!(engine.facts().count(), 3);
+}
+
+#[test]
+fn violations_name_what_is_stated() {
+    let mut engine = engine(
+        "p(?x) ^ q(?x) -> .",
+        "p(a), q(b), sameAs(a, b), differentFrom(c, d), sameAs(c, d), sameAs(a, 1)",
+    );
+    let shown: Vec<String> = engine.violations().iter().map(|v| show_violation(&engine, v)).collect();
+    assert_eq!(shown.len(), 3, "{shown:?}");
+    let delete = facts(engine.symbols_mut(), "sameAs(a, b), sameAs(c, d), sameAs(a, 1)");
+    engine.apply(Delta { insert: vec![], delete }).expect("no budget needed");
+    assert_eq!(engine.violations(), []);
+}
