@@ -55,7 +55,7 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
     let (mut atoms, mut derived) = (FxHashSet::default(), Vec::new());
     for (predicate, id) in lifted.predicates.iter().zip((0..).map(PredicateId)) {
         let any = vec![None; predicate.arity];
-        let rows = engine.matching(symbols.predicates[id.index()], &any).map(|row| (id, read(row)));
+        let rows = engine.matching(symbols.predicates[id.index()], &any).map(|row| (id, read(&row)));
         match (predicate.fluent, predicate.derived) {
             (true, _) => atoms.extend(rows),
             (false, true) => derived.extend(rows),
@@ -70,7 +70,7 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
             .matching(symbol, &any)
             .map(|row| {
                 let mut binding = vec![None; schema.variables];
-                for (parameter, object) in core.iter().zip(read(row).iter()) {
+                for (parameter, object) in core.iter().zip(read(&row).iter()) {
                     binding[*parameter as usize] = Some(*object);
                 }
                 binding
