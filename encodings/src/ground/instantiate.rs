@@ -7,7 +7,7 @@
 //! Conditional effects on atoms stay as they are. An instance whose numbers (cost among them) change under a
 //! condition becomes one operator for each case, and so does one whose start effects are conditional.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::configuration::{SlotParameter, conjuncts, slots_of_expression, slots_of_formula};
 use crate::error::{Error, File, Place};
@@ -142,6 +142,11 @@ fn instance(
         Some(duration) => build.static_quantity(duration, schema)?,
         None => Quantity::constant(Rational::from_integer(0)),
     };
+    build.forbid_negative(&duration);
+    let sizes: Vec<_> = build.slots.designs.iter().map(Vec::len).collect();
+    if !admit_some(&build.forbidden, &sizes) {
+        return Ok(Vec::new());
+    }
     let template = GroundOperator {
         schema: index,
         arguments: build.arguments(schema),
@@ -291,6 +296,19 @@ impl Build<'_, '_> {
         });
     }
 
+    /// Forbids the combinations of designs with which the action would end before it begins.
+    fn forbid_negative(&mut self, duration: &Quantity<Rational>) {
+        let zero = Rational::from_integer(0);
+        let least = duration.tables.iter().filter_map(|table| table.values.iter().min());
+        if least.fold(duration.constant, |sum, value| sum + value) >= zero {
+            return;
+        }
+        let slots: BTreeSet<u16> =
+            duration.tables.iter().flat_map(|table| table.slots.iter().copied()).collect();
+        let sizes: Vec<_> = self.slots.designs.iter().map(Vec::len).collect();
+        self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero);
+    }
+
     /// Forbids the combinations of designs for which a static condition over several slots fails.
     fn forbid_unless(&mut self, conjunct: &Formula, mentioned: &SlotSet) -> Result<(), Failure> {
         let (world, forbidden) = (&mut *self.world, &mut self.forbidden);
@@ -340,6 +358,23 @@ impl Build<'_, '_> {
         pairs
             .map(|(slot, designs)| Ok((function(slot.function).ok_or(Failure::Undefined)?, designs.clone())))
             .collect()
+    }
+}
+
+/// Whether some combination of designs is not forbidden.
+fn admit_some(forbidden: &[Forbidden], sizes: &[usize]) -> bool {
+    let mut choice = vec![0_u16; sizes.len()];
+    loop {
+        let hits = |rule: &Forbidden, bad: &SlotSet| {
+            rule.slots.iter().zip(bad).all(|(slot, design)| choice[*slot as usize] == *design)
+        };
+        if forbidden.iter().all(|rule| !rule.combinations.iter().any(|bad| hits(rule, bad))) {
+            return true;
+        }
+        let can_grow = |position: &usize| choice[*position] as usize + 1 < sizes[*position];
+        let Some(position) = (0..sizes.len()).rev().find(can_grow) else { return false };
+        choice[position] += 1;
+        choice[position + 1..].fill(0);
     }
 }
 

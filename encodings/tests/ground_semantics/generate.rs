@@ -48,7 +48,7 @@ pub const PLANNED: Features = Features {
     timed: false,
     inequalities: false,
     undefined: false,
-    negative: false,
+    negative: true,
     universal: false,
     nonlinear: false,
 };
