@@ -14,7 +14,7 @@ fn plan(scenario: Option<&str>) {
         mission.apply(&manifest.scenarios[scenario]).expect("the scenario fits");
     }
     let (problem, _) = mission.filled().expect("the knowledge base fits the domain");
-    let task = mission.ground(&problem, &Limits::none()).expect("the mission is ground");
+    let task = mission.ground(&problem, &[], &Limits::none()).expect("the mission is ground");
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     assert_eq!(black_box(solution).status, Status::Optimal);
 }

@@ -61,7 +61,8 @@ pub(crate) struct Lifted {
     pub(crate) goal: Formula,
     /// How many variables the quantifiers of the goal bind.
     pub(crate) goal_variables: usize,
-    pub(crate) metric: Option<Metric>,
+    /// What plans are measured by, the most important first; empty if the files do not say.
+    pub(crate) metrics: Vec<Metric>,
 }
 
 /// A predicate; it is a fluent if an action adds or deletes it, or if it is derived from fluents; else static.

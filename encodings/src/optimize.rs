@@ -15,6 +15,7 @@ use crate::quantity::Quantity;
 use crate::sat::{Answer, Solver as _, Varisat};
 use crate::search::{Found, search};
 use crate::task::Task;
+use crate::ties;
 
 /// Formulas with more operator variables than this are not built.
 const FORMULA_LIMIT: usize = 30_000_000;
@@ -123,6 +124,7 @@ pub struct Solution {
     pub status: Status,
     /// The best plan.
     pub plan: Option<Plan>,
+    pub(crate) ground: Option<GroundPlan>,
     /// No plan has a better metric; none if the metric is unbounded or nothing is known.
     pub lower_bound: Option<Exact>,
     /// Steps up to which all plans were considered.
@@ -176,6 +178,7 @@ impl Run<'_> {
         Solution {
             status,
             plan: plan.map(|plan| decode(self.task, plan)),
+            ground: plan.cloned(),
             lower_bound: lower.map(|lower| metric(self.task, lower)),
             horizon,
             proof,
@@ -202,7 +205,9 @@ impl Run<'_> {
             |plan: &GroundPlan| self.config.horizon.is_none_or(|horizon| plan.steps.len() <= horizon);
         let (incumbent, exact) = match found {
             Found::None => return self.finish(Status::Unsolvable, None, None, 0, Some(Proof::Search)),
-            Found::Optimal(plan) if within(&plan) => (Some(plan), true),
+            Found::Optimal(plan) if within(&plan) => {
+                (Some(ties::choose(self.task, &bounds, &self.config.limits, plan)), true)
+            }
             Found::Optimal(_) | Found::Unknown => (None, false),
         };
         let incumbent = match incumbent {
@@ -386,6 +391,7 @@ impl Run<'_> {
         Solution {
             status,
             plan: None,
+            ground: None,
             lower_bound: None,
             horizon,
             proof,
@@ -413,7 +419,13 @@ impl Run<'_> {
             (Some(plan), Status::Optimal) => plan.steps.len(),
             // The plan that there may be is measured by its steps, not by the metric: of no use to the user.
             (Some(_), _) => {
-                return Solution { status: Status::Unknown, plan: None, lower_bound: None, ..shortest };
+                return Solution {
+                    status: Status::Unknown,
+                    plan: None,
+                    ground: None,
+                    lower_bound: None,
+                    ..shortest
+                };
             }
             (None, _) => return Solution { lower_bound: None, ..shortest },
         };
@@ -449,6 +461,7 @@ impl Run<'_> {
         Solution {
             status: Status::Feasible,
             plan: Some(decode(self.task, &plan)),
+            ground: Some(plan),
             lower_bound: None,
             horizon: steps,
             proof,
@@ -465,7 +478,7 @@ impl Task {
         for operator in &mut task.operators {
             operator.cost = cost(operator);
         }
-        task.objective = crate::task::Objective { scale: 1, offset: 0, maximize: false };
+        task.objective = crate::task::Objective::sum();
         task
     }
 

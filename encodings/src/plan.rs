@@ -1,7 +1,7 @@
 //! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
 
 use crate::lifted::ObjectId;
-use crate::task::{Argument, Operator, OperatorId, State, Task};
+use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 
 /// One step of a plan over operators.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -135,8 +135,15 @@ pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
 
 /// The metric of the problem file for a sum of operator costs.
 pub(crate) fn metric(task: &Task, cost: i64) -> Exact {
-    let sign = if task.objective.maximize { -1 } else { 1 };
-    Exact::scaled(sign * (cost + task.objective.offset), task.objective.scale)
+    task.objective.metric(cost)
+}
+
+impl Objective {
+    /// The metric as the file writes it for a sum of operator costs.
+    pub(crate) fn metric(&self, cost: i64) -> Exact {
+        let sign = if self.maximize { -1 } else { 1 };
+        Exact::scaled(sign * (cost + self.offset), self.scale)
+    }
 }
 
 fn design(task: &Task, operator: &Operator, choice: &[u16], position: usize) -> String {

@@ -1,4 +1,5 @@
-//! A quick search for a first plan: A* with Pareto dominance over numeric variables.
+//! A quick search for a first plan: A* with Pareto dominance over numeric variables. Among the cheapest plans it
+//! finds one with fewest steps.
 //!
 //! States that agree on all finite-domain variables are compared by cost and by numeric variables; where a higher value
 //! never hurts (a battery), a state that costs no less and has no more of anything is dropped. That is the label-setting
@@ -16,7 +17,8 @@ use rustc_hash::FxHashMap;
 use crate::bounds::Bounds;
 use crate::limits::Limits;
 use crate::plan::{GroundPlan, GroundStep};
-use crate::task::{Fact, Operator, OperatorId, State, Task};
+use crate::successors::{OperatorIndex, undominated};
+use crate::task::{Fact, OperatorId, State, Task};
 
 /// How many states are stored at most.
 const STATE_LIMIT: usize = 400_000;
@@ -37,6 +39,7 @@ pub(crate) enum Found {
 struct Node {
     state: State,
     cost: i64,
+    steps: u32,
     parent: Option<(u32, OperatorId, u32)>,
     dominated: bool,
 }
@@ -46,9 +49,7 @@ struct Search<'a> {
     bounds: &'a Bounds,
     /// For each operator its combinations of designs that no other one dominates, with their costs.
     choices: Vec<Vec<(Vec<u16>, i64)>>,
-    /// Operators by a fact that they require, and those that require none.
-    by_fact: FxHashMap<(u32, u32), Vec<OperatorId>>,
-    always: Vec<OperatorId>,
+    index: OperatorIndex,
     nodes: Vec<Node>,
     seen: FxHashMap<Box<[u32]>, Vec<u32>>,
     open: BinaryHeap<Reverse<(i64, u32, u32)>>,
@@ -64,15 +65,13 @@ pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
         if operator.sizes().iter().product::<usize>() > CHOICE_LIMIT {
             return Found::Unknown;
         }
-        choices.push(undominated(operator, monotone));
+        choices.push(undominated(operator, monotone, false));
     }
-    let (by_fact, always) = index(task);
     let mut search = Search {
         task,
         bounds,
         choices,
-        by_fact,
-        always,
+        index: OperatorIndex::new(task),
         nodes: Vec::new(),
         seen: FxHashMap::default(),
         open: BinaryHeap::new(),
@@ -104,16 +103,8 @@ impl Search<'_> {
     fn expand(&mut self, id: u32, steps: u32) {
         let state = self.nodes[id as usize].state.clone();
         let cost = self.nodes[id as usize].cost;
-        let mut candidates = self.always.clone();
-        for (variable, value) in state.values.iter().enumerate() {
-            candidates.extend(self.by_fact.get(&(variable as u32, *value)).into_iter().flatten());
-        }
-        candidates.sort_unstable();
-        for operator_id in candidates {
+        for operator_id in self.index.applicable(self.task, &state) {
             let operator = &self.task.operators[operator_id.index()];
-            if !operator.condition.holds_propositionally(&state.values) {
-                continue;
-            }
             let sizes = operator.sizes();
             for index in 0..self.choices[operator_id.index()].len() {
                 let (choice, step) = &self.choices[operator_id.index()][index];
@@ -139,21 +130,22 @@ impl Search<'_> {
                 };
                 let known = |id: &u32| &nodes[*id as usize];
                 let front = entry.get_mut();
-                if front
-                    .iter()
-                    .any(|id| known(id).cost <= cost && at_least(&known(id).state.numbers, &state.numbers))
-                {
+                if front.iter().any(|id| {
+                    (known(id).cost, known(id).steps) <= (cost, steps)
+                        && at_least(&known(id).state.numbers, &state.numbers)
+                }) {
                     return;
                 }
                 front.retain(|id| {
                     let node = &mut nodes[*id as usize];
-                    node.dominated = cost <= node.cost && at_least(&state.numbers, &node.state.numbers);
+                    node.dominated = (cost, steps) <= (node.cost, node.steps)
+                        && at_least(&state.numbers, &node.state.numbers);
                     !node.dominated
                 });
                 front.push(id);
             }
         }
-        self.nodes.push(Node { state, cost, parent, dominated: false });
+        self.nodes.push(Node { state, cost, steps, parent, dominated: false });
         self.open.push(Reverse((cost + estimate, steps, id)));
     }
 
@@ -172,7 +164,7 @@ impl Search<'_> {
 
 /// Whether more of any numeric variable can only help: it enters conditions and effects with factors ≥ 0, and
 /// whether a derived variable holds that depends on numbers is asked only where it helps.
-fn is_monotone(task: &Task) -> bool {
+pub(crate) fn is_monotone(task: &Task) -> bool {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain([&task.goal]);
     let rules = || task.axioms.iter().flat_map(|layer| &layer.rules);
     let conditions: Vec<_> = conditions.chain(rules().map(|rule| &rule.body)).collect();
@@ -201,45 +193,4 @@ fn is_monotone(task: &Task) -> bool {
     let effects =
         task.operators.iter().flat_map(|operator| &operator.numeric_effects).map(|effect| &effect.value);
     comparisons.chain(effects).all(|linear| linear.coefficients.iter().all(|(_, factor)| *factor >= 0))
-}
-
-fn undominated(operator: &Operator, monotone: bool) -> Vec<(Vec<u16>, i64)> {
-    let sizes = operator.sizes();
-    let profile = |choice: &[u16]| -> Vec<i64> {
-        let effects = operator.numeric_effects.iter().map(|effect| effect.value.quantity.at(choice, &sizes));
-        let conditions =
-            operator.condition.comparisons.iter().map(|linear| linear.quantity.at(choice, &sizes));
-        effects.chain(conditions).collect()
-    };
-    let mut front: Vec<(Vec<u16>, i64, Vec<i64>)> = Vec::new();
-    let no_worse =
-        |a: &[i64], b: &[i64]| if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b };
-    for choice in operator.choices() {
-        let (cost, profile) = (operator.cost.at(&choice, &sizes), profile(&choice));
-        if front.iter().any(|(_, other, numbers)| *other <= cost && no_worse(numbers, &profile)) {
-            continue;
-        }
-        front.retain(|(_, other, numbers)| !(cost <= *other && no_worse(&profile, numbers)));
-        front.push((choice, cost, profile));
-    }
-    front.into_iter().map(|(choice, cost, _)| (choice, cost)).collect()
-}
-
-type FactIndex = FxHashMap<(u32, u32), Vec<OperatorId>>;
-
-/// Operators by that fact of their condition whose variable has the most values.
-fn index(task: &Task) -> (FactIndex, Vec<OperatorId>) {
-    let (mut by_fact, mut always) = (FactIndex::default(), Vec::new());
-    for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
-        let widest = operator
-            .condition
-            .facts
-            .iter()
-            .max_by_key(|fact| task.variables[fact.variable.index()].values.len());
-        match widest {
-            Some(fact) => by_fact.entry((fact.variable.0, fact.value)).or_default().push(id),
-            None => always.push(id),
-        }
-    }
-    (by_fact, always)
 }

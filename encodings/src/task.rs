@@ -155,6 +155,8 @@ pub(crate) struct Operator {
     pub(crate) numeric_effects: Vec<NumericEffect>,
     /// In the task's cost unit; may be negative where the metric rewards.
     pub(crate) cost: Quantity<i64>,
+    /// By the task's other objectives, in their units.
+    pub(crate) others: Vec<Quantity<i64>>,
     /// In the task's time unit.
     pub(crate) duration: Quantity<i64>,
 }
@@ -177,6 +179,13 @@ pub struct Objective {
     pub(crate) maximize: bool,
 }
 
+impl Objective {
+    /// The plain sum of costs.
+    pub(crate) fn sum() -> Self {
+        Self { scale: 1, offset: 0, maximize: false }
+    }
+}
+
 /// A ground task.
 #[derive(Debug, Clone)]
 pub struct Task {
@@ -194,6 +203,8 @@ pub struct Task {
     pub(crate) initial: State,
     pub(crate) goal: Condition,
     pub(crate) objective: Objective,
+    /// Less important ones, in order.
+    pub(crate) others: Vec<Objective>,
     /// Durations are this many times the values of the files.
     pub(crate) time_scale: i64,
     /// Set if relaxed reachability shows that the goal cannot be reached: the reason.
@@ -213,6 +224,11 @@ impl Operator {
                 .iter()
                 .all(|bad| rule.slots.iter().zip(bad).any(|(slot, design)| choice[*slot as usize] != *design))
         })
+    }
+
+    /// The cost with a combination of designs.
+    pub(crate) fn cost_of(&self, choice: &[u16]) -> i64 {
+        self.cost.at(choice, &self.sizes())
     }
 
     /// All admitted combinations of designs, in lexicographic order.

@@ -2,6 +2,7 @@
 
 mod convert;
 mod export;
+mod objectives;
 mod output;
 mod plan;
 mod reason;

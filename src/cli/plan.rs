@@ -8,15 +8,14 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use encodings::pddl::ast::{Name, Problem};
 use encodings::validate::{Options, PlanStep, PlanText, validate};
-use encodings::{
-    Config, Exact, Improvement, Limits, Plan, Proof, Solution, Status, Step, Unbounded, optimize,
-};
+use encodings::{Config, Exact, Improvement, Limits, Plan, Proof, Solution, Status, Step, Unbounded};
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use num_rational::BigRational;
 use serde_json::{Value, json};
 
+use crate::cli::objectives::Objectives;
 use crate::cli::{Common, Exit, Failure, Format, Situation, output};
 
 /// Arguments of `plan`.
@@ -33,6 +32,13 @@ pub struct Arguments {
     /// Stop after this many seconds with the best plan so far.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
+    /// What to minimize in place of the problem's metric: an expression as in a metric, or a function's name. Repeated,
+    /// earlier objectives come first, and later ones decide among plans that are equal by them.
+    #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true)]
+    minimize: Vec<String>,
+    /// All plans that are best by one of two objectives without being worse by the other.
+    #[arg(long, value_name = "EXPRESSION,EXPRESSION", conflicts_with_all = ["minimize", "plan_format"])]
+    pareto: Option<String>,
     /// Only the plan, in a format that other tools read.
     #[arg(long, value_enum)]
     plan_format: Option<PlanFormat>,
@@ -57,7 +63,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 /// Milliseconds spent before the optimizer runs.
-struct Stages {
+#[derive(Default)]
+pub(super) struct Stages {
     read: Duration,
     ground: Duration,
 }
@@ -77,7 +84,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
     let read = started.elapsed();
-    let task = mission.ground(&problem, &limits).map_err(|messages| {
+    let objectives = Objectives::read(&mission, &problem, &arguments.minimize, arguments.pareto.as_deref())?;
+    let task = mission.ground(&problem, &objectives.metrics, &limits).map_err(|messages| {
         let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
         Failure { exit, messages }
     })?;
@@ -91,21 +99,38 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             improvement.cost, improvement.lower_bound, improvement.horizon
         ));
     };
-    let solution = optimize(&task, &config, &mut report);
-    progress.finish_and_clear();
-    if let Some(plan) = &solution.plan {
-        confirm(&mission, &problem, plan)?;
+    if arguments.pareto.is_some() {
+        let front = encodings::pareto(&task, &config, &mut report);
+        progress.finish_and_clear();
+        for point in &front.points {
+            objectives.confirm(&mission, &problem, point)?;
+        }
+        let text = match common.format {
+            Format::Json => output::pretty(&objectives.front_json(&mission.name, &front, &stages)),
+            _ => objectives.front_text(&mission.name, &front),
+        };
+        match &arguments.output {
+            Some(file) => output::write_file(file, &text)?,
+            None => output::answer(&text),
+        }
+        return Ok(exit(front.status));
     }
+    let point = encodings::lexicographic(&task, &config, &mut report);
+    progress.finish_and_clear();
+    objectives.confirm(&mission, &problem, &point)?;
+    let solution = &point.solution;
 
     let text = match (arguments.plan_format, common.format) {
         (Some(PlanFormat::Json), _) | (None, Format::Json) => {
-            output::pretty(&json(&mission.name, &solution, &stages))
+            let mut answer = json(&mission.name, solution, &stages);
+            objectives.attach(&mut answer, &point);
+            output::pretty(&answer)
         }
-        (None, _) => text(&mission.name, &solution, common.verbose, &stages),
+        (None, _) => text(&mission.name, solution, common.verbose, &stages) + &objectives.values_text(&point),
         (Some(format), _) => {
             let Some(plan) = &solution.plan else {
                 // There is nothing to write, and readers of plans would stumble over anything else.
-                output::note(&verdict(&solution));
+                output::note(&verdict(solution));
                 return Ok(exit(solution.status));
             };
             plan_text(plan, format)
@@ -114,7 +139,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     match &arguments.output {
         Some(file) => {
             output::write_file(file, &text)?;
-            output::note(&verdict(&solution));
+            output::note(&verdict(solution));
         }
         None => output::answer(&text),
     }
@@ -122,7 +147,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 }
 
 /// Has the independent validator execute the plan; what it refuses is not shown.
-fn confirm(mission: &Mission, problem: &Problem, plan: &Plan) -> Result<(), Failure> {
+pub(super) fn confirm(mission: &Mission, problem: &Problem, plan: &Plan) -> Result<(), Failure> {
     let rational = |exact: Exact| BigRational::new(exact.numerator.into(), exact.denominator.into());
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
@@ -169,7 +194,7 @@ fn progress(common: &Common) -> ProgressBar {
 }
 
 /// The status in a word, as JSON has it.
-fn status_word(status: Status) -> &'static str {
+pub(super) fn status_word(status: Status) -> &'static str {
     match status {
         Status::Optimal => "optimal",
         Status::Feasible => "feasible",
@@ -231,27 +256,13 @@ fn steps(count: usize) -> String {
     if count == 1 { "1 step".to_owned() } else { format!("{count} steps") }
 }
 
-fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> String {
+pub(super) fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> String {
     let mut text = String::new();
     if let Some(plan) = &solution.plan {
         if plan.steps.is_empty() {
             text += "nothing has to be done: the goal holds already\n";
         }
-        let rows = plan.steps.iter().enumerate().map(|(index, step)| {
-            let configuration: Vec<_> =
-                step.configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
-            let changed = if step.reconfigured.is_empty() { "" } else { " (changed)" };
-            vec![
-                (index + 1).to_string(),
-                step.start.to_string(),
-                step.duration.to_string(),
-                format!("{} {}", step.action, route(step).join(" ")).trim_end().to_owned(),
-                configuration.join(", ") + changed,
-                step.cost.to_string(),
-            ]
-        });
-        let rows: Vec<_> = rows.collect();
-        text += &output::table(&["step", "start", "duration", "action", "configuration", "cost"], rows);
+        text += &steps_text(plan);
         let _ = write!(
             text,
             "\n{}cost {}",
@@ -268,6 +279,25 @@ fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> Stri
         text += &statistics_text(solution, stages);
     }
     text
+}
+
+/// The steps as a table.
+pub(super) fn steps_text(plan: &Plan) -> String {
+    let rows = plan.steps.iter().enumerate().map(|(index, step)| {
+        let configuration: Vec<_> =
+            step.configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
+        let changed = if step.reconfigured.is_empty() { "" } else { " (changed)" };
+        vec![
+            (index + 1).to_string(),
+            step.start.to_string(),
+            step.duration.to_string(),
+            format!("{} {}", step.action, route(step).join(" ")).trim_end().to_owned(),
+            configuration.join(", ") + changed,
+            step.cost.to_string(),
+        ]
+    });
+    let rows: Vec<_> = rows.collect();
+    output::table(&["step", "start", "duration", "action", "configuration", "cost"], rows)
 }
 
 /// The arguments of a step apart from functions and their designs.
@@ -302,7 +332,7 @@ fn statistics_text(solution: &Solution, stages: &Stages) -> String {
     )
 }
 
-fn json(name: &str, solution: &Solution, stages: &Stages) -> Value {
+pub(super) fn json(name: &str, solution: &Solution, stages: &Stages) -> Value {
     let step = |step: &Step| {
         let configuration: serde_json::Map<String, Value> =
             step.configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect();

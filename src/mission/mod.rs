@@ -9,7 +9,7 @@ mod settings;
 
 use std::path::Path;
 
-use encodings::pddl::ast::{Domain, Problem};
+use encodings::pddl::ast::{Direction, Domain, Metric, Problem};
 use encodings::pddl::{self, Severity, Source};
 use encodings::{GroundConfig, Limits, Task};
 
@@ -162,12 +162,36 @@ impl Mission {
         &self.domain
     }
 
-    /// Grounds a problem that [`Mission::filled`] has made.
+    /// An objective from its text: an expression as it stands in a metric, or the name of a function without
+    /// parameters.
+    ///
+    /// # Errors
+    /// All that is wrong with it.
+    pub fn objective(&self, problem: &Problem, text: &str) -> Result<Metric, Vec<Message>> {
+        let text = text.trim();
+        let is_word = !text.starts_with('(') && !text.eq_ignore_ascii_case("total-time");
+        let text = if is_word && !text.is_empty() { format!("({text})") } else { text.to_owned() };
+        let source = Source::new("objective", text);
+        pddl::read_objective(Direction::Minimize, &source, &self.domain, problem)
+            .map_err(|diagnostics| Message::from_pddl(&diagnostics, &[&source]))
+    }
+
+    /// Grounds a problem that [`Mission::filled`] has made, to be measured by some objectives in place of its metric
+    /// if there are any.
     ///
     /// # Errors
     /// Everything that the planner does not handle, or that a limit was reached.
-    pub fn ground(&self, problem: &Problem, limits: &Limits) -> Result<Task, Vec<Message>> {
-        let config = GroundConfig { solves: self.bindings.solves(), limits: limits.clone() };
+    pub fn ground(
+        &self,
+        problem: &Problem,
+        objectives: &[Metric],
+        limits: &Limits,
+    ) -> Result<Task, Vec<Message>> {
+        let config = GroundConfig {
+            solves: self.bindings.solves(),
+            objectives: objectives.to_vec(),
+            limits: limits.clone(),
+        };
         encodings::ground(&self.domain, problem, &config)
             .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
     }

@@ -7,8 +7,11 @@
 //! [1] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
 mod projection;
+mod resources;
 
 pub(crate) use projection::Projection;
+
+use resources::Resource;
 
 use crate::limits::Limits;
 use crate::task::{State, Task};
@@ -23,6 +26,7 @@ const PAIR_LIMIT: usize = 40;
 /// Projections of a task, the one with the highest estimate of the initial state first.
 pub(crate) struct Bounds {
     pub(crate) projections: Vec<Projection>,
+    resources: Vec<Resource>,
 }
 
 /// What is known of plans whose cost stays below some limit.
@@ -65,12 +69,13 @@ impl Bounds {
         projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
         // Beyond the best few, projections cost more time than they save steps.
         projections.truncate(12);
-        Self { projections }
+        let resources = resources::resources(task, &projections);
+        Self { projections, resources }
     }
 
     /// Bounds that say nothing: the projection to no variable at all.
     pub(crate) fn trivial(task: &Task) -> Self {
-        Self { projections: vec![Projection::new(task, Vec::new())] }
+        Self { projections: vec![Projection::new(task, Vec::new())], resources: Vec::new() }
     }
 
     /// A lower bound on the cost from a state to the goal; none if the goal cannot be reached.
@@ -79,7 +84,8 @@ impl Bounds {
         for projection in &self.projections {
             best = best.max(projection.estimate(state)?);
         }
-        Some(best)
+        let enough = |resource: &Resource| resource.suffices(state, &self.projections);
+        self.resources.iter().all(enough).then_some(best)
     }
 
     /// What is known of plans with cost at most `limit` and at most `horizon` steps, where either is given.

@@ -153,14 +153,42 @@ impl Projection {
     }
 
     fn costs_to_go(&self) -> Vec<Option<i64>> {
+        self.distances(|operator| self.operators[operator].0, self.goals.iter().map(|goal| (*goal, 0)))
+    }
+
+    /// The least number of steps from each abstract state to the goal.
+    pub(crate) fn steps_to_go(&self) -> Vec<Option<i64>> {
+        self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)))
+    }
+
+    /// What of a resource is used up at least until it is replenished or a goal state is reached. `used` is what
+    /// each operator uses, none if it may replenish; `left` is what a goal state must have left.
+    pub(crate) fn needs(&self, used: &[Option<i64>], left: i64) -> Vec<Option<i64>> {
+        let replenishing = self.operators.iter().zip(used).filter(|(_, used)| used.is_none());
+        let free = replenishing.flat_map(|((_, transitions), _)| transitions).map(|t| (t.source, 0));
+        let goals = self.goals.iter().map(|goal| (*goal, left));
+        self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free))
+    }
+
+    /// Whether an operator changes or reads the pattern.
+    pub(crate) fn touches(&self, operator: usize) -> bool {
+        !self.operators[operator].1.is_empty()
+    }
+
+    /// The least sum of costs from each abstract state to one of the targets, each of which adds its own.
+    fn distances(
+        &self,
+        cost: impl Fn(usize) -> i64,
+        targets: impl Iterator<Item = (u32, i64)>,
+    ) -> Vec<Option<i64>> {
         let mut incoming: Vec<Vec<(u32, i64)>> = vec![Vec::new(); self.size()];
-        for (cost, transitions) in &self.operators {
+        for (operator, (_, transitions)) in self.operators.iter().enumerate() {
             for transition in transitions.iter().filter(|t| t.source != t.target) {
-                incoming[transition.target as usize].push((transition.source, *cost));
+                incoming[transition.target as usize].push((transition.source, cost(operator)));
             }
         }
         let mut to_go = vec![None; self.size()];
-        let mut heap: BinaryHeap<_> = self.goals.iter().map(|goal| Reverse((0_i64, *goal))).collect();
+        let mut heap: BinaryHeap<_> = targets.map(|(target, own)| Reverse((own, target))).collect();
         while let Some(Reverse((cost, state))) = heap.pop() {
             if to_go[state as usize].is_some() {
                 continue;

@@ -35,10 +35,13 @@ pub(crate) fn finish(
 ) -> Result<Task, Error> {
     let atoms = Atoms::new(lifted, task);
     let mut numbers = Numbers::new(task)?;
-    let cost_scale = common_denominator(
-        task.operators.iter().flat_map(|o| o.cost.numbers()).chain([&task.objective.offset]),
-        "the metric",
-    )?;
+    let mut objectives = Vec::new();
+    for (objective, position) in task.objectives.iter().zip(0..) {
+        let costs = task.operators.iter().flat_map(|operator| operator.costs[position].numbers());
+        let scale = common_denominator(costs.chain([&objective.offset]), "the metric")?;
+        let offset = integer(&objective.offset, scale, "the metric")?;
+        objectives.push(Objective { scale, offset, maximize: objective.maximize });
+    }
     let time_scale =
         common_denominator(task.operators.iter().flat_map(|o| o.duration.numbers()), "durations")?;
     let (slots, slot_ids) = slots(&task.operators);
@@ -46,6 +49,8 @@ pub(crate) fn finish(
     let mut operators = Vec::with_capacity(task.operators.len());
     let mut seen = FxHashSet::default();
     for operator in &task.operators {
+        let costs = operator.costs.iter().zip(&objectives);
+        let mut costs = costs.map(|(cost, objective)| integers(cost, objective.scale, "the metric"));
         let operator = Operator {
             schema: operator.schema,
             arguments: operator.arguments.clone(),
@@ -56,7 +61,8 @@ pub(crate) fn finish(
             effects: atoms.effects(operator),
             conditional: atoms.conditional(operator),
             numeric_effects: numbers.effects(operator)?,
-            cost: integers(&operator.cost, cost_scale, "the metric")?,
+            cost: costs.next().unwrap_or_else(|| Ok(Quantity::constant(1)))?,
+            others: costs.collect::<Result<_, _>>()?,
             duration: integers(&operator.duration, time_scale, "durations")?,
         };
         if !contradictory(&operator.condition) && seen.insert(operator.clone()) {
@@ -82,11 +88,8 @@ pub(crate) fn finish(
         slots,
         operators,
         goal,
-        objective: Objective {
-            scale: cost_scale,
-            offset: integer(&task.objective.offset, cost_scale, "the metric")?,
-            maximize: task.objective.maximize,
-        },
+        objective: objectives.remove(0),
+        others: objectives,
         time_scale,
         unreachable,
     };

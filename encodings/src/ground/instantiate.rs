@@ -40,7 +40,8 @@ pub(crate) struct GroundOperator {
     /// After `adds` and `deletes`, those of one entry at once, deletes first.
     pub(crate) conditional: Vec<GroundConditional>,
     pub(crate) numeric_effects: BTreeMap<NumericId, Linear<Rational>>,
-    pub(crate) cost: Quantity<Rational>,
+    /// By objective.
+    pub(crate) costs: Vec<Quantity<Rational>>,
     pub(crate) duration: Quantity<Rational>,
 }
 
@@ -58,7 +59,7 @@ pub(crate) struct GroundTask<'a> {
     pub(crate) operators: Vec<GroundOperator>,
     /// None if the goal is false whatever happens.
     pub(crate) goal: Option<GroundCondition>,
-    pub(crate) objective: GroundObjective,
+    pub(crate) objectives: Vec<GroundObjective>,
 }
 
 /// Turns every reached instance into an operator.
@@ -110,7 +111,7 @@ pub(crate) fn instantiate<'a>(
     if !errors.is_empty() {
         return Err(errors);
     }
-    let mut task = GroundTask { world, operators, goal, objective: GroundObjective::default() };
+    let mut task = GroundTask { world, operators, goal, objectives: Vec::new() };
     derived::simplify(&mut task);
     Ok(task)
 }
@@ -158,7 +159,7 @@ fn instance(
         deletes: Vec::new(),
         conditional: Vec::new(),
         numeric_effects: BTreeMap::new(),
-        cost: Quantity::constant(Rational::from_integer(0)),
+        costs: Vec::new(),
         duration,
     };
     let mut operators = Vec::new();

@@ -1,4 +1,4 @@
-//! The metric of the problem as a cost of each operator.
+//! Metrics as costs of each operator.
 //!
 //! A metric is linear in fluents and total time. Every fluent in it must be changed by sums that do not depend on
 //! the state, so that the metric of a plan is an offset plus the sum of its operators' costs. A metric to maximize is
@@ -9,7 +9,7 @@ use num_traits::Zero;
 use crate::error::{Error, Place};
 use crate::ground::evaluate::{Failure, World};
 use crate::ground::instantiate::{GroundOperator, GroundTask};
-use crate::lifted::{Expression, Lifted, Rational};
+use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::pddl::ast::Direction;
 use crate::quantity::{Linear, NumericId, Quantity};
 
@@ -21,21 +21,30 @@ pub(crate) struct GroundObjective {
     pub(crate) maximize: bool,
 }
 
-/// Gives every operator its cost, and the task the rest of the metric.
+/// Gives every operator its costs, and the task the rest of the metrics.
 ///
 /// # Errors
 /// A metric that is not linear, or over a fluent whose change depends on the state.
 pub(crate) fn attach_costs(lifted: &Lifted, task: &mut GroundTask<'_>) -> Result<(), Vec<Error>> {
-    let Some(metric) = &lifted.metric else {
+    if lifted.metrics.is_empty() {
         let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
         for operator in &mut task.operators {
             let unit = Quantity::constant(Rational::from_integer(1));
-            operator.cost = if temporal { operator.duration.clone() } else { unit };
+            operator.costs = vec![if temporal { operator.duration.clone() } else { unit }];
         }
+        task.objectives = vec![GroundObjective::default()];
         return Ok(());
-    };
-    let (mut linear, mut time) =
-        split(&mut task.world, &metric.expression, metric.place).map_err(|e| vec![e])?;
+    }
+    let mut errors = Vec::new();
+    for metric in &lifted.metrics {
+        attach(lifted, task, metric).unwrap_or_else(|error| errors.push(error));
+    }
+    if errors.is_empty() { Ok(()) } else { Err(errors) }
+}
+
+/// Gives every operator its cost by one metric.
+fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric) -> Result<(), Error> {
+    let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
     let maximize = metric.direction == Direction::Maximize;
     if maximize {
         linear = linear.negated();
@@ -44,24 +53,19 @@ pub(crate) fn attach_costs(lifted: &Lifted, task: &mut GroundTask<'_>) -> Result
     let initial =
         linear.coefficients.iter().map(|(variable, factor)| initial_value(&task.world, *variable) * factor);
     let offset = initial.fold(linear.quantity.constant, |sum, value| sum + value);
-    task.objective = GroundObjective { offset, maximize };
-
-    let mut errors = Vec::new();
+    task.objectives.push(GroundObjective { offset, maximize });
     for operator in &mut task.operators {
-        match cost(operator, &linear, time) {
-            Some(cost) => operator.cost = cost,
-            None if errors.is_empty() => errors.push(Error::Unsupported {
-                construct: format!(
-                    "a metric over a fluent that `{}` changes depending on the state",
-                    lifted.schemas[operator.schema as usize].name
-                ),
-                instead: "a metric over fluents that are only increased or decreased by constants".into(),
-                place: metric.place,
-            }),
-            None => {}
-        }
+        let cost = cost(operator, &linear, time).ok_or_else(|| Error::Unsupported {
+            construct: format!(
+                "a metric over a fluent that `{}` changes depending on the state",
+                lifted.schemas[operator.schema as usize].name
+            ),
+            instead: "a metric over fluents that are only increased or decreased by constants".into(),
+            place: metric.place,
+        })?;
+        operator.costs.push(cost);
     }
-    if errors.is_empty() { Ok(()) } else { Err(errors) }
+    Ok(())
 }
 
 /// The initial value of a numeric variable; 0 for a `total-cost` to which the file gives none.

@@ -25,7 +25,7 @@ use crate::configuration::{design_parameters, slot_parameters};
 use crate::error::Error;
 use crate::limits::Limits;
 use crate::normalize::normalize;
-use crate::pddl::ast::{Domain, Name, Problem};
+use crate::pddl::ast::{Domain, Metric, Name, Problem};
 use crate::task::Task;
 
 /// How the domain's symbols are to be read.
@@ -33,6 +33,8 @@ use crate::task::Task;
 pub struct Config {
     /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
     pub solves: Vec<Name>,
+    /// What plans are measured by, the most important first, in place of the metric of the problem; none for that metric.
+    pub objectives: Vec<Metric>,
     /// When to give up.
     pub limits: Limits,
 }
@@ -42,6 +44,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec(),
+            objectives: Vec::new(),
             limits: Limits::none(),
         }
     }
@@ -52,7 +55,7 @@ impl Default for Config {
 /// # Errors
 /// Every construct that the planner does not handle, with its place.
 pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Vec<Error>> {
-    let lifted = normalize(domain, problem)?;
+    let lifted = normalize(domain, problem, &config.objectives)?;
     let designs: Vec<_> =
         lifted.schemas.iter().map(|schema| design_parameters(&lifted, schema, &config.solves)).collect();
     let slots: Vec<_> = lifted

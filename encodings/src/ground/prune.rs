@@ -12,7 +12,7 @@ use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::intervals::{goal_can_hold, prune_by_numbers};
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::lifted::{Arguments, Formula, Lifted, PredicateId, Rational};
-use crate::quantity::NumericId;
+use crate::quantity::{NumericId, Quantity};
 
 /// Prunes the task in place; returns a reason if the goal cannot be reached even if nothing is ever deleted.
 pub(crate) fn prune(lifted: &Lifted, task: &mut GroundTask<'_>) -> Option<String> {
@@ -200,13 +200,15 @@ pub(crate) fn read_atoms(task: &GroundTask<'_>) -> FxHashSet<AtomId> {
 /// Whether the operator changes nothing and cannot lower the cost of a plan.
 fn is_idle(operator: &GroundOperator) -> bool {
     let known: FxHashSet<_> = operator.condition.literals.iter().copied().collect();
-    let lowest = operator.cost.tables.iter().filter_map(|table| table.values.iter().min());
-    let lowest = lowest.fold(operator.cost.constant, |sum, value| sum + value);
+    let lowest = |cost: &Quantity<Rational>| {
+        let tables = cost.tables.iter().filter_map(|table| table.values.iter().min());
+        tables.fold(cost.constant, |sum, value| sum + value)
+    };
     operator.adds.iter().all(|atom| known.contains(&(*atom, true)))
         && operator.deletes.iter().all(|atom| known.contains(&(*atom, false)))
         && operator.conditional.is_empty()
         && operator.numeric_effects.iter().all(|(variable, value)| {
             value.quantity.is_zero() && value.coefficients[..] == [(*variable, Rational::from_integer(1))]
         })
-        && lowest >= Rational::from_integer(0)
+        && operator.costs.iter().all(|cost| lowest(cost) >= Rational::from_integer(0))
 }

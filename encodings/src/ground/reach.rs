@@ -45,9 +45,10 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
     let (symbols, rules, facts) = builder.finish();
     let objects: FxHashMap<Symbol, ObjectId> =
         symbols.objects.iter().copied().zip((0..).map(ObjectId)).collect();
-    let engine = Engine::new(symbols.table, Program { rules, ..Program::default() }, facts).map_err(|errors| {
-        Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-    })?;
+    let engine =
+        Engine::new(symbols.table, Program { rules, ..Program::default() }, facts).map_err(|errors| {
+            Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+        })?;
     let read = |row: &[Symbol]| -> Arguments {
         row.iter().filter_map(|symbol| objects.get(symbol)).copied().collect()
     };

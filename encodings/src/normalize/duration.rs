@@ -17,15 +17,19 @@ pub(super) enum Duration {
     Open,
 }
 
-/// Whether the metric rewards time; nothing if that cannot be told from the metric alone.
-pub(super) fn is_rewarded(metric: Option<&Metric>) -> Option<bool> {
-    let Some(metric) = metric else { return Some(false) };
-    let factor = time_factor(&metric.expression)?;
+/// Whether the metrics reward time; nothing if that cannot be told from the metrics alone, or if they disagree.
+pub(super) fn is_rewarded(metrics: &[Metric]) -> Option<bool> {
     let zero = Rational::from_integer(0);
-    Some(match metric.direction {
-        Direction::Minimize => factor < zero,
-        Direction::Maximize => factor > zero,
-    })
+    let mut rewards = Vec::new();
+    for metric in metrics {
+        let factor = time_factor(&metric.expression)?;
+        let sign = if metric.direction == Direction::Minimize { factor } else { -factor };
+        if sign != zero {
+            rewards.push(sign < zero);
+        }
+    }
+    let rewarded = rewards.first().copied().unwrap_or(false);
+    rewards.iter().all(|other| *other == rewarded).then_some(rewarded)
 }
 
 /// The factor of total time in an expression.

@@ -21,18 +21,27 @@ use crate::lifted::{
 use crate::normalize::duration::Duration;
 use crate::pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypedName};
 
-/// Resolves and simplifies a domain and a problem.
+/// Resolves and simplifies a domain and a problem, to be measured by `objectives` (the most important first) or, if
+/// there are none, by the metric of the problem.
 ///
 /// # Errors
 /// All constructs that the planner does not handle, and all names that are declared nowhere.
-pub(crate) fn normalize(domain: &ast::Domain, problem: &ast::Problem) -> Result<Lifted, Vec<Error>> {
+pub(crate) fn normalize(
+    domain: &ast::Domain,
+    problem: &ast::Problem,
+    objectives: &[ast::Metric],
+) -> Result<Lifted, Vec<Error>> {
     let mut normalizer = Normalizer::new(domain, problem);
-    let metric = problem.metric.as_ref().map(|metric| Metric {
-        direction: metric.direction,
-        expression: normalizer.expression(&metric.expression, &mut Scope::new(File::Problem)),
-        place: Place { file: File::Problem, span: metric.span },
-    });
-    normalizer.longest = duration::is_rewarded(metric.as_ref());
+    let written = if objectives.is_empty() { problem.metric.as_slice() } else { objectives };
+    let metrics: Vec<_> = written
+        .iter()
+        .map(|metric| Metric {
+            direction: metric.direction,
+            expression: normalizer.expression(&metric.expression, &mut Scope::new(File::Problem)),
+            place: Place { file: File::Problem, span: metric.span },
+        })
+        .collect();
+    normalizer.longest = duration::is_rewarded(&metrics);
     let schemas = domain.actions.iter().map(|action| normalizer.schema(action)).collect();
     let axioms = domain.derived.iter().map(|axiom| normalizer.axiom(axiom)).collect();
     let (facts, values) = normalizer.initial_state(problem);
@@ -51,7 +60,7 @@ pub(crate) fn normalize(domain: &ast::Domain, problem: &ast::Problem) -> Result<
         values,
         goal,
         goal_variables: scope.bound as usize,
-        metric,
+        metrics,
     };
     mark_fluents(&mut lifted);
     Ok(lifted)

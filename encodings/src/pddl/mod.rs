@@ -23,7 +23,30 @@ pub use portable::portable;
 pub use print::{print_domain, print_problem};
 pub use source::{Position, Source};
 
-use ast::{Domain, Problem};
+use ast::{Direction, Domain, Metric, Problem};
+
+/// An objective from the text of its expression, checked against a domain and a problem.
+///
+/// # Errors
+///
+/// All that is wrong with it.
+pub fn read_objective(
+    direction: Direction,
+    expression: &Source,
+    domain: &Domain,
+    problem: &Problem,
+) -> Result<Metric, Vec<Diagnostic>> {
+    let mut parsed = parse::expression(expression);
+    if let Some(tree) = parsed.tree {
+        let end = expression.text().len() as u32;
+        let metric = Metric { direction, expression: tree, span: ast::Span { start: 0, end } };
+        parsed.diagnostics.extend(check::objective(domain, problem, &metric, expression));
+        if !has_errors(&parsed.diagnostics) {
+            return Ok(metric);
+        }
+    }
+    Err(parsed.diagnostics)
+}
 
 /// A domain and a problem from their texts, with the warnings about both.
 ///

@@ -8,7 +8,7 @@ mod symbols;
 
 use rustc_hash::FxHashSet;
 
-use super::ast::{Domain, Name, Problem, Span, TypedName};
+use super::ast::{Domain, Metric, Name, Problem, Span, TypedName};
 use super::diagnostic::{Diagnostic, Severity, Sink};
 use super::source::Source;
 use symbols::Symbols;
@@ -49,6 +49,19 @@ pub fn check(
     }
     diagnostics.append(&mut found);
     diagnostics
+}
+
+/// The messages about an objective that stands in neither file.
+pub(super) fn objective(
+    domain: &Domain,
+    problem: &Problem,
+    metric: &Metric,
+    source: &Source,
+) -> Vec<Diagnostic> {
+    let symbols = Symbols::of(domain, Some(problem));
+    let mut checker = Checker::new(&symbols, source);
+    checker.metric(metric);
+    checker.sink.finish()
 }
 
 /// The messages about a domain, and whether it is a template that `OWLToPDDL` still has to complete.

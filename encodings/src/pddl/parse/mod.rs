@@ -13,7 +13,7 @@ mod typed;
 
 use rustc_hash::FxHashMap;
 
-use super::ast::{Domain, Identifier, Name, Problem, Span};
+use super::ast::{Domain, Expression, Identifier, Name, Problem, Span};
 use super::diagnostic::{Diagnostic, Sink};
 use super::number::{Literal, literal};
 use super::sexp::{self, Item};
@@ -30,6 +30,21 @@ pub fn parse_domain(source: &Source) -> (Option<Domain>, Vec<Diagnostic>) {
 pub fn parse_problem(source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     let parsed = problem(source);
     (parsed.tree, parsed.diagnostics)
+}
+
+/// Reads a single expression, as it stands in a metric: `total-time`, `(energy)`, `(+ (energy) (* 2 total-time))`.
+pub(super) fn expression(source: &Source) -> Parsed<Expression> {
+    parse_top(source, |parser, top| {
+        let mut items: Vec<_> = top.collect();
+        let first = (!items.is_empty()).then(|| items.remove(0));
+        for item in items {
+            parser.sink.error("P104", at_start(item), "an objective is one expression");
+        }
+        if first.is_none() {
+            parser.sink.error("P100", Span::default(), "the expression is empty");
+        }
+        parser.expression(first?)
+    })
 }
 
 /// What came out of a text.
@@ -50,6 +65,16 @@ pub(super) fn problem(source: &Source) -> Parsed<Problem> {
 }
 
 fn parse<'s, T>(source: &'s Source, build: impl FnOnce(&mut Parser<'s>, Item<'_>) -> Option<T>) -> Parsed<T> {
+    parse_top(source, |parser, top| {
+        let define = parser.define(top)?;
+        build(parser, define)
+    })
+}
+
+fn parse_top<'s, T>(
+    source: &'s Source,
+    build: impl FnOnce(&mut Parser<'s>, sexp::Items<'_>) -> Option<T>,
+) -> Parsed<T> {
     let mut sink = Sink::new(source);
     let tree = sexp::read(source.text(), &mut sink);
     let well_formed = !sink.has_errors();
@@ -59,10 +84,7 @@ fn parse<'s, T>(source: &'s Source, build: impl FnOnce(&mut Parser<'s>, Item<'_>
         declarations_intact: well_formed,
         has_unknown_section: false,
     };
-    let tree = tree.and_then(|tree| {
-        let define = parser.define(tree.top())?;
-        build(&mut parser, define)
-    });
+    let tree = tree.and_then(|tree| build(&mut parser, tree.top()));
     Parsed { tree, declarations_intact: parser.declarations_intact, diagnostics: parser.sink.finish() }
 }
 

@@ -1,0 +1,62 @@
+//! Lower bounds on what is used up of a resource before it is replenished.
+//!
+//! A numeric variable is a resource if every operator that may lower it requires that it does not fall below 0 by that. Then
+//! the least consumption on the way to the goal, or to an operator that replenishes, in a projection is what a state must have
+//! at least: the resource-to-go of constrained shortest paths [1].
+//!
+//! [1] I. Dumitrescu, N. Boland: Improved preprocessing, labeling and scaling algorithms for the weight-constrained shortest
+//! path problem, Networks 42(3), 2003.
+
+use crate::bounds::Projection;
+use crate::quantity::NumericId;
+use crate::task::{Operator, State, Task};
+
+/// A resource, and what each abstract state needs of it, by projection.
+pub(super) struct Resource {
+    variable: NumericId,
+    needs: Vec<(usize, Vec<Option<i64>>)>,
+}
+
+impl Resource {
+    /// Whether a state has enough to reach the goal or a replenishment, as far as projections tell.
+    pub(super) fn suffices(&self, state: &State, projections: &[Projection]) -> bool {
+        let own = state.numbers[self.variable.index()];
+        self.needs.iter().all(|(projection, needs)| {
+            needs[projections[*projection].state(state) as usize].is_some_and(|need| need <= own)
+        })
+    }
+}
+
+/// The resources of a task.
+pub(super) fn resources(task: &Task, projections: &[Projection]) -> Vec<Resource> {
+    let mut found = Vec::new();
+    for variable in (0..task.numerics.len() as u32).map(NumericId) {
+        let Some(used) = task.operators.iter().map(|o| used(o, variable)).collect::<Option<Vec<_>>>() else {
+            continue;
+        };
+        let left = task.goal.comparisons.iter().filter(|c| c.coefficients[..] == [(variable, 1)]);
+        let left = left.map(|comparison| -comparison.quantity.constant).fold(0, i64::max);
+        let mut needs = Vec::new();
+        for (projection, position) in projections.iter().zip(0..) {
+            let anywhere = |operator: usize| used[operator].is_none() && !projection.touches(operator);
+            if !(0..used.len()).any(anywhere) {
+                needs.push((position, projection.needs(&used, left)));
+            }
+        }
+        found.push(Resource { variable, needs });
+    }
+    found
+}
+
+/// What an operator uses at least (none if it may replenish); nothing if it may lower the variable below 0.
+#[allow(clippy::option_option)]
+fn used(operator: &Operator, variable: NumericId) -> Option<Option<i64>> {
+    let Some(effect) = operator.numeric_effects.iter().find(|effect| effect.variable == variable) else {
+        return Some(Some(0));
+    };
+    let change = effect.value.quantity.maximum();
+    if effect.value.coefficients[..] != [(variable, 1)] || change > 0 {
+        return Some(None);
+    }
+    operator.condition.comparisons.contains(&effect.value).then_some(Some(-change))
+}

@@ -1,0 +1,173 @@
+//! Several objectives: one after the other, or against each other.
+//!
+//! What an earlier objective has come to is a budget for the later ones: a numeric variable that every operator uses up by its
+//! cost. So each question is an ordinary task with one objective, and each answer has an ordinary proof. The Pareto front is
+//! enumerated by the ε-constraint method [1]: best by A, then among those best by B, then strictly better by B, and so on.
+//!
+//! [1] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
+//! and system optimization, IEEE Trans. SMC 1(3), 1971.
+
+use crate::optimize::{Config, Improvement, Solution, Status, optimize};
+use crate::plan::{Exact, GroundPlan};
+use crate::quantity::{Linear, NumericId, Quantity};
+use crate::task::{NumericEffect, NumericVariable, Operator, Task};
+
+/// A point of the Pareto front, or what is known in place of one.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// The plan; its cost is that of the first objective.
+    pub solution: Solution,
+    /// What the plan comes to by each objective; empty if there is no plan.
+    pub values: Vec<Exact>,
+}
+
+/// The Pareto front of two objectives.
+#[derive(Debug, Clone)]
+pub struct Front {
+    /// Best by the first objective to best by the second.
+    pub points: Vec<Point>,
+    /// Whether it is proved that there are no other points: `Optimal`, or `Unsolvable` if there is no plan at all.
+    pub status: Status,
+}
+
+/// Finds a plan that is best by the first objective of the task, among those best by the second, and so on.
+/// The values by all objectives come with it; they are empty if there is no plan.
+pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Point {
+    let order: Vec<usize> = (0..=task.others.len()).collect();
+    in_order(task, &order, &[], config, report)
+}
+
+/// Enumerates the plans of which no other one is better by one of the first two objectives and not worse by
+/// the other, one plan for each pair of values.
+pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Front {
+    let mut points = Vec::new();
+    let mut budgets: Vec<(usize, i64)> = Vec::new();
+    loop {
+        let point = in_order(task, &[0, 1], &budgets, config, report);
+        match (point.solution.status, &point.solution.ground) {
+            (Status::Optimal, Some(plan)) => {
+                let by_second = task.cost_by(1, plan);
+                points.push(point);
+                budgets = vec![(1, by_second - 1)];
+            }
+            (Status::Unsolvable, _) if points.is_empty() => {
+                return Front { points: vec![point], status: Status::Unsolvable };
+            }
+            (Status::Unsolvable, _) => return Front { points, status: Status::Optimal },
+            (status, _) => {
+                points.extend((point.solution.plan.is_some() || points.is_empty()).then_some(point));
+                let status = if points.len() > 1 || points[0].solution.plan.is_some() {
+                    Status::Feasible
+                } else {
+                    status
+                };
+                return Front { points, status };
+            }
+        }
+    }
+}
+
+/// Optimizes by some objectives in order, within budgets for some.
+fn in_order(
+    task: &Task,
+    order: &[usize],
+    budgets: &[(usize, i64)],
+    config: &Config,
+    report: &mut dyn FnMut(Improvement),
+) -> Point {
+    let mut budgets = budgets.to_vec();
+    let mut best: Option<Solution> = None;
+    for objective in order {
+        let mut narrowed = task.clone();
+        for (other, budget) in &budgets {
+            narrowed.limit(*other, *budget);
+        }
+        narrowed.swap_objective(*objective);
+        let solution = optimize(&narrowed, config, report);
+        let Some(plan) = &solution.ground else {
+            // The plan that was best so far stays a plan; that nothing better was found for the rest is not proved.
+            let known = best.map(|known| Solution { status: Status::Feasible, proof: None, ..known });
+            return finish(task, known.unwrap_or(solution));
+        };
+        budgets.push((*objective, task.cost_by(*objective, plan)));
+        let proved = solution.status == Status::Optimal;
+        best = Some(match best {
+            None => solution,
+            Some(first) => Solution {
+                status: if proved { first.status } else { Status::Feasible },
+                proof: first.proof.filter(|_| proved),
+                plan: solution.plan,
+                ground: solution.ground,
+                ..first
+            },
+        });
+        if !proved {
+            break;
+        }
+    }
+    finish(task, best.unwrap_or_else(|| optimize(task, config, report)))
+}
+
+/// Shows the plan by the task's own objectives.
+fn finish(task: &Task, mut solution: Solution) -> Point {
+    let mut values = Vec::new();
+    if let Some(plan) = &solution.ground {
+        let plan = GroundPlan { steps: plan.steps.clone(), cost: task.cost_by(0, plan) };
+        solution.plan = Some(crate::plan::decode(task, &plan));
+        let objectives = std::iter::once(&task.objective).chain(&task.others);
+        values.extend(
+            objectives
+                .enumerate()
+                .map(|(position, objective)| objective.metric(task.cost_by(position, &plan))),
+        );
+        solution.ground = Some(plan);
+    }
+    Point { solution, values }
+}
+
+impl Task {
+    fn cost(operator: &Operator, objective: usize) -> &Quantity<i64> {
+        objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
+    }
+
+    /// What a plan costs by an objective, by its position.
+    fn cost_by(&self, objective: usize, plan: &GroundPlan) -> i64 {
+        let costs = plan.steps.iter().map(|step| {
+            let operator = &self.operators[step.operator.index()];
+            Self::cost(operator, objective).at(&step.choice, &operator.sizes())
+        });
+        costs.sum()
+    }
+
+    /// Admits only plans that cost at most so much by an objective.
+    fn limit(&mut self, objective: usize, budget: i64) {
+        let variable = NumericId(self.numerics.len() as u32);
+        self.numerics.push(NumericVariable { scale: 1 });
+        self.initial.numbers.push(budget);
+        let always = self.operators.iter().all(|operator| Self::cost(operator, objective).minimum() >= 0);
+        for operator in &mut self.operators {
+            let cost = Self::cost(operator, objective).clone();
+            if cost.is_zero() {
+                continue;
+            }
+            let mut left = Linear::constant(0);
+            left.quantity = cost;
+            let mut left = left.negated();
+            left.add(&Linear::variable(variable));
+            if always {
+                operator.condition.comparisons.push(left.clone());
+            }
+            operator.numeric_effects.push(NumericEffect { variable, value: left });
+        }
+        self.goal.comparisons.push(Linear::variable(variable));
+    }
+
+    /// Makes an objective the first one.
+    fn swap_objective(&mut self, objective: usize) {
+        let Some(other) = objective.checked_sub(1) else { return };
+        std::mem::swap(&mut self.objective, &mut self.others[other]);
+        for operator in &mut self.operators {
+            std::mem::swap(&mut operator.cost, &mut operator.others[other]);
+        }
+    }
+}
