@@ -4,6 +4,8 @@
 //! Relation atoms bind their variables; an equality, a built-in function or an aggregate binds one more once the others
 //! are bound. Aggregates are put into an order in which each has its group before it.
 
+use std::collections::BTreeSet;
+
 use crate::error::Error;
 use crate::plan::{Bound, Source};
 use crate::rule::{Atom, Rule, Term};
@@ -107,15 +109,29 @@ fn scope(rule: &Rule, at: usize, bound: &Bound, earlier: &[Scope]) -> Scope {
     let (group, locals): (Vec<u16>, Vec<u16>) = inner.iter().partition(|&&n| bound.0[usize::from(n)]);
     let mut alone = Bound(vec![false; rule.variable_count()]);
     close(rule.body[at].parts(), &mut alone, false);
-    let mut context = Vec::new();
-    if group.iter().any(|&number| !alone.0[usize::from(number)]) {
-        let usable = |&other: &usize| match &rule.body[other] {
-            Atom::Aggregate { .. } => earlier.iter().any(|scope| scope.at == other),
-            atom => bound.knows_all(&sources(&atom.terms())),
-        };
-        context = (0..rule.body.len()).filter(usable).collect();
-    }
+    let open: Vec<u16> = group.iter().copied().filter(|&number| !alone.0[usize::from(number)]).collect();
+    let context = context(rule, &open, bound, earlier);
     Scope { at, group, locals, context }
+}
+
+/// Positions of atoms that bind variables for an aggregate: one relation for each where that is enough, so that the
+/// aggregate depends on as little as possible, else all that can be evaluated.
+fn context(rule: &Rule, variables: &[u16], bound: &Bound, earlier: &[Scope]) -> Vec<usize> {
+    let relation_with = |&number: &u16| {
+        rule.body.iter().position(|atom| {
+            let term = Term::Variable(crate::rule::Variable(number));
+            matches!(atom, Atom::Relation { arguments, .. } if arguments.contains(&term))
+        })
+    };
+    let relations: Option<BTreeSet<usize>> = variables.iter().map(relation_with).collect();
+    let usable = |&other: &usize| match &rule.body[other] {
+        Atom::Aggregate { .. } => earlier.iter().any(|scope| scope.at == other),
+        atom => bound.knows_all(&sources(&atom.terms())),
+    };
+    match relations {
+        Some(relations) => relations.into_iter().collect(),
+        None => (0..rule.body.len()).filter(usable).collect(),
+    }
 }
 
 /// Which variables the atoms of the body bind, those of aggregates' own left out.

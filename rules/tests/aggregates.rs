@@ -78,6 +78,18 @@ fn values_follow_changes() {
     check(&["?rank(b, 0, 0)", "?rank(a, 2, 1)", "-rival(b)", "?rank(a, 2, 0)"]);
 }
 
+/// What the group is for need not be known to bind it.
+#[test]
+fn an_aggregate_depends_on_no_more_than_it_asks_for() {
+    let rules = "p(?x) ^ t(?x) ^ ?n = count { r(?y) ^ swrlb:lessThan(?y, ?x) } -> s(?x, ?n) .
+        s(?x, ?n) ^ swrlb:add(?y, ?x, 1) -> t(?y) .";
+    let mut engine = engine(rules, "p(1), p(2), p(3), t(1), r(0), r(1)").expect("stratified");
+    for (wanted, expected) in [("s(1, 1)", true), ("s(2, 2)", true), ("s(3, 2)", true), ("s(4, 2)", false)] {
+        let wanted = fact(&mut engine, wanted);
+        assert_eq!(engine.holds(&wanted), expected);
+    }
+}
+
 #[test]
 fn a_change_reports_only_its_group() {
     let mut engine = engine(RULES, STATED).expect("rules");

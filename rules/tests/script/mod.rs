@@ -142,7 +142,8 @@ impl World {
                 11 | 12 if level > 0 => {
                     let result = Term::Variable(Variable(u16::from(VARIABLES + c % 2)));
                     // What is asked of outside must lie below, too.
-                    let below = atoms.iter().all(|atom| self.is_below(atom, level));
+                    let differs = self.equality && level == 1 && body.iter().any(|(kind, ..)| kind % 13 == 8);
+                    let below = !differs && atoms.iter().all(|atom| self.is_below(atom, level));
                     let outside = if below { bound.clone() } else { BTreeSet::new() };
                     atoms.push(self.aggregate(result, (kind / 13, p, [a, b, c]), level, &outside));
                     bound.insert(result);
