@@ -59,12 +59,14 @@ pub enum Error {
     },
     /// O103: an import is found nowhere.
     #[error(
-        "{file}: error[O103]: cannot find the import <{import}>; name a directory that contains it, \
-         or a catalog with <uri name=\"{import}\" uri=\"FILE\"/>"
+        "{}: error[O103]: cannot find the import <{import}>; name a directory that contains it, \
+         or a catalog with <uri name=\"{import}\" uri=\"FILE\"/>", place(file, position.as_ref())
     )]
     UnresolvedImport {
         /// The document that imports.
         file: String,
+        /// Where it names the import, unless the syntax spells it in another way there.
+        position: Option<Position>,
         /// The IRI that it imports.
         import: String,
     },
@@ -149,6 +151,7 @@ impl Error {
     pub fn position(&self) -> Option<&Position> {
         match self {
             Self::Malformed { position, .. } => Some(position),
+            Self::UnresolvedImport { position, .. } => position.as_ref(),
             _ => None,
         }
     }
@@ -210,10 +213,14 @@ pub enum Warning {
         second: String,
     },
     /// O206: an import is found nowhere, and the reader was told to go on.
-    #[error("warning[O206]: {file}: the import <{import}> is left out: found nowhere")]
+    #[error(
+        "warning[O206]: {}: the import <{import}> is left out: found nowhere", place(file, position.as_ref())
+    )]
     MissingImport {
         /// The document that imports.
         file: String,
+        /// Where it names the import, unless the syntax spells it in another way there.
+        position: Option<Position>,
         /// The IRI that it imports.
         import: String,
     },
@@ -251,6 +258,17 @@ pub enum Warning {
         position: u32,
         /// The rule's label.
         label: Option<String>,
+    },
+    /// O304: how much of the ontology lies outside the profile.
+    #[error(
+        "warning[O304]: {outside} of {axioms} axioms are not used in full, because they lie outside OWL 2 RL; what is \
+         concluded is right, and other things may follow, too"
+    )]
+    Profile {
+        /// Axioms that are left out, or used in part.
+        outside: usize,
+        /// All axioms.
+        axioms: usize,
     },
     /// O401: a design that solves nothing.
     #[error("warning[O401]: the function design <{design}> solves no function, so it is never chosen")]
@@ -313,6 +331,11 @@ pub enum Warning {
     },
 }
 
+/// The position, or else the file.
+fn place(file: &str, position: Option<&Position>) -> String {
+    position.map_or_else(|| file.to_owned(), ToString::to_string)
+}
+
 impl Warning {
     /// The stable code, `O2xx` or `O3xx`.
     pub fn code(&self) -> &'static str {
@@ -326,6 +349,7 @@ impl Warning {
             Self::OutsideProfile { .. } => "O301",
             Self::UnusableRule { .. } => "O302",
             Self::DisabledRule { .. } => "O303",
+            Self::Profile { .. } => "O304",
             Self::DesignWithoutFunction { .. } => "O401",
             Self::FunctionWithoutDesign { .. } => "O402",
             Self::RequirementWithoutValue { .. } => "O403",

@@ -1,8 +1,15 @@
 //! The knowledge bases that we wrote: they load without warnings, say what the missions need, and react to what the
 //! robot reports.
 
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
 use ontology::tomasys::{View, change};
-use ontology::{ReadOptions, kb, lower, read_text};
+use ontology::{
+    Axiom, Characteristic, EntityKind, ObjectPropertyExpression, OutputSyntax, ReadOptions, convert_files,
+    kb, lower, read_text,
+};
 use rules::{Engine, Literal, Symbols};
 
 fn engine(text: &str, name: &str) -> Engine {
@@ -149,5 +156,70 @@ fn rule_texts_can_be_added() {
         engine.apply(delta).expect("applied");
         assert_eq!(all - available(&engine).len(), unavailable, "{name}");
         assert_eq!(engine.violations(), [], "{name}");
+    }
+}
+
+/// What OWL 2 DL asks beyond OWL 2 Full, as far as it concerns what our knowledge bases use: everything is declared
+/// (horned-owl reads all of it, without a warning), no IRI is a property of two kinds or both class and datatype, and
+/// what composes (transitive, or a chain) is not counted, functional, irreflexive, asymmetric or disjoint.
+#[test]
+fn our_knowledge_bases_are_owl_2_dl() {
+    for (text, name) in [(kb::TOMASYS, "tomasys.ttl"), (kb::UGV, "ugv.ttl"), (kb::UUV, "uuv.ttl")] {
+        let ontology = read_text(text, name, &ReadOptions::default()).expect("well-formed");
+        assert_eq!(ontology.warnings, [], "{name}");
+        let of = |kind| ontology.entities(kind).collect::<BTreeSet<_>>();
+        let properties =
+            [EntityKind::ObjectProperty, EntityKind::DataProperty, EntityKind::AnnotationProperty].map(of);
+        let [objects, data, annotations] = &properties;
+        assert!(objects.is_disjoint(data) && objects.is_disjoint(annotations), "{name}");
+        assert!(data.is_disjoint(annotations), "{name}");
+        assert!(of(EntityKind::Class).is_disjoint(&of(EntityKind::Datatype)), "{name}");
+        let (mut composite, mut simple) = (BTreeSet::new(), BTreeSet::new());
+        for annotated in &ontology.axioms {
+            match &annotated.axiom {
+                Axiom::ObjectPropertyCharacteristic(Characteristic::Transitive, property)
+                | Axiom::SubPropertyChainOf(_, property) => drop(composite.insert(property)),
+                Axiom::ObjectPropertyCharacteristic(
+                    Characteristic::Functional
+                    | Characteristic::InverseFunctional
+                    | Characteristic::Irreflexive
+                    | Characteristic::Asymmetric,
+                    property,
+                ) => drop(simple.insert(property)),
+                Axiom::DisjointObjectProperties(properties) => simple.extend(properties),
+                _ => {}
+            }
+        }
+        let iri = |property: &&ObjectPropertyExpression| match property {
+            ObjectPropertyExpression::Property(iri) | ObjectPropertyExpression::Inverse(iri) => iri.clone(),
+        };
+        let (composite, simple): (BTreeSet<_>, BTreeSet<_>) =
+            (composite.iter().map(iri).collect(), simple.iter().map(iri).collect());
+        assert!(composite.is_disjoint(&simple), "{name}");
+    }
+}
+
+/// `python3 -m venv /tmp/pellet && /tmp/pellet/bin/pip install owlready2==0.47`, Java 17, and then
+/// `METAPLAN_PYTHON=/tmp/pellet/bin/python cargo test -p metaplan-ontology --test kb -- --ignored`.
+#[test]
+#[ignore = "needs owlready2 and Java"]
+fn our_knowledge_bases_load_in_owlready2_and_are_consistent_in_pellet() {
+    let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let directory = tempfile::tempdir().expect("temporary directory");
+    for (name, individuals) in [("tomasys", 0), ("ugv", 10), ("uuv", 10)] {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("kb/{name}.ttl"));
+        let options = ReadOptions::default();
+        let (text, _) = convert_files(&[source], &options, OutputSyntax::RdfXml).expect("writable");
+        let file = directory.path().join(format!("{name}.owl"));
+        std::fs::write(&file, text).expect("written");
+        let script = "import sys, owlready2 as o
+w = o.World(); k = w.get_ontology('file://' + sys.argv[1]).load()
+o.sync_reasoner_pellet(w, infer_property_values=True, infer_data_property_values=True, debug=0)
+print(len(list(w.individuals())), len(list(w.rules())))";
+        let output = Command::new(&python).args(["-c", script]).arg(&file).output().expect("Python runs");
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        let text = String::from_utf8_lossy(&output.stdout);
+        let counts: Vec<usize> = text.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        assert!(counts[0] >= individuals && counts[1] > 0, "{name}: {text}");
     }
 }

@@ -125,7 +125,7 @@ fn suave_has_27_rules_of_which_one_is_stated_twice() {
 #[test]
 fn ten_reads_are_equal_to_the_byte() {
     let Some(real) = real() else { return };
-    for file in ["suave/suave.owl", "mros_ontology/test_pilot_nfr.owl", "navigation_planta/navigation.owl"] {
+    for (file, ..) in INVENTORY {
         let dump = || {
             let ontology = with_imports(&real.join(file));
             let mut symbols = Symbols::new();

@@ -90,6 +90,34 @@ fn loops_of_links_end() {
     }
 }
 
+/// Each with its place, as far as its syntax has places.
+#[test]
+fn malformed_documents_are_rejected_with_their_place() {
+    let owl_xml = "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\" ontologyIRI=\"http://x\">\n";
+    let functional = "Prefix(:=<http://x#>)\nOntology(<http://x>\n";
+    for (text, expected) in [
+        ("@prefix : <http://x#> .\n:a a :B .\n:c foo:bar :d .\n".to_owned(), "t:3:4: error[O102]"),
+        ("<http://x> <http://y> \"open .\n".to_owned(), "t:1:23: error[O102]"),
+        (
+            "<rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\">\n <rdf:Description x\n</rdf:RDF>"
+                .to_owned(),
+            "t:3:11: error[O102]",
+        ),
+        (format!("{owl_xml}<Declaration>\n<Class IRI=\"#a\"></Declaration></Ontology>"), "t:3:17: error[O102]"),
+        (format!("{owl_xml}<Declaration><Klass IRI=\"#a\"/></Declaration></Ontology>"), "t:2:"),
+        (format!("{functional}SubClassOf(:A foo:B)\n)"), "t:3:15: error[O102]"),
+        (format!("{functional}SubClassOf(:A\n)"), "t:4:1: error[O102]"),
+        (
+            "@prefix owl: <http://www.w3.org/2002/07/owl#> .\n<http://x> a owl:Ontology ;\n  owl:imports <http://y> ."
+                .to_owned(),
+            "t:3:16: error[O103]",
+        ),
+    ] {
+        let errors = read_text(&text, "t", &ReadOptions::default()).expect_err("malformed");
+        assert!(errors[0].to_string().starts_with(expected), "{text}: {}", errors[0]);
+    }
+}
+
 /// Nothing is declared: kinds are taken from use, with a warning for each.
 #[test]
 fn an_undeclared_vocabulary_is_read_with_warnings() {

@@ -5,6 +5,7 @@ use rules::{Atom, RuleIdentity, Term};
 use super::class;
 use super::context::{Conjunction, Context, Variables, identity};
 use super::range;
+use crate::error::Warning;
 use crate::owl::{
     AnnotatedAxiom, Axiom, Characteristic, ClassExpression, DataRange, Iri,
     ObjectPropertyExpression as Property,
@@ -14,8 +15,9 @@ use crate::vocab::owl;
 /// What keeps (a part of) an axiom from becoming rules.
 type Outside = Result<(), &'static str>;
 
-/// Adds the rules of all axioms that are not plain assertions.
+/// Adds the rules of all axioms that are not plain assertions; a summary follows the warnings about what has none.
 pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
+    let mut outside = 0;
     for (position, annotated) in axioms.iter().enumerate() {
         let axiom = &annotated.axiom;
         if is_assertion(axiom) {
@@ -27,7 +29,11 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
         if let Err(reason) = context.take_gaps().and(result) {
             let partly = context.rules.len() > before;
             context.outside(axiom, partly, reason);
+            outside += 1;
         }
+    }
+    if outside > 0 {
+        context.warnings.push(Warning::Profile { outside, axioms: axioms.len() });
     }
 }
 

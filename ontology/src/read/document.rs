@@ -28,8 +28,8 @@ pub(crate) struct Document {
     /// The ontology IRI, if the document declares one.
     pub iri: Option<Arc<str>>,
     pub version: Option<Arc<str>>,
-    /// The IRIs imported, in order of appearance.
-    pub imports: Vec<String>,
+    /// The IRIs imported, in order of appearance, with the place of each where it is spelled out.
+    pub imports: Vec<(String, Option<Position>)>,
     pub triples: Vec<Triple>,
 }
 
@@ -41,7 +41,12 @@ pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result
         Syntax::RdfXml => parse_rdf_xml(text, name, base)?,
         Syntax::OwlXml | Syntax::Functional => {
             let ntriples = horned::transcribe(text, syntax).map_err(|fault| {
-                let position = Position::of_offset(name, text, fault.offset);
+                // The reader of OWL/XML does not say where a tag is closed that is not open.
+                let offset = match fault.offset {
+                    0 if syntax == Syntax::OwlXml => syntax::mismatched_tag(text).unwrap_or(0),
+                    offset => offset,
+                };
+                let position = Position::of_offset(name, text, offset);
                 vec![Error::Malformed { position, syntax, message: shortened(&fault.message) }]
             })?;
             parse_turtle(&ntriples, name, base)?
@@ -61,7 +66,9 @@ pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result
         matching.filter_map(|triple| iri_of(&triple.object)).map(str::to_owned).collect()
     };
     let version = objects(owl::VERSION_IRI).first().map(|iri| Arc::from(iri.as_str()));
-    let imports = objects(owl::IMPORTS);
+    let place = |iri: &str| std::str::from_utf8(text).ok()?.find(iri);
+    let position = |iri: &String| place(iri).map(|offset| Position::of_offset(name, text, offset));
+    let imports = objects(owl::IMPORTS).into_iter().map(|iri| (iri.clone(), position(&iri))).collect();
     Ok(Document { name: name.to_owned(), syntax, iri: header, version, imports, triples })
 }
 

@@ -35,7 +35,7 @@ pub struct ReadOptions {
     pub allow_missing_imports: bool,
 }
 
-/// Reads documents and all that they import into one ontology.
+/// Reads documents and all that they import into one ontology. The file `-` is standard input.
 ///
 /// A document reached twice is read once, however it is named.
 ///
@@ -134,7 +134,7 @@ fn closure(
             }
         }
         let Some(importer) = documents.get(next) else { break };
-        for import in &importer.imports {
+        for (import, position) in &importer.imports {
             match resolver.resolve(import, paths[next].as_deref(), &documents) {
                 Ok(Some(Resolution::Loaded)) => {}
                 Ok(Some(Resolution::File(path))) => pending.push_back(Pending::File(path)),
@@ -142,14 +142,12 @@ fn closure(
                     pending.push_back(Pending::Text(name.to_owned(), text.as_bytes().to_vec()));
                 }
                 Ok(None) if options.allow_missing_imports => {
-                    warnings
-                        .push(Warning::MissingImport { file: importer.name.clone(), import: import.clone() });
+                    let (file, position) = (importer.name.clone(), position.clone());
+                    warnings.push(Warning::MissingImport { file, position, import: import.clone() });
                 }
                 Ok(None) => {
-                    errors.push(Error::UnresolvedImport {
-                        file: importer.name.clone(),
-                        import: import.clone(),
-                    });
+                    let (file, position) = (importer.name.clone(), position.clone());
+                    errors.push(Error::UnresolvedImport { file, position, import: import.clone() });
                 }
                 Err(error) => errors.push(error),
             }
@@ -165,6 +163,7 @@ type Loaded = Option<(Document, Option<PathBuf>)>;
 fn load(item: Pending, index: usize, seen: &mut HashSet<Vec<u8>>) -> Result<Loaded, Vec<Error>> {
     let (name, text, path) = match item {
         Pending::Text(name, text) => (name, text, None),
+        Pending::File(file) if file.as_os_str() == "-" => ("-".to_owned(), standard_input()?, None),
         Pending::File(file) => {
             let unreadable = |error: std::io::Error| {
                 vec![Error::Unreadable { file: file.clone(), reason: error.to_string() }]
@@ -181,6 +180,15 @@ fn load(item: Pending, index: usize, seen: &mut HashSet<Vec<u8>>) -> Result<Load
         path.as_ref().map_or_else(|| "file:///".to_owned(), |path| format!("file://{}", path.display()));
     let document = document::parse(&text, &name, &base, &format!("d{index}"))?;
     Ok(if seen.insert(text) { Some((document, path)) } else { None })
+}
+
+fn standard_input() -> Result<Vec<u8>, Vec<Error>> {
+    use std::io::Read;
+    let mut text = Vec::new();
+    match std::io::stdin().read_to_end(&mut text) {
+        Ok(_) => Ok(text),
+        Err(error) => Err(vec![Error::Unreadable { file: "-".into(), reason: error.to_string() }]),
+    }
 }
 
 /// A warning where another document declares the same ontology.

@@ -108,6 +108,34 @@ pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
     Some(String::from_utf8_lossy(root).into_owned())
 }
 
+/// Where the first tag stands that closes another element than the one that is open; or the end of the text, if
+/// elements are open there.
+pub(super) fn mismatched_tag(text: &[u8]) -> Option<usize> {
+    let (mut open, mut at) = (Vec::new(), 0);
+    while let Some(start) = text[at..].iter().position(|&byte| byte == b'<').map(|found| at + found) {
+        let tag = &text[start..];
+        let end: &[u8] = match tag {
+            [b'<', b'!', b'-', b'-', ..] => b"-->",
+            [b'<', b'?', ..] => b"?>",
+            [b'<', b'!', ..] if declares_entities(tag) => b"]>",
+            _ => b">",
+        };
+        let Some(length) = tag.windows(end.len()).position(|window| window == end) else {
+            return Some(start);
+        };
+        let inside = &tag[1..length];
+        let name = |text: &'_ [u8]| text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
+        match inside.first() {
+            Some(b'/') if open.pop() != Some(inside[1..].trim_ascii()) => return Some(start),
+            Some(b'/' | b'!' | b'?') => {}
+            _ if inside.ends_with(b"/") => {}
+            _ => open.push(&inside[..name(inside)]),
+        }
+        at = start + length + end.len();
+    }
+    (!open.is_empty()).then_some(text.len())
+}
+
 /// Whether a `!DOCTYPE` has an internal subset, which contains `>` itself.
 fn declares_entities(text: &[u8]) -> bool {
     let stop = text.iter().position(|&byte| byte == b'[' || byte == b'>');
