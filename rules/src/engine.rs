@@ -54,7 +54,7 @@ pub struct Engine {
     /// Rules that are switched off.
     pub(crate) disabled: Vec<Rule>,
     /// Where `owl:sameAs` is equality, the names of each individual; the store then knows one of each.
-    pub(crate) equality: Option<Box<Equality>>,
+    pub(crate) equality: Option<Arc<Equality>>,
 }
 
 impl Engine {
@@ -87,7 +87,7 @@ impl Engine {
         let mut symbols = symbols;
         let same = program.equality.then(|| symbols.name(SAME_AS));
         let (program, symbols) = (Arc::new(program), Arc::new(symbols));
-        let equality = same.map(|same| Box::new(Equality::new(same, &program)));
+        let equality = same.map(|same| Arc::new(Equality::new(same, &program)));
         let (network, store, records) = (Arc::default(), Store::default(), Records::default());
         let mut engine =
             Self { symbols, program, network, store, records, budget, disabled: Vec::new(), equality };
@@ -105,7 +105,7 @@ impl Engine {
         }
         if let Some(equality) = &mut self.equality {
             evaluated = Arc::new(equality.normal_program(&self.program));
-            equality.program = Arc::clone(&evaluated);
+            Arc::make_mut(equality).program = Arc::clone(&evaluated);
         }
         let network = compile(&evaluated, Arc::make_mut(&mut self.symbols), &mut self.store)?;
         self.records = Records::new(&network);
@@ -162,7 +162,7 @@ impl Engine {
         let facts: Vec<Fact> = kept.chain(undo.insert.iter().cloned()).collect();
         let budget = std::mem::replace(&mut self.budget, u64::MAX);
         if let Some(equality) = &mut self.equality {
-            **equality = equality.emptied(&self.program);
+            *equality = Arc::new(equality.emptied(&self.program));
             self.store = Store::default();
             // It was without errors and ended within the budget before, and so does now without one.
             let _ = self.build(facts);

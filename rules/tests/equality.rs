@@ -108,3 +108,32 @@ fn violations_name_what_is_stated() {
     engine.apply(Delta { insert: vec![], delete }).expect("no budget needed");
     assert_eq!(engine.violations(), []);
 }
+
+#[test]
+fn an_update_that_is_stopped_leaves_everything_as_it_was() {
+    let rules = "go(?x) -> n(0) . n(?x) ^ swrlb:add(?y, ?x, 1) -> n(?y) . go(?x) -> sameAs(?x, b) .";
+    let mut symbols = Symbols::new();
+    let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
+    let stated = facts(&mut symbols, "sameAs(a, b), p(a), p(c)");
+    let program = owl_rl::with_equality(&program, &mut symbols);
+    let mut engine = Engine::with_step_budget(symbols, program, stated, 1000).expect("nothing to count");
+    let before = engine.facts().collect::<Vec<_>>();
+    let (insert, delete) = (vec![fact(&mut engine, "go(c)")], vec![fact(&mut engine, "sameAs(a, b)")]);
+    engine.apply(Delta { insert, delete }).expect_err("it never ends");
+    assert_eq!(engine.facts().collect::<Vec<_>>(), before);
+    let delete = vec![fact(&mut engine, "sameAs(a, b)")];
+    engine.apply(Delta { insert: vec![], delete }).expect("within the budget");
+    assert_eq!(engine.facts().count(), 2);
+}
+
+#[test]
+fn a_clone_goes_its_own_way() {
+    let mut original = engine("p(?x) ^ q(?x) -> r(?x) .", "p(a), q(b)");
+    let mut what_if = original.clone();
+    let insert = vec![fact(&mut what_if, "sameAs(a, b)")];
+    let change = what_if.apply(Delta { insert, delete: vec![] }).expect("no budget needed");
+    assert_eq!((change.insert.len(), what_if.facts().count()), (6, 8));
+    assert_eq!(original.facts().count(), 2);
+    let insert = vec![fact(&mut original, "q(a)")];
+    assert_eq!(original.apply(Delta { insert, delete: vec![] }).expect("no budget needed").insert.len(), 2);
+}

@@ -17,7 +17,7 @@ use crate::symbol::Symbol;
 /// An update in progress.
 struct Update<'e> {
     engine: &'e mut Engine,
-    equality: Box<Equality>,
+    equality: Equality,
     /// Rows whose stated facts have changed since the last [`Update::flush`], with these facts.
     open: BTreeMap<Fact, BTreeSet<Fact>>,
     /// Whether rules mention a name whose representative has changed.
@@ -34,11 +34,11 @@ struct Update<'e> {
 
 impl Engine {
     /// As [`Engine::apply`], under equality.
-    pub(crate) fn apply_equally(&mut self, equality: Box<Equality>, delta: &Delta) -> Result<Delta, Error> {
+    pub(crate) fn apply_equally(&mut self, equality: Arc<Equality>, delta: &Delta) -> Result<Delta, Error> {
         let mut update = Update::new(self, equality);
         let result = update.apply(delta);
         let (equality, undo) = (update.equality, result.as_ref().err().map(|(_, undo)| undo.clone()));
-        self.equality = Some(equality);
+        self.equality = Some(Arc::new(equality));
         if let Some(undo) = undo {
             self.restore(&undo);
         }
@@ -54,7 +54,7 @@ impl Engine {
         update.joining = concluded.map(|row| Fact::new(same, row.iter().copied())).collect();
         let result = update.join_concluded();
         let equality = update.equality;
-        self.equality = Some(equality);
+        self.equality = Some(Arc::new(equality));
         result
     }
 
@@ -89,12 +89,13 @@ impl Engine {
             }
         }
         let equality = update.equality;
-        self.equality = Some(equality);
+        self.equality = Some(Arc::new(equality));
     }
 }
 
 impl<'e> Update<'e> {
-    fn new(engine: &'e mut Engine, equality: Box<Equality>) -> Self {
+    fn new(engine: &'e mut Engine, equality: Arc<Equality>) -> Self {
+        let equality = Arc::unwrap_or_clone(equality);
         let (open, net, moved) = (BTreeMap::new(), FxHashMap::default(), FxHashMap::default());
         let (before, joining) = (FxHashSet::default(), Vec::new());
         Self { engine, equality, open, rules_changed: false, net, moved, before, joining }
@@ -349,7 +350,7 @@ impl<'e> Update<'e> {
 
     /// Keeps what a row stands for; whether the row is stated.
     fn keep(&mut self, row: &Fact, facts: BTreeSet<Fact>) -> bool {
-        let equality = &mut *self.equality;
+        let equality = &mut self.equality;
         if equality.is_reflexive(row) && equality.is_pair(row, &self.engine.symbols) {
             let class = equality.classes.class(row.arguments[0]);
             let is_stated = |&name: &Symbol| equality.is_stated_pair(&Fact::new(equality.same, [name, name]));
