@@ -4,9 +4,10 @@
 //! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable*, and becomes a slot that is filled step by step, if no fluent
 //! mentions it: then the designs of one action instance do not multiply the ground operators.
 
+use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
-use crate::lifted::{Change, Expression, Formula, Lifted, Schema, Term};
+use crate::lifted::{Change, Expression, Formula, Lifted, PredicateId, Schema, Term};
 use crate::pddl::ast::Name;
 use crate::quantity::SlotSet;
 
@@ -144,6 +145,55 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
         && let Err(place) = set.binary_search(&(position as u16))
     {
         set.insert(place, position as u16);
+    }
+}
+
+/// Whether a condition after the start effects of a durative action asks for a derived predicate that they may change.
+pub(crate) fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
+    let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
+    let conditions =
+        schema.end_effects.iter().map(|effect| &effect.condition).chain([&schema.middle_condition]);
+    for condition in conditions {
+        atoms(condition, &mut |predicate| open.push(predicate));
+    }
+    open.retain(|predicate| lifted.predicates[predicate.index()].derived);
+    while let Some(predicate) = open.pop() {
+        for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
+            numbers |= has_numbers(&axiom.condition);
+            atoms(&axiom.condition, &mut |below| {
+                if seen.insert(below) {
+                    open.push(below);
+                }
+            });
+        }
+    }
+    schema.start_effects.iter().any(|effect| match &effect.change {
+        Change::Add(predicate, _) | Change::Delete(predicate, _) => seen.contains(predicate),
+        Change::Assign { .. } => numbers,
+    })
+}
+
+/// Calls `visit` with the predicate of every atom of a condition.
+fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => {
+            for part in parts {
+                atoms(part, visit);
+            }
+        }
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => atoms(body, visit),
+        Formula::Literal { predicate, .. } => visit(*predicate),
+        Formula::Equal { .. } | Formula::Compare(..) => {}
+    }
+}
+
+/// Whether a condition compares numbers.
+pub(crate) fn has_numbers(formula: &Formula) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(has_numbers),
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => has_numbers(body),
+        Formula::Compare(..) => true,
+        Formula::Literal { .. } | Formula::Equal { .. } => false,
     }
 }
 

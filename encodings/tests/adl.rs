@@ -119,6 +119,19 @@ fn durative_actions_with_cases() {
     check("inside", DURATIVE, &problem("(dark) (inside)"), None);
 }
 
+#[test]
+fn a_derived_predicate_that_the_start_changes_is_refused() {
+    let domain = DURATIVE
+        .replace("(:functions", "(:derived (bright) (or (lit) (warm))) (:functions")
+        .replace("(inside) (done))", "(inside) (done) (bright))")
+        .replace("(over all (or (lit) (warm)))", "(over all (bright))");
+    let problem = "(define (problem p) (:domain rooms) (:init (= (heat) 0)) (:goal (done)))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let errors = ground(&domain, &problem, &GroundConfig::default()).expect_err("a refusal");
+    assert!(errors.iter().any(|error| error.to_string().contains("its own start effects")), "{errors:?}");
+}
+
 /// A small deterministic generator of numbers (`SplitMix64`).
 struct Random(u64);
 

@@ -108,8 +108,27 @@ fn what_the_planner_does_not_handle_is_refused_with_its_place() {
         0,
         &["cost 2", "optimal, proved"],
     );
-    let domain = DOMAIN.replace("(not (at ?a))", "(when (way ?b ?a) (not (at ?a)))");
-    check(&plan(&domain, PROBLEM, &[]), 3, &["domain.pddl:7:", "E301", "a conditional effect"]);
+    let timed = PROBLEM.replace("(at a)", "(at a) (at 5 (way b c))");
+    check(&plan(DOMAIN, &timed, &[]), 3, &["problem.pddl:", "E301", "a timed initial literal"]);
+}
+
+#[test]
+fn objectives_take_the_place_of_the_metric() {
+    let domain = DOMAIN
+        .replace("(:action", "(:functions (toll ?a ?b) (used) (distance)) (:action")
+        .replace("(at ?b))", "(at ?b) (increase (used) (toll ?a ?b)) (increase (distance) 1))");
+    let problem = PROBLEM.replace(
+        "(at a)",
+        "(at a) (way a c) (= (toll a b) 1) (= (toll b c) 1) (= (toll a c) 5) (= (used) 0) (= (distance) 0)",
+    );
+    let in_order =
+        |first: &str, second: &str| plan(&domain, &problem, &["--minimize", first, "--minimize", second]);
+    check(&in_order("distance", "used"), 0, &["cost 1", "optimal, proved", "distance = 1, used = 5"]);
+    check(&in_order("used", "(+ (distance) 1)"), 0, &["cost 2", "used = 2, (+ (distance) 1) = 3"]);
+    let front = plan(&domain, &problem, &["--pareto", "used,distance"]);
+    check(&front, 0, &["used = 2, distance = 2", "used = 5, distance = 1", "2 on the front, proved"]);
+    check(&plan(&domain, &problem, &["--pareto", "used"]), 2, &["M109", "takes two"]);
+    check(&plan(&domain, &problem, &["--minimize", "usd"]), 3, &["P122", "did you mean `used`"]);
 }
 
 #[test]

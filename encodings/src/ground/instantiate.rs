@@ -9,7 +9,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::configuration::{SlotParameter, conjuncts, slots_of_expression, slots_of_formula};
+use crate::configuration::{
+    SlotParameter, conjuncts, depends_on_own_start, slots_of_expression, slots_of_formula,
+};
 use crate::error::{Error, File, Place};
 use crate::ground::derived;
 use crate::ground::effects::cases;
@@ -78,6 +80,17 @@ pub(crate) fn instantiate<'a>(
     for (((schema, slots), instances), index) in
         lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0..)
     {
+        if depends_on_own_start(lifted, schema) {
+            errors.push(Error::Unsupported {
+                construct: format!(
+                    "a derived predicate in `{}` that its own start effects may change",
+                    schema.name
+                ),
+                instead: "the condition of the derived predicate in its place".into(),
+                place: schema.place,
+            });
+            continue;
+        }
         for binding in instances {
             if operators.len().is_multiple_of(256) && limits.reached() {
                 return Err(vec![Error::Interrupted]);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term as RuleTerm, Variable};
 use rustc_hash::FxHashMap;
 
-use crate::configuration::is_static;
+use crate::configuration::{has_numbers, is_static};
 use crate::ground::reach::{free, with_bound};
 use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Term};
 
@@ -202,15 +202,5 @@ impl<'a> Builder<'a> {
             self.facts.push(Fact { predicate: relation, arguments });
         }
         relation
-    }
-}
-
-/// Whether a condition compares numbers.
-fn has_numbers(formula: &Formula) -> bool {
-    match formula {
-        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(has_numbers),
-        Formula::Exists(_, body) | Formula::ForAll(_, body) => has_numbers(body),
-        Formula::Compare(..) => true,
-        Formula::Literal { .. } | Formula::Equal { .. } => false,
     }
 }
