@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ontology::tomasys::View;
 use ontology::tomasys::change::{self, Status};
-use ontology::{Equality, Ontology, ReadOptions};
+use ontology::{Equality, ReadOptions};
 use rules::{Delta, Engine, Fact, Literal, Prefixes, Program, Symbols};
 
 use crate::message::Message;
@@ -17,7 +17,7 @@ pub const TOMASYS: &str = "tomasys";
 /// What an engine is built from.
 #[derive(Debug, Clone, Default)]
 pub struct Sources {
-    /// OWL documents; their imports are followed.
+    /// OWL documents (`-` is standard input); their imports are followed.
     pub documents: Vec<PathBuf>,
     /// Rule files in SWRL's human-readable syntax; `coadaptation` and `tomasys` name the shipped ones.
     pub rules: Vec<String>,
@@ -57,32 +57,10 @@ impl Knowledge {
     /// All that is wrong with the sources.
     pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
         let read = ontology::read_files(&sources.documents, &sources.options);
-        Self::build(read, &sources.rules, equality)
-    }
-
-    /// As [`Knowledge::read_as`], from the text of one document, which `name` stands for in messages, in place of the
-    /// documents.
-    ///
-    /// # Errors
-    /// All that is wrong with the sources.
-    pub fn read_text_as(
-        text: &str,
-        name: &str,
-        sources: &Sources,
-        equality: Equality,
-    ) -> Result<Self, Vec<Message>> {
-        Self::build(ontology::read_text(text, name, &sources.options), &sources.rules, equality)
-    }
-
-    fn build(
-        read: Result<Ontology, Vec<ontology::Error>>,
-        rule_files: &[String],
-        equality: Equality,
-    ) -> Result<Self, Vec<Message>> {
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
         let mut own = Vec::new();
-        for file in rule_files {
+        for file in &sources.rules {
             match parse_rule_file(file, &mut symbols) {
                 Ok(program) => own.extend(program.rules),
                 Err(more) => errors.extend(more),
@@ -213,6 +191,8 @@ fn parse_rule_file(file: &str, symbols: &mut Symbols) -> Result<Program, Vec<Mes
     let text = match file {
         COADAPTATION => rules::COADAPTATION_RULES.to_owned(),
         TOMASYS => rules::TOMASYS_RULES.to_owned(),
+        "-" => std::io::read_to_string(std::io::stdin())
+            .map_err(|error| vec![Message::at("M101", "-", None, format!("cannot be read: {error}"))])?,
         path => std::fs::read_to_string(path)
             .map_err(|error| vec![Message::at("M101", path, None, format!("cannot be read: {error}"))])?,
     };

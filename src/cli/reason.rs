@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::Args;
 use metaplan::knowledge::{Contradiction, Knowledge, Sources};
 use metaplan::message::Message;
-use metaplan::mission::source;
 use ontology::Equality;
 use rules::{Delta, Value};
 use serde_json::json;
@@ -79,18 +78,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 
 fn read(arguments: &Arguments) -> Result<Knowledge, Failure> {
     let equality = if arguments.unique_names { Equality::UniqueNames } else { Equality::Owl };
-    let (rules, options) = (arguments.rules.clone(), arguments.imports.options());
-    let mut sources = Sources { documents: Vec::new(), rules, options };
-    match &arguments.documents[..] {
-        [only] if only.as_os_str() == "-" => {
-            let text = source(only)?;
-            Ok(Knowledge::read_text_as(text.text(), "-", &sources, equality)?)
-        }
-        documents => {
-            sources.documents = documents.to_vec();
-            Ok(Knowledge::read_as(&sources, equality)?)
-        }
-    }
+    let (documents, rules) = (arguments.documents.clone(), arguments.rules.clone());
+    let sources = Sources { documents, rules, options: arguments.imports.options() };
+    Ok(Knowledge::read_as(&sources, equality)?)
 }
 
 /// Individuals with a property whose local name is given, and its values: `o_status` of objectives.

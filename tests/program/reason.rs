@@ -46,6 +46,38 @@ fn names_may_stand_for_one_individual_or_not() {
     assert!(!unique.stdout.contains("requiresF"), "{unique:#?}");
 }
 
+/// `-` is standard input, whatever stands there.
+#[test]
+fn standard_input_stands_for_any_document() {
+    let failed = ":c a t:Component ; t:c_status \"FALSE\" . :fd t:requiresC :c .";
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    std::fs::write(directory.path().join("model.ttl"), HEAD).expect("a file");
+    let prefixes = HEAD.lines().take(3).collect::<Vec<_>>().join("\n");
+    let more = format!("{prefixes}\n{failed}");
+    let rule = "<http://x#likes>(?x, ?y) -> <http://x#likes>(?y, ?x) .\n";
+    for (arguments, input, expected) in [
+        (&["reason", "model.ttl", "-"][..], &*more, "fd_realisability"),
+        (&["reason", "model.ttl", "--assert", "-"], &more, "fd_realisability"),
+        (&["reason", "model.ttl", "--rules", "-"], rule, "inferred assertions"),
+        (&["convert", "-", "--to", "ntriples"], &more, "<http://metacontrol.org/tomasys#requiresC>"),
+        (&["convert", "model.ttl", "-", "--to", "turtle"], &more, "requiresC"),
+    ] {
+        check(&metaplan_in(directory.path(), arguments, input), 0, &[expected]);
+    }
+}
+
+/// What the profile leaves out is said once each, and summed up.
+#[test]
+fn the_profile_is_summed_up() {
+    let model = format!(
+        "{HEAD}@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . :p a owl:ObjectProperty , owl:ReflexiveProperty .
+         :A a owl:Class ; rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :A ] ."
+    );
+    let outcome = run(&["reason", "-"], &model);
+    check(&outcome, 0, &["warning[O301]: ReflexiveObjectProperty", "warning[O304]: 2 of "]);
+    assert_eq!(outcome.stderr.matches("O301").count(), 2, "{outcome:#?}");
+}
+
 #[test]
 fn authors_are_warned() {
     let mistakes = ":g a t:Function . :e a t:FunctionDesign . :r a t:Requirement .";

@@ -1,0 +1,194 @@
+//! Metaplan beside Pellet, the reasoner of today's TOMASys robots, in one run: a process a cycle, resident, and at scale.
+//!
+//! ```sh
+//! apt-get install openjdk-17-jdk-headless
+//! python3 -m venv /tmp/pellet && /tmp/pellet/bin/pip install owlready2==0.47
+//! METAPLAN_PYTHON=/tmp/pellet/bin/python cargo test --release --test pellet -- --ignored --nocapture
+//! ```
+//!
+//! Pellet is started with the command line of owlready2's `sync_reasoner_pellet`, so that what Python adds is left out.
+//! Processor time is that of the process and its children; wall time depends on what else the machine does.
+
+#![allow(clippy::print_stdout)] // measurements are printed
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use ontology::runtime::{Mode, NewObjective, Runtime};
+use ontology::{ReadOptions, lower, read_files, vocab};
+use rules::{Engine, Literal, Symbols};
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const OURS: &str = env!("CARGO_BIN_EXE_metaplan");
+
+/// What a mission adds to SUAVE's knowledge base: an objective grounded in a design whose thruster has failed.
+const MISSION: &str = "@prefix t: <http://metacontrol.org/tomasys#> .
+@prefix s: <http://www.metacontrol.org/suave#> .
+t:o a t:Objective ; t:typeF s:f_maintain_motion .
+t:fg a t:FunctionGrounding ; t:solvesO t:o ; t:typeFD s:fd_all_thrusters .
+s:c_thruster_1 t:c_status \"FALSE\" .
+";
+
+/// Wall and processor time, in milliseconds.
+#[derive(Clone, Copy, Debug)]
+struct Took {
+    wall: f64,
+    processor: f64,
+}
+
+/// Where Pellet, SUAVE and the generator of large knowledge bases are; `None` with a message where one is not.
+struct Peer {
+    class_path: String,
+    shared: PathBuf,
+}
+
+impl Peer {
+    fn find() -> Option<Self> {
+        let shared = Path::new(ROOT).join("../shared");
+        let python = std::env::var("METAPLAN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+        let script = "import owlready2.reasoning as r; print(r._PELLET_CLASSPATH)";
+        let output = Command::new(python).args(["-c", script]).output().ok()?;
+        let class_path = String::from_utf8(output.stdout).ok()?.trim().to_owned();
+        let java = Command::new("java").arg("-version").output().is_ok_and(|output| output.status.success());
+        if class_path.is_empty() || !java || !shared.is_dir() {
+            println!("skipped: needs owlready2 in METAPLAN_PYTHON, java, and {}", shared.display());
+            return None;
+        }
+        Some(Self { class_path, shared })
+    }
+
+    /// The command line by which owlready2 starts Pellet on an N-Triples document.
+    fn command<'a>(&'a self, class: &'a [&'a str], document: &'a str) -> Vec<&'a str> {
+        let mut command = vec!["java", "-Xmx2000M", "-cp", &self.class_path];
+        command.extend(class);
+        command.extend(["realize", "--loader", "Jena", "--input-format", "N-Triples", "--infer-prop-values"]);
+        command.extend(["--infer-data-prop-values", "--ignore-imports", document]);
+        command
+    }
+
+    fn owl(&self, file: &str) -> String {
+        self.shared.join("real/owl").join(file).display().to_string()
+    }
+}
+
+/// Runs a command a few times; the median of each time.
+fn timed(command: &[&str], runs: usize) -> Took {
+    let script = "TIMEFORMAT='%R %U %S'; time \"$@\" > /dev/null 2>&1 || echo failed >&2";
+    let run = || {
+        let mut bash = Command::new("bash");
+        let output = bash.args(["-c", script, "--"]).args(command).output().expect("bash runs");
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!text.contains("failed"), "{command:?}");
+        let times: Vec<f64> = text.split_whitespace().filter_map(|time| time.parse().ok()).collect();
+        (times[0] * 1e3, (times[1] + times[2]) * 1e3)
+    };
+    let times: Vec<(f64, f64)> = (0..runs).map(|_| run()).collect();
+    Took {
+        wall: median(times.iter().map(|time| time.0).collect()),
+        processor: median(times.iter().map(|time| time.1).collect()),
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Milliseconds of a call in this process, the median of several.
+fn within(runs: usize, mut call: impl FnMut()) -> Took {
+    let times = (0..runs).map(|_| {
+        let start = Instant::now();
+        call();
+        start.elapsed().as_secs_f64() * 1e3
+    });
+    let wall = median(times.collect());
+    Took { wall, processor: wall }
+}
+
+fn report(what: &str, ours: Took, pellet: Took) {
+    println!(
+        "{what}: Pellet {:.0} ms wall, {:.0} ms processor; ours {:.3} and {:.3}; ratios {:.0} and {:.0}",
+        pellet.wall,
+        pellet.processor,
+        ours.wall,
+        ours.processor,
+        pellet.wall / ours.wall.max(1e-3),
+        pellet.processor / ours.processor.max(1e-3)
+    );
+}
+
+fn engine(files: &[&str], options: &ReadOptions) -> Engine {
+    let ontology = read_files(files, options).expect("readable");
+    let mut symbols = Symbols::new();
+    let lowered = lower(&ontology, &mut symbols);
+    Engine::new(symbols, lowered.program, lowered.facts).expect("safe rules")
+}
+
+#[test]
+#[ignore = "needs Java and owlready2"]
+fn suave_deployed_and_resident() {
+    let Some(peer) = Peer::find() else { return };
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = |name: &str| directory.path().join(name).display().to_string();
+    let (mission, merged) = (path("mission.ttl"), path("merged.nt"));
+    std::fs::write(&mission, MISSION).expect("written");
+    let (suave, real) = (peer.owl("suave/suave.owl"), peer.owl(""));
+    let convert =
+        [OURS, "convert", &suave, &mission, "--directory", &real, "--to", "ntriples", "-o", &merged];
+    timed(&convert, 1);
+
+    let ours = [OURS, "reason", &suave, &mission, "--directory", &real, "--format", "ntriples", "-q"];
+    let deployed = timed(&peer.command(&["pellet.Pellet"], &merged), 5);
+    report("SUAVE, a process a cycle", timed(&ours, 5), deployed);
+
+    let warm = format!("{ROOT}/tests/pellet/Warm.java");
+    let command = peer.command(&[&warm, "30"], &merged);
+    let output = Command::new(command[0]).args(&command[1..]).output().expect("java runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    let times: Vec<f64> = text.split_whitespace().filter_map(|time| time.parse().ok()).collect();
+    let [wall, processor] = times[..] else { panic!("the JDK's source launcher: {output:?}") };
+    let resident = Took { wall, processor };
+
+    let options = ReadOptions { directories: vec![PathBuf::from(&real)], ..ReadOptions::default() };
+    let scratch = within(30, || drop(engine(&[&suave, &mission], &options)));
+    report("SUAVE, resident, read and reasoned from scratch", scratch, resident);
+
+    let mut runtime = Runtime::new(engine(&[&suave], &options), Mode::Retract);
+    let (name, function) = ("search", "f_generate_search_path");
+    let objective = NewObjective { name, function, requirements: Vec::new(), always_improve: false };
+    runtime.add_objective(&objective).expect("known");
+    let best = runtime.select(name).expect("known").design.expect("one is available");
+    runtime.ground(name, &best.name).expect("known");
+    let mut turn = 0;
+    let change = within(2_001, || {
+        turn = 1 - turn;
+        let value = Literal::parse(["0.5", "3.5"][turn], Some(vocab::xsd::DECIMAL), None);
+        runtime.measure("water_visibility", value).expect("known");
+        assert_eq!(runtime.objectives_to_adapt().len(), 1 - turn);
+    });
+    report("SUAVE, resident, a measured value changes a status", change, resident);
+}
+
+#[test]
+#[ignore = "needs Java and owlready2, and takes minutes"]
+fn knowledge_bases_at_scale() {
+    let Some(peer) = Peer::find() else { return };
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = |name: &str| directory.path().join(name).display().to_string();
+    let generator = peer.shared.join("tools/scale_kb.py").display().to_string();
+    let (tomasys, mros) = (peer.owl("mc_mdl_tomasys/tomasys.owl"), peer.owl("mros_ontology/mros.owl"));
+    let real = peer.owl("");
+    for (functions, designs) in [(2, 5), (10, 10), (100, 10), (50, 100)] {
+        let (scaled, merged) = (path("scaled.nt"), path("merged.nt"));
+        let (n, m) = (functions.to_string(), designs.to_string());
+        let generate = ["python3", &generator, "-n", &n, "-m", &m, "-c", "2", "-q", "2"];
+        let options = ["--fail", "0.1", "--violate", "0.2", "-o", &scaled];
+        timed(&[&generate[..], &options].concat(), 1);
+        let documents = [&tomasys[..], &mros, &scaled, "--directory", &real];
+        timed(&[&[OURS, "convert"], &documents[..], &["--to", "ntriples", "-o", &merged]].concat(), 1);
+        let ours = [&[OURS, "reason"], &documents[..], &["--format", "ntriples", "-q"]].concat();
+        let (ours, pellet) = (timed(&ours, 3), timed(&peer.command(&["pellet.Pellet"], &merged), 3));
+        report(&format!("{} designs, files to conclusions", functions * designs), ours, pellet);
+    }
+}
