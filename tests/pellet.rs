@@ -143,7 +143,8 @@ fn suave_deployed_and_resident() {
     report("SUAVE, a process a cycle", timed(&ours, 5), deployed);
 
     let warm = format!("{ROOT}/tests/pellet/Warm.java");
-    let command = peer.command(&[&warm, "30"], &merged);
+    let class = [warm.as_str(), "30"];
+    let command = peer.command(&class, &merged);
     let output = Command::new(command[0]).args(&command[1..]).output().expect("java runs");
     let text = String::from_utf8_lossy(&output.stdout);
     let times: Vec<f64> = text.split_whitespace().filter_map(|time| time.parse().ok()).collect();
