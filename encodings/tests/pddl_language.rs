@@ -190,7 +190,10 @@ fn what_is_not_supported_is_refused_by_name() {
 }
 
 /// What is wrong, with its code.
-const WRONG: [(&str, &str, &str); 33] = [
+const WRONG: [(&str, &str, &str); 36] = [
+    ("duration", "(= ?duration =)", "P106"),
+    ("precondition", "(> (battery) -)", "P106"),
+    ("effect", "(increase + 1)", "P106"),
     ("precondition", "(not (at ?x) (at ?y))", "P108"),
     ("precondition", "(imply (at ?x))", "P108"),
     ("precondition", "(exists ?z (at ?z))", "P106"),

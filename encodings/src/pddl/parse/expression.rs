@@ -67,6 +67,15 @@ impl Parser<'_> {
         if item.is_list() {
             return self.atom(item, "a function");
         }
+        let is_sign = |symbol: &str| {
+            comparison(symbol).is_some()
+                || arithmetic(symbol).is_some()
+                || symbol.eq_ignore_ascii_case("is-violated")
+        };
+        if item.symbol().is_some_and(is_sign) {
+            self.expected(item, "a function");
+            return None;
+        }
         let predicate = self.name_item(item, "a function")?;
         Some(Atom { predicate, arguments: Vec::new(), span: item.span() })
     }
