@@ -123,7 +123,8 @@ impl Classes {
         let keeps = if (size(left), right) >= (size(right), left) { left } else { right };
         let mut members: Vec<Symbol> =
             [left, right].iter().flat_map(|&name| self.class(name).to_vec()).collect();
-        members.sort_unstable();
+        // Two ascending runs, which a stable sort merges.
+        members.sort();
         self.members.remove(&left);
         self.members.remove(&right);
         self.representatives.extend(members.iter().map(|&name| (name, keeps)));

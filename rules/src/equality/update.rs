@@ -26,8 +26,9 @@ struct Update<'e> {
     net: FxHashMap<Fact, i8>,
     /// Names whose class has changed, with the class that they had.
     moved: FxHashMap<Symbol, Arc<[Symbol]>>,
-    /// Facts that held before, among those that may not any more.
+    /// Facts that held before, among those that may not any more; not noted where nobody asks for the change.
     before: FxHashSet<Fact>,
+    silent: bool,
     /// Concluded pairs that join classes.
     joining: Vec<Fact>,
 }
@@ -50,6 +51,7 @@ impl Engine {
         let Some(equality) = self.equality.take() else { return Ok(()) };
         let same = equality.same;
         let mut update = Update::new(self, equality);
+        update.silent = true;
         let concluded = update.engine.matching_rows(same, &[None, None]);
         update.joining = concluded.map(|row| Fact::new(same, row.iter().copied())).collect();
         let result = update.join_concluded();
@@ -98,7 +100,7 @@ impl<'e> Update<'e> {
         let equality = Arc::unwrap_or_clone(equality);
         let (open, net, moved) = (BTreeMap::new(), FxHashMap::default(), FxHashMap::default());
         let (before, joining) = (FxHashSet::default(), Vec::new());
-        Self { engine, equality, open, rules_changed: false, net, moved, before, joining }
+        Self { engine, equality, open, rules_changed: false, net, moved, before, silent: false, joining }
     }
 
     /// The change of what holds; on an error, what takes the change back.
@@ -211,14 +213,15 @@ impl<'e> Update<'e> {
         if self.moved.contains_key(&representative) {
             return;
         }
-        let mut rows = self.mentions(representative);
-        rows.retain(|row| self.net.get(row) != Some(&1));
-        let gone =
-            self.net.iter().filter(|(row, net)| **net == -1 && row.arguments.contains(&representative));
-        rows.extend(gone.map(|(row, _)| row.clone()));
-        for row in rows {
-            let facts = self.facts_before(&row);
-            self.before.extend(facts);
+        if !self.silent {
+            let mut rows = self.mentions(representative);
+            rows.retain(|row| self.net.get(row) != Some(&1));
+            let is_gone = |&(row, &net): &(&Fact, &i8)| net == -1 && row.arguments.contains(&representative);
+            rows.extend(self.net.iter().filter(is_gone).map(|(row, _)| row.clone()));
+            for row in rows {
+                let facts = self.facts_before(&row);
+                self.before.extend(facts);
+            }
         }
         for &name in class.iter() {
             self.moved.entry(name).or_insert_with(|| Arc::clone(&class));
