@@ -104,6 +104,8 @@ fn malformed_documents_are_rejected_with_their_place() {
             "t:3:11: error[O102]",
         ),
         (format!("{owl_xml}<Declaration>\n<Class IRI=\"#a\"></Declaration></Ontology>"), "t:3:17: error[O102]"),
+        // This once took all memory.
+        (format!("{owl_xml}<Declaration><Class IRI=\"#a>b\"/>"), "t:2:33: error[O102]"),
         (format!("{owl_xml}<Declaration><Klass IRI=\"#a\"/></Declaration></Ontology>"), "t:2:"),
         (format!("{functional}SubClassOf(:A foo:B)\n)"), "t:3:15: error[O102]"),
         (format!("{functional}SubClassOf(:A\n)"), "t:4:1: error[O102]"),

@@ -40,15 +40,17 @@ pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result
         Syntax::Turtle => parse_turtle(text, name, base)?,
         Syntax::RdfXml => parse_rdf_xml(text, name, base)?,
         Syntax::OwlXml | Syntax::Functional => {
-            let ntriples = horned::transcribe(text, syntax).map_err(|fault| {
-                // The reader of OWL/XML does not say where a tag is closed that is not open.
-                let offset = match fault.offset {
-                    0 if syntax == Syntax::OwlXml => syntax::mismatched_tag(text).unwrap_or(0),
-                    offset => offset,
-                };
+            let malformed = |offset, message: &str| {
                 let position = Position::of_offset(name, text, offset);
-                vec![Error::Malformed { position, syntax, message: shortened(&fault.message) }]
-            })?;
+                vec![Error::Malformed { position, syntax, message: shortened(message) }]
+            };
+            // The reader of OWL/XML takes memory without end where an element is not closed.
+            let unbalanced = (syntax == Syntax::OwlXml).then(|| syntax::mismatched_tag(text)).flatten();
+            if let Some(offset) = unbalanced {
+                return Err(malformed(offset, "an element is not closed, or another one than is open"));
+            }
+            let ntriples =
+                horned::transcribe(text, syntax).map_err(|fault| malformed(fault.offset, &fault.message))?;
             parse_turtle(&ntriples, name, base)?
         }
     };

@@ -120,9 +120,11 @@ pub(super) fn mismatched_tag(text: &[u8]) -> Option<usize> {
             [b'<', b'!', ..] if declares_entities(tag) => b"]>",
             _ => b">",
         };
-        let Some(length) = tag.windows(end.len()).position(|window| window == end) else {
-            return Some(start);
+        let length = match end {
+            b">" => end_of_tag(tag),
+            _ => tag.windows(end.len()).position(|window| window == end),
         };
+        let Some(length) = length else { return Some(start) };
         let inside = &tag[1..length];
         let name = |text: &'_ [u8]| text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
         match inside.first() {
@@ -134,6 +136,19 @@ pub(super) fn mismatched_tag(text: &[u8]) -> Option<usize> {
         at = start + length + end.len();
     }
     (!open.is_empty()).then_some(text.len())
+}
+
+/// Where a tag's `>` stands, outside of quotes.
+fn end_of_tag(tag: &[u8]) -> Option<usize> {
+    let mut quote = None;
+    tag.iter().position(|&byte| {
+        match (quote, byte) {
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(open), _) if open == byte => quote = None,
+            _ => return quote.is_none() && byte == b'>',
+        }
+        false
+    })
 }
 
 /// Whether a `!DOCTYPE` has an internal subset, which contains `>` itself.
