@@ -157,7 +157,8 @@ impl Engine {
     }
 
     /// The integrity constraints (rules with an empty head) that fire, once per match, and the facts with ill-typed
-    /// literals; sorted. A knowledge base is consistent where there are none.
+    /// literals; sorted. A knowledge base is consistent where there are none. Under equality a match is one of
+    /// individuals, whatever names they have, and its supports are what is stated of them, as far as it is.
     pub fn violations(&self) -> Vec<Violation> {
         let mut violations = Vec::new();
         for &(relation, position) in &self.network.constraints {
