@@ -173,6 +173,49 @@ pub(crate) fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
     })
 }
 
+/// Derived predicates that depend on themselves through a universal quantifier.
+pub(crate) fn recursive_through_forall(lifted: &Lifted) -> Vec<PredicateId> {
+    let depends = |from: PredicateId, on: PredicateId| {
+        let (mut open, mut seen) = (vec![from], FxHashSet::default());
+        while let Some(predicate) = open.pop() {
+            if predicate == on {
+                return true;
+            }
+            for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
+                atoms(&axiom.condition, &mut |below| {
+                    if seen.insert(below) {
+                        open.push(below);
+                    }
+                });
+            }
+        }
+        false
+    };
+    let mut found = Vec::new();
+    for axiom in &lifted.axioms {
+        let mut inside = Vec::new();
+        universal_atoms(&axiom.condition, &mut |predicate| inside.push(predicate));
+        if inside.into_iter().any(|predicate| depends(predicate, axiom.predicate)) {
+            found.push(axiom.predicate);
+        }
+    }
+    found
+}
+
+/// Calls `visit` with the predicate of every atom below a universal quantifier.
+fn universal_atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => {
+            for part in parts {
+                universal_atoms(part, visit);
+            }
+        }
+        Formula::Exists(_, body) => universal_atoms(body, visit),
+        Formula::ForAll(_, body) => atoms(body, visit),
+        _ => {}
+    }
+}
+
 /// Calls `visit` with the predicate of every atom of a condition.
 fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     match formula {

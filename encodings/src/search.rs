@@ -22,6 +22,8 @@ use crate::task::{Fact, OperatorId, State, Task};
 
 /// How many states are stored at most.
 const STATE_LIMIT: usize = 400_000;
+/// States with larger numbers are left out.
+const NUMBER_LIMIT: u64 = 1 << 60;
 /// Operators with more combinations of designs than this are left to the SAT solver.
 const CHOICE_LIMIT: usize = 20_000;
 
@@ -55,6 +57,8 @@ struct Search<'a> {
     open: BinaryHeap<Reverse<(i64, u32, u32)>>,
     /// Whether more of any numeric variable never hurts.
     monotone: bool,
+    /// Whether states were left out because their numbers do not fit.
+    incomplete: bool,
 }
 
 /// Searches a task whose operators all cost at least 0.
@@ -76,6 +80,7 @@ pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
         seen: FxHashMap::default(),
         open: BinaryHeap::new(),
         monotone,
+        incomplete: false,
     };
     search.push(task.initial.clone(), 0, 0, None);
     search.run(limits)
@@ -89,6 +94,9 @@ impl Search<'_> {
                 continue;
             }
             if self.task.is_goal(&self.nodes[id as usize].state) {
+                if self.incomplete {
+                    return Found::Unknown;
+                }
                 return Found::Optimal(self.plan(id));
             }
             expanded += 1;
@@ -97,7 +105,7 @@ impl Search<'_> {
             }
             self.expand(id, steps);
         }
-        Found::None
+        if self.incomplete { Found::Unknown } else { Found::None }
     }
 
     fn expand(&mut self, id: u32, steps: u32) {
@@ -118,6 +126,10 @@ impl Search<'_> {
 
     fn push(&mut self, state: State, cost: i64, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
         let Some(estimate) = self.bounds.estimate(&state) else { return };
+        if state.numbers.iter().any(|number| number.unsigned_abs() > NUMBER_LIMIT) {
+            self.incomplete = true;
+            return;
+        }
         let id = self.nodes.len() as u32;
         match self.seen.entry(state.values[..self.task.basic].into()) {
             Entry::Vacant(entry) => {

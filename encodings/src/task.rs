@@ -270,8 +270,8 @@ impl Iterator for Choices<'_> {
 impl Linear<i64> {
     /// The value in a state, for a combination of designs.
     pub(crate) fn value(&self, numbers: &[i64], choice: &[u16], sizes: &[usize]) -> i64 {
-        let state: i64 = self.coefficients.iter().map(|(v, factor)| factor * numbers[v.index()]).sum();
-        state + self.quantity.at(choice, sizes)
+        let terms = self.coefficients.iter().map(|(v, factor)| factor.saturating_mul(numbers[v.index()]));
+        terms.fold(self.quantity.at(choice, sizes), i64::saturating_add)
     }
 }
 

@@ -120,6 +120,25 @@ fn durative_actions_with_cases() {
 }
 
 #[test]
+fn derived_predicates_recur_through_forall() {
+    let domain = "(define (domain d) (:types part)
+      (:predicates (below ?a ?b - part) (broken ?a - part) (sound ?a - part))
+      (:functions (total-cost))
+      (:derived (sound ?a - part) (and (not (broken ?a)) (forall (?b - part) (or (not (below ?b ?a)) (sound ?b)))))
+      (:action mend :parameters (?a - part) :precondition (broken ?a)
+        :effect (and (not (broken ?a)) (increase (total-cost) 1))))";
+    let problem = |broken: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:objects a b c d - part)
+             (:init (below b a) (below c b) (= (total-cost) 0) {broken}) (:goal (sound a)) (:metric minimize (total-cost)))"
+        )
+    };
+    check("sound", domain, &problem(""), Some("0"));
+    check("one of two", domain, &problem("(broken c) (broken d)"), Some("1"));
+    check("both", domain, &problem("(broken c) (broken a)"), Some("2"));
+}
+
+#[test]
 fn a_derived_predicate_that_the_start_changes_is_refused() {
     let domain = DURATIVE
         .replace("(:functions", "(:derived (bright) (or (lit) (warm))) (:functions")

@@ -12,7 +12,7 @@ use num_rational::BigRational;
 use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::configuration::is_static;
+use crate::configuration::{is_static, recursive_through_forall};
 use crate::error::{Error, File, Place};
 use crate::lifted::{
     Axiom, Change, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter, Predicate,
@@ -77,6 +77,10 @@ fn mark_fluents(lifted: &mut Lifted) {
             }
             Change::Assign { function, .. } => lifted.functions[function.index()].fluent = true,
         }
+    }
+    // The rule engine negates only what is complete; what recurs through a quantifier is evaluated by itself.
+    for predicate in recursive_through_forall(lifted) {
+        lifted.predicates[predicate.index()].fluent = true;
     }
     loop {
         let depends = |axiom: &&Axiom| {
