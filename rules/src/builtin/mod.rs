@@ -272,7 +272,10 @@ impl BuiltIn {
             Self::DataRange => matches!(right, Literal::Uri(datatype) if left.is_in(datatype)),
             Self::OutsideDataRange => matches!(right, Literal::Uri(datatype) if !left.is_in(datatype)),
             Self::Equal => order() == Some(Ordering::Equal),
-            Self::NotEqual => order().is_some_and(|order| order != Ordering::Equal),
+            // SWRL defines it as the negation of `equal`; what has no value satisfies neither.
+            Self::NotEqual => {
+                !left.is_ill_typed() && !right.is_ill_typed() && order() != Some(Ordering::Equal)
+            }
             Self::LessThan => order() == Some(Ordering::Less),
             Self::LessThanOrEqual => order().is_some_and(Ordering::is_le),
             Self::GreaterThan => order() == Some(Ordering::Greater),

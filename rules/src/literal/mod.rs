@@ -10,6 +10,7 @@
 
 mod decimal;
 mod temporal;
+mod text;
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -272,7 +273,7 @@ fn parse_xsd(lexical: &str, local: &str) -> Parsed {
     let value = match local {
         "string" => Some(Literal::String(lexical.into())),
         "normalizedString" | "token" | "language" | "Name" | "NCName" | "NMTOKEN" => {
-            Some(Literal::String(collapsed.into()))
+            text::parse(lexical, local).map(|text| Literal::String(text.into()))
         }
         "anyURI" => Some(Literal::Uri(collapsed.into())),
         "boolean" => match collapsed {
