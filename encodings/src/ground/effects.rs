@@ -54,7 +54,10 @@ impl Build<'_, '_> {
             let own = std::mem::take(&mut self.binding);
             for binding in bindings {
                 self.binding = binding;
-                let condition = self.world.residual(&effect.condition, &mut self.binding)?;
+                self.world.in_effect = true;
+                let condition = self.world.residual(&effect.condition, &mut self.binding);
+                self.world.in_effect = false;
+                let condition = condition?;
                 if condition != Residual::False {
                     let change = self.change(&effect.change)?;
                     changes.push((condition, change));

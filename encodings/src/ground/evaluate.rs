@@ -38,6 +38,8 @@ pub(crate) struct World<'a> {
     pub(crate) numerics: AtomIndex<FunctionId>,
     pub(crate) joins: JoinIndex,
     pub(crate) definitions: Definitions,
+    /// Whether the condition of an effect is evaluated, which must be defined.
+    pub(crate) in_effect: bool,
 }
 
 /// Why an expression has no value here.
@@ -69,6 +71,7 @@ impl<'a> World<'a> {
             numerics: IndexMap::default(),
             joins: JoinIndex::default(),
             definitions: Definitions::default(),
+            in_effect: false,
         }
     }
 

@@ -1,5 +1,6 @@
 //! Conditions of a schema under a binding of its parameters: what is left once everything static is decided.
 
+use crate::error::Error;
 use crate::ground::evaluate::{AtomId, Binding, Failure, World};
 use crate::ground::join::{guards_of_exists, guards_of_forall};
 use crate::lifted::{Bound, Formula, Rational};
@@ -91,10 +92,18 @@ impl World<'_> {
                 }
                 Ok(Residual::Literal { atom: self.atom(*predicate, arguments), positive: *positive })
             }
-            Formula::Compare(comparison, left, right, _) => {
+            Formula::Compare(comparison, left, right, place) => {
                 let difference = match (self.ground(left, binding), self.ground(right, binding)) {
                     (Ok(left), Ok(right)) => (left, right),
-                    // PDDL 2.1: a comparison with an undefined value does not hold.
+                    // PDDL 2.1: an action with an undefined value in an effect cannot be executed…
+                    (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) if self.in_effect => {
+                        return Err(Failure::Error(Error::Unsupported {
+                            construct: "a comparison in `when` with a value that is not defined".into(),
+                            instead: "a value for it in `:init`".into(),
+                            place: *place,
+                        }));
+                    }
+                    // … and elsewhere a comparison with one does not hold.
                     (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) => {
                         return Ok(Residual::False);
                     }
