@@ -2,16 +2,17 @@
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
+mod common;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use common::{SHARED, recorded};
 use ontology::{
     ANONYMOUS, Equality, INTERNAL, Ontology, ReadOptions, lower_with, read_files, read_text, vocab,
 };
 use rules::{Delta, Engine, Fact, Literal, Symbols};
 use serde_json::Value;
-
-const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
 
 /// Cases that are not compared, each with the reason.
 const SKIPPED: [(&str, &str); 5] = [
@@ -90,21 +91,13 @@ fn one_question_ontologies_infer_what_the_reference_infers() {
 
 /// Runs a comparison on every case of a directory and lists those that fail.
 fn check_all(directory: &str, compare: impl Fn(&Value) -> Result<(), String>) {
-    let directory = Path::new(SHARED).join(directory);
-    let Ok(entries) = std::fs::read_dir(&directory) else {
-        println!("skipped: {} is not there", directory.display());
-        return;
-    };
-    let mut files: Vec<PathBuf> = entries.filter_map(Result::ok).map(|entry| entry.path()).collect();
-    files.sort();
+    let cases = recorded(directory);
     let mut failures = Vec::new();
-    for file in &files {
-        let case: Value =
-            serde_json::from_str(&std::fs::read_to_string(file).expect("readable")).expect("JSON");
+    for case in &cases {
         let name = case["case"].as_str().expect("case");
         if let Some((_, reason)) = SKIPPED.iter().find(|(skipped, _)| *skipped == name) {
             println!("{name} skipped: {reason}");
-        } else if let Err(difference) = compare(&case) {
+        } else if let Err(difference) = compare(case) {
             failures.push(format!("{name}: {difference}"));
         }
     }
@@ -112,7 +105,7 @@ fn check_all(directory: &str, compare: impl Fn(&Value) -> Result<(), String>) {
         failures.is_empty(),
         "{} of {} cases differ:\n{}",
         failures.len(),
-        files.len(),
+        cases.len(),
         failures.join("\n")
     );
 }

@@ -390,3 +390,15 @@ fn one_ontology_iri_twice_is_reported() {
     let [warning] = &warnings(&ontology)[..] else { panic!("{:?}", ontology.warnings) };
     assert!(warning.contains("both declare the ontology <http://e/a>; both are read"), "{warning}");
 }
+
+/// Comments and CDATA sections are markup, not text, and tags in them are none.
+#[test]
+fn owl_xml_with_sections_and_comments_in_literals() {
+    let text = "<Ontology xmlns=\"http://www.w3.org/2002/07/owl#\" ontologyIRI=\"http://e/\">\n\
+        <Declaration><NamedIndividual IRI=\"http://e/#i\"/></Declaration><!-- <Declaration> -->\n\
+        <Declaration><DataProperty IRI=\"http://e/#d\"/></Declaration>\n\
+        <DataPropertyAssertion><DataProperty IRI=\"http://e/#d\"/><NamedIndividual IRI=\"http://e/#i\"/>\
+        <Literal>a &amp; <![CDATA[</b> ]> & 'c]]><!-- no --> d</Literal></DataPropertyAssertion>\n</Ontology>";
+    let ontology = read_text(text, "document", &ReadOptions::default()).unwrap_or_else(|e| panic!("{e:?}"));
+    assert_eq!(shown(&ontology), ["DataPropertyAssertion(<d> <i> \"a & </b> ]> & 'c d\")"]);
+}

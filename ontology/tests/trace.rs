@@ -2,15 +2,16 @@
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use common::{SHARED, recorded};
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::{ReadOptions, lower, read_files, vocab};
 use rules::{Delta, Engine, Fact, Literal, Symbols};
 use serde_json::{Value, json};
-
-const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
 
 /// Where we differ on purpose: the trace, the first step from which it is not compared, and why.
 const EXCEPTIONS: [(&str, usize, &str); 3] = [
@@ -33,22 +34,14 @@ const EXCEPTIONS: [(&str, usize, &str); 3] = [
 
 #[test]
 fn traces_of_the_original() {
-    let directory = PathBuf::from(SHARED).join("golden/trace");
-    let Ok(entries) = std::fs::read_dir(&directory) else {
-        println!("skipped: {} is not there", directory.display());
-        return;
-    };
-    let mut files: Vec<PathBuf> = entries.filter_map(Result::ok).map(|entry| entry.path()).collect();
-    files.sort();
+    let traces = recorded("golden/trace");
     let mut failures = Vec::new();
-    for file in &files {
-        let trace: Value =
-            serde_json::from_str(&std::fs::read_to_string(file).expect("readable")).expect("JSON");
+    for trace in &traces {
         let name = trace["scenario"].as_str().expect("scenario");
         let steps = trace["steps"].as_array().expect("steps");
         let exception = EXCEPTIONS.iter().find(|(scenario, ..)| *scenario == name);
         let compared = exception.map_or(steps.len(), |(_, step, _)| *step);
-        let mut replay = Replay { runtime: runtime(&trace) };
+        let mut replay = Replay { runtime: runtime(trace) };
         for (index, step) in steps[..compared].iter().enumerate() {
             if let Err(difference) = replay.step(step) {
                 failures.push(format!("{name}, step {index} ({}): {difference}", step["op"]));
@@ -59,7 +52,7 @@ fn traces_of_the_original() {
             println!("{name} from step {step}: {reason}");
         }
     }
-    assert!(failures.is_empty(), "{} of {} differ:\n{}", failures.len(), files.len(), failures.join("\n"));
+    assert!(failures.is_empty(), "{} of {} differ:\n{}", failures.len(), traces.len(), failures.join("\n"));
 }
 
 /// The knowledge base of a trace.

@@ -138,6 +138,7 @@ fn json(knowledge: &Knowledge, contradictions: &[Contradiction]) -> serde_json::
         "designs": designs,
         "objectives": objectives,
         "contradictions": contradictions,
+        "warnings": knowledge.warnings(),
     })
 }
 

@@ -55,6 +55,14 @@ fn standard_input_stands_for_any_document() {
     let prefixes = HEAD.lines().take(3).collect::<Vec<_>>().join("\n");
     let more = format!("{prefixes}\n{failed}");
     let rule = "<http://x#likes>(?x, ?y) -> <http://x#likes>(?y, ?x) .\n";
+    let stated = format!("{HEAD}{failed}");
+    std::fs::write(directory.path().join("failed.ttl"), stated).expect("a file");
+    let before = metaplan_in(directory.path(), &["reason", "failed.ttl"], "");
+    check(&before, 0, &["fd_realisability"]);
+    let status = format!("{prefixes}\n:c t:c_status \"FALSE\" .");
+    let after = metaplan_in(directory.path(), &["reason", "failed.ttl", "--retract", "-"], &status);
+    check(&after, 0, &["inferred assertions"]);
+    assert!(!after.stdout.contains("fd_realisability"), "{after:#?}");
     for (arguments, input, expected) in [
         (&["reason", "model.ttl", "-"][..], &*more, "fd_realisability"),
         (&["reason", "model.ttl", "--assert", "-"], &more, "fd_realisability"),
@@ -76,6 +84,10 @@ fn the_profile_is_summed_up() {
     let outcome = run(&["reason", "-"], &model);
     check(&outcome, 0, &["warning[O301]: ReflexiveObjectProperty", "warning[O304]: 2 of "]);
     assert_eq!(outcome.stderr.matches("O301").count(), 2, "{outcome:#?}");
+    let outcome = run(&["reason", "-", "--format", "json", "-q"], &model);
+    let answer: serde_json::Value = serde_json::from_str(&outcome.stdout).expect("JSON");
+    let codes: Vec<_> = answer["warnings"].as_array().expect("an array").iter().map(|w| &w["code"]).collect();
+    assert_eq!(codes, ["O301", "O301", "O304"], "{answer:#}");
 }
 
 #[test]

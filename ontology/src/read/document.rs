@@ -49,9 +49,17 @@ pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result
             if let Some(offset) = unbalanced {
                 return Err(malformed(offset, "an element is not closed, or another one than is open"));
             }
-            let ntriples =
-                horned::transcribe(text, syntax).map_err(|fault| malformed(fault.offset, &fault.message))?;
-            parse_turtle(&ntriples, name, base)?
+            let ntriples = match syntax {
+                Syntax::OwlXml => {
+                    let flat = syntax::flattened(text);
+                    horned::transcribe(&flat.text, syntax)
+                        .map_err(|fault| malformed(flat.origin(fault.offset), &fault.message))
+                }
+                _ => {
+                    horned::transcribe(text, syntax).map_err(|fault| malformed(fault.offset, &fault.message))
+                }
+            };
+            parse_turtle(&ntriples?, name, base)?
         }
     };
     let triples = rename_blank_nodes(triples, prefix);

@@ -1,6 +1,7 @@
 //! Which concrete syntax a document is written in, by its content: file names do not tell (real files named `.owl`
 //! are RDF/XML or Turtle).
 
+use std::borrow::Cow;
 use std::fmt;
 
 /// A concrete syntax of OWL ontologies.
@@ -112,20 +113,9 @@ pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
 /// elements are open there.
 pub(super) fn mismatched_tag(text: &[u8]) -> Option<usize> {
     let (mut open, mut at) = (Vec::new(), 0);
-    while let Some(start) = text[at..].iter().position(|&byte| byte == b'<').map(|found| at + found) {
-        let tag = &text[start..];
-        let end: &[u8] = match tag {
-            [b'<', b'!', b'-', b'-', ..] => b"-->",
-            [b'<', b'?', ..] => b"?>",
-            [b'<', b'!', ..] if declares_entities(tag) => b"]>",
-            _ => b">",
-        };
-        let length = match end {
-            b">" => end_of_tag(tag),
-            _ => tag.windows(end.len()).position(|window| window == end),
-        };
-        let Some(length) = length else { return Some(start) };
-        let inside = &tag[1..length];
+    while let Some((start, end)) = next_markup(text, at) {
+        let Some(end) = end else { return Some(start) };
+        let inside = &text[start + 1..end - 1];
         let name = |text: &'_ [u8]| text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
         match inside.first() {
             Some(b'/') if open.pop() != Some(inside[1..].trim_ascii()) => return Some(start),
@@ -133,9 +123,70 @@ pub(super) fn mismatched_tag(text: &[u8]) -> Option<usize> {
             _ if inside.ends_with(b"/") => {}
             _ => open.push(&inside[..name(inside)]),
         }
-        at = start + length + end.len();
+        at = end;
     }
     (!open.is_empty()).then_some(text.len())
+}
+
+/// A document in which text between two tags is in one piece.
+pub(super) struct Flattened<'a> {
+    pub text: Cow<'a, [u8]>,
+    /// After each change, the same place in the flattened and in the original text.
+    moved: Vec<(usize, usize)>,
+}
+
+impl Flattened<'_> {
+    /// Where in the original text a place of the flattened one is.
+    pub(super) fn origin(&self, offset: usize) -> usize {
+        let after = self.moved.partition_point(|&(here, _)| here <= offset);
+        let (here, there) = after.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
+        there + (offset - here)
+    }
+}
+
+/// Leaves comments out and writes CDATA sections as ordinary text: horned-owl takes their delimiters for a part of the
+/// literal that they stand in.
+pub(super) fn flattened(text: &[u8]) -> Flattened<'_> {
+    const SECTION: &[u8] = b"<![CDATA[";
+    let (mut flat, mut moved, mut at, mut copied) = (Vec::new(), Vec::new(), 0, 0);
+    while let Some((start, Some(end))) = next_markup(text, at) {
+        at = end;
+        let section = text[start..end].strip_prefix(SECTION);
+        if section.is_none() && !text[start..].starts_with(b"<!--") {
+            continue;
+        }
+        flat.extend_from_slice(&text[copied..start]);
+        for byte in section.map_or(&[][..], |section| &section[..section.len() - b"]]>".len()]) {
+            match byte {
+                b'<' => flat.extend_from_slice(b"&lt;"),
+                b'>' => flat.extend_from_slice(b"&gt;"),
+                b'&' => flat.extend_from_slice(b"&amp;"),
+                _ => flat.push(*byte),
+            }
+        }
+        copied = end;
+        moved.push((flat.len(), end));
+    }
+    if moved.is_empty() {
+        return Flattened { text: Cow::Borrowed(text), moved };
+    }
+    flat.extend_from_slice(&text[copied..]);
+    Flattened { text: Cow::Owned(flat), moved }
+}
+
+/// The next tag, comment, CDATA section or instruction from `at` on: where it starts, and where it ends if it does.
+fn next_markup(text: &[u8], at: usize) -> Option<(usize, Option<usize>)> {
+    let start = at + text[at..].iter().position(|&byte| byte == b'<')?;
+    let markup = &text[start..];
+    let (skip, end): (usize, &[u8]) = match markup {
+        [b'<', b'!', b'-', b'-', ..] => (4, b"-->"),
+        _ if markup.starts_with(b"<![CDATA[") => (9, b"]]>"),
+        [b'<', b'?', ..] => (2, b"?>"),
+        [b'<', b'!', ..] if declares_entities(markup) => (2, b"]>"),
+        _ => return Some((start, end_of_tag(markup).map(|length| start + length + 1))),
+    };
+    let length = markup[skip..].windows(end.len()).position(|window| window == end);
+    Some((start, length.map(|length| start + skip + length + end.len())))
 }
 
 /// Where a tag's `>` stands, outside of quotes.
@@ -159,7 +210,39 @@ fn declares_entities(text: &[u8]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::Syntax;
+    use super::{Syntax, flattened, mismatched_tag};
+
+    #[test]
+    fn tags_are_balanced_outside_of_comments_and_character_data() {
+        for (text, expected) in [
+            ("<a><b/></a>", None),
+            ("<a><b></a>", Some(6)),
+            ("<a><b></b>", Some(10)),
+            ("<a><![CDATA[</b> ]> <c d=\"]]></a>", None),
+            ("<a><![CDATA[<b>]]><b></a>", Some(21)),
+            ("<a><![CDATA[</a>", Some(3)),
+            ("<a><!-- </b> ' --></a>", None),
+            ("<!DOCTYPE a [ <!ENTITY b \"c\"> ]><?d <e> ?><a b='>'></a >", None),
+        ] {
+            assert_eq!(mismatched_tag(text.as_bytes()), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn text_is_flattened_and_places_are_kept() {
+        for (text, expected) in [
+            ("<a>b</a>", "<a>b</a>"),
+            ("<a>b<!-- <c> --> d</a>", "<a>b d</a>"),
+            ("<!----><a><![CDATA[<&>]]>!<![CDATA[]]></a>", "<a>&lt;&amp;&gt;!</a>"),
+            ("<a b='<!-- c -->'/><!-- open", "<a b='<!-- c -->'/><!-- open"),
+        ] {
+            let flat = flattened(text.as_bytes());
+            assert_eq!(String::from_utf8_lossy(&flat.text), expected, "{text}");
+            assert_eq!(flat.origin(flat.text.len()), text.len(), "{text}");
+            let (here, there) = (expected.find("</a>"), text.find("</a>"));
+            assert_eq!(here.map(|offset| flat.origin(offset)), there, "{text}");
+        }
+    }
 
     #[test]
     fn content_decides() {
