@@ -13,6 +13,8 @@ use metaplan_encodings::pddl::{Severity, Source, read, render};
 
 const TOOLS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools");
 
+const MATRIX: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/reference/pddl_quirks.md");
+
 /// Runs one of the scripts; nothing where it or Python is absent.
 fn script(name: &str, arguments: &[&str]) -> Option<()> {
     let path = Path::new(TOOLS).join(name);
@@ -112,6 +114,21 @@ fn types_decide_which_objects_fit() {
     }
 }
 
+/// The matrix says for each quirk which peers accept it; none of its rows goes untested.
+fn every_row_of_the_matrix_has_a_pair(index: &str) {
+    let Ok(text) = std::fs::read_to_string(MATRIX) else {
+        println!("skipped: {MATRIX} is absent");
+        return;
+    };
+    let matrix = text.split("| quirk |").nth(1).expect("a matrix");
+    let rows = matrix.lines().filter_map(|line| line.strip_prefix("| ")?.split_once(" | "));
+    let quirks: Vec<_> = rows.map(|(quirk, _)| quirk.replace('"', "\\\"")).collect();
+    assert!(quirks.len() > 40, "{quirks:?}");
+    for quirk in quirks {
+        assert!(index.contains(&format!("\"name\": \"{quirk}\"")), "{quirk}");
+    }
+}
+
 #[test]
 fn minimal_pairs_are_accepted_but_true_errors() {
     let folder = folder("quirks");
@@ -123,6 +140,7 @@ fn minimal_pairs_are_accepted_but_true_errors() {
         .map(|(at, key)| index[at + key.len()..].starts_with("accept"))
         .collect();
     assert!(pairs.len() > 40, "{index}");
+    every_row_of_the_matrix_has_a_pair(&index);
     for (number, is_accepted) in pairs.into_iter().enumerate() {
         let path = |kind: &str| folder.join(format!("{number:02}.{kind}.pddl"));
         let (domain, problem) = (file(&path("domain")), file(&path("problem")));

@@ -46,10 +46,10 @@ pub const PLANNED: Features = Features {
     conditional: true,
     derived: true,
     timed: false,
-    inequalities: false,
+    inequalities: true,
     undefined: false,
     negative: true,
-    universal: false,
+    universal: true,
     nonlinear: false,
 };
 
@@ -57,6 +57,8 @@ pub const PLANNED: Features = Features {
 pub struct Draw<'b> {
     bytes: &'b [u8],
     features: Features,
+    /// Whether expressions over what never changes may be undefined.
+    partial: bool,
 }
 
 /// Which derived predicates a condition may use.
@@ -81,7 +83,7 @@ impl Allowed {
 
 impl<'b> Draw<'b> {
     pub fn new(bytes: &'b [u8], features: Features) -> Self {
-        Self { bytes, features }
+        Self { bytes, features, partial: false }
     }
 
     pub fn below(&mut self, limit: usize) -> usize {
@@ -159,7 +161,12 @@ impl<'b> Draw<'b> {
             }
             _ => {
                 let is_constant = is_constant || !self.features.nonlinear;
-                let divisor = self.expression(depth, 0, is_constant, false);
+                // Zero and what has no value are divisors where expressions may be undefined.
+                let divisor = if self.partial || self.features.undefined {
+                    self.expression(depth, 0, is_constant, false)
+                } else {
+                    Expression::Number(Ratio::new(1 + self.below(4) as i128, 2))
+                };
                 Expression::Quotient(Box::new(inner(self)), Box::new(divisor))
             }
         }
@@ -216,7 +223,11 @@ impl<'b> Draw<'b> {
 
     /// A condition of an action or of the goal: mostly a conjunction of little.
     fn condition(&mut self, depth: usize, most: usize, duration: bool) -> Formula {
-        let allowed = Allowed { free: &EVERYWHERE, positive: &[], negated: false, numeric: true };
+        self.condition_over(depth, most, duration, true)
+    }
+
+    fn condition_over(&mut self, depth: usize, most: usize, duration: bool, numeric: bool) -> Formula {
+        let allowed = Allowed { free: &EVERYWHERE, positive: &[], negated: false, numeric };
         Formula::And(self.some(0, most, |this| {
             if this.chance(50) {
                 let fact = this.fact(depth, allowed);
@@ -254,7 +265,9 @@ impl<'b> Draw<'b> {
         match self.below(3) {
             0 => Effect::And(self.some(0, 2, |this| this.effect(depth, nesting - 1, duration))),
             1 if self.features.conditional => {
-                let condition = self.condition(depth, 2, duration);
+                // Nobody executes an action for which it is undefined what it does.
+                let numeric = self.features.undefined || !self.partial;
+                let condition = self.condition_over(depth, 2, duration, numeric);
                 Effect::When(condition, Box::new(self.effect(depth, nesting - 1, duration)))
             }
             _ => {
@@ -342,7 +355,7 @@ impl<'b> Draw<'b> {
             let arguments = if *arity == 0 { vec![vec![]] } else { vec![vec![0], vec![1], vec![2]] };
             for arguments in arguments {
                 let is_constant = CONSTANT.contains(&function);
-                let is_missing = (is_constant || self.features.undefined) && self.chance(15);
+                let is_missing = (is_constant && self.partial || self.features.undefined) && self.chance(15);
                 let number = if function == TOTAL_COST { Number::from_integer(0) } else { self.number() };
                 if !is_missing || function == TOTAL_COST {
                     values.insert((function, arguments), number);
@@ -370,6 +383,7 @@ impl<'b> Draw<'b> {
 
     /// A task.
     pub fn task(&mut self) -> Task {
+        self.partial = self.chance(50);
         let axioms = if self.features.derived { self.axioms() } else { Vec::new() };
         let basic: Vec<usize> = FLUENTS.iter().chain(&STATICS).copied().collect();
         let facts: BTreeSet<_> = self.some(0, 7, |this| this.atom(&basic)).into_iter().collect();

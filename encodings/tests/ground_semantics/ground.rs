@@ -7,7 +7,7 @@ use metaplan_encodings::pddl::ast::{Domain, Problem};
 use metaplan_encodings::{GroundConfig, Situation, ground};
 
 use crate::interpret::{State, choices};
-use crate::model::{OBJECTS, Task, fact_text};
+use crate::model::{Action, Expression, Number, OBJECTS, Sign, Task, fact_text};
 
 /// How many pairs of states are compared.
 const LIMIT: usize = 60;
@@ -18,6 +18,43 @@ const LARGE: i128 = 100_000;
 /// The codes of what the planner may refuse: a construct, a product of fluents, numbers that are too large.
 const REFUSALS: [&str; 3] = ["E301", "E303", "E304"];
 
+/// Whether the metric rewards time.
+fn rewards_time(task: &Task) -> bool {
+    let Some((maximize, Expression::Sum(parts))) = &task.metric else { return false };
+    let weights = parts.iter().filter_map(|part| match part {
+        Expression::Product(weight, what) if matches!(**what, Expression::TotalTime) => Some(&**weight),
+        _ => None,
+    });
+    let zero = Number::from_integer(0);
+    let sum = weights.fold(zero, |sum, weight| match weight {
+        Expression::Number(weight) => sum + weight,
+        _ => sum,
+    });
+    if *maximize { sum > zero } else { sum < zero }
+}
+
+/// How long an action takes: what the only equation says, and otherwise the only bound that the metric makes it take.
+fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Option<Number> {
+    let bounds = action.duration.as_ref()?;
+    let among = |signs: &[Sign]| {
+        let mut found = bounds.iter().filter(|(_, sign, _)| signs.contains(sign)).map(|(.., value)| value);
+        found.next().filter(|_| found.next().is_none())
+    };
+    let longest = if rewards_time(task) { Sign::LessOrEqual } else { Sign::GreaterOrEqual };
+    let chosen = if bounds.iter().any(|(_, sign, _)| *sign == Sign::Equal) {
+        among(&[Sign::Equal])
+    } else {
+        among(&[longest])
+    };
+    state.value(task, chosen?, scope)
+}
+
+/// The state after an instance of an action, which takes the time that the planner would choose.
+fn after(task: &Task, state: &State, index: usize, objects: Vec<usize>) -> Option<State> {
+    let duration = duration(task, &task.actions[index], &objects, state);
+    state.after(task, &(index, objects, duration))
+}
+
 /// Looks for a state of the lifted task in which the goal holds.
 fn goal_is_out_of_reach(task: &Task) {
     let mut open = vec![State::initial(task)];
@@ -27,10 +64,10 @@ fn goal_is_out_of_reach(task: &Task) {
         assert!(!state.is_goal(task), "{}\n{}", task.domain(), task.problem());
         for (index, action) in task.actions.iter().enumerate() {
             let ranges: Vec<_> = action.parameters.iter().map(|range| range.objects()).collect();
-            let after =
-                choices(&ranges).into_iter().filter_map(|objects| state.after(task, &(index, objects, None)));
+            let states =
+                choices(&ranges).into_iter().filter_map(|objects| after(task, &state, index, objects));
             let room = LIMIT.saturating_sub(open.len());
-            open.extend(after.filter(is_small).take(room));
+            open.extend(states.filter(is_small).take(room));
         }
     }
 }
@@ -92,7 +129,7 @@ pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize
             for objects in choices(&ranges) {
                 let names = objects.iter().map(|object| OBJECTS[*object].0.to_owned()).collect();
                 let key = (format!("a{index}"), names);
-                let after = lifted.after(task, &(index, objects, None));
+                let after = after(task, &lifted, index, objects);
                 let pair = match (after, transitions.remove(&key)) {
                     (Some(after), Some(ground)) => (after, ground, steps.map(|steps| steps + 1)),
                     // Left out where it changes nothing that matters; of one with conditional effects, such a case.

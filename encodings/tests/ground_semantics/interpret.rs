@@ -277,6 +277,11 @@ impl State {
         exact.or(stated).filter(|duration| *duration >= Ratio::from_integer(0))
     }
 
+    /// What an expression over functions is worth here.
+    pub fn value(&self, task: &Task, expression: &Expression, scope: &[usize]) -> Option<Number> {
+        View::new(task, self, None).value(expression, scope)
+    }
+
     /// The state after a step, begun as soon as the one before has ended; nothing if it cannot be executed.
     pub fn after(&self, task: &Task, (action, scope, stated): &Step) -> Option<Self> {
         let action = &task.actions[*action];

@@ -5,6 +5,7 @@ mod generate;
 mod ground;
 mod interpret;
 mod model;
+mod mutate;
 mod text;
 
 use proptest::prelude::*;
@@ -40,6 +41,25 @@ proptest! {
     #[ignore = "takes minutes"]
     fn many_are_judged_alike(bytes in bytes()) {
         check_text(&bytes);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_changed_plan_that_the_interpreter_rejects_is_rejected(bytes in bytes()) {
+        mutate::check(&mut Draw::new(&bytes, ALL));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 50_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    #[ignore = "takes minutes; in release"]
+    fn many_changed_plans_are_judged_alike(bytes in bytes()) {
+        mutate::check(&mut Draw::new(&bytes, ALL));
     }
 }
 
@@ -87,4 +107,7 @@ fn generated_tasks_are_not_trivial() {
     let valid = seeds.clone().filter(|seed| check_text(&fixed_bytes(*seed))).count();
     let ground = seeds.filter(|seed| check_ground(&fixed_bytes(*seed))).count();
     assert!(valid > 10 && ground > 60, "{valid} plans are valid, {ground} tasks are ground");
+    let counts = (0..120).map(|seed| mutate::check(&mut Draw::new(&fixed_bytes(seed), ALL)));
+    let (valid, invalid) = counts.fold((0, 0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+    assert!(valid > 20 && invalid > 100, "{valid} changed plans are valid, {invalid} are not");
 }

@@ -64,13 +64,18 @@ fn interpret(task: &Task, plan: &[Step]) -> Result<State, usize> {
 /// Beyond this, products might not fit the numbers of the interpreter.
 const LARGE: i128 = 200;
 
-/// The plan up to the step that makes a number large.
+/// The plan up to before the step that makes a number large, so that the goal is not evaluated with it.
 fn with_small_numbers<'s>(task: &Task, plan: &'s [Step]) -> &'s [Step] {
     let mut state = State::initial(task);
     for (number, step) in plan.iter().enumerate() {
         let Some(after) = state.after(task, step) else { return plan };
-        if after.values.values().any(|value| value.numer().abs().max(*value.denom()) > LARGE) {
-            return &plan[..=number];
+        if after
+            .values
+            .values()
+            .chain([&after.time])
+            .any(|value| value.numer().abs().max(*value.denom()) > LARGE)
+        {
+            return &plan[..number];
         }
         state = after;
     }
