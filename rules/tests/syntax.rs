@@ -30,6 +30,21 @@ fn printed_rules_read_back_the_same() {
 }
 
 #[test]
+fn replaced_names_do_not_meet_those_of_the_author() {
+    let mut symbols = Symbols::new();
+    let text = "p(?a, ?b) ^ q(?c) -> r(?b, ?c) .";
+    let mut program = parse_rules(text, "test", &mut symbols, &prefixes()).expect("rules");
+    // The third has no spelling, and its number is the name of the second.
+    program.rules[0].variables = ["a", "_2", "c:::"].map(Into::into).to_vec();
+    let printed = print_rules(&program, &symbols, &prefixes());
+    let again = parse_rules(&printed, "test", &mut symbols, &prefixes()).expect(&printed);
+    let bare = |program: &metaplan_rules::Program| {
+        format!("{:?} {:?}", program.rules[0].head, program.rules[0].body)
+    };
+    assert_eq!(bare(&program), bare(&again), "{printed}");
+}
+
+#[test]
 fn names_that_the_syntax_has_no_room_for_are_replaced() {
     let mut symbols = Symbols::new();
     let text = "[a] p(?x, ?y) ^ q(?z) -> r(?x, ?y, ?z) .";

@@ -113,5 +113,12 @@ fn variable_name(rule: &Rule, variable: Variable) -> String {
     let readable = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
     let number = usize::from(variable.0);
     let unique = !rule.variables.iter().enumerate().any(|(other, taken)| other != number && **taken == *name);
-    if readable && unique { name } else { format!("_{number}") }
+    if readable && unique {
+        return name;
+    }
+    let mut spelled = format!("_{number}");
+    while rule.variables.iter().any(|taken| **taken == *spelled) {
+        spelled.push('_');
+    }
+    spelled
 }
