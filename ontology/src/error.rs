@@ -162,12 +162,14 @@ impl Error {
 #[non_exhaustive]
 pub enum Warning {
     /// O201: an entity is used and declared nowhere.
-    #[error("warning[O201]: <{iri}> is declared nowhere; read as {kind} because of its use")]
+    #[error("{}warning[O201]: <{iri}> is declared nowhere; read as {kind} because of its use", before(position.as_ref()))]
     Undeclared {
         /// The entity.
         iri: String,
         /// What it was taken for.
         kind: &'static str,
+        /// Where a document spells it for the first time, as far as the text shows that.
+        position: Option<Position>,
     },
     /// O202: a statement that is not part of any OWL axiom or SWRL rule.
     #[error("warning[O202]: not read: {statement} ({reason})")]
@@ -329,6 +331,11 @@ pub enum Warning {
         /// What the property's range or the rules ask for.
         expected: &'static str,
     },
+}
+
+/// The position with a colon, if there is one.
+fn before(position: Option<&Position>) -> String {
+    position.map_or_else(String::new, |position| format!("{position}: "))
 }
 
 /// The position, or else the file.

@@ -196,19 +196,19 @@ fn what_is_not_read_as_written_is_a_warning() {
     for (text, expected) in [
         (
             ":i :undeclared 1 .",
-            "warning[O201]: <http://e/#undeclared> is declared nowhere; read as a data property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as a data property because of its use",
         ),
         (
             ":i :undeclared :i .",
-            "warning[O201]: <http://e/#undeclared> is declared nowhere; read as an object property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as an object property because of its use",
         ),
         (
             ":i a :Undeclared .",
-            "warning[O201]: <http://e/#Undeclared> is declared nowhere; read as a class because of its use",
+            "test.ttl:10:7: warning[O201]: <http://e/#Undeclared> is declared nowhere; read as a class because of its use",
         ),
         (
             ":C :undeclared 1 .",
-            "warning[O201]: <http://e/#undeclared> is declared nowhere; read as an annotation property because of its use",
+            "test.ttl:10:5: warning[O201]: <http://e/#undeclared> is declared nowhere; read as an annotation property because of its use",
         ),
         (
             ":p owl:propertyChainAxiom ( :q 5 ) .",

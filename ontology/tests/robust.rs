@@ -127,6 +127,14 @@ fn an_undeclared_vocabulary_is_read_with_warnings() {
     let ontology = read_text(text, "undeclared.ttl", &ReadOptions::default()).expect("readable");
     let codes: Vec<_> = ontology.warnings.iter().map(ontology::Warning::code).collect();
     assert_eq!(codes, ["O201"; 4], "{:?}", ontology.warnings);
+    let mut shown: Vec<_> = ontology.warnings.iter().map(ToString::to_string).collect();
+    shown.sort();
+    for (warning, place) in shown.iter().zip(["2:16", "2:30", "2:7", "3:7"]) {
+        assert!(
+            warning.starts_with(&format!("undeclared.ttl:{place}: warning[O201]")),
+            "{warning}, not {place}"
+        );
+    }
     let facts = lower(&ontology, &mut Symbols::new()).facts;
     assert_eq!(facts.len(), 4);
 }

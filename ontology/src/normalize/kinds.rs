@@ -42,12 +42,12 @@ pub(crate) fn declare(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     let properties = kinds.between_properties(graph, warnings);
     for class in classes {
         state(graph, &class, owl::CLASS);
-        warnings.push(Warning::Undeclared { iri: class, kind: "a class" });
+        warnings.push(Warning::Undeclared { iri: class, kind: "a class", position: None });
     }
     for (property, used) in properties {
         let (class, kind) = kind_of(used);
         state(graph, &property, class);
-        warnings.push(Warning::Undeclared { iri: property, kind });
+        warnings.push(Warning::Undeclared { iri: property, kind, position: None });
     }
     let enabled = swrla::IS_RULE_ENABLED;
     let used = graph.iter().any(|(_, triple)| triple.predicate.as_str() == enabled);

@@ -8,6 +8,7 @@
 
 mod document;
 mod imports;
+mod spelling;
 mod syntax;
 
 pub(crate) use document::{Document, iri_of};
@@ -15,6 +16,7 @@ pub use syntax::Syntax;
 
 use std::collections::{HashSet, VecDeque};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use oxrdf::Triple;
 
@@ -62,7 +64,7 @@ pub(crate) fn merged<P: AsRef<Path>>(
     options: &ReadOptions,
 ) -> Result<(Vec<Triple>, Vec<Warning>), Vec<Error>> {
     let roots = files.iter().map(|file| Pending::File(file.as_ref().to_owned()));
-    let (documents, warnings) = closure(roots.collect(), options)?;
+    let (documents, warnings) = closure(roots.collect(), options, &mut Vec::new())?;
     Ok((normalize::merge(documents).0.into_triples(), warnings))
 }
 
@@ -83,7 +85,8 @@ pub(crate) struct Parts {
 }
 
 fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
-    let (documents, mut warnings) = closure(roots, options)?;
+    let mut texts = Vec::new();
+    let (documents, mut warnings) = closure(roots, options, &mut texts)?;
     let sources: Vec<Source> = documents.iter().map(source).collect();
     let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
     let Normal { ntriples, plain, names, rules, warnings: more } = normalize::normalize(documents);
@@ -91,6 +94,7 @@ fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec
     let parts = horned::build(&ntriples, &about, &rules, plain, names)
         .map_err(|reason| vec![Error::NotAnOntology { reason }])?;
     warnings.extend(parts.warnings);
+    spelling::locate(&mut warnings, &texts);
     warnings.sort();
     warnings.dedup();
     Ok(Ontology {
@@ -116,6 +120,7 @@ fn source(document: &Document) -> Source {
 fn closure(
     mut pending: VecDeque<Pending>,
     options: &ReadOptions,
+    texts: &mut Vec<(String, Arc<[u8]>)>,
 ) -> Result<(Vec<Document>, Vec<Warning>), Vec<Error>> {
     let resolver = Resolver::new(options)?;
     let (mut documents, mut paths) = (Vec::<Document>::new(), Vec::<Option<PathBuf>>::new());
@@ -124,7 +129,8 @@ fn closure(
     loop {
         while let Some(item) = pending.pop_front() {
             match load(item, documents.len(), &mut seen) {
-                Ok(Some((document, path))) => {
+                Ok(Some((document, path, text))) => {
+                    texts.push((document.name.clone(), text));
                     warnings.extend(twice(&document, &documents));
                     documents.push(document);
                     paths.push(path);
@@ -157,10 +163,10 @@ fn closure(
     if errors.is_empty() { Ok((documents, warnings)) } else { Err(errors) }
 }
 
-type Loaded = Option<(Document, Option<PathBuf>)>;
+type Loaded = Option<(Document, Option<PathBuf>, Arc<[u8]>)>;
 
 /// Reads and parses one document; `None` if the same file, or the same text, has been read already.
-fn load(item: Pending, index: usize, seen: &mut HashSet<Vec<u8>>) -> Result<Loaded, Vec<Error>> {
+fn load(item: Pending, index: usize, seen: &mut HashSet<Arc<[u8]>>) -> Result<Loaded, Vec<Error>> {
     let (name, text, path) = match item {
         Pending::Text(name, text) => (name, text, None),
         Pending::File(file) if file.as_os_str() == "-" => ("-".to_owned(), standard_input()?, None),
@@ -169,7 +175,7 @@ fn load(item: Pending, index: usize, seen: &mut HashSet<Vec<u8>>) -> Result<Load
                 vec![Error::Unreadable { file: file.clone(), reason: error.to_string() }]
             };
             let path = file.canonicalize().map_err(unreadable)?;
-            if !seen.insert(path.as_os_str().as_encoded_bytes().to_vec()) {
+            if !seen.insert(path.as_os_str().as_encoded_bytes().into()) {
                 return Ok(None);
             }
             let text = std::fs::read(&path).map_err(unreadable)?;
@@ -179,7 +185,8 @@ fn load(item: Pending, index: usize, seen: &mut HashSet<Vec<u8>>) -> Result<Load
     let base =
         path.as_ref().map_or_else(|| "file:///".to_owned(), |path| format!("file://{}", path.display()));
     let document = document::parse(&text, &name, &base, &format!("d{index}"))?;
-    Ok(if seen.insert(text) { Some((document, path)) } else { None })
+    let text: Arc<[u8]> = text.into();
+    Ok(if seen.insert(Arc::clone(&text)) { Some((document, path, text)) } else { None })
 }
 
 fn standard_input() -> Result<Vec<u8>, Vec<Error>> {

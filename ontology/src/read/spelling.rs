@@ -1,0 +1,38 @@
+//! Where documents spell the names that warnings are about. Parsers hand on triples without their places, so the text is
+//! searched for the name: as a whole IRI, or its last part behind a prefix.
+
+use std::sync::Arc;
+
+use crate::error::{Position, Warning};
+
+/// Only so many warnings are given a place: each costs a search through all documents.
+const MOST_SEARCHES: usize = 100;
+
+/// Gives undeclared names the place where a document spells them first.
+pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Arc<[u8]>)]) {
+    for warning in warnings.iter_mut().take(MOST_SEARCHES) {
+        if let Warning::Undeclared { iri, position, .. } = warning {
+            *position = texts.iter().find_map(|(name, text)| {
+                let offset = offset(iri, std::str::from_utf8(text).ok()?)?;
+                Some(Position::of_offset(name, text, offset))
+            });
+        }
+    }
+}
+
+/// Where a text spells an IRI: whole between brackets or quotes, or its local name behind `:` or `#`.
+fn offset(iri: &str, text: &str) -> Option<usize> {
+    let whole = spelled(text, iri, |c| matches!(c, '<' | '"' | '\''));
+    let local = iri.rsplit(['#', '/', ':']).next().filter(|local| !local.is_empty());
+    let short = local.and_then(|local| spelled(text, local, |c| matches!(c, ':' | '#')));
+    [whole, short].into_iter().flatten().min()
+}
+
+/// The first place where a word stands behind one of some characters and no name goes on after it.
+fn spelled(text: &str, word: &str, opens: impl Fn(char) -> bool) -> Option<usize> {
+    let goes_on = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
+    text.match_indices(word).map(|(offset, _)| offset).find(|offset| {
+        text[..*offset].chars().next_back().is_some_and(&opens)
+            && !text[offset + word.len()..].chars().next().is_some_and(goes_on)
+    })
+}
