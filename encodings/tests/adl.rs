@@ -151,6 +151,27 @@ fn a_derived_predicate_that_the_start_changes_is_refused() {
     assert!(errors.iter().any(|error| error.to_string().contains("its own start effects")), "{errors:?}");
 }
 
+#[test]
+fn numbers_below_zero_do_no_harm_where_nothing_is_used() {
+    let domain = "(define (domain d) (:predicates (done)) (:functions (level) (total-cost))
+      (:action sink :parameters () :precondition (>= (level) 2) :effect (decrease (level) 2))
+      (:action end :parameters () :precondition (< (level) 0) :effect (and (done) (increase (total-cost) 1))))";
+    let dig = "(:action dig :parameters () :precondition (not (dug))
+        :effect (and (dug) (assign (level) -5) (increase (total-cost) 1)))";
+    let digging = domain
+        .replace("(done))", "(done) (dug))")
+        .replace("(:action sink", &format!("{dig} (:action sink"))
+        .replace("(< (level) 0)", "(and (dug) (< (level) 0))");
+    let problem = |level: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:init (= (level) {level}) (= (total-cost) 0)) (:goal (done))
+             (:metric minimize (total-cost)))"
+        )
+    };
+    check("below from the start", domain, &problem("-3"), Some("1"));
+    check("dug", &digging, &problem("1"), Some("2"));
+}
+
 /// A small deterministic generator of numbers (`SplitMix64`).
 struct Random(u64);
 

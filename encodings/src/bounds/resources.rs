@@ -18,11 +18,12 @@ pub(super) struct Resource {
 }
 
 impl Resource {
-    /// Whether a state has enough to reach the goal or a replenishment, as far as projections tell.
+    /// Whether a state has enough to reach the goal or a replenishment, as far as projections tell. Where nothing is
+    /// needed, a value below 0 does no harm.
     pub(super) fn suffices(&self, state: &State, projections: &[Projection]) -> bool {
         let own = state.numbers[self.variable.index()];
         self.needs.iter().all(|(projection, needs)| {
-            needs[projections[*projection].state(state) as usize].is_some_and(|need| need <= own)
+            needs[projections[*projection].state(state) as usize].is_some_and(|need| need == 0 || need <= own)
         })
     }
 }
