@@ -146,17 +146,20 @@ impl Objective {
     }
 }
 
-fn design(task: &Task, operator: &Operator, choice: &[u16], position: usize) -> String {
-    let slot = &operator.slots[position];
-    let design = slot.designs[choice[position] as usize] as usize;
-    task.object_names[task.slots[slot.slot.index()].designs[design].index()].clone()
+/// The object that an argument stands for, with a combination of designs.
+pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u16], argument: Argument) -> ObjectId {
+    match argument {
+        Argument::Object(object) => object,
+        Argument::Slot(position) => {
+            let slot = &operator.slots[position as usize];
+            let design = slot.designs[choice[position as usize] as usize];
+            task.slots[slot.slot.index()].designs[design as usize]
+        }
+    }
 }
 
 fn argument(task: &Task, operator: &Operator, choice: &[u16], argument: Argument) -> String {
-    match argument {
-        Argument::Object(object) => task.object_names[object.index()].clone(),
-        Argument::Slot(position) => design(task, operator, choice, position as usize),
-    }
+    task.object_names[resolve(task, operator, choice, argument).index()].clone()
 }
 
 fn arguments(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<String> {

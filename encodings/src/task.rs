@@ -278,9 +278,8 @@ impl Linear<i64> {
 impl Condition {
     /// Whether the propositional part holds.
     pub(crate) fn holds_propositionally(&self, values: &[u32]) -> bool {
-        let is = |fact: &Fact| values[fact.variable.index()] == fact.value;
-        self.facts.iter().all(is)
-            && self.clauses.iter().all(|clause| clause.iter().any(|l| is(&l.fact) == l.positive))
+        self.facts.iter().all(|fact| fact.holds(values))
+            && self.clauses.iter().all(|clause| clause.iter().any(|literal| literal.holds(values)))
     }
 
     /// Whether the numeric part holds.
@@ -289,10 +288,17 @@ impl Condition {
     }
 }
 
+impl Fact {
+    /// Whether it holds.
+    pub(crate) fn holds(self, values: &[u32]) -> bool {
+        values[self.variable.index()] == self.value
+    }
+}
+
 impl Literal {
     /// Whether it holds.
     pub(crate) fn holds(&self, values: &[u32]) -> bool {
-        (values[self.fact.variable.index()] == self.fact.value) == self.positive
+        self.fact.holds(values) == self.positive
     }
 }
 

@@ -16,10 +16,10 @@ use rustc_hash::FxHashMap;
 use crate::bounds::{Bounds, Projection};
 use crate::lifted::ObjectId;
 use crate::limits::Limits;
-use crate::plan::{GroundPlan, GroundStep};
+use crate::plan::{GroundPlan, GroundStep, resolve};
 use crate::search::is_monotone;
 use crate::successors::{OperatorIndex, undominated};
-use crate::task::{Argument, Operator, OperatorId, State, Task};
+use crate::task::{Operator, OperatorId, State, Task};
 
 /// How many labels are made at most.
 const LABEL_LIMIT: usize = 100_000;
@@ -111,7 +111,7 @@ impl Ties<'_> {
                         replaced = Some(std::iter::once(step).chain(rest).collect());
                         break 'candidates;
                     }
-                    if self.made >= LABEL_LIMIT {
+                    if self.made >= LABEL_LIMIT || self.limits.reached() {
                         return None;
                     }
                 }
@@ -168,14 +168,7 @@ impl Ties<'_> {
         choice: &'o [u16],
     ) -> impl Iterator<Item = (usize, ObjectId)> + 'o {
         operator.configuration.iter().filter_map(move |(function, argument)| {
-            let design = match argument {
-                Argument::Object(object) => *object,
-                Argument::Slot(position) => {
-                    let slot = &operator.slots[*position as usize];
-                    let design = slot.designs[choice[*position as usize] as usize];
-                    self.task.slots[slot.slot.index()].designs[design as usize]
-                }
-            };
+            let design = resolve(self.task, operator, choice, *argument);
             Some((self.functions.binary_search(function).ok()?, design))
         })
     }

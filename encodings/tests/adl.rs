@@ -2,10 +2,13 @@
 //! which the quick search and the SAT solver alone must agree. (That ground tasks mean what the files mean is
 //! checked elsewhere, against an interpreter of the files.)
 
+mod random;
+
 use std::fmt::Write as _;
 
 use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, ground, optimize};
+use random::Random;
 
 /// Solves a task with the quick search, or with the SAT solver alone.
 fn solve(domain: &str, problem: &str, quick_search: bool) -> Solution {
@@ -172,16 +175,12 @@ fn numbers_below_zero_do_no_harm_where_nothing_is_used() {
     check("dug", &digging, &problem("1"), Some("2"));
 }
 
-/// A small deterministic generator of numbers (`SplitMix64`).
-struct Random(u64);
+/// Writes random domains and problems.
+struct Generator(Random);
 
-impl Random {
+impl Generator {
     fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        (z ^ (z >> 31)) % limit
+        self.0.below(limit).unsigned_abs()
     }
 
     fn pick<'t>(&mut self, all: &[&'t str]) -> &'t str {
@@ -315,7 +314,7 @@ const HORIZON: usize = 4;
 fn agree(seeds: std::ops::Range<u64>) {
     let (mut solved, mut longest) = (0, 0);
     for seed in seeds {
-        let mut random = Random(seed);
+        let mut random = Generator(Random(seed));
         let (domain, problem) = (random.domain(), random.problem());
         let (parsed, goal, _) = read(&Source::new("domain", &domain), &Source::new("problem", &problem))
             .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}\n{domain}\n{problem}"));

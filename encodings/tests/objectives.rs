@@ -1,24 +1,14 @@
 //! Several objectives and the choice among equals, against enumeration of all plans of small missions.
 
+mod random;
+
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use metaplan_encodings::pddl::ast::{Direction, Metric};
 use metaplan_encodings::pddl::{Source, read, read_objective};
 use metaplan_encodings::{Config, GroundConfig, Plan, Status, Task, ground, lexicographic, optimize, pareto};
-
-/// A small deterministic generator of numbers (`SplitMix64`).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: u64) -> i64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) % limit) as i64
-    }
-}
+use random::Random;
 
 /// Waypoints with corridors, and two functions with designs; every move costs time and energy by its designs.
 #[derive(Debug)]

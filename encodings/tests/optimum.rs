@@ -1,11 +1,14 @@
 //! Cheapest plans of generated missions against an oracle that shares nothing with the planner: Dijkstra over the
 //! explicit states of the mission, from which the PDDL text is generated, too.
 
+mod random;
+
 use std::collections::{BTreeMap, BinaryHeap};
 use std::fmt::Write as _;
 
 use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{Config, GroundConfig, Proof, Status, ground, optimize};
+use random::Random;
 
 /// A mission of a robot on a small map, in numbers.
 #[derive(Debug)]
@@ -21,19 +24,6 @@ struct Mission {
     goal: usize,
     /// Weights of time and energy.
     weights: (i64, i64),
-}
-
-/// A small deterministic generator of numbers (`SplitMix64`).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: u64) -> i64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) % limit) as i64
-    }
 }
 
 impl Mission {

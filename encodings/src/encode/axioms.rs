@@ -27,11 +27,7 @@ impl Encoding<'_> {
                 let mut premises: Vec<_> =
                     rule.body.facts.iter().map(|fact| self.fact(*fact, step)).collect();
                 for clause in &rule.body.clauses {
-                    let literals = clause.iter().map(|literal| {
-                        let fact = self.fact(literal.fact, step);
-                        if literal.positive { fact } else { !fact }
-                    });
-                    premises.extend(literals);
+                    premises.extend(clause.iter().map(|literal| self.literal(*literal, step)));
                 }
                 for comparison in &rule.body.comparisons {
                     premises.push(self.is_at_least_zero(comparison, numbers, Family::Axiom));

@@ -24,10 +24,7 @@ impl Encoding<'_> {
             let (id, operator) = self.operators[step][index];
             for (effect, position) in self.task.operators[id.index()].conditional.iter().zip(0..) {
                 let mut premises = vec![operator];
-                for part in &effect.condition {
-                    let fact = self.fact(part.fact, step);
-                    premises.push(if part.positive { fact } else { !fact });
-                }
+                premises.extend(effect.condition.iter().map(|part| self.literal(*part, step)));
                 let literal = if premises.contains(&!Formula::truth()) {
                     !Formula::truth()
                 } else {

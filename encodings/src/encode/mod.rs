@@ -24,7 +24,7 @@ use rustc_hash::FxHashMap;
 use crate::bounds::Bounds;
 use crate::plan::GroundStep;
 use crate::sat::{Lit, Solver};
-use crate::task::{Fact, OperatorId, Task};
+use crate::task::{Fact, Literal, OperatorId, Task};
 use conditional::Fires;
 use cost::Cost;
 use formula::{Family, Formula};
@@ -97,6 +97,12 @@ impl<'a> Encoding<'a> {
         self.values[step][fact.variable.index()][fact.value as usize]
     }
 
+    /// The variable of a fact before a step, or its negation.
+    fn literal(&self, literal: Literal, step: usize) -> Lit {
+        let fact = self.fact(literal.fact, step);
+        if literal.positive { fact } else { !fact }
+    }
+
     /// The last state satisfies the goal; idle steps at the end keep it satisfied.
     fn goal(&mut self, numbers: &[arithmetic::Bits]) {
         let task = self.task;
@@ -105,13 +111,8 @@ impl<'a> Encoding<'a> {
             self.formula.add(Family::Goal, [literal]);
         }
         for clause in &task.goal.clauses {
-            let literals: Vec<_> = clause
-                .iter()
-                .map(|literal| {
-                    let fact = self.fact(literal.fact, self.horizon);
-                    if literal.positive { fact } else { !fact }
-                })
-                .collect();
+            let literals: Vec<_> =
+                clause.iter().map(|literal| self.literal(*literal, self.horizon)).collect();
             self.formula.add(Family::Goal, literals);
         }
         self.numeric_goal(numbers);

@@ -40,12 +40,8 @@ impl Encoding<'_> {
                 self.formula.add(Family::Condition, [!literal, fact]);
             }
             for clause in &condition.clauses {
-                let mut literals = vec![!literal];
-                for part in clause {
-                    let fact = self.fact(part.fact, step);
-                    literals.push(if part.positive { fact } else { !fact });
-                }
-                self.formula.add(Family::Condition, literals);
+                let literals: Vec<_> = clause.iter().map(|part| self.literal(*part, step)).collect();
+                self.formula.add(Family::Condition, std::iter::once(!literal).chain(literals));
             }
         }
     }
