@@ -14,8 +14,12 @@ const FORBIDDEN: [(&str, &[&str]); 4] = [
 ];
 
 /// Crates that only one file or folder may name.
-const SINGLE_FILE: [(&str, &str); 2] =
-    [("horned_owl", "ontology/src/horned/"), ("varisat::", "encodings/src/sat.rs")];
+const SINGLE_FILE: [(&str, &str); 4] = [
+    ("horned_owl", "ontology/src/horned/"),
+    ("varisat::", "encodings/src/sat/"),
+    ("batsat::", "encodings/src/sat/"),
+    ("cadical::", "encodings/src/sat/"),
+];
 
 fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(directory) else { return };

@@ -26,15 +26,21 @@ mod optimize;
 mod plan;
 mod sat;
 mod search;
+mod solution;
 mod successors;
 mod ties;
 mod transitions;
+
+#[cfg(test)]
+mod tests;
 
 pub use error::{Error, File, Place};
 pub use ground::{Config as GroundConfig, ground};
 pub use limits::Limits;
 pub use objectives::{Front, Point, lexicographic, pareto};
-pub use optimize::{Config, Improvement, Proof, Solution, Statistics, Status, Unbounded, optimize};
+pub use optimize::{Config, optimize};
 pub use plan::{Exact, Plan, Step};
+pub use sat::{Backend, BackendError};
+pub use solution::{Improvement, Proof, Solution, Statistics, Status, Unbounded};
 pub use task::Task;
 pub use transitions::{Situation, Transition};

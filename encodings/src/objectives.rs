@@ -7,9 +7,10 @@
 //! [1] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
 //! and system optimization, IEEE Trans. SMC 1(3), 1971.
 
-use crate::optimize::{Config, Improvement, Solution, Status, optimize};
+use crate::optimize::{Config, optimize};
 use crate::plan::{Exact, GroundPlan};
 use crate::quantity::{Linear, NumericId, Quantity};
+use crate::solution::{Improvement, Solution, Status};
 use crate::task::{NumericEffect, NumericVariable, Operator, Task};
 
 /// A point of the Pareto front, or what is known in place of one.

@@ -5,15 +5,16 @@
 //! best known. Only then is the answer called optimal. Where no step bound exists (free cycles), the search's own
 //! exhaustion may serve; otherwise the answer is a plan that is not proved optimal.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::bounds::Bounds;
 use crate::encode::{CostLimit, Encoding};
 use crate::limits::Limits;
-use crate::plan::{Exact, GroundPlan, GroundStep, Plan, decode, metric, replay};
+use crate::plan::{GroundPlan, GroundStep, decode, metric, replay};
 use crate::quantity::Quantity;
-use crate::sat::{Answer, Solver as _, Varisat};
+use crate::sat::{Answer, Backend};
 use crate::search::{Found, search};
+use crate::solution::{Improvement, Proof, Solution, Statistics, Status, Unbounded};
 use crate::task::Task;
 use crate::ties;
 
@@ -33,108 +34,16 @@ pub struct Config {
     pub horizon: Option<usize>,
     /// Whether a quick search looks for a first plan; otherwise the SAT solver finds it, horizon by horizon.
     pub quick_search: bool,
+    /// The SAT solver.
+    pub backend: Backend,
     /// When to stop.
     pub limits: Limits,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { horizon: None, quick_search: true, limits: Limits::none() }
+        Self { horizon: None, quick_search: true, backend: Backend::default(), limits: Limits::none() }
     }
-}
-
-/// How good the answer is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
-    /// No plan of any length has a better metric: proved.
-    Optimal,
-    /// There is a plan; that it is optimal is not proved.
-    Feasible,
-    /// There is no plan of any length: proved.
-    Unsolvable,
-    /// There is no plan with at most as many steps as asked for: proved.
-    UnsolvableWithinHorizon,
-    /// A limit was reached before anything was known.
-    Unknown,
-}
-
-/// Why the status is what it is.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Proof {
-    /// The formula for cheaper plans is unsatisfiable up to the step bound, and no longer plan is cheaper.
-    Sat {
-        /// No plan with more steps can be cheaper.
-        step_bound: usize,
-    },
-    /// The cost of the plan equals a lower bound on the cost of all plans, by the cost to go in a projection.
-    Bound,
-    /// A* with an admissible estimate ended; all that it left out is dominated.
-    Search,
-    /// Relaxed or projected, the goal is out of reach: the reason in words.
-    Relaxation(String),
-}
-
-/// A better plan was found.
-#[derive(Debug, Clone, Copy)]
-pub struct Improvement {
-    /// The metric of the best plan so far.
-    pub cost: Exact,
-    /// No plan has a better metric than this.
-    pub lower_bound: Exact,
-    /// Steps of the formula at hand.
-    pub horizon: usize,
-}
-
-/// A metric that has no best value, or none that is known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unbounded {
-    /// An action that improves the metric can be repeated for ever in a state that the plan passes.
-    Proved,
-    /// Actions improve the metric; that they can be repeated for ever is not shown.
-    Suspected,
-}
-
-/// Figures of a run.
-#[derive(Debug, Clone, Default)]
-pub struct Statistics {
-    /// Operators of the ground task.
-    pub operators: usize,
-    /// Variables of the largest formula.
-    pub variables: usize,
-    /// Clauses of that formula.
-    pub clauses: usize,
-    /// Clauses of that formula by family.
-    pub families: Vec<(&'static str, usize)>,
-    /// Clauses learnt by the SAT solver, over all formulas.
-    pub conflicts: u64,
-    /// Calls of the SAT solver.
-    pub calls: usize,
-    /// Time for bounds and the quick search.
-    pub search: Duration,
-    /// Time for building formulas.
-    pub encode: Duration,
-    /// Time in the SAT solver.
-    pub solve: Duration,
-}
-
-/// The answer.
-#[derive(Debug, Clone)]
-pub struct Solution {
-    /// How good the plan is.
-    pub status: Status,
-    /// The best plan.
-    pub plan: Option<Plan>,
-    pub(crate) ground: Option<GroundPlan>,
-    /// No plan has a better metric; none if the metric is unbounded or nothing is known.
-    pub lower_bound: Option<Exact>,
-    /// Steps up to which all plans were considered.
-    pub horizon: usize,
-    /// The reason for the status.
-    pub proof: Option<Proof>,
-    /// Set if the metric has no best value: the plan has fewest steps, and of those the best metric.
-    pub unbounded: Option<Unbounded>,
-    /// Figures.
-    pub statistics: Statistics,
 }
 
 /// Finds a cheapest plan; `report` hears of every improvement.
@@ -269,9 +178,10 @@ impl Run<'_> {
         let started = Instant::now();
         let allowed = vec![vec![true; self.task.operators.len()]; steps];
         let bounds = Bounds::trivial(self.task);
-        let encoding = Encoding::new(self.task, &allowed, Some(CostLimit { limit, bounds: &bounds }));
+        let cost = CostLimit { limit, bounds: &bounds };
+        let encoding = Encoding::new(self.task, &allowed, Some(cost), &self.config.limits);
         self.statistics.encode += started.elapsed();
-        let (answer, _) = self.call(&encoding, u64::MAX);
+        let (answer, _) = self.call(&encoding?, u64::MAX);
         debug_assert_ne!(answer, Answer::Satisfiable, "a plan is cheaper than the lower bound");
         (answer == Answer::Unsatisfiable).then_some(Proof::Sat { step_bound: steps })
     }
@@ -306,8 +216,9 @@ impl Run<'_> {
     ) -> Tightened {
         let started = Instant::now();
         let limit = CostLimit { limit: incumbent.cost - 1, bounds };
-        let mut encoding = Encoding::new(self.task, allowed, Some(limit));
+        let encoding = Encoding::new(self.task, allowed, Some(limit), &self.config.limits);
         self.statistics.encode += started.elapsed();
+        let Some(mut encoding) = encoding else { return Tightened::Interrupted };
         loop {
             let better = match self.call(&encoding, budget) {
                 (Answer::Unsatisfiable, _) => return Tightened::Exhausted,
@@ -332,7 +243,7 @@ impl Run<'_> {
     fn call(&mut self, encoding: &Encoding<'_>, budget: u64) -> (Answer, Option<GroundPlan>) {
         let started = Instant::now();
         let formula = &encoding.formula;
-        let mut solver = Varisat::new(&self.config.limits, budget);
+        let mut solver = self.config.backend.start(&self.config.limits, budget);
         for (_, clause) in formula.clauses() {
             solver.add_clause(clause);
         }
@@ -344,8 +255,12 @@ impl Run<'_> {
         let answer = solver.solve();
         self.statistics.calls += 1;
         self.statistics.conflicts += solver.conflicts();
+        if let Some(reason) = solver.failure() {
+            self.statistics.failure = Some(reason.to_owned());
+        }
         self.statistics.solve += started.elapsed();
-        let plan = if answer == Answer::Satisfiable { self.check(encoding.decode(&solver)) } else { None };
+        let plan =
+            if answer == Answer::Satisfiable { self.check(encoding.decode(solver.as_ref())) } else { None };
         (answer, plan)
     }
 
@@ -356,9 +271,11 @@ impl Run<'_> {
         loop {
             let started = Instant::now();
             let window = bounds.window(self.task, None, Some(horizon));
-            let encoding = Encoding::new(self.task, &window.allowed, None);
+            let encoding = Encoding::new(self.task, &window.allowed, None, &self.config.limits);
             self.statistics.encode += started.elapsed();
-            match self.call(&encoding, u64::MAX) {
+            let answer =
+                encoding.map_or((Answer::Interrupted, None), |encoding| self.call(&encoding, u64::MAX));
+            match answer {
                 (_, Some(plan)) => return Ok(plan),
                 (Answer::Unsatisfiable, None) if horizon < most => {
                     horizon = (horizon + 1 + horizon / 4).min(most);

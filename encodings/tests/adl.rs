@@ -17,7 +17,7 @@ fn solve(domain: &str, problem: &str, quick_search: bool) -> Solution {
     let task = ground(&domain, &problem, &GroundConfig::default())
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain:?}"));
     let limits = Limits::none();
-    optimize(&task, &Config { horizon: None, quick_search, limits }, &mut |_| {})
+    optimize(&task, &Config { horizon: None, quick_search, limits, ..Config::default() }, &mut |_| {})
 }
 
 /// Both ways find the cost; none stands for "no plan exists".
@@ -321,7 +321,7 @@ fn agree(seeds: std::ops::Range<u64>) {
         let task = ground(&parsed, &goal, &GroundConfig::default())
             .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}\n{domain}\n{problem}"));
         let run = |quick_search| {
-            let config = Config { horizon: Some(HORIZON), quick_search, limits: Limits::none() };
+            let config = Config { horizon: Some(HORIZON), quick_search, ..Config::default() };
             optimize(&task, &config, &mut |_| {})
         };
         let (quick, sat) = (run(true), run(false));

@@ -2,6 +2,7 @@
 
 mod convert;
 mod export;
+mod memory;
 mod objectives;
 mod output;
 mod plan;

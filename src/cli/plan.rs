@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use encodings::pddl::ast::{Name, Problem};
 use encodings::validate::{Options, PlanStep, PlanText, validate};
-use encodings::{Config, Exact, Improvement, Limits, Plan, Proof, Solution, Status, Step, Unbounded};
+use encodings::{
+    Backend, BackendError, Config, Exact, Improvement, Limits, Plan, Proof, Solution, Status, Step, Unbounded,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
@@ -16,7 +18,7 @@ use num_rational::BigRational;
 use serde_json::{Value, json};
 
 use crate::cli::objectives::Objectives;
-use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+use crate::cli::{Common, Exit, Failure, Format, Situation, memory, output};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -32,6 +34,12 @@ pub struct Arguments {
     /// Stop after this many seconds with the best plan so far.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
+    /// Stop when the program takes more than this much memory, in megabytes, with the best plan so far.
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
+    memory_limit: Option<u64>,
+    /// The SAT solver: `varisat`, `batsat`, or a program with its arguments that reads DIMACS on its standard input.
+    #[arg(long, value_name = "NAME", default_value = Backend::BUILT_IN[0])]
+    solver: Backend,
     /// What to minimize in place of the problem's metric: an expression as in a metric, or a function's name. Repeated,
     /// earlier objectives come first, and later ones decide among plans that are equal by them.
     #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true)]
@@ -76,6 +84,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(time) = arguments.time_limit {
         limits = limits.with_time(time);
     }
+    if let Some(megabytes) = arguments.memory_limit {
+        memory::watch(megabytes, limits.interrupt())?;
+    }
+    let usage = |error: &BackendError| Failure::usage(Message::error("M113", error.to_string()));
+    arguments.solver.check().map_err(|error| usage(&error))?;
     let interrupt = limits.interrupt();
     // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual.
     let _ = ctrlc::set_handler(move || interrupt.store(true, Ordering::Relaxed));
@@ -91,7 +104,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     })?;
     let stages = Stages { read, ground: started.elapsed().saturating_sub(read) };
 
-    let config = Config { horizon: arguments.horizon, limits, ..Config::default() };
+    let backend = arguments.solver.clone();
+    let config = Config { horizon: arguments.horizon, limits, backend, ..Config::default() };
     let progress = progress(common);
     let mut report = |improvement: Improvement| {
         progress.set_message(format!(
@@ -119,6 +133,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     progress.finish_and_clear();
     objectives.confirm(&mission, &problem, &point)?;
     let solution = &point.solution;
+    if let Some(reason) = &solution.statistics.failure {
+        let text = format!("the SAT solver gave up: {reason}");
+        output::warnings(common, &[Message::warning("M114", text)]);
+    }
 
     let text = match (arguments.plan_format, common.format) {
         (Some(PlanFormat::Json), _) | (None, Format::Json) => {

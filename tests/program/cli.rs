@@ -300,3 +300,21 @@ fn a_bounded_reading_stands_in_for_a_metric_without_a_best_value() {
     );
     assert_eq!((answer["status"].as_str(), answer["lower_bound"].as_null()), (Some("feasible"), Some(())));
 }
+
+#[test]
+fn every_solver_proves_the_same() {
+    let cheapest = metaplan(&["plan", "missions/ugv.toml"]);
+    for solver in encodings::Backend::BUILT_IN {
+        let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", solver]);
+        assert_eq!((answer.status, &answer.stdout), (0, &cheapest.stdout), "{solver}");
+    }
+    let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", "no-such-solver -q"]);
+    check(&answer, 2, &["M113", "`no-such-solver` does not serve", "varisat, batsat"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--solver", " "]), 2, &["needs a name"]);
+}
+
+#[test]
+fn memory_is_limited() {
+    check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "0"]), 2, &["0 is not in"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "4000"]), 0, &["optimal, proved"]);
+}

@@ -194,11 +194,11 @@ impl Arithmetic<'_> {
 mod tests {
     use super::*;
     use crate::limits::Limits;
-    use crate::sat::{Answer, Solver, Varisat};
+    use crate::sat::{Answer, Backend};
 
     /// Whether the formula has an assignment in which the bits read as the value.
     fn can_be(formula: &Formula, bits: &Bits, value: i64) -> bool {
-        let mut solver = Varisat::new(&Limits::none(), u64::MAX);
+        let mut solver = Backend::default().start(&Limits::none(), u64::MAX);
         formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));
         for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
             solver.add_clause(&[if wanted == Formula::truth() { *bit } else { !*bit }]);

@@ -14,6 +14,7 @@ use crate::encode::arithmetic::{Arithmetic, Bits};
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::selection::global;
 use crate::encode::{CostLimit, Encoding};
+use crate::limits::Limits;
 use crate::sat::Lit;
 use crate::task::{Operator, OperatorId};
 
@@ -55,28 +56,31 @@ impl Cost {
 }
 
 impl Encoding<'_> {
-    /// Adds up the cost of all steps and limits it.
-    pub(super) fn accumulate(&mut self, cost: &CostLimit<'_>) -> Cost {
+    /// Adds up the cost of all steps and limits it. None if a limit of the run was reached meanwhile.
+    pub(super) fn accumulate(&mut self, cost: &CostLimit<'_>, limits: &Limits) -> Option<Cost> {
         let lower = cost.bounds.estimate(&self.task.initial);
         let Some(potential) = cost.bounds.projections.first() else {
-            return Cost { lower: 0, spent: Spent::Order(BTreeMap::new()) };
+            return Some(Cost { lower: 0, spent: Spent::Order(BTreeMap::new()) });
         };
         let (Some(_), Some(lower)) = (lower, potential.estimate(&self.task.initial)) else {
             self.formula.add(Family::Bound, []);
-            return Cost { lower: i64::MAX, spent: Spent::Order(BTreeMap::new()) };
+            return Some(Cost { lower: i64::MAX, spent: Spent::Order(BTreeMap::new()) });
         };
         let gap = cost.limit - lower;
         if gap < 0 {
             self.formula.add(Family::Bound, []);
-            return Cost { lower, spent: Spent::Order(BTreeMap::new()) };
+            return Some(Cost { lower, spent: Spent::Order(BTreeMap::new()) });
         }
-        let steps: Vec<Vec<Increments>> = (0..self.horizon).map(|step| self.increments(step, cost)).collect();
+        let running = |step: usize| (!limits.reached()).then_some(step);
+        let steps: Option<Vec<Vec<Increments>>> =
+            (0..self.horizon).map(|step| Some(self.increments(running(step)?, cost))).collect();
+        let steps = steps?;
         let spent = if amounts_fit(&steps, gap) {
-            Spent::Order(self.add_in_order(&steps, gap))
+            Spent::Order(self.add_in_order(&steps, gap, limits)?)
         } else {
             Spent::Binary(self.add_in_binary(&steps, gap))
         };
-        Cost { lower, spent }
+        Some(Cost { lower, spent })
     }
 
     /// What a step can add, by source: the operator itself, and each table of designs.
@@ -152,14 +156,22 @@ impl Encoding<'_> {
         }
     }
 
-    fn add_in_order(&mut self, steps: &[Vec<Increments>], gap: i64) -> BTreeMap<i64, Lit> {
+    fn add_in_order(
+        &mut self,
+        steps: &[Vec<Increments>],
+        gap: i64,
+        limits: &Limits,
+    ) -> Option<BTreeMap<i64, Lit>> {
         let mut spent: BTreeMap<i64, Lit> = BTreeMap::new();
         for (step, sources) in steps.iter().enumerate() {
             for (stage, source) in sources.iter().enumerate() {
+                if limits.reached() {
+                    return None;
+                }
                 spent = self.add_amounts(source, &spent, gap, step as u32, stage as u32);
             }
         }
-        spent
+        Some(spent)
     }
 
     /// `spent ≥ v ∧ increment ≥ w → spent' ≥ v + w`; sums above the gap are conflicts.

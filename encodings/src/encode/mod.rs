@@ -22,6 +22,7 @@ mod tests;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
+use crate::limits::Limits;
 use crate::plan::GroundStep;
 use crate::sat::{Lit, Solver};
 use crate::task::{Fact, Literal, OperatorId, Task};
@@ -55,8 +56,14 @@ pub(crate) struct CostLimit<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// Encodes plans of at most `allowed.len()` steps, with the operators allowed at each step.
-    pub(crate) fn new(task: &'a Task, allowed: &[Vec<bool>], cost: Option<CostLimit<'_>>) -> Self {
+    /// Encodes plans of at most `allowed.len()` steps, with the operators allowed at each step. None if a limit was
+    /// reached meanwhile.
+    pub(crate) fn new(
+        task: &'a Task,
+        allowed: &[Vec<bool>],
+        cost: Option<CostLimit<'_>>,
+        limits: &Limits,
+    ) -> Option<Self> {
         let horizon = allowed.len();
         let mut encoding = Self {
             task,
@@ -72,6 +79,9 @@ impl<'a> Encoding<'a> {
         };
         encoding.declare(allowed);
         for step in 0..horizon {
+            if limits.reached() {
+                return None;
+            }
             encoding.domain(step);
             encoding.sequence(step);
             encoding.conditions(step);
@@ -81,15 +91,15 @@ impl<'a> Encoding<'a> {
             encoding.selection(step);
         }
         encoding.domain(horizon);
-        let numbers = encoding.numeric();
+        let numbers = encoding.numeric(limits)?;
         for (step, numbers) in numbers.iter().enumerate() {
             encoding.axioms(step, numbers);
         }
         encoding.goal(&numbers[horizon]);
         if let Some(cost) = cost {
-            encoding.cost = Some(encoding.accumulate(&cost));
+            encoding.cost = Some(encoding.accumulate(&cost, limits)?);
         }
-        encoding
+        Some(encoding)
     }
 
     /// The variable of a fact before a step.

@@ -11,6 +11,7 @@ use crate::encode::Encoding;
 use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::cost::combinations;
 use crate::encode::formula::{Family, Formula};
+use crate::limits::Limits;
 use crate::quantity::{Linear, Quantity};
 use crate::sat::Lit;
 use crate::task::{NumericId, Operator, OperatorId};
@@ -29,8 +30,9 @@ struct Range {
 }
 
 impl Encoding<'_> {
-    /// Encodes all numeric variables; returns their values before each step and after the last one.
-    pub(super) fn numeric(&mut self) -> Vec<Vec<Bits>> {
+    /// Encodes all numeric variables; returns their values before each step and after the last one. None if a limit was
+    /// reached meanwhile.
+    pub(super) fn numeric(&mut self, limits: &Limits) -> Option<Vec<Vec<Bits>>> {
         let task = self.task;
         let mut ranges: Vec<Range> =
             task.initial.numbers.iter().map(|n| Range { low: *n, high: *n }).collect();
@@ -38,6 +40,9 @@ impl Encoding<'_> {
             task.initial.numbers.iter().map(|n| Arithmetic::constant(*n, width(*n, *n))).collect();
         let mut all = vec![numbers.clone()];
         for step in 0..self.horizon {
+            if limits.reached() {
+                return None;
+            }
             let next_ranges = self.next_ranges(step, &ranges);
             let mut next = Vec::with_capacity(numbers.len());
             for (range, variable) in next_ranges.iter().zip((0..).map(NumericId)) {
@@ -47,7 +52,7 @@ impl Encoding<'_> {
             (numbers, ranges) = (next, next_ranges);
             all.push(numbers.clone());
         }
-        all
+        Some(all)
     }
 
     fn next_ranges(&self, step: usize, ranges: &[Range]) -> Vec<Range> {

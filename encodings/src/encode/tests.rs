@@ -8,6 +8,7 @@ use crate::bounds::Bounds;
 use crate::encode::formula::{Family, Meaning};
 use crate::encode::{CostLimit, Encoding};
 use crate::ground::{Config, ground};
+use crate::limits::Limits;
 use crate::pddl::{Source, read};
 use crate::sat::Lit;
 use crate::task::{Argument, Task};
@@ -88,9 +89,10 @@ fn clauses(encoding: &Encoding<'_>, family: Family) -> String {
 
 fn check(family: Family) -> String {
     let task = task();
-    let bounds = Bounds::new(&task, &crate::limits::Limits::none());
+    let bounds = Bounds::new(&task, &Limits::none());
     let allowed = vec![vec![true; task.operators.len()]; 2];
-    let encoding = Encoding::new(&task, &allowed, Some(CostLimit { limit: 6, bounds: &bounds }));
+    let cost = CostLimit { limit: 6, bounds: &bounds };
+    let encoding = Encoding::new(&task, &allowed, Some(cost), &Limits::none()).expect("no limit");
     clauses(&encoding, family)
 }
 

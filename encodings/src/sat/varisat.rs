@@ -1,7 +1,9 @@
-//! The SAT solvers behind one trait, and Varisat, the default one.
+//! Varisat [1] as a back end.
 //!
 //! Varisat has no way to be interrupted. It streams its proof, though, and stops at once when the stream reports an
 //! error; so the proof goes to a sink that counts learnt clauses and fails when a limit is reached.
+//!
+//! \[1\] J. Harder: Varisat, <https://jix.github.io/varisat/>.
 
 use std::cell::Cell;
 use std::io;
@@ -10,61 +12,10 @@ use std::rc::Rc;
 use varisat::ExtendFormula as _;
 
 use crate::limits::Limits;
+use crate::sat::{Answer, Lit, Solver};
 
-/// A literal: a variable, counted from 0, or its negation.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct Lit(u32);
-
-impl Lit {
-    /// The first variable, which formulas fix to true.
-    pub(crate) const TRUE: Self = Self(0);
-
-    pub(crate) fn positive(variable: u32) -> Self {
-        Self(variable << 1)
-    }
-
-    pub(crate) fn variable(self) -> u32 {
-        self.0 >> 1
-    }
-
-    pub(crate) fn is_positive(self) -> bool {
-        self.0 & 1 == 0
-    }
-}
-
-impl std::ops::Not for Lit {
-    type Output = Self;
-
-    fn not(self) -> Self {
-        Self(self.0 ^ 1)
-    }
-}
-
-/// What a solver says of its clauses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Answer {
-    Satisfiable,
-    Unsatisfiable,
-    /// A limit was reached; the solver is of no further use.
-    Interrupted,
-}
-
-/// A SAT solver for one formula.
-pub(crate) trait Solver {
-    /// Adds a clause; its variables need no declaration. Not after `solve`.
-    fn add_clause(&mut self, clause: &[Lit]);
-    /// Decides the clauses.
-    fn solve(&mut self) -> Answer;
-    /// The value of a variable in the assignment found last.
-    fn value(&self, variable: u32) -> bool;
-    /// Clauses learnt so far, one for each conflict.
-    fn conflicts(&self) -> u64;
-}
-
-/// Varisat [1].
-///
-/// [1] J. Harder: Varisat, <https://jix.github.io/varisat/>.
-pub(crate) struct Varisat {
+/// A Varisat solver.
+pub(super) struct Varisat {
     solver: varisat::Solver<'static>,
     conflicts: Rc<Cell<u64>>,
     assignment: Vec<bool>,
@@ -73,7 +24,7 @@ pub(crate) struct Varisat {
 
 impl Varisat {
     /// A solver that gives up at a limit, or after learning `budget` clauses.
-    pub(crate) fn new(limits: &Limits, budget: u64) -> Self {
+    pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let conflicts = Rc::new(Cell::new(0));
         let sink = CountingSink {
             limits: limits.clone(),

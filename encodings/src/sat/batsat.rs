@@ -1,0 +1,91 @@
+//! `BatSat` [1], `MiniSat` [2] in Rust, as a back end.
+//!
+//! Its callbacks count what is learnt and say when to stop.
+//!
+//! \[1\] S. Cruanes, M. Hara: `BatSat`, <https://github.com/c-cube/batsat>.
+//! \[2\] N. Eén, N. Sörensson: An extensible SAT-solver, SAT 2003.
+
+use std::cell::Cell;
+
+use batsat::{Callbacks, ClauseKind, SolverInterface as _, lbool};
+
+use crate::limits::Limits;
+use crate::sat::{Answer, Lit, Solver};
+
+/// How many decisions pass between two looks at the clock.
+const CLOCK_INTERVAL: u32 = 64;
+
+/// A `BatSat` solver.
+pub(super) struct Batsat {
+    solver: batsat::Solver<Watch>,
+    buffer: Vec<batsat::Lit>,
+}
+
+/// Counts conflicts, and says when to stop.
+struct Watch {
+    limits: Limits,
+    budget: u64,
+    conflicts: u64,
+    decisions: Cell<u32>,
+    stopped: Cell<bool>,
+}
+
+impl Callbacks for Watch {
+    fn on_new_clause(&mut self, _: &[batsat::Lit], kind: ClauseKind) {
+        self.conflicts += u64::from(kind == ClauseKind::Learnt);
+    }
+
+    fn stop(&self) -> bool {
+        let decisions = self.decisions.get().wrapping_add(1);
+        self.decisions.set(decisions);
+        if self.conflicts > self.budget || (decisions % CLOCK_INTERVAL == 1 && self.limits.reached()) {
+            self.stopped.set(true);
+        }
+        self.stopped.get()
+    }
+}
+
+impl Batsat {
+    /// A solver that gives up at a limit, or after learning `budget` clauses.
+    pub(super) fn new(limits: &Limits, budget: u64) -> Self {
+        let watch = Watch {
+            limits: limits.clone(),
+            budget,
+            conflicts: 0,
+            decisions: Cell::new(0),
+            stopped: Cell::new(false),
+        };
+        Self { solver: batsat::Solver::new(batsat::SolverOpts::default(), watch), buffer: Vec::new() }
+    }
+}
+
+impl Solver for Batsat {
+    fn add_clause(&mut self, clause: &[Lit]) {
+        self.buffer.clear();
+        for literal in clause {
+            let variable = self.solver.var_of_int(literal.variable());
+            self.buffer.push(batsat::Lit::new(variable, literal.is_positive()));
+        }
+        // Whether the clauses are contradictory already is what `solve` says, too.
+        let _ = self.solver.add_clause_reuse(&mut self.buffer);
+    }
+
+    fn solve(&mut self) -> Answer {
+        let answer = self.solver.solve_limited(&[]);
+        if answer == lbool::TRUE {
+            Answer::Satisfiable
+        } else if answer == lbool::FALSE {
+            Answer::Unsatisfiable
+        } else {
+            Answer::Interrupted
+        }
+    }
+
+    fn value(&self, variable: u32) -> bool {
+        self.solver.get_model().get(variable as usize).is_some_and(|value| *value == lbool::TRUE)
+    }
+
+    fn conflicts(&self) -> u64 {
+        self.solver.cb().conflicts
+    }
+}

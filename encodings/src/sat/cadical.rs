@@ -1,0 +1,78 @@
+//! `CaDiCaL` [1] as a back end.
+//!
+//! Its callbacks count what is learnt and say when to stop.
+//!
+//! \[1\] A. Biere, T. Faller, K. Fazekas, M. Fleury, N. Froleyks, F. Pollitt: `CaDiCaL` 2.0, CAV 2024.
+
+use crate::limits::Limits;
+use crate::sat::{Answer, Lit, Solver};
+
+/// A `CaDiCaL` solver.
+pub(super) struct Cadical {
+    solver: cadical::Solver<Watch>,
+    /// Values of the variables that have one.
+    assignment: Vec<bool>,
+    variables: u32,
+    conflicts: u64,
+}
+
+/// Counts conflicts, and says when to stop.
+struct Watch {
+    limits: Limits,
+    budget: u64,
+    conflicts: u64,
+}
+
+impl cadical::Callbacks for Watch {
+    fn terminate(&mut self) -> bool {
+        self.conflicts > self.budget || self.limits.reached()
+    }
+
+    fn max_length(&self) -> i32 {
+        i32::MAX
+    }
+
+    fn learn(&mut self, _: &[i32]) {
+        self.conflicts += 1;
+    }
+}
+
+impl Cadical {
+    /// A solver that gives up at a limit, or after learning `budget` clauses.
+    pub(super) fn new(limits: &Limits, budget: u64) -> Self {
+        let mut solver = cadical::Solver::new();
+        solver.set_callbacks(Some(Watch { limits: limits.clone(), budget, conflicts: 0 }));
+        Self { solver, assignment: Vec::new(), variables: 0, conflicts: 0 }
+    }
+}
+
+impl Solver for Cadical {
+    fn add_clause(&mut self, clause: &[Lit]) {
+        for literal in clause {
+            self.variables = self.variables.max(literal.variable() + 1);
+        }
+        self.solver.add_clause(clause.iter().map(|literal| literal.dimacs()));
+    }
+
+    fn solve(&mut self) -> Answer {
+        let answer = self.solver.solve();
+        self.conflicts = self.solver.get_callbacks().map_or(0, |watch| watch.conflicts);
+        match answer {
+            Some(true) => {
+                let value = |variable| self.solver.value(Lit::positive(variable).dimacs()) == Some(true);
+                self.assignment = (0..self.variables).map(value).collect();
+                Answer::Satisfiable
+            }
+            Some(false) => Answer::Unsatisfiable,
+            None => Answer::Interrupted,
+        }
+    }
+
+    fn value(&self, variable: u32) -> bool {
+        self.assignment.get(variable as usize).copied().unwrap_or(false)
+    }
+
+    fn conflicts(&self) -> u64 {
+        self.conflicts
+    }
+}

@@ -1,0 +1,186 @@
+//! A formula to an assignment, or to the answer that there is none: SAT solvers behind one trait.
+//!
+//! Each solver has a file, and only that file names its crate. Every formula gets a solver of its own.
+
+mod batsat;
+#[cfg(feature = "cadical")]
+mod cadical;
+mod program;
+#[cfg(test)]
+mod tests;
+mod varisat;
+
+use std::str::FromStr;
+
+use crate::limits::Limits;
+use program::Program;
+
+/// A literal: a variable, counted from 0, or its negation.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct Lit(u32);
+
+impl Lit {
+    /// The first variable, which formulas fix to true.
+    pub(crate) const TRUE: Self = Self(0);
+
+    pub(crate) fn positive(variable: u32) -> Self {
+        Self(variable << 1)
+    }
+
+    pub(crate) fn variable(self) -> u32 {
+        self.0 >> 1
+    }
+
+    pub(crate) fn is_positive(self) -> bool {
+        self.0 & 1 == 0
+    }
+
+    /// As in DIMACS files: variables count from 1, negation is the sign.
+    pub(crate) fn dimacs(self) -> i32 {
+        let number = self.variable() as i32 + 1;
+        if self.is_positive() { number } else { -number }
+    }
+}
+
+impl std::ops::Not for Lit {
+    type Output = Self;
+
+    fn not(self) -> Self {
+        Self(self.0 ^ 1)
+    }
+}
+
+/// What a solver says of its clauses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Answer {
+    Satisfiable,
+    Unsatisfiable,
+    /// A limit was reached; the solver is of no further use.
+    Interrupted,
+}
+
+/// A SAT solver for one formula.
+pub(crate) trait Solver {
+    /// Adds a clause; its variables need no declaration. Not after `solve`.
+    fn add_clause(&mut self, clause: &[Lit]);
+    /// Decides the clauses.
+    fn solve(&mut self) -> Answer;
+    /// The value of a variable in the assignment found last.
+    fn value(&self, variable: u32) -> bool;
+    /// Clauses learnt so far, one for each conflict; 0 if the solver does not tell.
+    fn conflicts(&self) -> u64;
+    /// Why the solver was interrupted, if not by a limit.
+    fn failure(&self) -> Option<&str> {
+        None
+    }
+}
+
+/// Which SAT solver decides the formulas.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Backend {
+    /// Varisat, in pure Rust.
+    #[default]
+    Varisat,
+    /// `BatSat`, in pure Rust.
+    Batsat,
+    /// `CaDiCaL`, in C++; with the feature `cadical` only.
+    #[cfg(feature = "cadical")]
+    Cadical,
+    /// A program and its arguments. It gets the formula in DIMACS on its standard input, and answers on its standard
+    /// output as the SAT competitions ask for, or as `MiniSat` does.
+    Program {
+        /// A path, or a name that is looked up as a shell does.
+        command: String,
+        /// Passed as they are.
+        arguments: Vec<String>,
+    },
+}
+
+/// What is wrong with a solver that a user names.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BackendError {
+    /// Nothing but blanks.
+    #[error("a solver needs a name; built in are: {}", Backend::BUILT_IN.join(", "))]
+    Empty,
+    /// It does not answer as it should.
+    #[error("`{command}` does not serve as a SAT solver: {reason}; built in are: {}", Backend::BUILT_IN.join(", "))]
+    Unusable {
+        /// The program as the user has named it.
+        command: String,
+        /// What happened.
+        reason: String,
+    },
+}
+
+impl Backend {
+    /// The names of solvers that need no program.
+    pub const BUILT_IN: &[&str] = &[
+        "varisat",
+        "batsat",
+        #[cfg(feature = "cadical")]
+        "cadical",
+    ];
+
+    /// A solver that gives up at a limit, or after learning `budget` clauses.
+    pub(crate) fn start(&self, limits: &Limits, budget: u64) -> Box<dyn Solver> {
+        match self {
+            Self::Varisat => Box::new(varisat::Varisat::new(limits, budget)),
+            Self::Batsat => Box::new(batsat::Batsat::new(limits, budget)),
+            #[cfg(feature = "cadical")]
+            Self::Cadical => Box::new(cadical::Cadical::new(limits, budget)),
+            Self::Program { command, arguments } => {
+                Box::new(Program::new(command, arguments, limits, budget))
+            }
+        }
+    }
+
+    /// Whether the solver is there and answers: asked of two formulas with one variable.
+    ///
+    /// # Errors
+    ///
+    /// The program cannot be started, or does not answer right.
+    pub fn check(&self) -> Result<(), BackendError> {
+        let Self::Program { command, .. } = self else { return Ok(()) };
+        let one = Lit::TRUE;
+        for (clauses, expected) in
+            [(&[one][..], Answer::Satisfiable), (&[one, !one][..], Answer::Unsatisfiable)]
+        {
+            // A program that has to be killed here would never end.
+            let mut solver = self.start(&Limits::none(), 0);
+            for literal in clauses {
+                solver.add_clause(&[*literal]);
+            }
+            let answer = solver.solve();
+            if answer != expected {
+                let reason = match (answer, solver.failure()) {
+                    (Answer::Interrupted, Some(reason)) => reason.to_owned(),
+                    (Answer::Interrupted, None) => "it does not end".to_owned(),
+                    _ => "it answers wrongly".to_owned(),
+                };
+                return Err(BackendError::Unusable { command: command.clone(), reason });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A name that is built in; or a program, with arguments after blanks.
+impl FromStr for Backend {
+    type Err = BackendError;
+
+    fn from_str(text: &str) -> Result<Self, BackendError> {
+        match text.trim() {
+            "varisat" => Ok(Self::Varisat),
+            "batsat" => Ok(Self::Batsat),
+            #[cfg(feature = "cadical")]
+            "cadical" => Ok(Self::Cadical),
+            other => {
+                let mut words = other.split_whitespace().map(str::to_owned);
+                let command = words.next().ok_or(BackendError::Empty)?;
+                Ok(Self::Program { command, arguments: words.collect() })
+            }
+        }
+    }
+}

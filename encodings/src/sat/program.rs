@@ -1,0 +1,189 @@
+//! A solver that is a program of its own: DIMACS [1] to its standard input, its answer from its standard output.
+//!
+//! Two forms of answers are read: that of the SAT competitions (`s SATISFIABLE`, and the assignment in lines `v …`), and
+//! that of `MiniSat`'s result file (`SAT`, and the assignment on the line below). The process is killed when a limit is
+//! reached. It cannot be told how many clauses it may learn, so where that is limited, its time is.
+//!
+//! \[1\] DIMACS challenge: Satisfiability, suggested format, 1993.
+
+use std::fmt::Write as _;
+use std::io::{Read as _, Write as _};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::limits::Limits;
+use crate::sat::{Answer, Lit, Solver};
+
+/// Time in place of a budget of conflicts.
+const BUDGET_TIME: Duration = Duration::from_secs(2);
+/// How often limits are looked at while the program runs.
+const INTERVAL: Duration = Duration::from_millis(5);
+
+/// A formula for a program, and its answer.
+pub(super) struct Program {
+    command: Command,
+    limits: Limits,
+    budget: u64,
+    /// Each ends with 0.
+    clauses: Vec<i32>,
+    variables: u32,
+    assignment: Vec<bool>,
+    failure: Option<String>,
+}
+
+impl Program {
+    /// A run of the program that ends at a limit; or after a short time, if there is a budget.
+    pub(super) fn new(command: &str, arguments: &[String], limits: &Limits, budget: u64) -> Self {
+        let mut process = Command::new(command);
+        process.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+        Self {
+            command: process,
+            limits: limits.clone(),
+            budget,
+            clauses: Vec::new(),
+            variables: 0,
+            assignment: Vec::new(),
+            failure: None,
+        }
+    }
+
+    fn dimacs(&self) -> String {
+        let count = self.clauses.iter().filter(|literal| **literal == 0).count();
+        let mut text = format!("p cnf {} {count}\n", self.variables);
+        for literal in &self.clauses {
+            let end = if *literal == 0 { '\n' } else { ' ' };
+            // Writing to a string does not fail.
+            let _ = write!(text, "{literal}{end}");
+        }
+        text
+    }
+
+    /// Keeps the assignment if it satisfies every clause.
+    fn keep(&mut self, literals: &[i32]) -> Result<(), String> {
+        self.assignment = vec![false; self.variables as usize];
+        for literal in literals.iter().filter(|literal| **literal > 0) {
+            if let Some(value) = self.assignment.get_mut(*literal as usize - 1) {
+                *value = true;
+            }
+        }
+        let holds = |literal: &i32| self.assignment[literal.unsigned_abs() as usize - 1] == (*literal > 0);
+        // Each clause has its 0 with it.
+        let mut clauses = self.clauses.split_inclusive(|literal| *literal == 0);
+        if clauses.all(|clause| clause[..clause.len() - 1].iter().any(holds)) {
+            Ok(())
+        } else {
+            Err("its assignment does not satisfy the formula".to_owned())
+        }
+    }
+
+    /// What the program writes; none if it had to be killed.
+    fn run(&mut self) -> Result<Option<String>, String> {
+        let started = Instant::now();
+        let mut child = Process(self.command.spawn().map_err(|error| format!("cannot be started: {error}"))?);
+        let (sender, receiver) = mpsc::channel();
+        if let Some(mut output) = child.0.stdout.take() {
+            thread::spawn(move || {
+                let mut text = Vec::new();
+                let read = output.read_to_end(&mut text).map(|_| text);
+                // Nobody waits any more if the process was killed.
+                let _ = sender.send(read);
+            });
+        }
+        if let Some(mut input) = child.0.stdin.take() {
+            let text = self.dimacs();
+            // A program that has seen enough may close its input; whether it has is what its answer shows.
+            thread::spawn(move || input.write_all(text.as_bytes()));
+        }
+        loop {
+            match receiver.recv_timeout(INTERVAL) {
+                Ok(Ok(text)) => return Ok(Some(String::from_utf8_lossy(&text).into_owned())),
+                Ok(Err(error)) => return Err(format!("its output cannot be read: {error}")),
+                Err(mpsc::RecvTimeoutError::Disconnected) => return Err("its output is closed".to_owned()),
+                Err(mpsc::RecvTimeoutError::Timeout) => {
+                    let over = self.budget < u64::MAX && started.elapsed() > BUDGET_TIME;
+                    if over || self.limits.reached() {
+                        return Ok(None);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A process that does not outlive this value.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The answer in what a program has written, and the literals of its assignment.
+fn read(output: &str) -> Result<(Answer, Vec<i32>), String> {
+    let mut answer = None;
+    let mut literals = Vec::new();
+    for line in output.lines() {
+        let line = line.trim();
+        match line.strip_prefix("s ").unwrap_or(line).trim() {
+            "SATISFIABLE" | "SAT" => answer = Some(Answer::Satisfiable),
+            "UNSATISFIABLE" | "UNSAT" => answer = Some(Answer::Unsatisfiable),
+            "UNKNOWN" | "INDETERMINATE" | "INDET" => answer = Some(Answer::Interrupted),
+            _ => {
+                let values =
+                    line.strip_prefix("v ").unwrap_or(line).split_whitespace().map(str::parse::<i32>);
+                if let Ok(values) = values.collect::<Result<Vec<_>, _>>() {
+                    literals.extend(values.into_iter().filter(|literal| *literal != 0));
+                }
+            }
+        }
+    }
+    match answer {
+        Some(answer) => Ok((answer, literals)),
+        None => Err("its output says neither SATISFIABLE nor UNSATISFIABLE".to_owned()),
+    }
+}
+
+impl Solver for Program {
+    fn add_clause(&mut self, clause: &[Lit]) {
+        for literal in clause {
+            self.variables = self.variables.max(literal.variable() + 1);
+            self.clauses.push(literal.dimacs());
+        }
+        self.clauses.push(0);
+    }
+
+    fn solve(&mut self) -> Answer {
+        let read = match self.run() {
+            Ok(None) => return Answer::Interrupted,
+            Ok(Some(output)) => read(&output),
+            Err(reason) => Err(reason),
+        };
+        let kept = read.and_then(|(answer, literals)| {
+            if answer == Answer::Satisfiable { self.keep(&literals).map(|()| answer) } else { Ok(answer) }
+        });
+        match kept {
+            Ok(answer) => answer,
+            Err(reason) => {
+                self.failure = Some(reason);
+                Answer::Interrupted
+            }
+        }
+    }
+
+    fn value(&self, variable: u32) -> bool {
+        self.assignment.get(variable as usize).copied().unwrap_or(false)
+    }
+
+    fn conflicts(&self) -> u64 {
+        0
+    }
+
+    fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
+    }
+}

@@ -1,0 +1,32 @@
+//! The limit on memory: what the process occupies, to the flag that stops the planner.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use metaplan::message::Message;
+
+use crate::cli::Failure;
+
+/// How often the memory is measured. So long the process may go on taking more.
+const INTERVAL: Duration = Duration::from_millis(5);
+
+/// Sets the flag as soon as the process occupies more than so many megabytes (of 2^20 bytes) of main memory. Programs that
+/// it starts do not count.
+///
+/// # Errors
+/// The platform does not tell how much memory a process occupies.
+pub(super) fn watch(megabytes: u64, interrupt: Arc<AtomicBool>) -> Result<(), Failure> {
+    let occupied = || memory_stats::memory_stats().map(|stats| stats.physical_mem as u64);
+    if occupied().is_none() {
+        let text = "`--memory-limit`: this platform does not tell how much memory a process occupies";
+        return Err(Failure::usage(Message::error("M115", text.to_owned())));
+    }
+    std::thread::spawn(move || {
+        while occupied().is_none_or(|bytes| bytes >> 20 <= megabytes) {
+            std::thread::sleep(INTERVAL);
+        }
+        interrupt.store(true, Ordering::Relaxed);
+    });
+    Ok(())
+}
