@@ -217,7 +217,7 @@ fn universal_atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
 }
 
 /// Calls `visit` with the predicate of every atom of a condition.
-fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
+pub(crate) fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => {
             for part in parts {
@@ -261,7 +261,7 @@ pub(crate) fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
     }
 }
 
-fn expression_terms(expression: &Expression, visit: &mut dyn FnMut(Term)) {
+pub(crate) fn expression_terms(expression: &Expression, visit: &mut dyn FnMut(Term)) {
     match expression {
         Expression::Number(_) | Expression::TotalTime => {}
         Expression::Function(_, terms, _) => terms.iter().for_each(|term| visit(*term)),

@@ -11,7 +11,7 @@ use crate::optimize::{Config, optimize};
 use crate::plan::{Exact, GroundPlan};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::solution::{Improvement, Solution, Status};
-use crate::task::{NumericEffect, NumericVariable, Operator, Task};
+use crate::task::{NumericEffect, Operator, Task};
 
 /// A point of the Pareto front, or what is known in place of one.
 #[derive(Debug, Clone)]
@@ -142,8 +142,7 @@ impl Task {
 
     /// Admits only plans that cost at most so much by an objective.
     fn limit(&mut self, objective: usize, budget: i64) {
-        let variable = NumericId(self.numerics.len() as u32);
-        self.numerics.push(NumericVariable { scale: 1 });
+        let variable = NumericId(self.initial.numbers.len() as u32);
         self.initial.numbers.push(budget);
         let always = self.operators.iter().all(|operator| Self::cost(operator, objective).minimum() >= 0);
         for operator in &mut self.operators {

@@ -319,7 +319,7 @@ impl Run<'_> {
 
     /// How many states the task has at most, if that is few: a shortest plan visits none twice.
     fn states(&self) -> Option<usize> {
-        if !self.task.numerics.is_empty() {
+        if !self.task.initial.numbers.is_empty() {
             return None;
         }
         let sizes = self.task.variables[..self.task.basic].iter().map(|variable| variable.values.len());

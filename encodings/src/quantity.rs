@@ -3,17 +3,27 @@
 //! A quantity is a constant plus tables over slots. The tables are what keeps the encoding factored: a sum over
 //! k functions of m designs each is k tables of m entries, not one of m^k.
 
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
 use smallvec::SmallVec;
 
 /// Positions in an operator's slot list, ascending.
 pub(crate) type SlotSet = SmallVec<[u16; 2]>;
 
 /// One value for each combination of the admitted designs of some slots.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Table<N> {
     pub(crate) slots: SlotSet,
-    /// Row-major: the last slot varies fastest.
-    pub(crate) values: Vec<N>,
+    /// Row-major: the last slot varies fastest. Shared by the operators of one schema for which it is the same.
+    pub(crate) values: Arc<[N]>,
+}
+
+/// By the slots and the first value: tables are long, and operators with equal ones are few.
+impl<N: Hash> Hash for Table<N> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (&self.slots, self.values.first()).hash(state);
+    }
 }
 
 /// A constant plus tables; the sum of what the chosen designs contribute.
@@ -84,9 +94,8 @@ impl<N: Number> Quantity<N> {
     pub(crate) fn add_table(&mut self, table: Table<N>) {
         match self.tables.iter_mut().find(|present| present.slots == table.slots) {
             Some(present) => {
-                for (value, more) in present.values.iter_mut().zip(table.values) {
-                    *value = value.clone() + more;
-                }
+                let sums = present.values.iter().zip(table.values.iter());
+                present.values = sums.map(|(value, more)| value.clone() + more.clone()).collect();
             }
             None => self.tables.push(table),
         }
@@ -107,9 +116,12 @@ impl<N: Number> Quantity<N> {
     }
 
     pub(crate) fn scale(&mut self, factor: &N) {
+        if factor.is_one() {
+            return;
+        }
         self.constant = self.constant.clone() * factor.clone();
-        for value in self.tables.iter_mut().flat_map(|table| &mut table.values) {
-            *value = value.clone() * factor.clone();
+        for table in &mut self.tables {
+            table.values = table.values.iter().map(|value| value.clone() * factor.clone()).collect();
         }
         self.fold_constant_tables();
     }
@@ -118,26 +130,6 @@ impl<N: Number> Quantity<N> {
     pub(crate) fn at(&self, choice: &[u16], sizes: &[usize]) -> N {
         let chosen = self.tables.iter().map(|table| table.values[table.index(choice, sizes)].clone());
         chosen.fold(self.constant.clone(), |sum, value| sum + value)
-    }
-
-    /// All numbers that occur.
-    pub(crate) fn numbers(&self) -> impl Iterator<Item = &N> {
-        std::iter::once(&self.constant).chain(self.tables.iter().flat_map(|table| &table.values))
-    }
-
-    pub(crate) fn map<M>(&self, mut f: impl FnMut(&N) -> Option<M>) -> Option<Quantity<M>> {
-        let constant = f(&self.constant)?;
-        let tables = self
-            .tables
-            .iter()
-            .map(|table| {
-                Some(Table {
-                    slots: table.slots.clone(),
-                    values: table.values.iter().map(&mut f).collect::<Option<_>>()?,
-                })
-            })
-            .collect::<Option<_>>()?;
-        Some(Quantity { constant, tables })
     }
 }
 

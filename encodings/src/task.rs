@@ -6,6 +6,9 @@
 //!
 //! [1] C. Bäckström, B. Nebel: Complexity results for SAS+ planning, Computational Intelligence 11(4), 1995.
 
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
 use crate::lifted::ObjectId;
 pub use crate::quantity::NumericId;
 use crate::quantity::{Linear, Quantity, SlotSet};
@@ -72,13 +75,6 @@ pub(crate) struct Variable {
     pub(crate) values: Vec<String>,
 }
 
-/// A numeric variable.
-#[derive(Debug, Clone)]
-pub(crate) struct NumericVariable {
-    /// The integers of the task are this many times the values of the files.
-    pub(crate) scale: i64,
-}
-
 /// A function and the designs that may solve it.
 #[derive(Debug, Clone)]
 pub(crate) struct Slot {
@@ -137,16 +133,16 @@ pub(crate) enum Argument {
     Slot(u16),
 }
 
-/// An operator.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+/// An operator. What depends on its designs is shared with other operators of the same schema.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Operator {
     /// Index of the action schema in the domain.
     pub(crate) schema: u32,
     pub(crate) arguments: Vec<Argument>,
     /// Each function that the action requires, with the argument that is its design.
     pub(crate) configuration: Vec<(ObjectId, Argument)>,
-    pub(crate) slots: Vec<SlotUse>,
-    pub(crate) forbidden: Vec<Forbidden>,
+    pub(crate) slots: Arc<[SlotUse]>,
+    pub(crate) forbidden: Arc<[Forbidden]>,
     pub(crate) condition: Condition,
     /// At most one value for each variable, ascending by variable.
     pub(crate) effects: Vec<Fact>,
@@ -197,7 +193,6 @@ pub struct Task {
     pub(crate) basic: usize,
     /// The rules of the derived variables, in the order of their evaluation.
     pub(crate) axioms: Vec<Layer>,
-    pub(crate) numerics: Vec<NumericVariable>,
     pub(crate) slots: Vec<Slot>,
     pub(crate) operators: Vec<Operator>,
     pub(crate) initial: State,
@@ -209,6 +204,13 @@ pub struct Task {
     pub(crate) time_scale: i64,
     /// Set if relaxed reachability shows that the goal cannot be reached: the reason.
     pub(crate) unreachable: Option<String>,
+}
+
+/// By what usually tells operators apart; the rest may be long.
+impl Hash for Operator {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.schema, &self.arguments, &self.condition.facts, &self.effects).hash(state);
+    }
 }
 
 impl Operator {

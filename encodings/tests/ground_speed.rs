@@ -162,7 +162,7 @@ print(used.ru_utime + used.ru_stime)";
     seconds
 }
 
-/// Needs a Python with the translator (`python3 -m venv peers; peers/bin/pip install up-fast-downward`), named by
+/// The largest instances, for which the factor is asserted, and smaller ones beside them. Needs a Python with the translator (`python3 -m venv peers; peers/bin/pip install up-fast-downward`), named by
 /// `METAPLAN_PEERS=peers/bin/python`.
 #[test]
 #[ignore = "measures beside a peer; in release"]
@@ -170,10 +170,22 @@ fn reading_and_grounding_beside_the_translator_of_fast_downward() {
     let Ok(python) = std::env::var("METAPLAN_PEERS") else { panic!("METAPLAN_PEERS names no Python") };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
     std::fs::create_dir_all(&folder).expect("a folder");
-    for (n, m, k, encoding) in
-        [(50, 6, 1, "c"), (50, 6, 2, "c"), (50, 6, 1, "b"), (200, 12, 1, "c"), (200, 12, 2, "c")]
-    {
+    let rows = [
+        (200, 12, 2, "c"),
+        (200, 12, 2, "n"),
+        (200, 12, 2, "o"),
+        (200, 12, 2, "f"),
+        (200, 12, 2, "b"),
+        (200, 12, 1, "c"),
+        (200, 12, 1, "b"),
+        (50, 6, 2, "c"),
+        (50, 6, 1, "c"),
+        (50, 6, 1, "b"),
+    ];
+    let mut slow = Vec::new();
+    for (n, m, k, encoding) in rows {
         let name = format!("ugv-{n}-{m}-{k}");
+        let large = (n, m, k) == (200, 12, 2);
         let [n, m, k] = [n, m, k].map(|number: usize| number.to_string());
         let arguments =
             [["--n", &n, "--m", &m], ["--k", &k, "--enc", encoding], ["--name", &name, "--seed", "1"]];
@@ -204,6 +216,9 @@ fn reading_and_grounding_beside_the_translator_of_fast_downward() {
             "{name}: {} operators, {ours:.3} s; Fast Downward's translator {ratio}",
             task.operator_count()
         );
-        assert!(peer.is_none_or(|peer| peer >= 20.0 * ours), "{name}: {ratio}");
+        if large && peer.is_some_and(|peer| peer < 20.0 * ours) {
+            slow.push(format!("{name}: {ratio}"));
+        }
     }
+    assert!(slow.is_empty(), "{slow:?}");
 }

@@ -31,7 +31,7 @@ impl Resource {
 /// The resources of a task.
 pub(super) fn resources(task: &Task, projections: &[Projection]) -> Vec<Resource> {
     let mut found = Vec::new();
-    for variable in (0..task.numerics.len() as u32).map(NumericId) {
+    for variable in (0..task.initial.numbers.len() as u32).map(NumericId) {
         let Some(used) = task.operators.iter().map(|o| used(o, variable)).collect::<Option<Vec<_>>>() else {
             continue;
         };

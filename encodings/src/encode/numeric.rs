@@ -6,6 +6,7 @@
 //! must not fall below 0), the sign bit of the next value serves.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::encode::Encoding;
 use crate::encode::arithmetic::{Arithmetic, Bits, width};
@@ -187,9 +188,9 @@ impl Encoding<'_> {
                 .unwrap_or_default();
             let (groups, premises) = by_slots.entry(slots).or_default();
             groups.push(group);
-            for (entry, value) in entries.iter().zip(values) {
+            for (entry, value) in entries.iter().zip(values.iter()) {
                 let designs = entry.iter().map(|(slot, design)| self.designs[step][*slot][*design]);
-                premises.push((designs.chain([group]).collect(), value));
+                premises.push((designs.chain([group]).collect(), *value));
             }
         }
         let mut sum = self.add_source(base, &own, active, width);
@@ -289,7 +290,7 @@ impl Encoding<'_> {
 }
 
 /// The combinations of a table in the task's numbering, and its values.
-type TableKey = (Vec<Vec<(usize, usize)>>, Vec<i64>);
+type TableKey = (Vec<Vec<(usize, usize)>>, Arc<[i64]>);
 
 fn linear_range(linear: &Linear<i64>, ranges: &[Range]) -> Range {
     let (mut low, mut high) = (linear.quantity.minimum(), linear.quantity.maximum());

@@ -74,7 +74,9 @@ impl Encoding<'_> {
     fn declare_designs(&mut self, step: usize) {
         let mut used: Vec<Vec<bool>> =
             self.task.slots.iter().map(|slot| vec![false; slot.designs.len()]).collect();
-        for slot in self.operators[step].iter().flat_map(|(id, _)| &self.task.operators[id.index()].slots) {
+        for slot in
+            self.operators[step].iter().flat_map(|(id, _)| self.task.operators[id.index()].slots.iter())
+        {
             for design in &slot.designs {
                 used[slot.slot.index()][*design as usize] = true;
             }

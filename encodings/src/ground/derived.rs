@@ -41,7 +41,7 @@ impl World<'_> {
     pub(crate) fn name(&mut self, residual: Residual) -> AtomId {
         let predicate = PredicateId(self.lifted.predicates.len() as u32);
         let number = ObjectId(self.definitions.named.len() as u32);
-        let atom = self.atom(predicate, [number].into());
+        let atom = self.atom(predicate, &[number]);
         self.definitions.named.insert(residual, atom);
         atom
     }

@@ -1,9 +1,8 @@
 //! What an instance changes, by case and by moment.
 
-use std::collections::BTreeMap;
-
 use crate::error::{Error, Place};
 use crate::ground::evaluate::{AtomId, Failure, World};
+use crate::ground::frame::Operand;
 use crate::ground::instantiate::{Build, GroundConditional, GroundOperator};
 use crate::ground::join::guards_of_exists;
 use crate::ground::residual::{Residual, constant_comparison};
@@ -14,7 +13,38 @@ use crate::quantity::{Linear, NumericId};
 /// An instance becomes at most this many operators.
 const CASE_LIMIT: usize = 64;
 
-type Numbers = BTreeMap<NumericId, Linear<Rational>>;
+/// What numeric variables become; a list, because an operator changes few.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Numbers {
+    /// Ascending by variable.
+    changes: Vec<(NumericId, Linear<Rational>)>,
+}
+
+impl Numbers {
+    pub(crate) fn get(&self, variable: NumericId) -> Option<&Linear<Rational>> {
+        let position = self.changes.binary_search_by_key(&variable, |(own, _)| *own);
+        position.ok().map(|position| &self.changes[position].1)
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &(NumericId, Linear<Rational>)> {
+        self.changes.iter()
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.changes.is_empty()
+    }
+
+    pub(crate) fn retain(&mut self, keep: &dyn Fn(NumericId) -> bool) {
+        self.changes.retain(|(variable, _)| keep(*variable));
+    }
+
+    fn insert(&mut self, variable: NumericId, value: Linear<Rational>) {
+        match self.changes.binary_search_by_key(&variable, |(own, _)| *own) {
+            Ok(position) => self.changes[position].1 = value,
+            Err(position) => self.changes.insert(position, (variable, value)),
+        }
+    }
+}
 
 /// What the start or the end of an instance changes, each change under a condition.
 pub(super) struct Moment {
@@ -36,15 +66,27 @@ enum GroundChange {
 /// One way in which the conditions of an instance can turn out, all its conditions in terms of the state before it.
 pub(super) struct Case {
     parts: Vec<Residual>,
-    start: Vec<GroundChange>,
+    start: Start,
     end: Vec<(Residual, GroundChange)>,
+}
+
+/// What the start of an instance changes for certain.
+#[derive(Clone)]
+struct Start {
+    adds: Vec<AtomId>,
+    deletes: Vec<AtomId>,
+    numbers: Numbers,
 }
 
 impl Build<'_, '_> {
     /// The changes of effects that happen at once.
-    pub(super) fn moment(&mut self, effects: &[Effect]) -> Result<Moment, Failure> {
-        let mut changes = Vec::new();
-        for effect in effects {
+    pub(super) fn moment(&mut self, effects: &[Effect], operands: &[Operand]) -> Result<Moment, Failure> {
+        let mut changes = Vec::with_capacity(effects.len());
+        for (effect, operand) in effects.iter().zip(operands) {
+            if effect.bound.is_empty() {
+                self.effect(effect, operand, &mut changes)?;
+                continue;
+            }
             let guards = guards_of_exists(&effect.condition);
             let mut bindings = Vec::new();
             self.world.each_binding(&effect.bound, &guards, &mut self.binding, &mut |_, binding| {
@@ -54,33 +96,47 @@ impl Build<'_, '_> {
             let own = std::mem::take(&mut self.binding);
             for binding in bindings {
                 self.binding = binding;
-                self.world.in_effect = true;
-                let condition = self.world.residual(&effect.condition, &mut self.binding);
-                self.world.in_effect = false;
-                let condition = condition?;
-                if condition != Residual::False {
-                    let change = self.change(&effect.change)?;
-                    changes.push((condition, change));
-                }
+                self.effect(effect, operand, &mut changes)?;
             }
             self.binding = own;
         }
         Ok(Moment { changes })
     }
 
-    fn change(&mut self, change: &Change) -> Result<GroundChange, Failure> {
+    fn effect(
+        &mut self,
+        effect: &Effect,
+        operand: &Operand,
+        changes: &mut Vec<(Residual, GroundChange)>,
+    ) -> Result<(), Failure> {
+        self.world.in_effect = true;
+        let condition = self.world.residual(&effect.condition, &mut self.binding);
+        self.world.in_effect = false;
+        let condition = condition?;
+        if condition != Residual::False {
+            let change = self.change(&effect.change, operand)?;
+            changes.push((condition, change));
+        }
+        Ok(())
+    }
+
+    fn change(&mut self, change: &Change, operand: &Operand) -> Result<GroundChange, Failure> {
         Ok(match change {
             Change::Add(predicate, terms) | Change::Delete(predicate, terms) => {
-                let atom = self.world.atom(*predicate, World::arguments(terms, &self.binding));
+                let atom = self.world.atom(*predicate, &World::arguments(terms, &self.binding));
                 GroundChange::Atom(atom, matches!(change, Change::Add(..)))
             }
             Change::Assign { assignment, function, terms, expression, place } => {
-                let variable =
-                    self.world.numeric(*function, World::arguments(terms, &self.binding), *place)?;
-                let operand = match self.open(expression) {
-                    Ok(operand) => Some(operand),
-                    Err(Failure::Undefined) => None,
-                    Err(error) => return Err(error),
+                let arguments = World::arguments(terms, &self.binding);
+                let variable = self.world.numeric(*function, &arguments, *place)?;
+                let operand = match operand {
+                    Operand::Undefined => None,
+                    Operand::Open(operand) => Some(operand.clone()),
+                    Operand::Closed => match self.open(expression) {
+                        Ok(operand) => Some(operand),
+                        Err(Failure::Undefined) => None,
+                        Err(error) => return Err(error),
+                    },
                 };
                 GroundChange::Number { variable, assignment: *assignment, operand, place: *place }
             }
@@ -88,23 +144,41 @@ impl Build<'_, '_> {
     }
 }
 
+impl Moment {
+    fn is_certain(&self) -> bool {
+        self.changes.iter().all(|(condition, _)| *condition == Residual::True)
+    }
+}
+
+impl Start {
+    fn new<'c, I: Iterator<Item = &'c GroundChange>>(changes: impl Fn() -> I) -> Result<Self, Failure> {
+        let (adds, deletes) = atoms(changes());
+        Ok(Self { adds, deletes, numbers: numbers(changes(), &Numbers::default())? })
+    }
+}
+
 /// The cases of an instance: one, unless its start is conditional or its numbers are.
 pub(super) fn cases(
     schema: &Schema,
-    before: &[Residual],
+    before: Vec<Residual>,
     start: &Moment,
     middle: &[Residual],
-    end: &Moment,
+    end: Moment,
 ) -> Result<Vec<Case>, Failure> {
+    if start.is_certain() && end.is_certain() {
+        let start = Start::new(|| start.changes.iter().map(|(_, change)| change))?;
+        let mut parts = before;
+        parts.extend(middle.iter().map(|residual| after_start(residual, &start)));
+        return Ok(vec![Case { parts, start, end: end.changes }]);
+    }
     let mut all = Vec::new();
     for (decided, chosen) in split(schema, start.changes.iter().map(|(condition, _)| condition))? {
         let holds = |(condition, _): &&(Residual, GroundChange)| {
             *condition == Residual::True || chosen.contains(&condition)
         };
-        let start: Vec<_> = start.changes.iter().filter(holds).map(|(_, change)| change.clone()).collect();
-        let (adds, deletes) = atoms(start.iter());
-        let numbers = numbers(start.iter(), &Numbers::new())?;
-        let after = |residual: &Residual| after_start(residual, &adds, &deletes, &numbers);
+        let changes = || start.changes.iter().filter(holds).map(|(_, change)| change);
+        let start = Start::new(changes)?;
+        let after = |residual: &Residual| after_start(residual, &start);
         let mut parts: Vec<_> = before.iter().cloned().chain(decided).collect();
         parts.extend(middle.iter().map(after));
         let end: Vec<_> = end
@@ -173,20 +247,21 @@ impl Case {
     pub(super) fn operator(
         self,
         world: &mut World<'_>,
-        template: &GroundOperator,
+        template: GroundOperator,
     ) -> Result<GroundOperator, Failure> {
-        let (start_adds, start_deletes) = atoms(self.start.iter());
-        let start_numbers = numbers(self.start.iter(), &Numbers::new())?;
+        let start = self.start;
         let certain = || self.end.iter().filter(|(condition, _)| *condition == Residual::True);
         let (end_adds, end_deletes) = atoms(certain().map(|(_, change)| change));
-        let mut numeric_effects = numbers(certain().map(|(_, change)| change), &start_numbers)?;
-        for (variable, value) in start_numbers {
-            numeric_effects.entry(variable).or_insert(value);
+        let mut numeric_effects = numbers(certain().map(|(_, change)| change), &start.numbers)?;
+        for (variable, value) in start.numbers.changes {
+            if numeric_effects.get(variable).is_none() {
+                numeric_effects.insert(variable, value);
+            }
         }
         let mut conditional: Vec<GroundConditional> = Vec::new();
         for (condition, change) in self.end.iter().filter(|(condition, _)| *condition != Residual::True) {
             let GroundChange::Atom(atom, positive) = change else { continue };
-            let gone = start_deletes.contains(atom) && !start_adds.contains(atom);
+            let gone = start.deletes.contains(atom) && !start.adds.contains(atom);
             if !positive && (gone || end_adds.contains(atom)) {
                 continue;
             }
@@ -206,15 +281,15 @@ impl Case {
             entry.deletes.retain(|atom| !entry.adds.contains(atom));
         }
         let mut adds = end_adds;
-        adds.extend(start_adds.iter().filter(|atom| !end_deletes.contains(atom)));
+        adds.extend(start.adds.iter().filter(|atom| !end_deletes.contains(atom)));
         adds.sort_unstable();
         adds.dedup();
-        let mut deletes: Vec<_> = end_deletes.into_iter().chain(start_deletes).collect();
+        let mut deletes: Vec<_> = end_deletes.into_iter().chain(start.deletes).collect();
         deletes.sort_unstable();
         deletes.dedup();
         deletes.retain(|atom| !adds.contains(atom));
         let condition = world.condition(&self.parts)?;
-        Ok(GroundOperator { condition, adds, deletes, conditional, numeric_effects, ..template.clone() })
+        Ok(GroundOperator { condition, adds, deletes, conditional, numeric_effects, ..template })
     }
 }
 
@@ -246,13 +321,13 @@ fn numbers<'c>(
     changes: impl Iterator<Item = &'c GroundChange>,
     before: &Numbers,
 ) -> Result<Numbers, Failure> {
-    let mut changed = Numbers::new();
+    let mut changed = Numbers::default();
     for change in changes {
         let GroundChange::Number { variable, assignment, operand, place } = change else { continue };
         let mut operand = operand.clone().ok_or(Failure::Undefined)?;
         substitute(&mut operand, before);
         let current = || {
-            let old = changed.get(variable).or_else(|| before.get(variable));
+            let old = changed.get(*variable).or_else(|| before.get(*variable));
             old.cloned().unwrap_or_else(|| Linear::variable(*variable))
         };
         let value = match assignment {
@@ -290,22 +365,21 @@ fn scaled(
     Ok(value)
 }
 
-fn substitute(linear: &mut Linear<Rational>, before: &BTreeMap<NumericId, Linear<Rational>>) {
-    let variables: Vec<_> = linear.coefficients.iter().map(|(variable, _)| *variable).collect();
-    let mut result = linear.clone();
-    result.coefficients.clear();
+fn substitute(linear: &mut Linear<Rational>, before: &Numbers) {
+    if !linear.coefficients.iter().any(|(variable, _)| before.get(*variable).is_some()) {
+        return;
+    }
+    let mut result = Linear { coefficients: Vec::new(), quantity: linear.quantity.clone() };
     for (variable, factor) in &linear.coefficients {
-        let mut value = before.get(variable).cloned().unwrap_or_else(|| Linear::variable(*variable));
+        let mut value = before.get(*variable).cloned().unwrap_or_else(|| Linear::variable(*variable));
         value.scale(factor);
         result.add(&value);
     }
-    if variables.iter().any(|variable| before.contains_key(variable)) {
-        *linear = result;
-    }
+    *linear = result;
 }
 
 /// A condition of the middle or end of a durative action in terms of the state before its start.
-fn after_start(residual: &Residual, adds: &[AtomId], deletes: &[AtomId], numbers: &Numbers) -> Residual {
+fn after_start(residual: &Residual, Start { adds, deletes, numbers }: &Start) -> Residual {
     if adds.is_empty() && deletes.is_empty() && numbers.is_empty() {
         return residual.clone();
     }

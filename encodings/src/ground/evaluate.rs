@@ -1,7 +1,10 @@
 //! The world that grounding looks at, and expressions under a binding of their parameters.
 
-use indexmap::IndexMap;
-use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+use std::hash::Hash;
+
+use indexmap::{Equivalent, IndexMap, IndexSet};
+use rustc_hash::FxBuildHasher;
+use smallvec::SmallVec;
 
 use crate::configuration::{SlotParameter, slots_of_expression};
 use crate::error::{Error, Place};
@@ -28,11 +31,27 @@ impl AtomId {
 
 type AtomIndex<K> = IndexMap<(K, Arguments), (), FxBuildHasher>;
 
+/// Ground atoms, looked up without making one.
+pub(crate) type AtomSet = IndexSet<(PredicateId, Arguments), FxBuildHasher>;
+
+/// A symbol and arguments that lie elsewhere; hashes as `(K, Arguments)` does.
+#[derive(Hash)]
+struct Key<'k, K>(K, &'k [ObjectId]);
+
+impl<K: PartialEq> Equivalent<(K, Arguments)> for Key<'_, K> {
+    fn equivalent(&self, (symbol, arguments): &(K, Arguments)) -> bool {
+        self.0 == *symbol && *self.1 == **arguments
+    }
+}
+
+/// Arguments that are looked up and forgotten.
+pub(crate) type Row = SmallVec<[ObjectId; 8]>;
+
 /// The static facts and values of a task, and the fluent atoms and numeric variables met so far.
 pub(crate) struct World<'a> {
     pub(crate) lifted: &'a Lifted,
-    facts: FxHashSet<(PredicateId, Arguments)>,
-    pub(crate) values: FxHashMap<(FunctionId, Arguments), Rational>,
+    facts: AtomSet,
+    values: IndexMap<(FunctionId, Arguments), Rational, FxBuildHasher>,
     reached: &'a Reached,
     pub(crate) atoms: AtomIndex<PredicateId>,
     pub(crate) numerics: AtomIndex<FunctionId>,
@@ -60,6 +79,13 @@ pub(crate) struct Slots<'a> {
     pub(crate) designs: Vec<Vec<ObjectId>>,
 }
 
+impl Slots<'_> {
+    /// How many designs are left for each.
+    pub(crate) fn sizes(&self) -> Vec<usize> {
+        self.designs.iter().map(Vec::len).collect()
+    }
+}
+
 impl<'a> World<'a> {
     pub(crate) fn new(lifted: &'a Lifted, reached: &'a Reached) -> Self {
         Self {
@@ -83,44 +109,52 @@ impl<'a> World<'a> {
     }
 
     /// Whether a fluent atom holds in some state of the delete relaxation.
-    pub(crate) fn is_reached(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
-        self.reached.atoms.contains(&(predicate, arguments.clone()))
+    pub(crate) fn is_reached(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
+        self.reached.atoms.contains(&Key(predicate, arguments))
     }
 
-    pub(crate) fn holds_initially(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
-        self.facts.contains(&(predicate, arguments.clone()))
+    pub(crate) fn holds_initially(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
+        self.facts.contains(&Key(predicate, arguments))
     }
 
     /// Whether an atom holds in some state of the delete relaxation.
-    pub(crate) fn can_hold(&self, predicate: PredicateId, arguments: &Arguments) -> bool {
+    pub(crate) fn can_hold(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         self.holds_initially(predicate, arguments) || self.is_reached(predicate, arguments)
     }
 
-    pub(crate) fn atom(&mut self, predicate: PredicateId, arguments: Arguments) -> AtomId {
-        AtomId(self.atoms.insert_full((predicate, arguments), ()).0 as u32)
+    pub(crate) fn atom(&mut self, predicate: PredicateId, arguments: &[ObjectId]) -> AtomId {
+        let known = self.atoms.get_index_of(&Key(predicate, arguments));
+        AtomId(known.unwrap_or_else(|| self.atoms.insert_full((predicate, arguments.into()), ()).0) as u32)
+    }
+
+    /// The initial value of a numeric fluent, or the value of a static function.
+    pub(crate) fn value(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<Rational> {
+        self.values.get(&Key(function, arguments)).copied()
     }
 
     /// The variable of a numeric fluent, which must have a value from the start; `total-cost` begins at 0.
     pub(crate) fn numeric(
         &mut self,
         function: FunctionId,
-        arguments: Arguments,
+        arguments: &[ObjectId],
         place: Place,
     ) -> Result<NumericId, Failure> {
+        if let Some(known) = self.numerics.get_index_of(&Key(function, arguments)) {
+            return Ok(NumericId(known as u32));
+        }
         let name = &self.lifted.functions[function.index()].name;
-        let key = (function, arguments);
-        if !self.values.contains_key(&key) && *name != Name::new("total-cost") {
+        if self.value(function, arguments).is_none() && *name != Name::new("total-cost") {
             return Err(Failure::Error(Error::Unsupported {
                 construct: format!("`{name}` without an initial value"),
                 instead: "a value for it in `:init`".into(),
                 place,
             }));
         }
-        Ok(NumericId(self.numerics.insert_full(key, ()).0 as u32))
+        Ok(NumericId(self.numerics.insert_full((function, arguments.into()), ()).0 as u32))
     }
 
     /// The arguments under a binding that covers them.
-    pub(crate) fn arguments(terms: &[Term], binding: &Binding) -> Arguments {
+    pub(crate) fn arguments(terms: &[Term], binding: &Binding) -> Row {
         terms
             .iter()
             .filter_map(|term| match term {
@@ -143,12 +177,9 @@ impl<'a> World<'a> {
             Expression::Function(function, terms, place) => {
                 let arguments = Self::arguments(terms, binding);
                 if self.lifted.functions[function.index()].fluent {
-                    return Ok(Linear::variable(self.numeric(*function, arguments, *place)?));
+                    return Ok(Linear::variable(self.numeric(*function, &arguments, *place)?));
                 }
-                self.values
-                    .get(&(*function, arguments))
-                    .map(|v| Linear::constant(*v))
-                    .ok_or(Failure::Undefined)
+                self.value(*function, &arguments).map(Linear::constant).ok_or(Failure::Undefined)
             }
             Expression::Sum(parts) => {
                 let mut sum = Linear::constant(Rational::from_integer(0));
@@ -249,7 +280,7 @@ impl<'a> World<'a> {
             return Err(failure);
         }
         let mut quantity = Quantity::constant(Rational::from_integer(0));
-        quantity.add_table(Table { slots: mentioned, values });
+        quantity.add_table(Table { slots: mentioned, values: values.into() });
         Ok(Linear { coefficients: Vec::new(), quantity })
     }
 }

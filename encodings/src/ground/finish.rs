@@ -1,15 +1,18 @@
 //! Atoms to finite-domain variables, rationals to integers: the last step of grounding.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use indexmap::IndexSet;
 use num_integer::Integer;
 use num_traits::ToPrimitive;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 
 use crate::error::Error;
 use crate::ground::derived::components;
 use crate::ground::evaluate::AtomId;
-use crate::ground::instantiate::{GroundOperator, GroundTask};
+use crate::ground::instantiate::{GroundOperator, GroundSlots, GroundTask};
+use crate::ground::integers::{Denominator, Integers};
 use crate::ground::metric::initial_value;
 use crate::ground::mutex;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
@@ -17,12 +20,9 @@ use crate::ground::prune::{atom_name, read_atoms};
 use crate::lifted::{Lifted, ObjectId, Rational};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
-    Axiom, Condition, ConditionalEffect, Fact, Layer, Literal, NumericEffect, NumericVariable, Objective,
-    Operator, Slot, SlotId, SlotUse, State, Task, Variable, VariableId,
+    Axiom, Condition, ConditionalEffect, Fact, Layer, Literal, NumericEffect, Objective, Operator, Slot,
+    SlotId, SlotUse, State, Task, Variable, VariableId,
 };
-
-/// Integers of a task stay below this, so that sums over a plan fit 64 bits.
-const LIMIT: i64 = 1 << 46;
 
 /// Builds the final task.
 ///
@@ -30,53 +30,49 @@ const LIMIT: i64 = 1 << 46;
 /// `Error::Overflow` if exact integers would not fit.
 pub(crate) fn finish(
     lifted: &Lifted,
-    task: &GroundTask<'_>,
+    mut task: GroundTask<'_>,
     unreachable: Option<String>,
 ) -> Result<Task, Error> {
-    let atoms = Atoms::new(lifted, task);
-    let mut numbers = Numbers::new(task)?;
-    let mut objectives = Vec::new();
-    for (objective, position) in task.objectives.iter().zip(0..) {
-        let costs = task.operators.iter().flat_map(|operator| operator.costs[position].numbers());
-        let scale = common_denominator(costs.chain([&objective.offset]), "the metric")?;
-        let offset = integer(&objective.offset, scale, "the metric")?;
-        objectives.push(Objective { scale, offset, maximize: objective.maximize });
-    }
-    let time_scale =
-        common_denominator(task.operators.iter().flat_map(|o| o.duration.numbers()), "durations")?;
-    let (slots, slot_ids) = slots(&task.operators);
+    let atoms = Atoms::new(lifted, &task);
+    let mut numbers = Numbers::new(&task)?;
+    let (mut objectives, mut costs) = objectives(&task)?;
+    let mut durations = Denominator::new("durations");
+    task.operators.iter().for_each(|operator| durations.quantity(&operator.duration));
+    let mut durations = durations.integers()?;
+    let mut slots = Slots::new(&task.operators);
 
-    let mut operators = Vec::with_capacity(task.operators.len());
-    let mut seen = FxHashSet::default();
-    for operator in &task.operators {
-        let costs = operator.costs.iter().zip(&objectives);
-        let mut costs = costs.map(|(cost, objective)| integers(cost, objective.scale, "the metric"));
-        let operator = Operator {
-            schema: operator.schema,
-            arguments: operator.arguments.clone(),
-            configuration: operator.configuration.clone(),
-            slots: slot_uses(&slots, &slot_ids, operator),
-            forbidden: operator.forbidden.clone(),
-            condition: condition(&operator.condition, &atoms, &numbers)?,
-            effects: atoms.effects(operator),
-            conditional: atoms.conditional(operator),
-            numeric_effects: numbers.effects(operator)?,
-            cost: costs.next().unwrap_or_else(|| Ok(Quantity::constant(1)))?,
-            others: costs.collect::<Result<_, _>>()?,
-            duration: integers(&operator.duration, time_scale, "durations")?,
-        };
-        if !contradictory(&operator.condition) && seen.insert(operator.clone()) {
-            operators.push(operator);
+    let mut operators: IndexSet<Operator, FxBuildHasher> = IndexSet::default();
+    operators.reserve(task.operators.len());
+    for ground in std::mem::take(&mut task.operators) {
+        let condition = condition(&ground.condition, &atoms, &mut numbers)?;
+        if contradictory(&condition) {
+            continue;
         }
+        let by_objective = ground.costs.iter().zip(&mut costs);
+        let mut by_objective = by_objective.map(|(cost, integers)| integers.quantity(cost));
+        operators.insert(Operator {
+            schema: ground.schema,
+            slots: slots.uses(&ground.slots),
+            condition,
+            effects: atoms.effects(&ground),
+            conditional: atoms.conditional(&ground),
+            numeric_effects: numbers.effects(&ground)?,
+            cost: by_objective.next().unwrap_or_else(|| Ok(Quantity::constant(1)))?,
+            others: by_objective.collect::<Result<_, _>>()?,
+            duration: durations.quantity(&ground.duration)?,
+            arguments: ground.arguments,
+            configuration: ground.configuration,
+            forbidden: ground.forbidden,
+        });
     }
     let goal = match &task.goal {
-        Some(goal) => condition(goal, &atoms, &numbers)?,
+        Some(goal) => condition(goal, &atoms, &mut numbers)?,
         None => Condition::default(),
     };
     let exclusive =
         || contradictory(&goal).then(|| "the goal asks for atoms that exclude each other".to_owned());
     let unreachable = unreachable.or_else(exclusive);
-    let axioms = atoms.axioms(task, &numbers)?;
+    let axioms = atoms.axioms(&task, &mut numbers)?;
     let mut task = Task {
         object_names: lifted.objects.iter().map(ToString::to_string).collect(),
         schema_names: lifted.schemas.iter().map(|schema| schema.name.to_string()).collect(),
@@ -84,13 +80,12 @@ pub(crate) fn finish(
         variables: atoms.variables,
         axioms,
         initial: State { values: atoms.initial, numbers: std::mem::take(&mut numbers.initial) },
-        numerics: numbers.variables,
-        slots,
-        operators,
+        slots: slots.all,
+        operators: operators.into_iter().collect(),
         goal,
         objective: objectives.remove(0),
         others: objectives,
-        time_scale,
+        time_scale: durations.scale,
         unreachable,
     };
     let mut initial = std::mem::replace(&mut task.initial, State { values: Vec::new(), numbers: Vec::new() });
@@ -99,13 +94,29 @@ pub(crate) fn finish(
     Ok(task)
 }
 
+/// The objectives, and what makes integers of the costs by each.
+fn objectives(task: &GroundTask<'_>) -> Result<(Vec<Objective>, Vec<Integers>), Error> {
+    let (mut objectives, mut conversions) = (Vec::new(), Vec::new());
+    for (objective, position) in task.objectives.iter().zip(0..) {
+        let mut denominator = Denominator::new("the metric");
+        denominator.number(&objective.offset);
+        task.operators.iter().for_each(|operator| denominator.quantity(&operator.costs[position]));
+        let integers = denominator.integers()?;
+        let offset = integers.number(&objective.offset)?;
+        objectives.push(Objective { scale: integers.scale, offset, maximize: objective.maximize });
+        conversions.push(integers);
+    }
+    Ok((objectives, conversions))
+}
+
 /// The finite-domain variables and where each atom went.
 struct Atoms {
     variables: Vec<Variable>,
     /// How many of them are not derived.
     basic: usize,
     initial: Vec<u32>,
-    facts: FxHashMap<AtomId, Fact>,
+    /// By atom.
+    facts: Vec<Option<Fact>>,
     /// The value of each variable that stands for none of its atoms.
     none: Vec<u32>,
 }
@@ -125,7 +136,7 @@ impl Atoms {
             variables: Vec::new(),
             basic: groups.len(),
             initial: Vec::new(),
-            facts: FxHashMap::default(),
+            facts: vec![None; task.world.atoms.len()],
             none: Vec::new(),
         };
         groups.extend(derived.into_iter().map(|atom| vec![atom]));
@@ -136,7 +147,7 @@ impl Atoms {
             values.push("none of these".into());
             let mut initial = none;
             for (atom, value) in group.iter().zip(0..) {
-                atoms.facts.insert(*atom, Fact { variable, value });
+                atoms.facts[atom.index()] = Some(Fact { variable, value });
                 if let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index())
                     && task.world.holds_initially(*predicate, arguments)
                 {
@@ -151,35 +162,37 @@ impl Atoms {
     }
 
     fn literal(&self, (atom, positive): (AtomId, bool)) -> Literal {
-        Literal { fact: self.facts[&atom], positive }
+        let fact = self.fact(atom).expect("invariant: atoms in conditions are read, so they have a variable");
+        Literal { fact, positive }
+    }
+
+    /// What an atom is in the task; nothing if no condition reads it.
+    fn fact(&self, atom: AtomId) -> Option<Fact> {
+        self.facts[atom.index()]
     }
 
     fn effects(&self, operator: &GroundOperator) -> Vec<Fact> {
-        let mut effects: FxHashMap<VariableId, u32> = FxHashMap::default();
-        for atom in &operator.deletes {
-            if let Some(fact) = self.facts.get(atom) {
-                effects.insert(fact.variable, self.none[fact.variable.index()]);
+        let none = |fact: Fact| Fact { value: self.none[fact.variable.index()], ..fact };
+        let deletes = operator.deletes.iter().filter_map(|atom| self.fact(*atom)).map(none);
+        let adds = operator.adds.iter().filter_map(|atom| self.fact(*atom));
+        let mut effects: Vec<Fact> = Vec::with_capacity(operator.deletes.len() + operator.adds.len());
+        for fact in deletes.chain(adds) {
+            match effects.iter_mut().find(|known| known.variable == fact.variable) {
+                Some(known) => *known = fact,
+                None => effects.push(fact),
             }
         }
-        for atom in &operator.adds {
-            if let Some(fact) = self.facts.get(atom) {
-                effects.insert(fact.variable, fact.value);
-            }
-        }
-        let known = |fact: &Fact| {
-            let overridden =
+        let overridden = |fact: &Fact| {
+            let atoms =
                 operator.conditional.iter().flat_map(|effect| effect.adds.iter().chain(&effect.deletes));
-            let overridden = overridden.filter_map(|atom| self.facts.get(atom));
-            operator
-                .condition
-                .literals
-                .iter()
-                .any(|(atom, positive)| *positive && self.facts.get(atom) == Some(fact))
-                && !overridden.into_iter().any(|other| other.variable == fact.variable)
+            let mut facts = atoms.filter_map(|atom| self.fact(*atom));
+            facts.any(|other| other.variable == fact.variable)
         };
-        let mut effects: Vec<_> =
-            effects.into_iter().map(|(variable, value)| Fact { variable, value }).collect();
-        effects.retain(|fact| !known(fact));
+        let required = |fact: &Fact| {
+            let literals = &operator.condition.literals;
+            literals.iter().any(|(atom, positive)| *positive && self.fact(*atom) == Some(*fact))
+        };
+        effects.retain(|fact| !required(fact) || overridden(fact));
         effects.sort_unstable();
         effects
     }
@@ -187,8 +200,11 @@ impl Atoms {
     /// Conditional effects in the order in which they take place: what becomes false, then what becomes true. A
     /// deletion where the operator sets the same variable anyway says nothing: of two atoms of one variable only one holds.
     fn conditional(&self, operator: &GroundOperator) -> Vec<ConditionalEffect> {
+        if operator.conditional.is_empty() {
+            return Vec::new();
+        }
         let set: FxHashSet<VariableId> =
-            operator.adds.iter().filter_map(|atom| self.facts.get(atom)).map(|fact| fact.variable).collect();
+            operator.adds.iter().filter_map(|atom| self.fact(*atom)).map(|fact| fact.variable).collect();
         let added: FxHashSet<&AtomId> = operator.adds.iter().collect();
         let entry = |condition: &[GroundLiteral], mut effects: Vec<Fact>| {
             effects.sort_unstable();
@@ -197,30 +213,27 @@ impl Atoms {
             (!effects.is_empty()).then_some(ConditionalEffect { condition, effects })
         };
         let deletes = operator.conditional.iter().filter_map(|effect| {
-            let gone = effect.deletes.iter().filter_map(|atom| Some((atom, self.facts.get(atom)?)));
+            let gone = effect.deletes.iter().filter_map(|atom| Some((atom, self.fact(*atom)?)));
             let gone = gone.filter(|(atom, fact)| added.contains(atom) || !set.contains(&fact.variable));
-            let none = |(_, fact): (_, &Fact)| Fact { value: self.none[fact.variable.index()], ..*fact };
+            let none = |(_, fact): (_, Fact)| Fact { value: self.none[fact.variable.index()], ..fact };
             entry(&effect.condition, gone.map(none).collect())
         });
         let adds = operator.conditional.iter().filter_map(|effect| {
-            entry(
-                &effect.condition,
-                effect.adds.iter().filter_map(|atom| self.facts.get(atom)).copied().collect(),
-            )
+            entry(&effect.condition, effect.adds.iter().filter_map(|atom| self.fact(*atom)).collect())
         });
         deletes.chain(adds).collect()
     }
 
     /// The rules of derived variables in layers: what a layer depends on comes before it.
-    fn axioms(&self, task: &GroundTask<'_>, numbers: &Numbers) -> Result<Vec<Layer>, Error> {
+    fn axioms(&self, task: &GroundTask<'_>, numbers: &mut Numbers) -> Result<Vec<Layer>, Error> {
         let axioms = &task.world.definitions.axioms;
         let mut layers = Vec::new();
         for component in components(axioms) {
             let mut layer = Layer { rules: Vec::new(), recursive: component.len() > 1 };
             for axiom in axioms.iter().filter(|axiom| component.binary_search(&axiom.head).is_ok()) {
-                let Some(head) = self.facts.get(&axiom.head) else { continue };
+                let Some(head) = self.fact(axiom.head) else { continue };
                 layer.recursive |= axiom.body.atoms().any(|atom| atom == axiom.head);
-                layer.rules.push(Axiom { head: *head, body: condition(&axiom.body, self, numbers)? });
+                layer.rules.push(Axiom { head, body: condition(&axiom.body, self, numbers)? });
             }
             if !layer.rules.is_empty() {
                 layers.push(layer);
@@ -230,20 +243,20 @@ impl Atoms {
     }
 }
 
-/// The numeric variables that conditions depend on, each with the factor that makes all its values integers.
+/// The numeric variables that conditions depend on, with the factor that makes all their values integers.
 struct Numbers {
-    variables: Vec<NumericVariable>,
     initial: Vec<i64>,
     ids: FxHashMap<NumericId, NumericId>,
+    integers: Integers,
 }
 
 impl Numbers {
     fn new(task: &GroundTask<'_>) -> Result<Self, Error> {
         let mut used = FxHashSet::default();
-        let mut rationals: Vec<Rational> = Vec::new();
+        let mut denominator = Denominator::new("numeric fluents");
         let mut note = |linear: &Linear<Rational>| {
             used.extend(linear.coefficients.iter().map(|(variable, _)| *variable));
-            rationals.extend(linear.quantity.numbers());
+            denominator.quantity(&linear.quantity);
         };
         for condition in task.operators.iter().map(|operator| &operator.condition).chain(&task.goal) {
             condition.comparisons.iter().for_each(|(linear, _)| note(linear));
@@ -252,46 +265,42 @@ impl Numbers {
             axiom.body.comparisons.iter().for_each(|(linear, _)| note(linear));
         }
         for operator in &task.operators {
-            operator.numeric_effects.values().for_each(&mut note);
+            operator.numeric_effects.iter().for_each(|(_, value)| note(value));
         }
         let mut used: Vec<_> = used.into_iter().collect();
         used.sort_unstable();
         let initial: Vec<_> = used.iter().map(|variable| initial_value(&task.world, *variable)).collect();
-        let scale = common_denominator(rationals.iter().chain(&initial), "numeric fluents")?;
-        let mut numbers = Self { variables: Vec::new(), initial: Vec::new(), ids: FxHashMap::default() };
-        for (variable, initial) in used.iter().zip(&initial) {
-            numbers.ids.insert(*variable, NumericId(numbers.variables.len() as u32));
-            numbers.variables.push(NumericVariable { scale });
-            numbers.initial.push(integer(initial, scale, "numeric fluents")?);
+        for number in &initial {
+            denominator.number(number);
         }
-        Ok(numbers)
+        let integers = denominator.integers()?;
+        let initial = initial.iter().map(|number| integers.number(number)).collect::<Result<_, _>>()?;
+        let ids = used.into_iter().zip((0..).map(NumericId)).collect();
+        Ok(Self { initial, ids, integers })
     }
 
-    fn scale(&self) -> i64 {
-        self.variables.first().map_or(1, |variable| variable.scale)
-    }
-
-    fn linear(&self, linear: &Linear<Rational>) -> Result<Linear<i64>, Error> {
+    fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<i64>, Error> {
         let overflow = || Error::Overflow { what: "a factor of a numeric fluent".into() };
         let coefficients = linear.coefficients.iter().map(|(variable, factor)| {
             let factor = if factor.is_integer() { factor.to_integer().to_i64() } else { None };
             Ok((self.ids[variable], factor.ok_or_else(overflow)?))
         });
-        let quantity = integers(&linear.quantity, self.scale(), "numeric fluents")?;
-        Ok(Linear { coefficients: coefficients.collect::<Result<_, Error>>()?, quantity })
+        let coefficients = coefficients.collect::<Result<_, Error>>()?;
+        Ok(Linear { coefficients, quantity: self.integers.quantity(&linear.quantity)? })
     }
 
-    fn effects(&self, operator: &GroundOperator) -> Result<Vec<NumericEffect>, Error> {
-        let effects = operator.numeric_effects.iter().filter(|(variable, _)| self.ids.contains_key(variable));
-        effects
-            .map(|(variable, value)| {
-                Ok(NumericEffect { variable: self.ids[variable], value: self.linear(value)? })
-            })
-            .collect()
+    fn effects(&mut self, operator: &GroundOperator) -> Result<Vec<NumericEffect>, Error> {
+        let mut effects = Vec::new();
+        for (variable, value) in operator.numeric_effects.iter() {
+            if let Some(variable) = self.ids.get(variable).copied() {
+                effects.push(NumericEffect { variable, value: self.linear(value)? });
+            }
+        }
+        Ok(effects)
     }
 }
 
-fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &Numbers) -> Result<Condition, Error> {
+fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> Result<Condition, Error> {
     let mut condition = Condition::default();
     for literal in &ground.literals {
         let literal = atoms.literal(*literal);
@@ -331,63 +340,52 @@ fn contradictory(condition: &Condition) -> bool {
 /// A function, and which of the operator's slots for this function it is: an action may require one twice.
 type SlotKey = (ObjectId, usize);
 
-fn slot_keys(operator: &GroundOperator) -> impl Iterator<Item = (SlotKey, &Vec<ObjectId>)> {
-    let slots = operator.slots.iter().enumerate();
-    slots.map(|(position, (function, suitable))| {
-        let earlier = operator.slots[..position].iter().filter(|(other, _)| other == function).count();
+fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectId>)> {
+    slots.iter().enumerate().map(|(position, (function, suitable))| {
+        let earlier = slots[..position].iter().filter(|(other, _)| other == function).count();
         ((*function, earlier), suitable)
     })
 }
 
 /// All functions whose design some operator leaves open, in the order of the objects, with all their designs.
-fn slots(operators: &[GroundOperator]) -> (Vec<Slot>, FxHashMap<SlotKey, SlotId>) {
-    let mut designs: BTreeMap<SlotKey, Vec<ObjectId>> = BTreeMap::new();
-    for (key, suitable) in operators.iter().flat_map(slot_keys) {
-        designs.entry(key).or_default().extend(suitable);
-    }
-    let (mut slots, mut ids) = (Vec::new(), FxHashMap::default());
-    for (key, mut designs) in designs {
-        designs.sort_unstable();
-        designs.dedup();
-        ids.insert(key, SlotId(slots.len() as u32));
-        slots.push(Slot { designs });
-    }
-    (slots, ids)
+struct Slots {
+    all: Vec<Slot>,
+    ids: FxHashMap<SlotKey, SlotId>,
+    /// How slots are used, by where they lie: operators share them.
+    uses: FxHashMap<*const (ObjectId, Vec<ObjectId>), Arc<[SlotUse]>>,
 }
 
-fn slot_uses(slots: &[Slot], ids: &FxHashMap<SlotKey, SlotId>, operator: &GroundOperator) -> Vec<SlotUse> {
-    let mut uses = Vec::new();
-    for (key, suitable) in slot_keys(operator) {
-        let slot = ids[&key];
-        let all = &slots[slot.index()].designs;
-        let designs =
-            suitable.iter().filter_map(|design| all.binary_search(design).ok()).map(|i| i as u16).collect();
-        uses.push(SlotUse { slot, designs });
-    }
-    uses
-}
-
-fn common_denominator<'a>(numbers: impl Iterator<Item = &'a Rational>, what: &str) -> Result<i64, Error> {
-    let mut scale: i128 = 1;
-    for number in numbers {
-        scale = scale.lcm(number.denom());
-        if scale > i128::from(LIMIT) {
-            return Err(Error::Overflow { what: what.into() });
+impl Slots {
+    fn new(operators: &[GroundOperator]) -> Self {
+        let mut seen = FxHashSet::default();
+        let distinct = operators.iter().filter(|operator| seen.insert(operator.slots.as_ptr()));
+        let mut designs: BTreeMap<SlotKey, Vec<ObjectId>> = BTreeMap::new();
+        for (key, suitable) in distinct.flat_map(|operator| slot_keys(&operator.slots)) {
+            designs.entry(key).or_default().extend(suitable);
         }
+        let mut slots = Self { all: Vec::new(), ids: FxHashMap::default(), uses: FxHashMap::default() };
+        for (key, mut designs) in designs {
+            designs.sort_unstable();
+            designs.dedup();
+            slots.ids.insert(key, SlotId(slots.all.len() as u32));
+            slots.all.push(Slot { designs });
+        }
+        slots
     }
-    Ok(scale as i64)
-}
 
-fn integer(number: &Rational, scale: i64, what: &str) -> Result<i64, Error> {
-    let scaled = number * Rational::from_integer(i128::from(scale));
-    match scaled.to_integer().to_i64() {
-        Some(integer) if scaled.is_integer() && integer.abs() < LIMIT => Ok(integer),
-        _ => Err(Error::Overflow { what: what.into() }),
+    fn uses(&mut self, ground: &Arc<GroundSlots>) -> Arc<[SlotUse]> {
+        if let Some(known) = self.uses.get(&ground.as_ptr()) {
+            return known.clone();
+        }
+        let uses: Arc<[SlotUse]> = slot_keys(ground)
+            .map(|(key, suitable)| {
+                let slot = self.ids[&key];
+                let all = &self.all[slot.index()].designs;
+                let designs = suitable.iter().filter_map(|design| all.binary_search(design).ok());
+                SlotUse { slot, designs: designs.map(|index| index as u16).collect() }
+            })
+            .collect();
+        self.uses.insert(ground.as_ptr(), uses.clone());
+        uses
     }
-}
-
-fn integers(quantity: &Quantity<Rational>, scale: i64, what: &str) -> Result<Quantity<i64>, Error> {
-    quantity
-        .map(|number| integer(number, scale, what).ok())
-        .ok_or_else(|| Error::Overflow { what: what.into() })
 }

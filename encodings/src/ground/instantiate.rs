@@ -7,33 +7,38 @@
 //! Conditional effects on atoms stay as they are. An instance whose numbers (cost among them) change under a
 //! condition becomes one operator for each case, and so does one whose start effects are conditional.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
 
-use crate::configuration::{
-    SlotParameter, conjuncts, depends_on_own_start, slots_of_expression, slots_of_formula,
-};
+use rustc_hash::FxHashMap;
+
+use crate::configuration::{SlotParameter, depends_on_own_start};
 use crate::error::{Error, File, Place};
 use crate::ground::derived;
-use crate::ground::effects::cases;
-use crate::ground::evaluate::{AtomId, Binding, Failure, Slots, World, for_each_combination};
+use crate::ground::effects::{Numbers, cases};
+use crate::ground::evaluate::{AtomId, Binding, Failure, Row, Slots, World, for_each_combination};
+use crate::ground::frame::{Frame, Outline};
 use crate::ground::metric::GroundObjective;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::reach::Reached;
 use crate::ground::residual::{Residual, compare};
-use crate::lifted::{Change, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
+use crate::lifted::{Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::limits::Limits;
 use crate::pddl::ast::Span;
-use crate::quantity::{Linear, NumericId, Quantity, SlotSet};
+use crate::quantity::{Linear, Quantity, SlotSet};
 use crate::task::{Argument, Forbidden};
+
+/// The function and the designs that suit an operator, for each slot.
+pub(crate) type GroundSlots = [(ObjectId, Vec<ObjectId>)];
 
 /// An operator over atoms, with exact rationals.
 #[derive(Debug, Clone)]
 pub(crate) struct GroundOperator {
     pub(crate) schema: u32,
     pub(crate) arguments: Vec<Argument>,
-    /// The function and the designs that suit this operator, for each slot.
-    pub(crate) slots: Vec<(ObjectId, Vec<ObjectId>)>,
-    pub(crate) forbidden: Vec<Forbidden>,
+    pub(crate) slots: Arc<GroundSlots>,
+    pub(crate) forbidden: Arc<[Forbidden]>,
     /// Each function that the action requires, with the argument that is its design.
     pub(crate) configuration: Vec<(ObjectId, Argument)>,
     pub(crate) condition: GroundCondition,
@@ -41,7 +46,7 @@ pub(crate) struct GroundOperator {
     pub(crate) deletes: Vec<AtomId>,
     /// After `adds` and `deletes`, those of one entry at once, deletes first.
     pub(crate) conditional: Vec<GroundConditional>,
-    pub(crate) numeric_effects: BTreeMap<NumericId, Linear<Rational>>,
+    pub(crate) numeric_effects: Numbers,
     /// By objective.
     pub(crate) costs: Vec<Quantity<Rational>>,
     pub(crate) duration: Quantity<Rational>,
@@ -91,18 +96,27 @@ pub(crate) fn instantiate<'a>(
             });
             continue;
         }
+        let outline = Outline::new(lifted, schema, slots);
+        let mut frames: FxHashMap<Row, Option<Arc<Frame>>> = FxHashMap::default();
         for binding in instances {
             if operators.len().is_multiple_of(256) && limits.reached() {
                 return Err(vec![Error::Interrupted]);
             }
-            match instance(&mut world, schema, index, slots, binding) {
-                Ok(mut cases) => {
-                    for operator in &mut cases {
-                        operator.configuration =
-                            configuration(&operator.arguments, &designs[index as usize], binding);
-                    }
-                    operators.append(&mut cases);
+            let frame = match frames.entry(outline.key(binding)) {
+                Entry::Occupied(known) => Ok(known.get().clone()),
+                Entry::Vacant(new) => match Frame::new(&mut world, &outline, binding) {
+                    Ok(frame) => Ok(new.insert(frame.map(Arc::new)).clone()),
+                    Err(error) => Err(error),
+                },
+            };
+            let cases = frame.and_then(|frame| match frame {
+                Some(frame) => {
+                    instance(&mut world, &outline, index, &designs[index as usize], &frame, binding)
                 }
+                None => Ok(Vec::new()),
+            });
+            match cases {
+                Ok(mut cases) => operators.append(&mut cases),
                 Err(Failure::Undefined) => {}
                 Err(Failure::Error(error)) => {
                     errors.push(error);
@@ -132,52 +146,50 @@ pub(crate) fn instantiate<'a>(
 /// The cases of one instance. `Failure::Undefined` says that it can never be applied.
 fn instance(
     world: &mut World<'_>,
-    schema: &Schema,
+    outline: &Outline<'_>,
     index: u32,
-    parameters: &[SlotParameter],
+    designs: &[SlotParameter],
+    frame: &Frame,
     core: &Binding,
 ) -> Result<Vec<GroundOperator>, Failure> {
-    let mut binding = core.clone();
-    let mut slots = Slots { parameters, designs: Vec::new() };
-    for (slot, position) in parameters.iter().zip(0..) {
-        let designs = suitable_designs(world, schema, parameters, position, &mut binding)?;
-        if designs.is_empty() {
-            return Err(Failure::Undefined);
+    let mut build = Build { world, binding: core.clone(), slots: &frame.designs, forbidden: Vec::new() };
+    let before = build.conditions(&outline.start.closed, &frame.start)?;
+    let start = build.moment(&outline.schema.start_effects, &frame.start_operands)?;
+    let middle = build.conditions(&outline.middle.closed, &frame.middle)?;
+    let end = build.moment(&outline.schema.end_effects, &frame.end_operands)?;
+    let mut forbidden = frame.forbidden.clone();
+    if !build.forbidden.is_empty() {
+        let mut all = frame.forbidden.to_vec();
+        for rule in &build.forbidden {
+            for combination in &rule.combinations {
+                forbid(&mut all, &rule.slots, combination.clone());
+            }
         }
-        slots.designs.push(designs);
-        binding[slot.parameter as usize] = None;
+        if !admit_some(&all, &frame.designs.sizes()) {
+            return Ok(Vec::new());
+        }
+        forbidden = all.into();
     }
-    let mut build = Build { world, binding, slots, forbidden: Vec::new() };
-    let before = build.conditions(&schema.start_condition)?;
-    let start = build.moment(&schema.start_effects)?;
-    let middle = build.conditions(&schema.middle_condition)?;
-    let end = build.moment(&schema.end_effects)?;
-    let duration = match &schema.duration {
-        Some(duration) => build.static_quantity(duration, schema)?,
-        None => Quantity::constant(Rational::from_integer(0)),
-    };
-    build.forbid_negative(&duration);
-    let sizes: Vec<_> = build.slots.designs.iter().map(Vec::len).collect();
-    if !admit_some(&build.forbidden, &sizes) {
-        return Ok(Vec::new());
-    }
+    let arguments = build.arguments(outline.schema);
     let template = GroundOperator {
         schema: index,
-        arguments: build.arguments(schema),
-        slots: build.functions()?,
-        forbidden: std::mem::take(&mut build.forbidden),
-        configuration: Vec::new(),
+        configuration: configuration(&arguments, designs, core),
+        arguments,
+        slots: frame.slots.clone(),
+        forbidden,
         condition: GroundCondition::default(),
         adds: Vec::new(),
         deletes: Vec::new(),
         conditional: Vec::new(),
-        numeric_effects: BTreeMap::new(),
+        numeric_effects: Numbers::default(),
         costs: Vec::new(),
-        duration,
+        duration: frame.duration.clone(),
     };
     let mut operators = Vec::new();
-    for case in cases(schema, &before, &start, &middle, &end)? {
-        match case.operator(build.world, &template) {
+    let cases = cases(outline.schema, before, &start, &middle, end)?;
+    let templates = std::iter::repeat_n(template, cases.len());
+    for (case, template) in std::iter::zip(cases, templates) {
+        match case.operator(build.world, template) {
             Ok(operator) => operators.push(operator),
             Err(Failure::Undefined) => {}
             Err(error) => return Err(error),
@@ -198,78 +210,38 @@ fn configuration(
         .collect()
 }
 
-/// The candidates of one slot for which everything that depends on this slot alone is true and defined.
-fn suitable_designs(
-    world: &mut World<'_>,
-    schema: &Schema,
-    parameters: &[SlotParameter],
-    position: u16,
-    binding: &mut Binding,
-) -> Result<Vec<ObjectId>, Failure> {
-    let only = SlotSet::from_slice(&[position]);
-    let parameter = parameters[position as usize].parameter as usize;
-    let all = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
-    let conditions: Vec<_> = all.filter(|c| slots_of_formula(c, parameters) == only).collect();
-    let effects = schema.start_effects.iter().chain(&schema.end_effects);
-    let unconditional =
-        effects.filter(|effect| effect.bound.is_empty() && conjuncts(&effect.condition).is_empty());
-    let effects = unconditional.filter_map(|effect| match &effect.change {
-        Change::Assign { expression, .. } => Some(expression),
-        _ => None,
-    });
-    let expressions: Vec<_> =
-        effects.chain(&schema.duration).filter(|e| slots_of_expression(e, parameters) == only).collect();
-    let mut designs = Vec::new();
-    for design in schema.parameters[parameter].candidates.iter() {
-        binding[parameter] = Some(*design);
-        let mut suits = true;
-        for condition in &conditions {
-            suits = suits && !matches!(world.residual(condition, binding)?, Residual::False);
-        }
-        for expression in &expressions {
-            suits = suits && defined(world.ground(expression, binding))?;
-        }
-        if suits {
-            designs.push(*design);
-        }
-    }
-    binding[parameter] = None;
-    Ok(designs)
-}
-
-fn defined<T>(value: Result<T, Failure>) -> Result<bool, Failure> {
-    match value {
-        Ok(_) => Ok(true),
-        Err(Failure::Undefined) => Ok(false),
-        Err(error) => Err(error),
-    }
-}
-
 /// An instance under construction.
 pub(super) struct Build<'w, 'a> {
     pub(super) world: &'w mut World<'a>,
     pub(super) binding: Binding,
-    slots: Slots<'w>,
-    forbidden: Vec<Forbidden>,
+    pub(super) slots: &'w Slots<'w>,
+    pub(super) forbidden: Vec<Forbidden>,
 }
 
 impl Build<'_, '_> {
-    /// The conjuncts that remain; combinations of designs that break a static one are forbidden.
-    fn conditions(&mut self, formula: &Formula) -> Result<Vec<Residual>, Failure> {
+    /// What is left of conjuncts that mention no slot, after what is left of those that do.
+    fn conditions(&mut self, closed: &[&Formula], open: &[Residual]) -> Result<Vec<Residual>, Failure> {
+        let mut parts = Vec::with_capacity(open.len() + closed.len());
+        parts.extend_from_slice(open);
+        for conjunct in closed {
+            parts.push(self.world.residual(conjunct, &mut self.binding)?);
+        }
+        Ok(parts)
+    }
+
+    /// What is left of conjuncts that mention slots; combinations of designs that break a static one are forbidden.
+    pub(super) fn open_conditions(&mut self, open: &[(&Formula, SlotSet)]) -> Result<Vec<Residual>, Failure> {
         let mut parts = Vec::new();
-        for conjunct in conjuncts(formula) {
-            let mentioned = slots_of_formula(conjunct, self.slots.parameters);
-            if mentioned.is_empty() {
-                parts.push(self.world.residual(conjunct, &mut self.binding)?);
-            } else if let Formula::Compare(comparison, left, right, _) = conjunct {
+        for (conjunct, mentioned) in open {
+            if let Formula::Compare(comparison, left, right, _) = conjunct {
                 let (left, right) = (self.open(left)?, self.open(right)?);
                 let static_part = left.coefficients.is_empty() && right.coefficients.is_empty();
                 match compare(*comparison, left, right) {
-                    residual if static_part => self.forbid(&mentioned, &residual),
+                    residual if static_part => self.forbid(mentioned, &residual),
                     residual => parts.push(residual),
                 }
             } else if mentioned.len() > 1 {
-                self.forbid_unless(conjunct, &mentioned)?;
+                self.forbid_unless(conjunct, mentioned)?;
             }
         }
         Ok(parts)
@@ -278,7 +250,7 @@ impl Build<'_, '_> {
     pub(super) fn open(&mut self, expression: &Expression) -> Result<Linear<Rational>, Failure> {
         let forbidden = &mut self.forbidden;
         let mut undefined = |slots: &SlotSet, combination: SlotSet| forbid(forbidden, slots, combination);
-        self.world.open(expression, &mut self.binding, &self.slots, &mut undefined)
+        self.world.open(expression, &mut self.binding, self.slots, &mut undefined)
     }
 
     /// Forbids the combinations of designs for which a static comparison fails.
@@ -287,7 +259,7 @@ impl Build<'_, '_> {
             Residual::And(parts) => parts.iter().for_each(|part| self.forbid(mentioned, part)),
             Residual::False => self.forbid_where(mentioned, &|_| true),
             Residual::Compare { linear, strict } => {
-                let sizes: Vec<_> = self.slots.designs.iter().map(Vec::len).collect();
+                let sizes = self.slots.sizes();
                 self.forbid_where(mentioned, &|choice| {
                     let value = linear.quantity.at(choice, &sizes);
                     value < Rational::from_integer(0) || (*strict && value == Rational::from_integer(0))
@@ -300,7 +272,7 @@ impl Build<'_, '_> {
     fn forbid_where(&mut self, mentioned: &SlotSet, fails: &dyn Fn(&[u16]) -> bool) {
         let mut choice = vec![0; self.slots.designs.len()];
         let forbidden = &mut self.forbidden;
-        for_each_combination(mentioned, &self.slots, &mut self.binding, &mut |_, combination| {
+        for_each_combination(mentioned, self.slots, &mut self.binding, &mut |_, combination| {
             for (slot, design) in mentioned.iter().zip(combination) {
                 choice[*slot as usize] = *design;
             }
@@ -311,7 +283,7 @@ impl Build<'_, '_> {
     }
 
     /// Forbids the combinations of designs with which the action would end before it begins.
-    fn forbid_negative(&mut self, duration: &Quantity<Rational>) {
+    pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) {
         let zero = Rational::from_integer(0);
         let least = duration.tables.iter().filter_map(|table| table.values.iter().min());
         if least.fold(duration.constant, |sum, value| sum + value) >= zero {
@@ -319,7 +291,7 @@ impl Build<'_, '_> {
         }
         let slots: BTreeSet<u16> =
             duration.tables.iter().flat_map(|table| table.slots.iter().copied()).collect();
-        let sizes: Vec<_> = self.slots.designs.iter().map(Vec::len).collect();
+        let sizes = self.slots.sizes();
         self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero);
     }
 
@@ -327,17 +299,20 @@ impl Build<'_, '_> {
     fn forbid_unless(&mut self, conjunct: &Formula, mentioned: &SlotSet) -> Result<(), Failure> {
         let (world, forbidden) = (&mut *self.world, &mut self.forbidden);
         let mut failure = None;
-        for_each_combination(mentioned, &self.slots, &mut self.binding, &mut |binding, combination| {
-            match world.residual(conjunct, &mut binding.clone()) {
+        for_each_combination(
+            mentioned,
+            self.slots,
+            &mut self.binding,
+            &mut |binding, combination| match world.residual(conjunct, &mut binding.clone()) {
                 Ok(Residual::False) => forbid(forbidden, mentioned, SlotSet::from_slice(combination)),
                 Ok(_) => {}
                 Err(error) => failure = Some(error),
-            }
-        });
+            },
+        );
         failure.map_or(Ok(()), Err)
     }
 
-    fn static_quantity(
+    pub(super) fn static_quantity(
         &mut self,
         expression: &Expression,
         schema: &Schema,
@@ -365,18 +340,10 @@ impl Build<'_, '_> {
             })
             .collect()
     }
-
-    fn functions(&self) -> Result<Vec<(ObjectId, Vec<ObjectId>)>, Failure> {
-        let function = |term: Term| World::arguments(&[term], &self.binding).first().copied();
-        let pairs = self.slots.parameters.iter().zip(&self.slots.designs);
-        pairs
-            .map(|(slot, designs)| Ok((function(slot.function).ok_or(Failure::Undefined)?, designs.clone())))
-            .collect()
-    }
 }
 
 /// Whether some combination of designs is not forbidden.
-fn admit_some(forbidden: &[Forbidden], sizes: &[usize]) -> bool {
+pub(super) fn admit_some(forbidden: &[Forbidden], sizes: &[usize]) -> bool {
     let mut choice = vec![0_u16; sizes.len()];
     loop {
         let hits = |rule: &Forbidden, bad: &SlotSet| {

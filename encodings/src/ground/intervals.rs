@@ -58,7 +58,7 @@ fn reachable(task: &GroundTask<'_>) -> Vec<Interval> {
     loop {
         let before = intervals.clone();
         for operator in changing.iter().filter(|operator| can_hold(&operator.condition, &before)) {
-            for (variable, value) in &operator.numeric_effects {
+            for (variable, value) in operator.numeric_effects.iter() {
                 let range = range(value, &before);
                 let own = &mut intervals[variable.index()];
                 own.low = own.low.zip(range.low).map(|(a, b)| a.min(b));

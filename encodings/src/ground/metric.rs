@@ -4,11 +4,15 @@
 //! the state, so that the metric of a plan is an offset plus the sum of its operators' costs. A metric to maximize is
 //! negated. Without a metric, plans of durative actions are measured by total time, others by their length.
 
-use num_traits::Zero;
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+
+use num_traits::{One, Zero};
 
 use crate::error::{Error, Place};
 use crate::ground::evaluate::{Failure, World};
 use crate::ground::instantiate::{GroundOperator, GroundTask};
+use crate::ground::integers::TableMap;
 use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::pddl::ast::Direction;
 use crate::quantity::{Linear, NumericId, Quantity};
@@ -54,8 +58,9 @@ fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric) -> Result
         linear.coefficients.iter().map(|(variable, factor)| initial_value(&task.world, *variable) * factor);
     let offset = initial.fold(linear.quantity.constant, |sum, value| sum + value);
     task.objectives.push(GroundObjective { offset, maximize });
+    let mut scaled = Scaled::default();
     for operator in &mut task.operators {
-        let cost = cost(operator, &linear, time).ok_or_else(|| Error::Unsupported {
+        let cost = cost(operator, &linear, time, &mut scaled).ok_or_else(|| Error::Unsupported {
             construct: format!(
                 "a metric over a fluent that `{}` changes depending on the state",
                 lifted.schemas[operator.schema as usize].name
@@ -71,7 +76,7 @@ fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric) -> Result
 /// The initial value of a numeric variable; 0 for a `total-cost` to which the file gives none.
 pub(crate) fn initial_value(world: &World<'_>, variable: NumericId) -> Rational {
     let key = world.numerics.get_index(variable.index()).map(|(key, ())| key);
-    key.and_then(|key| world.values.get(key)).copied().unwrap_or_else(Rational::zero)
+    key.and_then(|(function, arguments)| world.value(*function, arguments)).unwrap_or_else(Rational::zero)
 }
 
 /// The part of the metric over fluents, and the factor of total time.
@@ -141,19 +146,40 @@ fn multiply(
     Some((linear, time * factor.quantity.constant))
 }
 
+/// Quantities times the factors of a metric; what operators share, they share afterwards.
+#[derive(Default)]
+struct Scaled {
+    by_factor: BTreeMap<Rational, TableMap<Rational>>,
+}
+
+impl Scaled {
+    fn times(&mut self, quantity: &Quantity<Rational>, factor: Rational) -> Quantity<Rational> {
+        if factor.is_one() {
+            return quantity.clone();
+        }
+        if factor.is_zero() {
+            return Quantity::constant(factor);
+        }
+        let tables = self.by_factor.entry(factor).or_insert_with(TableMap::new);
+        let Ok(scaled) = tables.map::<Infallible>(quantity, &|number| Ok(number * factor));
+        scaled
+    }
+}
+
 /// What one application adds to the metric; none if that depends on the state.
-fn cost(operator: &GroundOperator, metric: &Linear<Rational>, time: Rational) -> Option<Quantity<Rational>> {
-    let mut total = operator.duration.clone();
-    total.scale(&time);
+fn cost(
+    operator: &GroundOperator,
+    metric: &Linear<Rational>,
+    time: Rational,
+    scaled: &mut Scaled,
+) -> Option<Quantity<Rational>> {
+    let mut total = scaled.times(&operator.duration, time);
     for (variable, factor) in &metric.coefficients {
-        let Some(value) = operator.numeric_effects.get(variable) else { continue };
-        let unit = Rational::from_integer(1);
-        if value.coefficients[..] != [(*variable, unit)] {
+        let Some(value) = operator.numeric_effects.get(*variable) else { continue };
+        if value.coefficients[..] != [(*variable, Rational::one())] {
             return None;
         }
-        let mut change = value.quantity.clone();
-        change.scale(factor);
-        total.add(&change);
+        total.add(&scaled.times(&value.quantity, *factor));
     }
     Some(total)
 }

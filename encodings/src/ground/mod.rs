@@ -10,7 +10,9 @@ mod derived;
 mod effects;
 mod evaluate;
 mod finish;
+mod frame;
 mod instantiate;
+mod integers;
 mod intervals;
 mod join;
 mod metric;
@@ -71,5 +73,5 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Tas
         return Err(vec![Error::Interrupted]);
     }
     let unreachable = prune::prune(&lifted, &mut ground);
-    finish::finish(&lifted, &ground, unreachable).map_err(|error| vec![error])
+    finish::finish(&lifted, ground, unreachable).map_err(|error| vec![error])
 }

@@ -9,7 +9,8 @@
 
 use std::collections::BTreeMap;
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashSet;
+use smallvec::SmallVec;
 
 use crate::ground::evaluate::AtomId;
 use crate::ground::instantiate::{GroundOperator, GroundTask};
@@ -24,7 +25,7 @@ struct Part {
 }
 
 type Candidate = Vec<Part>;
-type Key = Vec<ObjectId>;
+type Key = SmallVec<[ObjectId; 4]>;
 
 /// How many candidates are tried before the search gives up refining.
 const CANDIDATE_LIMIT: usize = 500;
@@ -145,26 +146,28 @@ fn broken_by<'o>(
         adds: &effect.adds,
         deletes: &effect.deletes,
     });
-    let effects = operator.conditional.iter().flat_map(|effect| &effect.deletes);
-    let deleted: FxHashSet<_> = operator.deletes.iter().chain(effects).collect();
+    let deleted = |atom: &AtomId| {
+        let mut effects = operator.conditional.iter().map(|effect| &effect.deletes);
+        operator.deletes.contains(atom) || effects.any(|deletes| deletes.contains(atom))
+    };
     // Each entry has to keep the weight by itself, and no two of them may add to one key.
-    let mut adding: FxHashSet<Key> = FxHashSet::default();
+    let mut adding: Vec<Key> = Vec::new();
     for change in std::iter::once(own).chain(conditional) {
-        let mut added: FxHashSet<Key> = FxHashSet::default();
-        let mut balance: FxHashMap<Key, i32> = FxHashMap::default();
-        let comes = |atom: &&AtomId| !change.requires(**atom) || deleted.contains(atom);
-        for atom in change.adds.iter().filter(comes) {
-            if let Some(key) = key_of(task, candidate, *atom) {
-                added.insert(key.clone());
-                *balance.entry(key).or_default() += 1;
-            }
-        }
+        let mut balance: SmallVec<[(Key, i32); 4]> = SmallVec::new();
+        let mut weigh = |key: Key, weight| match balance.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, sum)) => *sum += weight,
+            None => balance.push((key, weight)),
+        };
+        let comes = |atom: &&AtomId| !change.requires(**atom) || deleted(atom);
+        let added = change.adds.iter().filter(comes).filter_map(|atom| key_of(task, candidate, *atom));
+        let added: SmallVec<[Key; 4]> = added.collect();
+        added.iter().for_each(|key| weigh(key.clone(), 1));
         for atom in change.deletes {
             if let Some(key) = key_of(task, candidate, *atom) {
                 if !change.requires(*atom) {
                     return Some((operator, key));
                 }
-                *balance.entry(key).or_default() -= 1;
+                weigh(key, -1);
             }
         }
         let heavy = balance.into_iter().filter(|(_, weight)| *weight > 0).map(|(key, _)| key);
@@ -172,7 +175,9 @@ fn broken_by<'o>(
         if let Some(key) = heavy.chain(twice).min() {
             return Some((operator, key));
         }
-        adding.extend(added);
+        if !operator.conditional.is_empty() {
+            adding.extend(added);
+        }
     }
     None
 }

@@ -11,7 +11,7 @@ use crate::ground::evaluate::{AtomId, World};
 use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::intervals::{goal_can_hold, prune_by_numbers};
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
-use crate::lifted::{Arguments, Formula, Lifted, PredicateId, Rational};
+use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Rational};
 use crate::quantity::{NumericId, Quantity};
 
 /// Prunes the task in place; returns a reason if the goal cannot be reached even if nothing is ever deleted.
@@ -67,7 +67,7 @@ pub(crate) fn atom_name(lifted: &Lifted, task: &GroundTask<'_>, atom: AtomId) ->
     found.map_or_else(String::new, |((predicate, arguments), ())| name(lifted, *predicate, arguments))
 }
 
-fn name(lifted: &Lifted, predicate: PredicateId, arguments: &Arguments) -> String {
+fn name(lifted: &Lifted, predicate: PredicateId, arguments: &[ObjectId]) -> String {
     let Some(symbol) = lifted.predicates.get(predicate.index()) else {
         let number = arguments.first().map_or(0, |number| number.0);
         return format!("condition {number}");
@@ -144,7 +144,7 @@ fn drop_unread_numerics(task: &mut GroundTask<'_>) {
         .collect();
     let mut read: FxHashSet<NumericId> = open.iter().copied().collect();
     while let Some(variable) = open.pop() {
-        let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(&variable));
+        let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));
         for (source, _) in values.flat_map(|value| &value.coefficients) {
             if read.insert(*source) {
                 open.push(*source);
@@ -152,7 +152,7 @@ fn drop_unread_numerics(task: &mut GroundTask<'_>) {
         }
     }
     for operator in &mut task.operators {
-        operator.numeric_effects.retain(|variable, _| read.contains(variable));
+        operator.numeric_effects.retain(&|variable| read.contains(&variable));
     }
 }
 
@@ -180,11 +180,15 @@ fn backward(task: &mut GroundTask<'_>) {
 
 /// The atoms that conditions read, directly or through rules.
 pub(crate) fn read_atoms(task: &GroundTask<'_>) -> FxHashSet<AtomId> {
-    let mut read: FxHashSet<AtomId> = FxHashSet::default();
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
-    conditions.for_each(|condition| read.extend(condition.atoms()));
     let conditional = task.operators.iter().flat_map(|operator| &operator.conditional);
-    read.extend(conditional.flat_map(|effect| effect.condition.iter().map(|(atom, _)| *atom)));
+    let conditional = conditional.flat_map(|effect| effect.condition.iter().map(|(atom, _)| *atom));
+    let mut direct = vec![false; task.world.atoms.len()];
+    for atom in conditions.flat_map(GroundCondition::atoms).chain(conditional) {
+        direct[atom.index()] = true;
+    }
+    let direct = direct.into_iter().zip(0..).filter(|(read, _)| *read);
+    let mut read: FxHashSet<AtomId> = direct.map(|(_, atom)| AtomId(atom)).collect();
     let mut bodies: FxHashMap<AtomId, Vec<&GroundCondition>> = FxHashMap::default();
     for axiom in &task.world.definitions.axioms {
         bodies.entry(axiom.head).or_default().push(&axiom.body);
@@ -199,13 +203,13 @@ pub(crate) fn read_atoms(task: &GroundTask<'_>) -> FxHashSet<AtomId> {
 
 /// Whether the operator changes nothing and cannot lower the cost of a plan.
 fn is_idle(operator: &GroundOperator) -> bool {
-    let known: FxHashSet<_> = operator.condition.literals.iter().copied().collect();
+    let known = |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();
     let lowest = |cost: &Quantity<Rational>| {
         let tables = cost.tables.iter().filter_map(|table| table.values.iter().min());
         tables.fold(cost.constant, |sum, value| sum + value)
     };
-    operator.adds.iter().all(|atom| known.contains(&(*atom, true)))
-        && operator.deletes.iter().all(|atom| known.contains(&(*atom, false)))
+    operator.adds.iter().all(|atom| known(*atom, true))
+        && operator.deletes.iter().all(|atom| known(*atom, false))
         && operator.conditional.is_empty()
         && operator.numeric_effects.iter().all(|(variable, value)| {
             value.quantity.is_zero() && value.coefficients[..] == [(*variable, Rational::from_integer(1))]

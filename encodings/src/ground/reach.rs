@@ -10,11 +10,11 @@
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
 use rules::{Atom, Engine, Program, Symbol};
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
-use crate::configuration::{SlotParameter, conjuncts, formula_terms};
+use crate::configuration::{SlotParameter, atoms, conjuncts, formula_terms};
 use crate::error::Error;
-use crate::ground::evaluate::Binding;
+use crate::ground::evaluate::{AtomSet, Binding};
 use crate::ground::relaxed::{Builder, Candidates};
 use crate::lifted::{
     Arguments, Axiom, Bound, Change, Effect, Formula, Lifted, ObjectId, PredicateId, Schema, Term,
@@ -26,7 +26,7 @@ pub(crate) struct Reached {
     /// For each schema the bindings of its parameters apart from slots, ascending.
     pub(crate) instances: Vec<Vec<Binding>>,
     /// The fluent atoms that can become true.
-    pub(crate) atoms: FxHashSet<(PredicateId, Arguments)>,
+    pub(crate) atoms: AtomSet,
     /// What follows by static derived predicates.
     pub(crate) derived: Vec<(PredicateId, Arguments)>,
 }
@@ -53,7 +53,7 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
         row.iter().filter_map(|symbol| objects.get(symbol)).copied().collect()
     };
 
-    let (mut atoms, mut derived) = (FxHashSet::default(), Vec::new());
+    let (mut atoms, mut derived) = (AtomSet::default(), Vec::new());
     for (predicate, id) in lifted.predicates.iter().zip((0..).map(PredicateId)) {
         let any = vec![None; predicate.arity];
         let rows = engine.matching(symbols.predicates[id.index()], &any).map(|row| (id, read(&row)));
@@ -215,14 +215,9 @@ fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
 
 /// Whether a condition mentions one of the given predicates, or a derived one.
 fn mentions_fluent(lifted: &Lifted, formula: &Formula, predicates: &[PredicateId]) -> bool {
-    match formula {
-        Formula::And(parts) | Formula::Or(parts) => {
-            parts.iter().any(|part| mentions_fluent(lifted, part, predicates))
-        }
-        Formula::Exists(_, body) | Formula::ForAll(_, body) => mentions_fluent(lifted, body, predicates),
-        Formula::Literal { predicate, .. } => {
-            predicates.contains(predicate) || lifted.predicates[predicate.index()].derived
-        }
-        Formula::Equal { .. } | Formula::Compare(..) => false,
-    }
+    let mut found = false;
+    atoms(formula, &mut |predicate| {
+        found |= predicates.contains(&predicate) || lifted.predicates[predicate.index()].derived;
+    });
+    found
 }

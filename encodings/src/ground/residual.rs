@@ -90,7 +90,7 @@ impl World<'_> {
                 if !self.is_reached(*predicate, &arguments) {
                     return Ok(truth(!positive));
                 }
-                Ok(Residual::Literal { atom: self.atom(*predicate, arguments), positive: *positive })
+                Ok(Residual::Literal { atom: self.atom(*predicate, &arguments), positive: *positive })
             }
             Formula::Compare(comparison, left, right, place) => {
                 let difference = match (self.ground(left, binding), self.ground(right, binding)) {

@@ -1,0 +1,120 @@
+//! Exact rationals to integers: one factor for all numbers of a kind, and each table converted once.
+
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+
+use num_integer::Integer;
+use num_traits::{One, ToPrimitive};
+use rustc_hash::FxHashMap;
+
+use crate::error::Error;
+use crate::lifted::Rational;
+use crate::quantity::{Quantity, Table};
+
+/// Integers of a task stay below this, so that sums over a plan fit 64 bits.
+const LIMIT: i64 = 1 << 46;
+
+/// The values of a table, and what they are mapped to.
+type Mapped<M> = (Arc<[Rational]>, Arc<[M]>);
+
+/// Maps numbers of quantities; tables that operators share stay shared.
+#[derive(Debug)]
+pub(super) struct TableMap<M> {
+    /// By where a table lies; it is kept, so that nothing else can come to lie there.
+    done: FxHashMap<*const Rational, Mapped<M>>,
+}
+
+impl<M> TableMap<M> {
+    pub(super) fn new() -> Self {
+        Self { done: FxHashMap::default() }
+    }
+
+    pub(super) fn map<E>(
+        &mut self,
+        quantity: &Quantity<Rational>,
+        f: &dyn Fn(&Rational) -> Result<M, E>,
+    ) -> Result<Quantity<M>, E> {
+        let mut tables = Vec::with_capacity(quantity.tables.len());
+        for table in &quantity.tables {
+            let values = match self.done.entry(table.values.as_ptr()) {
+                Entry::Occupied(known) => &known.into_mut().1,
+                Entry::Vacant(new) => {
+                    let values = table.values.iter().map(f).collect::<Result<_, _>>()?;
+                    &new.insert((table.values.clone(), values)).1
+                }
+            };
+            tables.push(Table { slots: table.slots.clone(), values: values.clone() });
+        }
+        Ok(Quantity { constant: f(&quantity.constant)?, tables })
+    }
+}
+
+/// The least factor that makes all numbers of one kind integers.
+#[derive(Debug)]
+pub(super) struct Denominator {
+    what: &'static str,
+    common: i128,
+    /// Tables that have been looked at.
+    seen: FxHashMap<*const Rational, Arc<[Rational]>>,
+}
+
+impl Denominator {
+    /// `what` names the numbers in errors.
+    pub(super) fn new(what: &'static str) -> Self {
+        Self { what, common: 1, seen: FxHashMap::default() }
+    }
+
+    pub(super) fn number(&mut self, number: &Rational) {
+        if self.common <= i128::from(LIMIT) && !number.denom().is_one() {
+            self.common = self.common.lcm(number.denom());
+        }
+    }
+
+    pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) {
+        self.number(&quantity.constant);
+        for table in &quantity.tables {
+            if let Entry::Vacant(new) = self.seen.entry(table.values.as_ptr()) {
+                let values = new.insert(table.values.clone()).clone();
+                values.iter().for_each(|number| self.number(number));
+            }
+        }
+    }
+
+    /// The conversion.
+    ///
+    /// # Errors
+    /// `Error::Overflow` if the factor is too large.
+    pub(super) fn integers(self) -> Result<Integers, Error> {
+        if self.common > i128::from(LIMIT) {
+            return Err(Error::Overflow { what: self.what.into() });
+        }
+        Ok(Integers { what: self.what, scale: self.common as i64, tables: TableMap::new() })
+    }
+}
+
+/// Turns numbers of one kind into integers.
+#[derive(Debug)]
+pub(super) struct Integers {
+    what: &'static str,
+    pub(super) scale: i64,
+    tables: TableMap<i64>,
+}
+
+impl Integers {
+    pub(super) fn number(&self, number: &Rational) -> Result<i64, Error> {
+        integer(number, self.scale, self.what)
+    }
+
+    pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<i64>, Error> {
+        let (scale, what) = (self.scale, self.what);
+        self.tables.map(quantity, &|number| integer(number, scale, what))
+    }
+}
+
+fn integer(number: &Rational, scale: i64, what: &str) -> Result<i64, Error> {
+    let scaled = number * Rational::from_integer(i128::from(scale));
+    match scaled.to_integer().to_i64() {
+        Some(integer) if scaled.is_integer() && integer.abs() < LIMIT => Ok(integer),
+        _ => Err(Error::Overflow { what: what.into() }),
+    }
+}
