@@ -148,7 +148,8 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     }
 }
 
-/// Whether a condition after the start effects of a durative action asks for a derived predicate that they may change.
+/// Whether a condition after the start effects of a durative action asks for a derived predicate that they, or what
+/// happens by itself, may change.
 pub(crate) fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
     let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
     let conditions =
@@ -167,10 +168,12 @@ pub(crate) fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
             });
         }
     }
-    schema.start_effects.iter().any(|effect| match &effect.change {
+    let own = schema.start_effects.iter().any(|effect| match &effect.change {
         Change::Add(predicate, _) | Change::Delete(predicate, _) => seen.contains(predicate),
         Change::Assign { .. } => numbers,
-    })
+    });
+    let changes = lifted.events.iter().flat_map(|event| &event.changes);
+    own || changes.into_iter().any(|(predicate, ..)| schema.duration.is_some() && seen.contains(predicate))
 }
 
 /// Derived predicates that depend on themselves through a universal quantifier.

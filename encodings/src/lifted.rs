@@ -58,6 +58,9 @@ pub(crate) struct Lifted {
     /// Initial facts in the order of the file, without repetitions.
     pub(crate) facts: Vec<(PredicateId, Arguments)>,
     pub(crate) values: Vec<(FunctionId, Arguments, Rational)>,
+    /// What happens by itself, in the order of time.
+    pub(crate) events: Vec<Event>,
+    pub(crate) time: Time,
     pub(crate) goal: Formula,
     /// How many variables the quantifiers of the goal bind.
     pub(crate) goal_variables: usize,
@@ -93,10 +96,31 @@ pub(crate) struct Schema {
     pub(crate) start_effects: Vec<Effect>,
     /// Must hold after the start effects: `over all` and `at end` of a durative action.
     pub(crate) middle_condition: Formula,
+    /// The part of it that must hold from the start to the end; the planner asks only if something happens by itself.
+    pub(crate) over_all: Formula,
     pub(crate) end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; none for an instantaneous action.
     pub(crate) duration: Option<Expression>,
     pub(crate) place: Place,
+}
+
+/// What stands for time in a task in which something happens by itself.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Time {
+    pub(crate) clock: FunctionId,
+    /// `(phase NUMBER)`: how many events have taken place.
+    pub(crate) phase: PredicateId,
+    /// The object for phase 0; those of the others follow.
+    pub(crate) first_phase: ObjectId,
+    pub(crate) waited: PredicateId,
+}
+
+/// Timed initial literals of one time: each becomes true or false then.
+#[derive(Debug, Clone)]
+pub(crate) struct Event {
+    /// In the domain's time unit, from the start of the plan.
+    pub(crate) time: Rational,
+    pub(crate) changes: Vec<(PredicateId, Arguments, bool)>,
 }
 
 /// A rule of a derived predicate: the atom over the parameters holds where the condition does.

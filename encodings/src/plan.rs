@@ -80,7 +80,8 @@ pub struct Step {
     pub configuration: Vec<(String, String)>,
     /// Functions whose design differs from the one that the last step with this function used.
     pub reconfigured: Vec<String>,
-    /// When the action starts, in the domain's time unit, actions executing one after another.
+    /// When the action starts, in the domain's time unit, actions executing one after another. There is nothing between
+    /// them but time to wait for timed initial literals.
     pub start: Exact,
     /// How long it takes; none for an instantaneous action.
     pub duration: Exact,
@@ -105,6 +106,10 @@ pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
     let sign = if task.objective.maximize { -1 } else { 1 };
     for step in &plan.steps {
         let operator = &task.operators[step.operator.index()];
+        if let Some(time) = operator.wait {
+            clock = time;
+            continue;
+        }
         let sizes = operator.sizes();
         let duration = operator.duration.at(&step.choice, &sizes);
         let configuration = configuration(task, operator, &step.choice);

@@ -155,6 +155,8 @@ pub(crate) struct Operator {
     pub(crate) others: Vec<Quantity<i64>>,
     /// In the task's time unit.
     pub(crate) duration: Quantity<i64>,
+    /// Set if this is no action but a wait until that time, in the task's time unit from the start of the plan.
+    pub(crate) wait: Option<i64>,
 }
 
 /// A state: a value for each variable.

@@ -2,13 +2,14 @@
 
 use crate::error::{Error, Place};
 use crate::ground::evaluate::{AtomId, Failure, World};
+use crate::ground::events::Passage;
 use crate::ground::frame::Operand;
 use crate::ground::instantiate::{Build, GroundConditional, GroundOperator};
 use crate::ground::join::guards_of_exists;
 use crate::ground::residual::{Residual, constant_comparison};
 use crate::lifted::{Change, Effect, Rational, Schema};
 use crate::pddl::ast::Assignment;
-use crate::quantity::{Linear, NumericId};
+use crate::quantity::{Linear, NumericId, Quantity};
 
 /// An instance becomes at most this many operators.
 const CASE_LIMIT: usize = 64;
@@ -38,6 +39,11 @@ impl Numbers {
         self.changes.retain(|(variable, _)| keep(*variable));
     }
 
+    /// One variable that changes.
+    pub(super) fn one(variable: NumericId, value: Linear<Rational>) -> Self {
+        Self { changes: vec![(variable, value)] }
+    }
+
     fn insert(&mut self, variable: NumericId, value: Linear<Rational>) {
         match self.changes.binary_search_by_key(&variable, |(own, _)| *own) {
             Ok(position) => self.changes[position].1 = value,
@@ -47,6 +53,7 @@ impl Numbers {
 }
 
 /// What the start or the end of an instance changes, each change under a condition.
+#[derive(Clone)]
 pub(super) struct Moment {
     changes: Vec<(Residual, GroundChange)>,
 }
@@ -151,9 +158,44 @@ impl Moment {
 }
 
 impl Start {
+    fn change(&mut self, changes: &[(AtomId, bool)]) {
+        for (atom, holds) in changes {
+            self.adds.retain(|known| known != atom);
+            self.deletes.retain(|known| known != atom);
+            if *holds { &mut self.adds } else { &mut self.deletes }.push(*atom);
+        }
+    }
+
     fn new<'c, I: Iterator<Item = &'c GroundChange>>(changes: impl Fn() -> I) -> Result<Self, Failure> {
         let (adds, deletes) = atoms(changes());
         Ok(Self { adds, deletes, numbers: numbers(changes(), &Numbers::default())? })
+    }
+}
+
+/// What must hold between the start effects and the end effects, and what happens by itself in between.
+pub(super) struct Middle<'m> {
+    pub(super) conditions: &'m [Residual],
+    /// Those that hold all the time.
+    pub(super) over_all: &'m [Residual],
+    pub(super) passage: Option<(Passage<'m>, &'m Quantity<Rational>)>,
+}
+
+impl Middle<'_> {
+    /// Adds the conditions in terms of the state before the start, and to the start what happens until the end.
+    fn pass(&self, start: &mut Start, parts: &mut Vec<Residual>) {
+        if let Some((passage, duration)) = &self.passage {
+            parts.extend(passage.conditions(duration));
+            for event in passage.events() {
+                parts.extend(self.over_all.iter().map(|residual| after_start(residual, start)));
+                start.change(event);
+            }
+        }
+        parts.extend(self.conditions.iter().map(|residual| after_start(residual, start)));
+        if let Some((passage, duration)) = &self.passage {
+            start.change(&passage.changes());
+            let (clock, value) = passage.clock(duration);
+            start.numbers.insert(clock, value);
+        }
     }
 }
 
@@ -162,13 +204,13 @@ pub(super) fn cases(
     schema: &Schema,
     before: Vec<Residual>,
     start: &Moment,
-    middle: &[Residual],
+    middle: &Middle<'_>,
     end: Moment,
 ) -> Result<Vec<Case>, Failure> {
     if start.is_certain() && end.is_certain() {
-        let start = Start::new(|| start.changes.iter().map(|(_, change)| change))?;
+        let mut start = Start::new(|| start.changes.iter().map(|(_, change)| change))?;
         let mut parts = before;
-        parts.extend(middle.iter().map(|residual| after_start(residual, &start)));
+        middle.pass(&mut start, &mut parts);
         return Ok(vec![Case { parts, start, end: end.changes }]);
     }
     let mut all = Vec::new();
@@ -177,10 +219,10 @@ pub(super) fn cases(
             *condition == Residual::True || chosen.contains(&condition)
         };
         let changes = || start.changes.iter().filter(holds).map(|(_, change)| change);
-        let start = Start::new(changes)?;
-        let after = |residual: &Residual| after_start(residual, &start);
+        let mut start = Start::new(changes)?;
         let mut parts: Vec<_> = before.iter().cloned().chain(decided).collect();
-        parts.extend(middle.iter().map(after));
+        middle.pass(&mut start, &mut parts);
+        let after = |residual: &Residual| after_start(residual, &start);
         let end: Vec<_> = end
             .changes
             .iter()

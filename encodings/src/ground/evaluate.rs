@@ -153,6 +153,11 @@ impl<'a> World<'a> {
         Ok(NumericId(self.numerics.insert_full((function, arguments.into()), ()).0 as u32))
     }
 
+    /// The clock, which begins at 0.
+    pub(crate) fn clock(&mut self, function: FunctionId) -> NumericId {
+        NumericId(self.numerics.insert_full((function, Box::default()), ()).0 as u32)
+    }
+
     /// The arguments under a binding that covers them.
     pub(crate) fn arguments(terms: &[Term], binding: &Binding) -> Row {
         terms

@@ -37,7 +37,10 @@ pub(crate) fn finish(
     let mut numbers = Numbers::new(&task)?;
     let (mut objectives, mut costs) = objectives(&task)?;
     let mut durations = Denominator::new("durations");
-    task.operators.iter().for_each(|operator| durations.quantity(&operator.duration));
+    for operator in &task.operators {
+        durations.quantity(&operator.duration);
+        operator.wait.iter().for_each(|time| durations.number(time));
+    }
     let mut durations = durations.integers()?;
     let mut slots = Slots::new(&task.operators);
 
@@ -63,6 +66,7 @@ pub(crate) fn finish(
             arguments: ground.arguments,
             configuration: ground.configuration,
             forbidden: ground.forbidden,
+            wait: ground.wait.map(|time| durations.number(&time)).transpose()?,
         });
     }
     let goal = match &task.goal {

@@ -16,6 +16,8 @@ use crate::lifted::{Change, Effect, Expression, Formula, Lifted, ObjectId, Ratio
 use crate::quantity::{Linear, Quantity, SlotSet};
 use crate::task::Forbidden;
 
+static NOTHING: Formula = Formula::truth();
+
 /// A schema with what mentions its slots apart from the rest.
 pub(super) struct Outline<'a> {
     pub(super) schema: &'a Schema,
@@ -24,6 +26,8 @@ pub(super) struct Outline<'a> {
     key: Vec<u32>,
     pub(super) start: Conjuncts<'a>,
     pub(super) middle: Conjuncts<'a>,
+    /// Empty if nothing happens by itself.
+    pub(super) over_all: Conjuncts<'a>,
 }
 
 /// The conjuncts of a condition.
@@ -42,6 +46,7 @@ pub(super) struct Frame<'a> {
     /// What is left of the open conjuncts.
     pub(super) start: Vec<Residual>,
     pub(super) middle: Vec<Residual>,
+    pub(super) over_all: Vec<Residual>,
     /// By the position of the effect.
     pub(super) start_operands: Vec<Operand>,
     pub(super) end_operands: Vec<Operand>,
@@ -86,6 +91,8 @@ impl<'a> Outline<'a> {
     pub(super) fn new(lifted: &Lifted, schema: &'a Schema, parameters: &'a [SlotParameter]) -> Self {
         let start = Conjuncts::new(lifted, &schema.start_condition, parameters);
         let middle = Conjuncts::new(lifted, &schema.middle_condition, parameters);
+        let over_all = if lifted.events.is_empty() { &NOTHING } else { &schema.over_all };
+        let over_all = Conjuncts::new(lifted, over_all, parameters);
         let mut key = Vec::new();
         let mut note = |term: Term| {
             if let Term::Parameter(parameter) = term
@@ -109,7 +116,7 @@ impl<'a> Outline<'a> {
         }
         key.sort_unstable();
         key.dedup();
-        Self { schema, parameters, key, start, middle }
+        Self { schema, parameters, key, start, middle, over_all }
     }
 
     /// The objects on which the frame of an instance depends.
@@ -163,6 +170,7 @@ impl<'a> Frame<'a> {
         let start = build.open_conditions(&outline.start.open)?;
         let start_operands = build.operands(&outline.schema.start_effects)?;
         let middle = build.open_conditions(&outline.middle.open)?;
+        let over_all = build.open_conditions(&outline.over_all.open)?;
         let end_operands = build.operands(&outline.schema.end_effects)?;
         let duration = match &outline.schema.duration {
             Some(duration) => build.static_quantity(duration, outline.schema)?,
@@ -178,7 +186,17 @@ impl<'a> Frame<'a> {
         let slots: Option<_> = slots.map(|(slot, own)| Some((function(slot)?, own.clone()))).collect();
         let Some(slots) = slots else { return Ok(None) };
         let forbidden = forbidden.into();
-        Ok(Some(Self { designs, slots, forbidden, start, middle, start_operands, end_operands, duration }))
+        Ok(Some(Self {
+            designs,
+            slots,
+            forbidden,
+            start,
+            middle,
+            over_all,
+            start_operands,
+            end_operands,
+            duration,
+        }))
     }
 }
 

@@ -16,8 +16,9 @@ use rustc_hash::FxHashMap;
 use crate::configuration::{SlotParameter, depends_on_own_start};
 use crate::error::{Error, File, Place};
 use crate::ground::derived;
-use crate::ground::effects::{Numbers, cases};
+use crate::ground::effects::{Middle, Numbers, cases};
 use crate::ground::evaluate::{AtomId, Binding, Failure, Row, Slots, World, for_each_combination};
+use crate::ground::events::Timeline;
 use crate::ground::frame::{Frame, Outline};
 use crate::ground::metric::GroundObjective;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
@@ -50,6 +51,8 @@ pub(crate) struct GroundOperator {
     /// By objective.
     pub(crate) costs: Vec<Quantity<Rational>>,
     pub(crate) duration: Quantity<Rational>,
+    /// Set if this is no action but a wait until that time.
+    pub(crate) wait: Option<Rational>,
 }
 
 /// Atoms that change if a conjunction holds before the operator.
@@ -81,6 +84,7 @@ pub(crate) fn instantiate<'a>(
     limits: &Limits,
 ) -> Result<GroundTask<'a>, Vec<Error>> {
     let mut world = World::new(lifted, reached);
+    let timeline = Timeline::new(&mut world, &lifted.events);
     let (mut operators, mut errors): (Vec<GroundOperator>, _) = (Vec::new(), Vec::new());
     for (((schema, slots), instances), index) in
         lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0..)
@@ -88,7 +92,7 @@ pub(crate) fn instantiate<'a>(
         if depends_on_own_start(lifted, schema) {
             errors.push(Error::Unsupported {
                 construct: format!(
-                    "a derived predicate in `{}` that its own start effects may change",
+                    "a derived predicate in `{}` that its own start effects or timed literals may change",
                     schema.name
                 ),
                 instead: "the condition of the derived predicate in its place".into(),
@@ -111,7 +115,8 @@ pub(crate) fn instantiate<'a>(
             };
             let cases = frame.and_then(|frame| match frame {
                 Some(frame) => {
-                    instance(&mut world, &outline, index, &designs[index as usize], &frame, binding)
+                    let designs = &designs[index as usize];
+                    instance(&mut world, &outline, index, designs, &frame, timeline.as_ref(), binding)
                 }
                 None => Ok(Vec::new()),
             });
@@ -126,7 +131,8 @@ pub(crate) fn instantiate<'a>(
         }
     }
     let mut binding = vec![None; lifted.goal_variables];
-    let goal = world.residual(&lifted.goal, &mut binding).and_then(|goal| world.condition(&[goal]));
+    let at_rest = timeline.as_ref().map_or(Residual::True, Timeline::at_rest);
+    let goal = world.residual(&lifted.goal, &mut binding).and_then(|goal| world.condition(&[goal, at_rest]));
     let goal = match goal.and_then(|goal| world.instantiate_axioms().map(|()| goal)) {
         Ok(goal) => Some(goal),
         Err(Failure::Undefined) => None,
@@ -138,6 +144,7 @@ pub(crate) fn instantiate<'a>(
     if !errors.is_empty() {
         return Err(errors);
     }
+    operators.extend(timeline.iter().flat_map(|timeline| timeline.waits(lifted.schemas.len() as u32)));
     let mut task = GroundTask { world, operators, goal, objectives: Vec::new() };
     derived::simplify(&mut task);
     Ok(task)
@@ -150,6 +157,7 @@ fn instance(
     index: u32,
     designs: &[SlotParameter],
     frame: &Frame,
+    timeline: Option<&Timeline>,
     core: &Binding,
 ) -> Result<Vec<GroundOperator>, Failure> {
     let mut build = Build { world, binding: core.clone(), slots: &frame.designs, forbidden: Vec::new() };
@@ -184,9 +192,25 @@ fn instance(
         numeric_effects: Numbers::default(),
         costs: Vec::new(),
         duration: frame.duration.clone(),
+        wait: None,
+    };
+    let cases = match timeline {
+        None => {
+            let middle = Middle { conditions: &middle, over_all: &[], passage: None };
+            cases(outline.schema, before, &start, &middle, end)?
+        }
+        Some(timeline) => {
+            let over_all = build.conditions(&outline.over_all.closed, &frame.over_all)?;
+            let mut all = Vec::new();
+            for passage in timeline.passages(&frame.duration) {
+                let passage = Some((passage, &frame.duration));
+                let middle = Middle { conditions: &middle, over_all: &over_all, passage };
+                all.extend(cases(outline.schema, before.clone(), &start, &middle, end.clone())?);
+            }
+            all
+        }
     };
     let mut operators = Vec::new();
-    let cases = cases(outline.schema, before, &start, &middle, end)?;
     let templates = std::iter::repeat_n(template, cases.len());
     for (case, template) in std::iter::zip(cases, templates) {
         match case.operator(build.world, template) {

@@ -9,6 +9,7 @@
 mod derived;
 mod effects;
 mod evaluate;
+mod events;
 mod finish;
 mod frame;
 mod instantiate;

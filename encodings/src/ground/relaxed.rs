@@ -39,9 +39,12 @@ impl<'a> Builder<'a> {
         let objects: Vec<_> = (0..lifted.objects.len()).map(|i| table.name(&format!("object {i}"))).collect();
         let predicates: Vec<_> =
             (0..lifted.predicates.len()).map(|i| table.name(&format!("predicate {i}"))).collect();
+        let events = lifted.events.iter().flat_map(|event| &event.changes).filter(|(_, _, holds)| *holds);
         let facts = lifted
             .facts
             .iter()
+            .map(|(predicate, arguments)| (predicate, arguments))
+            .chain(events.map(|(predicate, arguments, _)| (predicate, arguments)))
             .map(|(predicate, arguments)| Fact {
                 predicate: predicates[predicate.index()],
                 arguments: arguments.iter().map(|object| objects[object.index()]).collect(),

@@ -1,8 +1,8 @@
 //! Syntax tree to lifted task: names become ids, negation moves inwards to the atoms, and the two times of
 //! durative conditions and effects are sorted apart.
 //!
-//! The files have passed `pddl::check`; what the planner does not handle (timed initial literals, durations that
-//! effects depend on and that are not fixed) is refused here, with its place.
+//! The files have passed `pddl::check`; what the planner does not handle (such as durations that effects depend on and
+//! that are not fixed) is refused here, with its place.
 
 mod condition;
 mod duration;
@@ -15,8 +15,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::configuration::{is_static, recursive_through_forall};
 use crate::error::{Error, File, Place};
 use crate::lifted::{
-    Axiom, Change, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter, Predicate,
-    PredicateId, Rational, Schema, Term,
+    Axiom, Change, Event, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter, Predicate,
+    PredicateId, Rational, Schema, Term, Time,
 };
 use crate::normalize::duration::Duration;
 use crate::pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypedName};
@@ -41,14 +41,21 @@ pub(crate) fn normalize(
             place: Place { file: File::Problem, span: metric.span },
         })
         .collect();
-    normalizer.longest = duration::is_rewarded(&metrics);
+    let has_events = problem.init.iter().any(|element| matches!(element, ast::InitialElement::Timed(..)));
+    // What happens by itself may be worth waiting for, in the midst of an action, too.
+    normalizer.longest = if has_events { None } else { duration::is_rewarded(&metrics) };
     let schemas = domain.actions.iter().map(|action| normalizer.schema(action)).collect();
     let axioms = domain.derived.iter().map(|axiom| normalizer.axiom(axiom)).collect();
-    let (facts, values) = normalizer.initial_state(problem);
+    let (mut facts, values) = normalizer.initial_state(problem);
+    let events = normalizer.events(problem);
     let mut scope = Scope::new(File::Problem);
     let goal = normalizer.condition(&problem.goal, true, &mut scope);
     if !normalizer.errors.is_empty() {
         return Err(normalizer.errors);
+    }
+    let time = normalizer.time(&events);
+    if !events.is_empty() {
+        facts.push((time.phase, [time.first_phase].into()));
     }
     let mut lifted = Lifted {
         objects: normalizer.objects,
@@ -58,6 +65,8 @@ pub(crate) fn normalize(
         axioms,
         facts,
         values,
+        events,
+        time,
         goal,
         goal_variables: scope.bound as usize,
         metrics,
@@ -77,6 +86,9 @@ fn mark_fluents(lifted: &mut Lifted) {
             }
             Change::Assign { function, .. } => lifted.functions[function.index()].fluent = true,
         }
+    }
+    for (predicate, ..) in lifted.events.iter().flat_map(|event| &event.changes) {
+        lifted.predicates[predicate.index()].fluent = true;
     }
     // The rule engine negates only what is complete; what recurs through a quantifier is evaluated by itself.
     for predicate in recursive_through_forall(lifted) {
@@ -195,6 +207,7 @@ impl Normalizer {
             start_condition: Formula::truth(),
             start_effects: Vec::new(),
             middle_condition: Formula::truth(),
+            over_all: Formula::truth(),
             end_effects: Vec::new(),
             duration: None,
             place: scope.place(action.span),
@@ -205,14 +218,18 @@ impl Normalizer {
                 self.effect(effect, &mut scope, &mut schema.end_effects);
             }
             ast::ActionBody::Durative { duration, conditions, effects } => {
-                let (mut start, mut middle) = (Vec::new(), Vec::new());
+                let (mut start, mut middle, mut over_all) = (Vec::new(), Vec::new(), Vec::new());
                 schema.duration = Some(self.duration(duration, action, &mut scope, &mut start));
                 for (time, condition) in conditions {
                     let formula = self.condition(condition, true, &mut scope);
+                    if *time == ConditionTime::OverAll {
+                        over_all.push(formula.clone());
+                    }
                     if *time == ConditionTime::AtStart { &mut start } else { &mut middle }.push(formula);
                 }
                 (schema.start_condition, schema.middle_condition) =
                     (Formula::And(start), Formula::And(middle));
+                schema.over_all = Formula::And(over_all);
                 for (time, effect) in effects {
                     let target = match time {
                         EffectTime::AtStart => &mut schema.start_effects,
@@ -300,22 +317,48 @@ impl Normalizer {
                         facts.push(fact);
                     }
                 }
-                ast::InitialElement::NegatedFact(_) => {}
+                ast::InitialElement::NegatedFact(_) | ast::InitialElement::Timed(..) => {}
                 ast::InitialElement::Value(atom, number, span) => {
                     let number = self.number(number, Place { file: File::Problem, span: *span });
                     values.push((self.function(atom, File::Problem), self.objects(atom), number));
                 }
-                ast::InitialElement::Timed(_, _, _, span) => {
-                    self.unsupported(
-                        "a timed initial literal",
-                        "a fact that holds from the start",
-                        File::Problem,
-                        *span,
-                    );
-                }
             }
         }
         (facts, values)
+    }
+
+    /// Symbols for time. Their names have a space, so that no file can mean them.
+    fn time(&mut self, events: &[Event]) -> Time {
+        let time = Time {
+            clock: FunctionId(self.functions.len() as u32),
+            phase: PredicateId(self.predicates.len() as u32),
+            first_phase: ObjectId(self.objects.len() as u32),
+            waited: PredicateId(self.predicates.len() as u32 + 1),
+        };
+        if !events.is_empty() {
+            let predicate =
+                |name, arity| Predicate { name: Name::new(name), arity, fluent: true, derived: false };
+            self.functions.push(Function { name: Name::new("the clock"), fluent: true });
+            self.predicates.extend([predicate("the phase", 1), predicate("has waited", 0)]);
+            self.objects.extend((0..=events.len()).map(|number| Name::new(&format!("phase {number}"))));
+        }
+        time
+    }
+
+    /// The timed initial literals by time; of two of one time about one atom, the later one prevails.
+    fn events(&mut self, problem: &ast::Problem) -> Vec<Event> {
+        let mut events: Vec<Event> = Vec::new();
+        for element in &problem.init {
+            let ast::InitialElement::Timed(time, atom, holds, span) = element else { continue };
+            let time = self.number(time, Place { file: File::Problem, span: *span });
+            let change = (self.predicate(atom, File::Problem), self.objects(atom), *holds);
+            let position = events.partition_point(|event| event.time < time);
+            match events.get_mut(position).filter(|event| event.time == time) {
+                Some(event) => event.changes.push(change),
+                None => events.insert(position, Event { time, changes: vec![change] }),
+            }
+        }
+        events
     }
 
     fn objects(&mut self, atom: &ast::Atom) -> Box<[ObjectId]> {

@@ -52,6 +52,8 @@ impl<'e, 'p> Execution<'e, 'p> {
                 _ => None,
             })
             .collect();
+        // Of two literals of one time about one atom, the later one in the file prevails.
+        pending.reverse();
         pending.sort_by(|left, right| right.0.cmp(&left.0));
         Self { world, options, state, pending }
     }

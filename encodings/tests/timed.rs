@@ -1,0 +1,237 @@
+//! Plans with timed initial literals: known optima, and random tasks on which the planner must agree with the validator
+//! run on every sequence of up to three actions.
+
+mod random;
+
+use std::fmt::Write as _;
+
+use metaplan_encodings::pddl::ast::{Domain, Problem};
+use metaplan_encodings::pddl::{Source, read};
+use metaplan_encodings::validate::{Options, PlanText, validate};
+use metaplan_encodings::{Config, Exact, GroundConfig, Limits, Plan, Status, ground, optimize};
+use random::Random;
+
+fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
+    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
+    let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
+    (domain, problem)
+}
+
+/// The cheapest plan; none if it is proved that there is none. `quick_search` is off for the SAT solver alone.
+fn plan(domain: &Domain, problem: &Problem, quick_search: bool) -> Option<Plan> {
+    let task =
+        ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
+    let limits = Limits::none();
+    let horizon = (!quick_search).then_some(8);
+    let solution =
+        optimize(&task, &Config { horizon, quick_search, limits, ..Config::default() }, &mut |_| {});
+    match solution.status {
+        Status::Optimal | Status::Feasible => solution.plan,
+        _ => None,
+    }
+}
+
+fn written(plan: &Plan) -> String {
+    let mut text = String::new();
+    for step in &plan.steps {
+        let mut words = step.arguments.clone();
+        words.insert(0, step.action.clone());
+        let _ = writeln!(text, "{}: ({}) [{}]", step.start, words.join(" "), step.duration);
+    }
+    text
+}
+
+/// What the validator says a plan costs; none if it is not valid.
+fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
+    let plan =
+        PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
+    let verdict = validate(domain, problem, &plan, &Options::default());
+    let value = verdict.metric.unwrap_or(verdict.total_time);
+    verdict.valid.then(|| value.to_string())
+}
+
+/// The cost, and the times at which the actions start.
+fn check(name: &str, domain: &str, problem: &str, expected: Option<(&str, &[&str])>) {
+    let (domain, problem) = parse(domain, problem);
+    let found = plan(&domain, &problem, true);
+    let starts = |plan: &Plan| plan.steps.iter().map(|step| step.start.to_string()).collect::<Vec<_>>();
+    let shown = found.as_ref().map(|plan| (plan.cost.to_string(), starts(plan)));
+    let expected =
+        expected.map(|(cost, starts)| (cost.to_owned(), starts.iter().map(ToString::to_string).collect()));
+    assert_eq!(shown, expected, "{name}");
+    if let Some(plan) = found {
+        let text = written(&plan);
+        assert_eq!(metric(&domain, &problem, &text), Some(plan.cost.to_string()), "{name}: {text}");
+    }
+}
+
+const INSPECTION: &str = "(define (domain inspection)
+  (:requirements :durative-actions :timed-initial-literals :fluents)
+  (:predicates (daylight) (at-pipe) (inspected) (recorded))
+  (:functions (level))
+  (:durative-action dive :parameters () :duration (= ?duration 4) :condition (and)
+    :effect (and (at end (at-pipe)) (at start (decrease (level) 3))))
+  (:durative-action inspect :parameters () :duration (= ?duration 3)
+    :condition (and (at start (at-pipe)) (over all (daylight)))
+    :effect (at end (inspected)))
+  (:durative-action record :parameters () :duration (= ?duration 2)
+    :condition (and (at start (at-pipe)) (at end (daylight))) :effect (at end (recorded))))";
+
+#[test]
+fn actions_wait_for_what_happens_by_itself() {
+    let problem = |init: &str, goal: &str| {
+        format!(
+            "(define (problem p) (:domain inspection) (:init (= (level) 10) {init}) (:goal {goal})
+             (:metric minimize (total-time)))"
+        )
+    };
+    let case = |name: &str, init: &str, goal: &str, expected: Option<(&str, &[&str])>| {
+        check(name, INSPECTION, &problem(init, goal), expected);
+    };
+    case("day all along", "(daylight)", "(inspected)", Some(("7", &["0", "4"])));
+    case("the night ends", "(at 10 (daylight))", "(inspected)", Some(("7", &["0", "10"])));
+    case(
+        "the day ends as it ends",
+        "(daylight) (at 7 (not (daylight)))",
+        "(inspected)",
+        Some(("7", &["0", "4"])),
+    );
+    case("too short a day", "(daylight) (at 6.5 (not (daylight)))", "(inspected)", None);
+    case(
+        "a night in between",
+        "(daylight) (at 6 (not (daylight))) (at 12.5 (daylight))",
+        "(inspected)",
+        Some(("7", &["0", "12.5"])),
+    );
+    case("only its end needs light", "(at 5.5 (daylight))", "(recorded)", Some(("6", &["0", "4"])));
+    case("light at the end, but not after it", "(at 6 (daylight))", "(recorded)", Some(("6", &["0", "6"])));
+    case("a plan ends with an action", "(at 6 (daylight))", "(daylight)", Some(("4", &["6"])));
+    case("a day that is there", "(daylight) (at 6 (not (daylight)))", "(daylight)", Some(("0", &[])));
+    case(
+        "two windows",
+        "(at 5 (daylight)) (at 8 (not (daylight))) (at 20 (daylight))",
+        "(and (inspected) (recorded))",
+        Some(("9", &["0", "4", "20"])),
+    );
+}
+
+fn literal(random: &mut Random) -> String {
+    let atom = ["(p)", "(q)", "(r)"][random.below(3) as usize];
+    if random.below(3) == 0 { format!("(not {atom})") } else { atom.to_owned() }
+}
+
+/// Conditions or effects, each at one of some times.
+fn timed(random: &mut Random, times: &[&str], most: u64) -> String {
+    let mut text = String::from("(and");
+    for _ in 0..=random.below(most) {
+        let time = times[random.below(times.len() as u64) as usize];
+        let _ = write!(text, " ({time} {})", literal(random));
+    }
+    text + ")"
+}
+
+/// A task and what brute force has to know of it.
+struct Sample {
+    durations: [i64; 3],
+    events: Vec<i64>,
+    domain: String,
+    problem: String,
+}
+
+fn sample(random: &mut Random) -> Sample {
+    let mut domain = String::from(
+        "(define (domain d) (:requirements :durative-actions) (:predicates (p) (q) (r)) (:functions (total-cost))\n",
+    );
+    let mut durations = [0; 3];
+    for (action, duration) in durations.iter_mut().enumerate() {
+        *duration = random.below(4);
+        let conditions = timed(random, &["at start", "over all", "at end", "over all"], 2);
+        let effects = timed(random, &["at start", "at end", "at end"], 2);
+        let _ = writeln!(
+            domain,
+            "(:durative-action a{action} :parameters () :duration (= ?duration {duration}) :condition {conditions}
+               :effect (and {effects} (at end (increase (total-cost) {}))))",
+            1 + random.below(3)
+        );
+    }
+    domain.push(')');
+    let mut init = String::from("(= (total-cost) 0)");
+    for atom in ["(p)", "(q)", "(r)"] {
+        if random.below(3) == 0 {
+            let _ = write!(init, " {atom}");
+        }
+    }
+    let mut events = Vec::new();
+    for _ in 0..=random.below(4) {
+        let time = random.below(7);
+        let _ = write!(init, " (at {time} {})", literal(random));
+        events.push(time);
+    }
+    let metric = ["(total-cost)", "(total-time)"][random.below(2) as usize];
+    let problem = format!(
+        "(define (problem x) (:domain d) (:init {init}) (:goal (and {} {})) (:metric minimize {metric}))",
+        literal(random),
+        literal(random)
+    );
+    Sample { durations, events, domain, problem }
+}
+
+/// The least cost of valid plans of up to three actions that start as soon as the last has ended, or with an event.
+fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<i64> {
+    let mut best = None;
+    let mut open: Vec<(i64, String, usize)> = vec![(0, String::new(), 0)];
+    while let Some((clock, text, length)) = open.pop() {
+        let cost = metric(domain, problem, &text).and_then(|value| value.parse::<i64>().ok());
+        best = [best, cost].into_iter().flatten().min();
+        if length == 3 {
+            continue;
+        }
+        let mut starts: Vec<_> =
+            task.events.iter().copied().filter(|time| *time > clock).chain([clock]).collect();
+        starts.sort_unstable();
+        starts.dedup();
+        for start in starts {
+            for (action, duration) in task.durations.iter().enumerate() {
+                let longer = format!("{text}{start}: (a{action}) [{duration}]\n");
+                open.push((start + duration, longer, length + 1));
+            }
+        }
+    }
+    best
+}
+
+fn agree(seed: u64) {
+    let task = sample(&mut Random(seed));
+    let (domain, problem) = parse(&task.domain, &task.problem);
+    let expected = brute_force(&task, &domain, &problem);
+    for quick_search in [true, false] {
+        let found = plan(&domain, &problem, quick_search);
+        let context =
+            || format!("seed {seed}, quick search {quick_search}\n{}\n{}", task.domain, task.problem);
+        let Some(found) = found else {
+            assert_eq!(expected, None, "{}", context());
+            continue;
+        };
+        let text = written(&found);
+        let cost = metric(&domain, &problem, &text);
+        assert_eq!(cost, Some(found.cost.to_string()), "{}\n{text}", context());
+        let Exact { numerator, denominator } = found.cost;
+        assert_eq!(denominator, 1);
+        if found.steps.len() <= 3 {
+            assert_eq!(Some(numerator), expected, "{}\n{text}", context());
+        } else {
+            assert!(expected.is_none_or(|expected| numerator <= expected), "{}\n{text}", context());
+        }
+    }
+}
+
+#[test]
+fn plans_are_as_cheap_as_the_validator_admits() {
+    (0..60).for_each(agree);
+}
+
+#[test]
+#[ignore = "a minute"]
+fn plans_are_as_cheap_as_the_validator_admits_on_many() {
+    (1_000..20_000).for_each(agree);
+}
