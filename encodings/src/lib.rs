@@ -34,6 +34,7 @@ mod transitions;
 #[cfg(test)]
 mod tests;
 
+pub use encode::Semantics;
 pub use error::{Error, File, Place};
 pub use ground::{Config as GroundConfig, ground};
 pub use limits::Limits;

@@ -8,7 +8,7 @@
 use std::time::Instant;
 
 use crate::bounds::Bounds;
-use crate::encode::{CostLimit, Encoding};
+use crate::encode::{CostLimit, Encoding, Semantics};
 use crate::limits::Limits;
 use crate::plan::{GroundPlan, GroundStep, decode, metric, replay};
 use crate::quantity::Quantity;
@@ -34,6 +34,9 @@ pub struct Config {
     pub horizon: Option<usize>,
     /// Whether a quick search looks for a first plan; otherwise the SAT solver finds it, horizon by horizon.
     pub quick_search: bool,
+    /// How many operators stand at a step of the formulas; with a horizon, which counts actions, always one. If not
+    /// given, several while a first plan is looked for, and one for the proof that there is no cheaper one.
+    pub semantics: Option<Semantics>,
     /// The SAT solver.
     pub backend: Backend,
     /// When to stop.
@@ -42,7 +45,13 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { horizon: None, quick_search: true, backend: Backend::default(), limits: Limits::none() }
+        Self {
+            horizon: None,
+            quick_search: true,
+            semantics: None,
+            backend: Backend::default(),
+            limits: Limits::none(),
+        }
     }
 }
 
@@ -179,7 +188,13 @@ impl Run<'_> {
         let allowed = vec![vec![true; self.task.operators.len()]; steps];
         let bounds = Bounds::trivial(self.task);
         let cost = CostLimit { limit, bounds: &bounds };
-        let encoding = Encoding::new(self.task, &allowed, Some(cost), &self.config.limits);
+        let encoding = Encoding::new(
+            self.task,
+            &allowed,
+            Some(cost),
+            self.semantics(Semantics::Sequential),
+            &self.config.limits,
+        );
         self.statistics.encode += started.elapsed();
         let (answer, _) = self.call(&encoding?, u64::MAX);
         debug_assert_ne!(answer, Answer::Satisfiable, "a plan is cheaper than the lower bound");
@@ -193,6 +208,13 @@ impl Run<'_> {
                 self.finish(Status::Optimal, Some(incumbent), Some(incumbent.cost), horizon, Some(proof))
             }
             None => self.finish(Status::Feasible, Some(incumbent), Some(lower), horizon, None),
+        }
+    }
+
+    fn semantics(&self, unless_given: Semantics) -> Semantics {
+        match self.config.horizon {
+            Some(_) => Semantics::Sequential,
+            None => self.config.semantics.unwrap_or(unless_given),
         }
     }
 
@@ -216,7 +238,13 @@ impl Run<'_> {
     ) -> Tightened {
         let started = Instant::now();
         let limit = CostLimit { limit: incumbent.cost - 1, bounds };
-        let encoding = Encoding::new(self.task, allowed, Some(limit), &self.config.limits);
+        let encoding = Encoding::new(
+            self.task,
+            allowed,
+            Some(limit),
+            self.semantics(Semantics::Sequential),
+            &self.config.limits,
+        );
         self.statistics.encode += started.elapsed();
         let Some(mut encoding) = encoding else { return Tightened::Interrupted };
         loop {
@@ -271,7 +299,13 @@ impl Run<'_> {
         loop {
             let started = Instant::now();
             let window = bounds.window(self.task, None, Some(horizon));
-            let encoding = Encoding::new(self.task, &window.allowed, None, &self.config.limits);
+            let encoding = Encoding::new(
+                self.task,
+                &window.allowed,
+                None,
+                self.semantics(Semantics::ExistsStep),
+                &self.config.limits,
+            );
             self.statistics.encode += started.elapsed();
             let answer =
                 encoding.map_or((Answer::Interrupted, None), |encoding| self.call(&encoding, u64::MAX));

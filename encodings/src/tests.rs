@@ -5,24 +5,42 @@ mod missions;
 #[path = "../tests/random/mod.rs"]
 mod random;
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::fmt::Write as _;
+
+use rustc_hash::FxHashMap;
+
 use crate::bounds::Bounds;
-use crate::encode::{CostLimit, Encoding};
+use crate::encode::{CostLimit, Encoding, Semantics};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
 use crate::pddl::{Source, read};
 use crate::plan::replay;
 use crate::sat::{Answer, Backend};
-use crate::task::Task;
+use crate::task::{State, Task};
 use missions::Mission;
+use random::Random;
 
 /// Longest plans that are looked for.
 const STEPS: usize = 6;
 
+/// More than any plan of the small tasks below costs.
+const MUCH: i64 = 200;
+
 /// Whether there is a plan with at most so many steps and at most this cost; if so, it is one.
-fn is_solvable(task: &Task, bounds: &Bounds, steps: usize, limit: i64, backend: &Backend) -> bool {
+fn is_solvable(
+    task: &Task,
+    bounds: &Bounds,
+    steps: usize,
+    limit: i64,
+    semantics: Semantics,
+    backend: &Backend,
+) -> bool {
     let window = bounds.window(task, Some(limit), Some(steps));
     let cost = CostLimit { limit, bounds };
-    let encoding = Encoding::new(task, &window.allowed, Some(cost), &Limits::none()).expect("no limit");
+    let encoding =
+        Encoding::new(task, &window.allowed, Some(cost), semantics, &Limits::none()).expect("no limit");
     let mut solver = backend.start(&Limits::none(), u64::MAX);
     for (_, clause) in encoding.formula.clauses() {
         solver.add_clause(clause);
@@ -56,7 +74,7 @@ fn check(seed: u64, backend: &Backend) {
     let bounds = Bounds::new(&task, &Limits::none());
     for bounds in [&bounds, &Bounds::trivial(&task)] {
         for (steps, cost) in costs.iter().enumerate() {
-            let solvable = |limit| is_solvable(&task, bounds, steps, limit, backend);
+            let solvable = |limit| is_solvable(&task, bounds, steps, limit, Semantics::Sequential, backend);
             let context = || format!("seed {seed}, {backend:?}, {steps} steps: {mission:?}");
             match cost {
                 Some(cost) => {
@@ -85,5 +103,224 @@ fn formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
 fn many_formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
     for backend in built_in() {
         (25..2_100).for_each(|seed| check(seed, &backend));
+    }
+}
+
+/// Robots with designs on a map with doors and lamps, some with a battery: much can happen at once, and much interferes.
+fn fleet(seed: u64) -> (String, String) {
+    let mut random = Random(seed);
+    let domain = "(define (domain fleet)
+      (:types robot place design function)
+      (:predicates (at ?r - robot ?p - place) (way ?a ?b - place) (open) (lit ?p - place) (seen ?r - robot)
+        (solves ?d - design ?f - function) (drives ?r - robot ?f - function) (safe) (dark))
+      (:functions (total-cost) (price ?d - design) (charge ?r - robot) (use ?d - design))
+      (:derived (safe) (or (open) (exists (?p - place) (lit ?p))))
+      (:action move :parameters (?r - robot ?a ?b - place ?f - function ?d - design)
+        :precondition (and (at ?r ?a) (way ?a ?b) (drives ?r ?f) (solves ?d ?f) (>= (charge ?r) (use ?d)))
+        :effect (and (not (at ?r ?a)) (at ?r ?b) (decrease (charge ?r) (use ?d)) (increase (total-cost) (price ?d))))
+      (:action jump :parameters (?r - robot ?a ?b - place)
+        :precondition (and (at ?r ?a) (open) (or (dark) (lit ?b)))
+        :effect (and (not (at ?r ?a)) (at ?r ?b) (when (lit ?a) (seen ?r)) (increase (total-cost) 3)))
+      (:action toggle :parameters () :precondition (not (open)) :effect (and (open) (increase (total-cost) 1)))
+      (:action shut :parameters () :precondition (open) :effect (and (not (open)) (increase (total-cost) 1)))
+      (:action light :parameters (?r - robot ?p - place) :precondition (at ?r ?p)
+        :effect (and (lit ?p) (not (dark)) (increase (total-cost) 1)))
+      (:action look :parameters (?r - robot) :precondition (safe) :effect (and (seen ?r) (increase (total-cost) 2))))";
+    let mut init = String::from("(= (total-cost) 0) (dark) (drives r0 f0) (drives r1 f1)");
+    for from in 0..3 {
+        for to in 0..3 {
+            if from != to && random.below(3) > 0 {
+                let _ = write!(init, " (way p{from} p{to})");
+            }
+        }
+    }
+    for design in 0..3 {
+        let _ = write!(init, " (solves d{design} f{})", random.below(2));
+        let (price, energy) = (random.below(4), random.below(3));
+        let _ = write!(init, " (= (price d{design}) {price}) (= (use d{design}) {energy})");
+    }
+    let mut goal = String::new();
+    for robot in 0..2 {
+        let (place, charge, target) = (random.below(3), random.below(5), random.below(3));
+        let _ = write!(init, " (at r{robot} p{place}) (= (charge r{robot}) {charge})");
+        let _ = write!(goal, " (at r{robot} p{target})");
+        if random.below(2) == 0 {
+            let _ = write!(goal, " (seen r{robot})");
+        }
+    }
+    if random.below(2) == 0 {
+        init.push_str(" (open)");
+    }
+    goal.push_str(["", " (not (open))", " (lit p1)", " (safe)"][random.below(4) as usize]);
+    let problem = format!(
+        "(define (problem p) (:domain fleet)
+          (:objects r0 r1 - robot p0 p1 p2 - place d0 d1 d2 - design f0 f1 - function)
+          (:init {init}) (:goal (and {goal})) (:metric minimize (total-cost)))"
+    );
+    (domain.to_owned(), problem)
+}
+
+/// Where a state leads to, and what that costs.
+fn successors(task: &Task, state: &State) -> Vec<(State, i64)> {
+    let mut all = Vec::new();
+    for operator in &task.operators {
+        for choice in operator.choices().filter(|choice| operator.applicable(state, choice)) {
+            all.push((task.successor(operator, state, &choice), operator.cost_of(&choice)));
+        }
+    }
+    all
+}
+
+/// The least cost of a plan, by Dijkstra over all states that can be reached.
+fn optimum(task: &Task) -> Option<i64> {
+    let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
+    let mut states = vec![task.initial.clone()];
+    let mut open = BinaryHeap::from([Reverse((0, 0))]);
+    while let Some(Reverse((cost, index))) = open.pop() {
+        let state = states[index].clone();
+        if best[&state] < cost {
+            continue;
+        }
+        if task.is_goal(&state) {
+            return Some(cost);
+        }
+        for (next, step) in successors(task, &state) {
+            let known = best.entry(next.clone()).or_insert(i64::MAX);
+            if cost + step < *known {
+                *known = cost + step;
+                open.push(Reverse((cost + step, states.len())));
+                states.push(next);
+            }
+        }
+    }
+    None
+}
+
+/// The least cost of a plan with at most so many steps, for each number from 0.
+fn costs_by_steps(task: &Task, most: usize) -> Vec<Option<i64>> {
+    let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
+    let mut improved = vec![(task.initial.clone(), 0)];
+    let mut costs = Vec::new();
+    for _ in 0..=most {
+        let goals = best.iter().filter(|(state, _)| task.is_goal(state));
+        costs.push(goals.map(|(_, cost)| *cost).min());
+        let mut next = Vec::new();
+        for (state, cost) in improved {
+            for (after, step) in successors(task, &state) {
+                let known = best.entry(after.clone()).or_insert(i64::MAX);
+                if cost + step < *known {
+                    *known = cost + step;
+                    next.push((after, cost + step));
+                }
+            }
+        }
+        improved = next;
+    }
+    costs
+}
+
+/// Parcels, some of them equal, and robots that carry them, with designs some of which are equal.
+fn depot(seed: u64) -> (String, String) {
+    let mut random = Random(seed);
+    let domain = "(define (domain depot)
+      (:types robot parcel place design function)
+      (:predicates (at ?r - robot ?p - place) (lies ?o - parcel ?p - place) (holds ?r - robot ?o - parcel)
+        (free ?r - robot) (solves ?d - design ?f - function) (light ?d - design))
+      (:functions (total-cost) (price ?d - design))
+      (:action move :parameters (?r - robot ?a ?b - place ?f - function ?d - design)
+        :precondition (and (at ?r ?a) (solves ?d ?f))
+        :effect (and (not (at ?r ?a)) (at ?r ?b) (increase (total-cost) (price ?d))))
+      (:action pick :parameters (?r - robot ?o - parcel ?p - place)
+        :precondition (and (at ?r ?p) (lies ?o ?p) (free ?r))
+        :effect (and (not (lies ?o ?p)) (not (free ?r)) (holds ?r ?o) (increase (total-cost) 1)))
+      (:action drop :parameters (?r - robot ?o - parcel ?p - place ?f - function ?d - design)
+        :precondition (and (at ?r ?p) (holds ?r ?o) (solves ?d ?f) (light ?d))
+        :effect (and (lies ?o ?p) (free ?r) (not (holds ?r ?o)) (increase (total-cost) (price ?d)))))";
+    let mut init = String::from("(= (total-cost) 0)");
+    let mut goal = String::new();
+    for design in 0..3 {
+        let _ = write!(init, " (solves d{design} f0) (= (price d{design}) {})", 1 + random.below(2));
+        if random.below(2) == 0 {
+            let _ = write!(init, " (light d{design})");
+        }
+    }
+    for robot in 0..=random.below(2) {
+        let _ = write!(init, " (at r{robot} p{}) (free r{robot})", random.below(2));
+    }
+    for parcel in 0..3 {
+        let _ = write!(init, " (lies o{parcel} p{})", random.below(2));
+        if random.below(3) > 0 {
+            let _ = write!(goal, " (lies o{parcel} p{})", random.below(2));
+        }
+    }
+    let problem = format!(
+        "(define (problem p) (:domain depot)
+          (:objects r0 r1 - robot o0 o1 o2 - parcel p0 p1 - place d0 d1 d2 - design f0 - function)
+          (:init {init}) (:goal (and {goal})) (:metric minimize (total-cost)))"
+    );
+    (domain.to_owned(), problem)
+}
+
+/// What a task's formulas say in all semantics. Returns whether several operators stood at a step, and whether anything
+/// was equal.
+fn check_all((domain, problem): (String, String), backend: &Backend) -> (bool, bool) {
+    let text = problem.clone();
+    let (domain, problem) = (Source::new("d", domain), Source::new("p", problem));
+    let (domain, problem, _) = read(&domain, &problem).expect("PDDL");
+    let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")], ..Config::default() };
+    let task = ground(&domain, &problem, &config).expect("a task");
+    if task.unreachable.is_some() {
+        return (false, false);
+    }
+    let most = 4;
+    let (costs, optimum) = (costs_by_steps(&task, most), optimum(&task));
+    let bounds = Bounds::new(&task, &Limits::none());
+    let mut together = false;
+    for bounds in [&bounds, &Bounds::trivial(&task)] {
+        for (steps, cost) in costs.iter().enumerate() {
+            let context = |semantics| format!("{backend:?}, {steps} steps, {semantics:?}, {cost:?}: {text}");
+            for semantics in [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep] {
+                let solvable = |limit| is_solvable(&task, bounds, steps, limit, semantics, backend);
+                if let Some(cost) = cost {
+                    assert!(solvable(*cost), "{}", context(semantics));
+                }
+                let below = cost.unwrap_or(MUCH) - 1;
+                match (semantics, optimum) {
+                    (Semantics::Sequential, _) => assert!(!solvable(below), "{}", context(semantics)),
+                    (_, Some(optimum)) => {
+                        assert!(!solvable(optimum - 1), "{}", context(semantics));
+                        together |= below >= optimum && solvable(below);
+                    }
+                    (_, None) => assert!(!solvable(MUCH), "{}", context(semantics)),
+                }
+            }
+        }
+    }
+    let allowed = vec![vec![true; task.operators.len()]; most];
+    let encoding = Encoding::new(&task, &allowed, None, Semantics::Sequential, &Limits::none());
+    let counts = encoding.expect("no limit").formula.counts();
+    (together, !counts.contains(&("symmetry", 0)))
+}
+
+#[test]
+fn neither_parallel_steps_nor_broken_symmetries_change_an_optimum() {
+    for backend in built_in() {
+        let fleets = (0..8).map(|seed| check_all(fleet(seed), &backend));
+        let together = fleets.filter(|(together, _)| *together).count();
+        assert!(together > 1, "{backend:?}: operators stand together in {together} tasks only");
+        let depots = (0..8).map(|seed| check_all(depot(seed), &backend));
+        let equal = depots.filter(|(_, equal)| *equal).count();
+        assert!(equal > 3, "{backend:?}: something is equal in {equal} tasks only");
+    }
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn neither_parallel_steps_nor_broken_symmetries_change_the_optimum_of_many() {
+    for backend in built_in() {
+        for seed in 8..1_100 {
+            check_all(fleet(seed), &backend);
+            check_all(depot(seed), &backend);
+        }
     }
 }

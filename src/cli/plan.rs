@@ -9,7 +9,8 @@ use clap::{Args, ValueEnum};
 use encodings::pddl::ast::{Name, Problem};
 use encodings::validate::{Options, PlanStep, PlanText, validate};
 use encodings::{
-    Backend, BackendError, Config, Exact, Improvement, Limits, Plan, Proof, Solution, Status, Step, Unbounded,
+    Backend, BackendError, Config, Exact, Improvement, Limits, Plan, Proof, Semantics, Solution, Status,
+    Step, Unbounded,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::message::Message;
@@ -40,6 +41,10 @@ pub struct Arguments {
     /// The SAT solver: `varisat`, `batsat`, or a program with its arguments that reads DIMACS on its standard input.
     #[arg(long, value_name = "NAME", default_value = Backend::BUILT_IN[0])]
     solver: Backend,
+    /// How many actions stand at one step of the SAT solver's formulas; if not given, several while a first plan is looked
+    /// for, and one from then on. The answer is the same.
+    #[arg(long, value_enum)]
+    encoding: Option<Encoding>,
     /// What to minimize in place of the problem's metric: an expression as in a metric, or a function's name. Repeated,
     /// earlier objectives come first, and later ones decide among plans that are equal by them.
     #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true)]
@@ -63,6 +68,26 @@ enum PlanFormat {
     Plansys2,
     /// As `--format json`.
     Json,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Encoding {
+    /// One.
+    Sequential,
+    /// Several that can be executed in any order.
+    ForAllStep,
+    /// Several that can be executed in at least one order.
+    ExistsStep,
+}
+
+impl From<Encoding> for Semantics {
+    fn from(encoding: Encoding) -> Self {
+        match encoding {
+            Encoding::Sequential => Self::Sequential,
+            Encoding::ForAllStep => Self::ForAllStep,
+            Encoding::ExistsStep => Self::ExistsStep,
+        }
+    }
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {
@@ -105,7 +130,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let stages = Stages { read, ground: started.elapsed().saturating_sub(read) };
 
     let backend = arguments.solver.clone();
-    let config = Config { horizon: arguments.horizon, limits, backend, ..Config::default() };
+    let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
+    let config = Config { horizon, semantics, limits, backend, ..Config::default() };
     let progress = progress(common);
     let mut report = |improvement: Improvement| {
         progress.set_message(format!(

@@ -308,6 +308,10 @@ fn every_solver_proves_the_same() {
         let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", solver]);
         assert_eq!((answer.status, &answer.stdout), (0, &cheapest.stdout), "{solver}");
     }
+    for encoding in ["sequential", "for-all-step", "exists-step"] {
+        let answer = metaplan(&["plan", "missions/uuv.toml", "--encoding", encoding]);
+        check(&answer, 0, &["optimal, proved"]);
+    }
     let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", "no-such-solver -q"]);
     check(&answer, 2, &["M113", "`no-such-solver` does not serve", "varisat, batsat"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--solver", " "]), 2, &["needs a name"]);

@@ -85,12 +85,20 @@ impl Encoding<'_> {
 
     /// What a step can add, by source: the operator itself, and each table of designs.
     fn increments(&mut self, step: usize, cost: &CostLimit<'_>) -> Vec<Increments> {
-        let mut own = Increments::new();
+        // Of one source at most one amount counts, so operators that can stand together are sources of their own.
+        let mut own: BTreeMap<(Option<usize>, Option<OperatorId>), Increments> = BTreeMap::new();
         for index in 0..self.operators[step].len() {
             let (id, literal) = self.operators[step][index];
-            self.reduced(step, id, literal, cost, &mut own);
+            let source = match &self.interference {
+                None => (None, None),
+                Some(interference) => {
+                    let class = interference.class(id);
+                    (class, class.is_none().then_some(id))
+                }
+            };
+            self.reduced(step, id, literal, cost, own.entry(source).or_default());
         }
-        let mut all = vec![own];
+        let mut all: Vec<Increments> = own.into_values().collect();
         let mut by_slots: BTreeMap<Vec<usize>, Increments> = BTreeMap::new();
         for ((entries, values), members) in self.partition(step, residual_tables) {
             let group = self.group(step, &members, Family::Cost);

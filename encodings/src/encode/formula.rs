@@ -11,6 +11,8 @@ pub(crate) enum Family {
     Domain,
     /// At most one operator a step, none after the last.
     Sequence,
+    /// Operators at the same step do not disturb each other.
+    Interference,
     /// Operators need their conditions.
     Condition,
     /// Operators have their effects.
@@ -23,6 +25,8 @@ pub(crate) enum Family {
     Axiom,
     /// Each function in use has one design, and one that suits.
     Selection,
+    /// Equal designs and equal objects are used in their order.
+    Symmetry,
     /// Exact integers of numeric variables.
     Numeric,
     /// The accumulated cost.
@@ -34,15 +38,17 @@ pub(crate) enum Family {
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::Domain,
         Self::Sequence,
+        Self::Interference,
         Self::Condition,
         Self::Effect,
         Self::Conditional,
         Self::Frame,
         Self::Axiom,
         Self::Selection,
+        Self::Symmetry,
         Self::Numeric,
         Self::Cost,
         Self::Goal,
@@ -54,12 +60,14 @@ impl Family {
         match self {
             Self::Domain => "domain",
             Self::Sequence => "sequence",
+            Self::Interference => "interference",
             Self::Condition => "condition",
             Self::Effect => "effect",
             Self::Conditional => "conditional",
             Self::Frame => "frame",
             Self::Axiom => "axiom",
             Self::Selection => "selection",
+            Self::Symmetry => "symmetry",
             Self::Numeric => "numeric",
             Self::Cost => "cost",
             Self::Goal => "goal",

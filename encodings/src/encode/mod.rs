@@ -1,7 +1,7 @@
 //! Ground task to formula: is there a plan of at most `horizon` steps that costs at most `limit`?
 //!
-//! A sequential encoding over finite-domain variables with explanatory frame axioms [1]. Steps that a plan does not need
-//! are idle, and stand at its end. The designs of an operator's slots are variables of their own beside the operator's, so that
+//! An encoding over finite-domain variables with explanatory frame axioms [1], sequential or with several operators at a
+//! step. Steps that a plan does not need are idle, and stand at its end. The designs of an operator's slots are variables of their own beside the operator's, so that
 //! the formula grows with the sum of the designs, not with their product. Each family of clauses has a file.
 //!
 //! [1] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic search, AAAI 1996.
@@ -12,10 +12,12 @@ mod conditional;
 mod cost;
 mod formula;
 mod groups;
+mod interference;
 mod numeric;
 mod operators;
 mod selection;
 mod state;
+mod symmetry;
 #[cfg(test)]
 mod tests;
 
@@ -29,12 +31,16 @@ use crate::task::{Fact, Literal, OperatorId, Task};
 use conditional::Fires;
 use cost::Cost;
 use formula::{Family, Formula};
+use interference::Interference;
+pub use interference::Semantics;
 
 /// A formula and what its variables mean.
 pub(crate) struct Encoding<'a> {
     task: &'a Task,
     pub(crate) formula: Formula,
     horizon: usize,
+    /// What operators must not stand at the same step; none if each stands alone.
+    interference: Option<Interference>,
     /// For each step the operators that can be there, ascending, with their variables.
     operators: Vec<Vec<(OperatorId, Lit)>>,
     /// Whether any operator is executed at the step.
@@ -62,13 +68,16 @@ impl<'a> Encoding<'a> {
         task: &'a Task,
         allowed: &[Vec<bool>],
         cost: Option<CostLimit<'_>>,
+        semantics: Semantics,
         limits: &Limits,
     ) -> Option<Self> {
+        let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());
         let horizon = allowed.len();
         let mut encoding = Self {
             task,
             formula: Formula::new(),
             horizon,
+            interference: Interference::new(task, semantics, potential),
             operators: Vec::new(),
             busy: Vec::new(),
             values: Vec::new(),
@@ -84,6 +93,7 @@ impl<'a> Encoding<'a> {
             }
             encoding.domain(step);
             encoding.sequence(step);
+            encoding.interfere(step);
             encoding.conditions(step);
             encoding.conditional(step);
             encoding.effects(step);
@@ -91,6 +101,7 @@ impl<'a> Encoding<'a> {
             encoding.selection(step);
         }
         encoding.domain(horizon);
+        encoding.break_symmetries();
         let numbers = encoding.numeric(limits)?;
         for (step, numbers) in numbers.iter().enumerate() {
             encoding.axioms(step, numbers);
@@ -143,14 +154,16 @@ impl<'a> Encoding<'a> {
         };
         let mut steps = Vec::new();
         for (step, candidates) in self.operators.iter().enumerate() {
-            let Some((id, _)) = candidates.iter().find(|(_, literal)| holds(*literal)) else { continue };
-            let operator = &self.task.operators[id.index()];
-            let choice = operator.slots.iter().map(|slot| {
-                let designs = &self.designs[step][slot.slot.index()];
-                let chosen = slot.designs.iter().position(|design| holds(designs[*design as usize]));
-                chosen.unwrap_or(0) as u16
-            });
-            steps.push(GroundStep { operator: *id, choice: choice.collect() });
+            // Several stand in the order in which they can be executed.
+            for (id, _) in candidates.iter().filter(|(_, literal)| holds(*literal)) {
+                let operator = &self.task.operators[id.index()];
+                let choice = operator.slots.iter().map(|slot| {
+                    let designs = &self.designs[step][slot.slot.index()];
+                    let chosen = slot.designs.iter().position(|design| holds(designs[*design as usize]));
+                    chosen.unwrap_or(0) as u16
+                });
+                steps.push(GroundStep { operator: *id, choice: choice.collect() });
+            }
         }
         steps
     }

@@ -1,6 +1,6 @@
 //! Operators: their order, conditions and effects.
 //!
-//! - sequence: at most one operator a step; `o@t → busy@t`, `busy@t → ⋁ o@t`, `busy@t+1 → busy@t`;
+//! - sequence: at most one operator a step, unless several may stand there; `o@t → busy@t`, `busy@t → ⋁ o@t`, `busy@t+1 → busy@t`;
 //! - condition: `o@t → p@t` for each fact, `o@t → ⋁ l@t` for each clause;
 //! - effect: `o@t → e@t+1`, unless a conditional effect of the operator prevails.
 
@@ -8,7 +8,7 @@ use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
 
 impl Encoding<'_> {
-    /// One operator at most, and none after an idle step.
+    /// One operator at most, where operators stand alone, and none after an idle step.
     pub(super) fn sequence(&mut self, step: usize) {
         let literals: Vec<_> = self.operators[step].iter().map(|(_, literal)| *literal).collect();
         let busy = match literals[..] {
@@ -20,7 +20,9 @@ impl Encoding<'_> {
                     self.formula.add(Family::Sequence, [!*literal, busy]);
                 }
                 self.formula.add(Family::Sequence, literals.iter().copied().chain([!busy]));
-                self.formula.at_most_one(Family::Sequence, &literals);
+                if self.interference.is_none() {
+                    self.formula.at_most_one(Family::Sequence, &literals);
+                }
                 busy
             }
         };

@@ -6,7 +6,7 @@ use insta::assert_snapshot;
 
 use crate::bounds::Bounds;
 use crate::encode::formula::{Family, Meaning};
-use crate::encode::{CostLimit, Encoding};
+use crate::encode::{CostLimit, Encoding, Semantics};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
 use crate::pddl::{Source, read};
@@ -92,8 +92,45 @@ fn check(family: Family) -> String {
     let bounds = Bounds::new(&task, &Limits::none());
     let allowed = vec![vec![true; task.operators.len()]; 2];
     let cost = CostLimit { limit: 6, bounds: &bounds };
-    let encoding = Encoding::new(&task, &allowed, Some(cost), &Limits::none()).expect("no limit");
+    let encoding =
+        Encoding::new(&task, &allowed, Some(cost), Semantics::Sequential, &Limits::none()).expect("no limit");
     clauses(&encoding, family)
+}
+
+/// Two equal lamps that need power, and a switch that takes it away: declared after one action that needs it, and before another.
+const LAMPS: (&str, &str) = (
+    "(define (domain d)
+      (:predicates (on ?x) (red ?x) (power))
+      (:action light :parameters (?x) :precondition (power) :effect (on ?x))
+      (:action cut :parameters () :precondition (power) :effect (not (power)))
+      (:action colour :parameters (?x) :precondition (power) :effect (red ?x)))",
+    "(define (problem p) (:domain d) (:objects a b) (:init (power))
+      (:goal (and (on a) (on b) (red a) (red b) (not (power)))))",
+);
+
+fn lamps(semantics: Semantics, family: Family) -> String {
+    let (domain, problem, _) =
+        read(&Source::new("domain", LAMPS.0), &Source::new("problem", LAMPS.1)).expect("PDDL");
+    let task = ground(&domain, &problem, &Config::default()).expect("a task");
+    let allowed = vec![vec![true; task.operators.len()]; 2];
+    let encoding = Encoding::new(&task, &allowed, None, semantics, &Limits::none()).expect("no limit");
+    clauses(&encoding, family)
+}
+
+#[test]
+fn interference_in_any_order() {
+    assert_snapshot!(lamps(Semantics::ForAllStep, Family::Interference));
+}
+
+#[test]
+fn interference_in_some_order() {
+    assert_eq!(lamps(Semantics::Sequential, Family::Interference), "");
+    assert_snapshot!(lamps(Semantics::ExistsStep, Family::Interference));
+}
+
+#[test]
+fn symmetry_of_objects() {
+    assert_snapshot!(lamps(Semantics::Sequential, Family::Symmetry));
 }
 
 #[test]

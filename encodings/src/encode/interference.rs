@@ -1,0 +1,267 @@
+//! Several operators at a step: which ones must not stand together.
+//!
+//! In ∀-step semantics [1] the operators of a step can be executed in any order with the same outcome, in ∃-step semantics
+//! [2] in at least one order, which is fixed: that of the ground task. Both ask for all conditions before the step and
+//! for all effects after it. With E the operators that change a fact (or any variable that is read in another way than by a
+//! plain condition) and R those that need it:
+//!
+//! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`, `a@t → a'@t`, `a@t → ¬p@t`;
+//! - ∀-step: the same, and once more in the reverse order;
+//! - exclusion: at most one of the operators that share a slot, a numeric variable, or a change of the state that costs are
+//!   reduced by. So numbers, designs and costs are encoded as where operators stand alone.
+//!
+//! Every sequential plan is one in these semantics, so a bound on the steps of sequential plans serves them, too.
+//!
+//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic search, AAAI 1996.
+//! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
+//! Artificial Intelligence 170(12-13), 2006.
+
+use std::collections::BTreeMap;
+
+use crate::bounds::Projection;
+use crate::encode::Encoding;
+use crate::encode::formula::{Family, Formula, Meaning};
+use crate::sat::Lit;
+use crate::task::{Condition, OperatorId, Task, VariableId};
+
+/// How many operators can stand at one step of a formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Semantics {
+    /// One.
+    Sequential,
+    /// Several that can be executed in any order.
+    ForAllStep,
+    /// Several that can be executed in the order of the ground task.
+    ExistsStep,
+}
+
+/// What must not happen at the same step, for all steps alike.
+pub(super) struct Interference {
+    /// Whether the reverse order counts, too.
+    both_orders: bool,
+    /// At most one of each group.
+    exclusions: Vec<Vec<OperatorId>>,
+    conflicts: Vec<Conflict>,
+    /// For each operator the first exclusion that holds it.
+    classes: Vec<Option<usize>>,
+}
+
+/// Operators that change something, and operators that need it as it is, both ascending.
+struct Conflict {
+    erase: Vec<OperatorId>,
+    need: Vec<OperatorId>,
+}
+
+/// What operators read of a variable, and change.
+#[derive(Default)]
+struct Uses {
+    /// By the value that a plain condition asks for.
+    require: BTreeMap<u32, Vec<OperatorId>>,
+    /// In any other way.
+    read: Vec<OperatorId>,
+    /// With the value that they set.
+    write: Vec<(OperatorId, u32)>,
+}
+
+impl Interference {
+    /// The interferences of a task; none if operators stand alone. Costs are reduced by the potential.
+    pub(super) fn new(task: &Task, semantics: Semantics, potential: Option<&Projection>) -> Option<Self> {
+        if semantics == Semantics::Sequential {
+            return None;
+        }
+        let support = Support::new(task);
+        let mut variables: Vec<Uses> = (0..task.basic).map(|_| Uses::default()).collect();
+        let mut slots = vec![Vec::new(); task.slots.len()];
+        let mut numbers = vec![Vec::new(); task.initial.numbers.len()];
+        let (mut constant, mut changers) = (Vec::new(), Vec::new());
+        for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+            for usage in operator.slots.iter() {
+                slots[usage.slot.index()].push(id);
+            }
+            let mut touched = support.numbers_of(&operator.condition);
+            let mut read = support.read_by(&operator.condition);
+            for effect in &operator.conditional {
+                let condition = Condition { clauses: vec![effect.condition.clone()], ..Condition::default() };
+                touched.extend(support.numbers_of(&condition));
+                read.extend(support.read_by(&condition));
+            }
+            for effect in &operator.numeric_effects {
+                touched.push(effect.variable.index());
+                touched.extend(effect.value.coefficients.iter().map(|(variable, _)| variable.index()));
+            }
+            for number in sorted(&mut touched) {
+                numbers[*number].push(id);
+            }
+            for variable in sorted(&mut read) {
+                variables[*variable].read.push(id);
+            }
+            for fact in operator.condition.facts.iter().filter(|fact| fact.variable.index() < task.basic) {
+                variables[fact.variable.index()].require.entry(fact.value).or_default().push(id);
+            }
+            let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+            for effect in operator.effects.iter().chain(conditional) {
+                variables[effect.variable.index()].write.push((id, effect.value));
+            }
+            if operator.condition.comparisons.iter().any(|comparison| comparison.coefficients.is_empty()) {
+                constant.push(id);
+            }
+            let moves = potential.is_some_and(|p| p.transitions(id).iter().any(|t| t.source != t.target));
+            changers.extend(moves.then_some(id));
+        }
+        let groups = std::iter::once(changers).chain(slots).chain(numbers).chain([constant]);
+        let exclusions: Vec<_> = groups.filter(|group| group.len() > 1).collect();
+        let mut classes = vec![None; task.operators.len()];
+        for (group, position) in exclusions.iter().zip(0..) {
+            for id in group {
+                classes[id.index()].get_or_insert(position);
+            }
+        }
+        let conflicts = variables.iter().flat_map(Uses::conflicts).collect();
+        Some(Self { both_orders: semantics == Semantics::ForAllStep, exclusions, conflicts, classes })
+    }
+
+    /// Operators of the same class never stand at the same step; those without one may stand with any.
+    pub(super) fn class(&self, operator: OperatorId) -> Option<usize> {
+        self.classes[operator.index()]
+    }
+}
+
+impl Uses {
+    fn conflicts(&self) -> Vec<Conflict> {
+        let mut found = Vec::new();
+        let required: BTreeMap<OperatorId, u32> =
+            self.require.iter().flat_map(|(value, all)| all.iter().map(|id| (*id, *value))).collect();
+        let mut writers: BTreeMap<Option<u32>, Vec<(OperatorId, u32)>> = BTreeMap::new();
+        for (id, set) in &self.write {
+            writers.entry(required.get(id).copied()).or_default().push((*id, *set));
+        }
+        for (value, need) in &self.require {
+            // What needs another value of the variable cannot stand at the step anyway.
+            let possible = [None, Some(*value)].into_iter().filter_map(|required| writers.get(&required));
+            let erase = possible.flatten().filter(|(_, set)| set != value);
+            let mut erase: Vec<_> = erase.map(|(id, _)| *id).collect();
+            erase.sort_unstable();
+            erase.dedup();
+            found.push(Conflict { erase, need: need.clone() });
+        }
+        let mut erase: Vec<_> = self.write.iter().map(|(id, _)| *id).collect();
+        erase.dedup();
+        found.push(Conflict { erase, need: self.read.clone() });
+        found.retain(|conflict| !conflict.erase.is_empty() && !conflict.need.is_empty());
+        found
+    }
+}
+
+/// What derived variables depend on, in the end.
+struct Support {
+    basic: usize,
+    /// For each derived variable the basic variables and the numeric ones.
+    of: Vec<(Vec<usize>, Vec<usize>)>,
+}
+
+impl Support {
+    fn new(task: &Task) -> Self {
+        let derived = task.variables.len() - task.basic;
+        let mut support = Self { basic: task.basic, of: vec![(Vec::new(), Vec::new()); derived] };
+        loop {
+            let mut changed = false;
+            for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
+                let mut read = support.read_by(&rule.body);
+                read.extend(rule.body.facts.iter().filter_map(|fact| support.if_basic(fact.variable)));
+                let numbers = support.numbers_of(&rule.body);
+                let (variables, numerics) = &mut support.of[rule.head.variable.index() - task.basic];
+                let before = (variables.len(), numerics.len());
+                variables.extend(read);
+                numerics.extend(numbers);
+                changed |= (sorted(variables).len(), sorted(numerics).len()) != before;
+            }
+            if !changed {
+                return support;
+            }
+        }
+    }
+
+    fn if_basic(&self, variable: VariableId) -> Option<usize> {
+        (variable.index() < self.basic).then_some(variable.index())
+    }
+
+    fn derived(&self, condition: &Condition) -> impl Iterator<Item = &(Vec<usize>, Vec<usize>)> {
+        let literals = condition.clauses.iter().flatten().map(|literal| literal.fact.variable);
+        let facts = condition.facts.iter().map(|fact| fact.variable);
+        facts.chain(literals).filter_map(|variable| self.of.get(variable.index().checked_sub(self.basic)?))
+    }
+
+    /// The basic variables that a condition depends on, apart from those of its facts.
+    fn read_by(&self, condition: &Condition) -> Vec<usize> {
+        let literals = condition.clauses.iter().flatten();
+        let own = literals.filter_map(|literal| self.if_basic(literal.fact.variable));
+        own.chain(self.derived(condition).flat_map(|(variables, _)| variables.iter().copied())).collect()
+    }
+
+    /// The numeric variables that a condition depends on.
+    fn numbers_of(&self, condition: &Condition) -> Vec<usize> {
+        let own = condition.comparisons.iter().flat_map(|linear| &linear.coefficients);
+        let own = own.map(|(variable, _)| variable.index());
+        own.chain(self.derived(condition).flat_map(|(_, numbers)| numbers.iter().copied())).collect()
+    }
+}
+
+fn sorted(numbers: &mut Vec<usize>) -> &[usize] {
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers
+}
+
+impl Encoding<'_> {
+    /// The operators at a step do not interfere.
+    pub(super) fn interfere(&mut self, step: usize) {
+        let Some(interference) = self.interference.take() else { return };
+        for group in &interference.exclusions {
+            let literals: Vec<_> = group.iter().filter_map(|id| self.operator(step, *id)).collect();
+            self.formula.at_most_one(Family::Interference, &literals);
+        }
+        for conflict in &interference.conflicts {
+            let mut users: BTreeMap<OperatorId, (bool, bool)> = BTreeMap::new();
+            for id in &conflict.erase {
+                users.entry(*id).or_default().0 = true;
+            }
+            for id in &conflict.need {
+                users.entry(*id).or_default().1 = true;
+            }
+            let mut chain: Vec<_> =
+                users.iter().filter_map(|(id, uses)| Some((self.operator(step, *id)?, *uses))).collect();
+            self.ladder(&chain);
+            if interference.both_orders {
+                chain.reverse();
+                self.ladder(&chain);
+            }
+        }
+        self.interference = Some(interference);
+    }
+
+    /// The variable of an operator at a step, if it can stand there.
+    pub(super) fn operator(&self, step: usize, id: OperatorId) -> Option<Lit> {
+        let all = &self.operators[step];
+        all.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| all[index].1)
+    }
+
+    /// After an operator that erases there is none that needs.
+    fn ladder(&mut self, chain: &[(Lit, (bool, bool))]) {
+        let mut erased = !Formula::truth();
+        for (index, (literal, (erases, needs))) in chain.iter().enumerate() {
+            if *needs {
+                self.formula.add(Family::Interference, [!erased, !*literal]);
+            }
+            if *erases && chain[index + 1..].iter().any(|(_, (_, needs))| *needs) {
+                if erased == !Formula::truth() {
+                    erased = *literal;
+                } else {
+                    let longer = self.formula.fresh(Meaning::Ladder);
+                    self.formula.add(Family::Interference, [!erased, longer]);
+                    self.formula.add(Family::Interference, [!*literal, longer]);
+                    erased = longer;
+                }
+            }
+        }
+    }
+}
