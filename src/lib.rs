@@ -1,9 +1,9 @@
 //! Metaplan adapts a robot's task plan and its software architecture together.
 //!
 //! This facade joins the three libraries: [`ontology`] (what the robot is), [`rules`] (what follows) and [`encodings`] (what to
-//! do about it). [`mission`] is the only place that sees OWL and PDDL at once. Order lives here, not logic.
+//! do about it); and [`probabilistic`], model checking of decision processes. [`mission`] is the only place that sees OWL and PDDL at once. Order lives here, not logic.
 
-pub use {encodings, ontology, rules};
+pub use {encodings, ontology, probabilistic, rules};
 
 pub mod knowledge;
 pub mod message;

@@ -1,5 +1,6 @@
 //! Arguments to calls of the library, answers to standard output, everything else to standard error.
 
+mod check;
 mod convert;
 mod export;
 mod memory;
@@ -100,6 +101,8 @@ enum Command {
     Reason(reason::Arguments),
     /// A knowledge base with its imports as one document in another syntax.
     Convert(convert::Arguments),
+    /// Model checking of a PRISM-language model: a value with bounds, and its policy.
+    Check(check::Arguments),
     /// A mission for other planners, with what the knowledge base has contributed.
     Export(export::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
@@ -277,6 +280,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Plan(arguments) => plan::run(arguments, &cli.common),
         Command::Reason(arguments) => reason::run(arguments, &cli.common),
         Command::Convert(arguments) => convert::run(arguments, &cli.common),
+        Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),
     }

@@ -1,0 +1,115 @@
+//! A policy by the values of variables: for files, and back from them.
+
+use serde_json::{Map, Value, json};
+
+use crate::error::Error;
+use crate::explore::Explored;
+use crate::number::Number;
+use crate::prism::{Packed, Program};
+use crate::solve::NONE;
+
+/// What a policy does in each state that it can get to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PolicyTable {
+    /// The variables: name, and whether it is a truth value.
+    pub variables: Vec<(String, bool)>,
+    /// The states.
+    pub rows: Vec<Row>,
+}
+
+/// What a policy does in one state.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Row {
+    /// The values of the variables.
+    pub values: Vec<i64>,
+    /// The action, empty for a command without one.
+    pub action: String,
+    /// Which of the state's choices it is, from 0, in the order of the commands.
+    pub choice: usize,
+}
+
+/// The name and version of the format.
+const FORMAT: &str = "metaplan-policy/1";
+
+impl PolicyTable {
+    /// As JSON.
+    pub fn to_json(&self) -> Value {
+        let row = |row: &Row| {
+            let values = self.variables.iter().zip(&row.values).map(|((name, is_bool), value)| {
+                (name.clone(), if *is_bool { json!(*value != 0) } else { json!(value) })
+            });
+            let state: Map<String, Value> = values.collect();
+            json!({ "state": state, "action": row.action, "choice": row.choice })
+        };
+        json!({ "format": FORMAT, "states": self.rows.iter().map(row).collect::<Vec<_>>() })
+    }
+
+    /// From JSON, for the variables of a model.
+    ///
+    /// # Errors
+    /// What is not as it should be.
+    pub fn from_json(text: &str) -> Result<Self, Error> {
+        let wrong = |what: String| Error::Policy(what);
+        let json: Value = serde_json::from_str(text).map_err(|error| wrong(format!("no JSON: {error}")))?;
+        if json["format"] != FORMAT {
+            return Err(wrong(format!("`format` must be `{FORMAT}`")));
+        }
+        let Some(states) = json["states"].as_array() else {
+            return Err(wrong("`states` must be a list".to_owned()));
+        };
+        let mut table = Self { variables: Vec::new(), rows: Vec::new() };
+        for (number, entry) in states.iter().enumerate() {
+            let problem = |what: &str| wrong(format!("state {}: {what}", number + 1));
+            let Some(state) = entry["state"].as_object() else {
+                return Err(problem("`state` must be an object"));
+            };
+            if number == 0 {
+                table.variables =
+                    state.iter().map(|(name, value)| (name.clone(), value.is_boolean())).collect();
+            }
+            let mut values = Vec::new();
+            for (name, _) in &table.variables {
+                let value = state.get(name).and_then(|v| v.as_bool().map(i64::from).or_else(|| v.as_i64()));
+                values.push(value.ok_or_else(|| problem(&format!("no value of `{name}`")))?);
+            }
+            let action = entry["action"].as_str().ok_or_else(|| problem("`action` must be a text"))?;
+            let choice = entry["choice"].as_u64().ok_or_else(|| problem("`choice` must be a number"))?;
+            table.rows.push(Row { values, action: action.to_owned(), choice: choice as usize });
+        }
+        Ok(table)
+    }
+
+    /// The choices that it makes in a process; those it says nothing about get none.
+    ///
+    /// # Errors
+    /// It is about another model.
+    pub fn choices<N: Number>(
+        &self,
+        program: &Program<N>,
+        explored: &Explored<Packed, N>,
+    ) -> Result<Vec<u32>, Error> {
+        let mut order = Vec::new();
+        for variable in &program.variables {
+            let found = self.variables.iter().position(|(name, _)| *name == variable.name);
+            let missing = || Error::Policy(format!("the policy has no variable `{}`", variable.name));
+            order.push(found.ok_or_else(missing)?);
+        }
+        let mut policy = vec![NONE; explored.mdp.states()];
+        for (number, row) in self.rows.iter().enumerate() {
+            let problem = |what: &str| Error::Policy(format!("state {}: {what}", number + 1));
+            let values: Vec<i64> = order.iter().map(|at| row.values[*at]).collect();
+            let state = program.pack(&values).and_then(|packed| explored.states.get_index_of(&packed));
+            let state = state.ok_or_else(|| problem("the model does not reach this state"))?;
+            let choices = explored.mdp.choices(state);
+            let choice = choices.start + row.choice;
+            if !choices.contains(&choice) {
+                return Err(problem("the model has no such choice there"));
+            }
+            if program.action_name(explored.mdp.action(choice)) != row.action {
+                return Err(problem("the choice has another action"));
+            }
+            policy[state] = choice as u32;
+        }
+        Ok(policy)
+    }
+}

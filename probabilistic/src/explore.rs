@@ -1,0 +1,150 @@
+//! A generator of successors to the process of all states that it reaches, breadth first.
+//!
+//! A generator computes the successors of a state natively. It is the one place where the meaning of a state is
+//! known; whatever comes after knows numbers only.
+
+use std::hash::Hash;
+
+use indexmap::IndexSet;
+use rustc_hash::FxBuildHasher;
+
+use crate::error::Error;
+use crate::mdp::Mdp;
+use crate::number::Number;
+
+/// The action of the loop that a state without choices gets.
+pub const DEADLOCK: u32 = u32::MAX;
+
+/// How a model moves.
+pub trait Generator<N: Number> {
+    /// What a model remembers.
+    type State: Clone + Eq + Hash;
+
+    /// Where it starts.
+    fn initial(&self) -> Self::State;
+
+    /// How many rewards each choice has.
+    fn rewards(&self) -> usize;
+
+    /// Writes all choices of a state.
+    ///
+    /// # Errors
+    /// What the model does there and must not do.
+    fn successors(&self, state: &Self::State, choices: &mut Choices<Self::State, N>) -> Result<(), Error>;
+}
+
+/// The choices of one state, as a generator writes them.
+#[derive(Debug)]
+pub struct Choices<S, N> {
+    transitions: Vec<(S, N)>,
+    /// Action, and the end of its transitions.
+    ends: Vec<(u32, u32)>,
+    rewards: Vec<N>,
+}
+
+impl<S, N: Number> Choices<S, N> {
+    fn new() -> Self {
+        Self { transitions: Vec::new(), ends: Vec::new(), rewards: Vec::new() }
+    }
+
+    /// Adds a transition to the choice that is being written. Those of probability 0 are dropped.
+    pub fn to(&mut self, state: S, probability: N) {
+        if !probability.is_zero() {
+            self.transitions.push((state, probability));
+        }
+    }
+
+    /// Ends the choice that is being written.
+    pub fn end(&mut self, action: u32, rewards: impl IntoIterator<Item = N>) {
+        self.rewards.extend(rewards);
+        self.ends.push((action, self.transitions.len() as u32));
+    }
+
+    fn clear(&mut self) {
+        self.transitions.clear();
+        self.ends.clear();
+        self.rewards.clear();
+    }
+}
+
+/// When exploration has to stop.
+pub struct Bounds<'a> {
+    /// More states than this are an error.
+    pub states: usize,
+    /// Told the number of states from time to time; false stops.
+    pub progress: &'a dyn Fn(usize) -> bool,
+}
+
+impl Default for Bounds<'_> {
+    fn default() -> Self {
+        Self { states: 50_000_000, progress: &|_| true }
+    }
+}
+
+/// A process with what its states and choices mean.
+#[derive(Debug)]
+pub struct Explored<S, N> {
+    /// The process; state 0 is where it starts.
+    pub mdp: Mdp<N>,
+    /// The states by number.
+    pub states: IndexSet<S, FxBuildHasher>,
+    /// For each reward its value for each choice.
+    pub rewards: Vec<Vec<N>>,
+    /// How many states had no choice and got a loop.
+    pub deadlocks: usize,
+}
+
+/// Explores all states.
+///
+/// # Errors
+/// What the model must not do, a limit, or that the caller wants to stop.
+pub fn explore<N: Number, G: Generator<N>>(
+    generator: &G,
+    bounds: &Bounds<'_>,
+) -> Result<Explored<G::State, N>, Error> {
+    let mut states: IndexSet<G::State, FxBuildHasher> = IndexSet::default();
+    states.insert(generator.initial());
+    let mut mdp = Mdp::default();
+    let kinds = generator.rewards();
+    let mut rewards: Vec<Vec<N>> = vec![Vec::new(); kinds];
+    let mut choices = Choices::new();
+    let (mut at, mut deadlocks) = (0, 0);
+    while at < states.len() {
+        if at % 65_536 == 0 && !(bounds.progress)(states.len()) {
+            return Err(Error::Interrupted { states: states.len() });
+        }
+        choices.clear();
+        let state = states[at].clone();
+        generator.successors(&state, &mut choices)?;
+        let mut transitions = choices.transitions.drain(..);
+        let mut begin = 0;
+        let mut reward = choices.rewards.drain(..);
+        for (action, end) in choices.ends.drain(..) {
+            for _ in begin..end {
+                if let Some((target, probability)) = transitions.next() {
+                    let (target, new) = states.insert_full(target);
+                    if new && states.len() > bounds.states {
+                        return Err(Error::StateLimit { states: states.len(), limit: bounds.states });
+                    }
+                    mdp.push_transition(target as u32, probability);
+                }
+            }
+            begin = end;
+            mdp.end_choice(action)?;
+            for values in &mut rewards {
+                values.push(reward.next().unwrap_or_else(N::zero));
+            }
+        }
+        if mdp.open_choices() == 0 {
+            deadlocks += 1;
+            mdp.push_transition(at as u32, N::one());
+            mdp.end_choice(DEADLOCK)?;
+            for values in &mut rewards {
+                values.push(N::zero());
+            }
+        }
+        mdp.end_state();
+        at += 1;
+    }
+    Ok(Explored { mdp, states, rewards, deadlocks })
+}

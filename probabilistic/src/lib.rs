@@ -1,0 +1,30 @@
+//! Probabilistic model checking of Markov decision processes, with bounds that are certified or exact.
+//!
+//! A model comes as PRISM-language text ([`prism`]) or from a [`explore::Generator`] that computes successors natively.
+//! It becomes a sparse process ([`mdp`]); [`solve`] computes least and greatest probabilities and expected rewards with
+//! bounds and policies; [`policy`] evaluates a given policy; [`pareto`] trades two objectives. [`check`] does all of
+//! this for a property in PRISM's syntax.
+//!
+//! The crate knows no OWL and no PDDL, opens no file and prints nothing.
+
+pub mod check;
+pub mod error;
+pub mod explore;
+pub mod graph;
+pub mod mdp;
+pub mod number;
+pub mod pareto;
+pub mod policy;
+pub mod prism;
+pub mod property;
+pub mod solve;
+
+pub use error::{Diagnostic, Error, Place};
+pub use mdp::Mdp;
+pub use number::Number;
+pub use solve::{Direction, Problem, Solution};
+
+/// The README's example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -1,0 +1,142 @@
+//! Choices and distributions to a sparse Markov decision process.
+//!
+//! States, choices and transitions lie in three arrays, each state's choices and each choice's transitions side
+//! by side. So all successors of a state are one slice, which is what the graph algorithms run over.
+
+use num_rational::BigRational;
+
+use crate::error::Error;
+use crate::number::Number;
+
+/// A Markov decision process; a Markov chain is one with a single choice in each state.
+///
+/// States are numbers from 0, choices are numbered through over all states.
+#[derive(Debug, Clone)]
+pub struct Mdp<N> {
+    /// For each state its first choice, and the number of choices at the end.
+    first_choice: Vec<u32>,
+    /// For each choice its first transition, and the number of transitions at the end.
+    first_transition: Vec<u32>,
+    targets: Vec<u32>,
+    probabilities: Vec<N>,
+    /// For each choice the number of its action.
+    actions: Vec<u32>,
+}
+
+impl<N: Number> Default for Mdp<N> {
+    fn default() -> Self {
+        Self {
+            first_choice: vec![0],
+            first_transition: vec![0],
+            targets: Vec::new(),
+            probabilities: Vec::new(),
+            actions: Vec::new(),
+        }
+    }
+}
+
+impl<N: Number> Mdp<N> {
+    /// How many states there are.
+    pub fn states(&self) -> usize {
+        self.first_choice.len() - 1
+    }
+
+    /// How many choices there are in all states together.
+    pub fn choice_count(&self) -> usize {
+        self.actions.len()
+    }
+
+    /// How many transitions there are.
+    pub fn transition_count(&self) -> usize {
+        self.targets.len()
+    }
+
+    /// The choices of a state.
+    pub fn choices(&self, state: usize) -> std::ops::Range<usize> {
+        self.first_choice[state] as usize..self.first_choice[state + 1] as usize
+    }
+
+    /// The state that a choice belongs to.
+    pub fn owner(&self, choice: usize) -> usize {
+        self.first_choice.partition_point(|first| *first as usize <= choice) - 1
+    }
+
+    /// The action of a choice, as the generator numbered it.
+    pub fn action(&self, choice: usize) -> u32 {
+        self.actions[choice]
+    }
+
+    fn range(&self, choice: usize) -> std::ops::Range<usize> {
+        self.first_transition[choice] as usize..self.first_transition[choice + 1] as usize
+    }
+
+    /// The states that a choice can lead to, each once.
+    pub fn targets(&self, choice: usize) -> &[u32] {
+        &self.targets[self.range(choice)]
+    }
+
+    /// Where a choice leads, and with which probability.
+    pub fn transitions(&self, choice: usize) -> impl ExactSizeIterator<Item = (usize, &N)> {
+        let range = self.range(choice);
+        self.targets[range.clone()].iter().map(|state| *state as usize).zip(&self.probabilities[range])
+    }
+
+    /// All successors of a state, by choice; a state can occur more than once.
+    pub fn successors(&self, state: usize) -> &[u32] {
+        let choices = self.choices(state);
+        let first = self.first_transition[choices.start] as usize;
+        &self.targets[first..self.first_transition[choices.end] as usize]
+    }
+
+    /// Adds a transition to the choice that is being written; transitions to one state are added up.
+    pub fn push_transition(&mut self, target: u32, probability: N) {
+        let first = self.first_transition[self.actions.len()] as usize;
+        if let Some(at) = self.targets[first..].iter().position(|known| *known == target) {
+            self.probabilities[first + at] = self.probabilities[first + at].plus(&probability);
+        } else {
+            self.targets.push(target);
+            self.probabilities.push(probability);
+        }
+    }
+
+    /// Ends the choice that is being written.
+    ///
+    /// # Errors
+    /// There are more transitions than 32 bits can count.
+    pub fn end_choice(&mut self, action: u32) -> Result<(), Error> {
+        let end = u32::try_from(self.targets.len()).map_err(|_| self.too_large())?;
+        self.actions.push(action);
+        self.first_transition.push(end);
+        Ok(())
+    }
+
+    /// Ends the state that is being written.
+    pub fn end_state(&mut self) {
+        self.first_choice.push(self.actions.len() as u32);
+    }
+
+    /// How many choices the state that is being written has so far.
+    pub fn open_choices(&self) -> usize {
+        self.actions.len() - self.first_choice[self.states()] as usize
+    }
+
+    fn too_large(&self) -> Error {
+        Error::StateLimit { states: self.states(), limit: self.states() }
+    }
+
+    /// The same process in doubles.
+    pub fn to_f64(&self) -> Mdp<f64> {
+        Mdp {
+            first_choice: self.first_choice.clone(),
+            first_transition: self.first_transition.clone(),
+            targets: self.targets.clone(),
+            probabilities: self.probabilities.iter().map(Number::to_f64).collect(),
+            actions: self.actions.clone(),
+        }
+    }
+}
+
+/// What a decimal of the model stands for in the kind of number that is solved in.
+pub fn number<N: Number>(value: &BigRational) -> N {
+    N::from_rational(value)
+}

@@ -1,0 +1,318 @@
+//! Two objectives to the vertices of their Pareto front, and to the best value of one under a bound on the other.
+//!
+//! Each objective is a loss: an expected cost until its target, or the probability of missing its target. While neither
+//! target is reached, a weighted sum of both is minimised; what comes after the first one is one objective alone, and
+//! enters as the worth of the states in which the first target is reached (Etessami et al., LMCS 4(4:8), 2008;
+//! the search for vertices by normals is that of Forejt, Kwiatkowska and Parker, ATVA 2012). So the vertices are those of
+//! policies that remember which targets have been reached, and nothing else.
+
+use fixedbitset::FixedBitSet;
+
+use crate::mdp::Mdp;
+use crate::number::Number;
+use crate::policy::{choices_of, conserving};
+use crate::solve::{Direction, NONE, Problem, Solution, solve};
+
+/// Exact arithmetic would take too long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Exhausted;
+
+/// One of two objectives.
+#[derive(Debug, Clone)]
+pub struct Objective<N> {
+    /// The rewards whose expected sum is to be small; none for the probability of the target, which is to be great.
+    pub rewards: Option<Vec<N>>,
+    /// Its target.
+    pub target: FixedBitSet,
+}
+
+/// A policy and what it is worth.
+#[derive(Debug, Clone)]
+pub struct Point<N> {
+    /// The losses: expected cost, or probability of missing the target.
+    pub losses: [N; 2],
+    /// The choices until the first target.
+    pub policy: Vec<u32>,
+}
+
+/// The least value of the first objective under a bound on the second.
+#[derive(Debug, Clone)]
+pub struct Constrained<N> {
+    /// By policies that may draw lots.
+    pub randomised: N,
+    /// By policies that may not (and that remember only which targets have been reached); with whether it is proved
+    /// to be the least one. None where there is none.
+    pub deterministic: Option<(N, bool)>,
+}
+
+/// How many vertices are looked for at most.
+const VERTICES: usize = 2000;
+/// How many restrictions of the process are tried for the best deterministic policy.
+const BRANCHES: usize = 3000;
+
+/// Two objectives in one process.
+#[derive(Debug)]
+pub struct Pareto<'a, N> {
+    mdp: &'a Mdp<N>,
+    objectives: &'a [Objective<N>; 2],
+    /// What each objective is worth alone, as a loss; infinite states apart.
+    alone: [Vec<N>; 2],
+    /// Both targets.
+    terminal: FixedBitSet,
+    /// States that leave no hope for a cost.
+    blocked: FixedBitSet,
+    has_costs: bool,
+}
+
+impl<'a, N: Number> Pareto<'a, N> {
+    /// Prepares two objectives.
+    ///
+    /// # Errors
+    /// Exact arithmetic takes too long.
+    pub fn new(mdp: &'a Mdp<N>, objectives: &'a [Objective<N>; 2]) -> Result<Self, Exhausted> {
+        let n = mdp.states();
+        let mut terminal = FixedBitSet::with_capacity(n);
+        let mut blocked = FixedBitSet::with_capacity(n);
+        let mut alone = [Vec::new(), Vec::new()];
+        let has_costs = objectives.iter().any(|objective| objective.rewards.is_some());
+        for (number, objective) in objectives.iter().enumerate() {
+            terminal.union_with(&objective.target);
+            let solution = solve(problem(mdp, objective), None).ok_or(Exhausted)?;
+            alone[number] = match objective.rewards {
+                Some(_) => solution.values,
+                None => solution.values.iter().map(|value| N::one().minus(value)).collect(),
+            };
+            blocked.union_with(&solution.infinite);
+        }
+        // A state from which a cost is infinite must be avoided before its target, not after it.
+        let avoided: Vec<usize> = blocked.ones().collect();
+        for state in avoided {
+            let pending = objectives.iter().any(|o| o.rewards.is_some() && !o.target.contains(state));
+            blocked.set(state, pending);
+        }
+        terminal.difference_with(&blocked);
+        Ok(Self { mdp, objectives, alone, terminal, blocked, has_costs })
+    }
+
+    /// The worth of the targets for one objective.
+    fn worth(&self, objective: usize) -> Vec<N> {
+        let target = &self.objectives[objective].target;
+        let own = |state: usize| {
+            if target.contains(state) { N::zero() } else { self.alone[objective][state].clone() }
+        };
+        (0..self.mdp.states()).map(own).collect()
+    }
+
+    /// Least weighted loss, by the choices that are allowed.
+    fn solve(
+        &self,
+        weights: &[N; 2],
+        allowed: Option<&FixedBitSet>,
+    ) -> Result<(Solution<N>, FixedBitSet), Exhausted> {
+        let mix = |values: [&N; 2]| values[0].times(&weights[0]).plus(&values[1].times(&weights[1]));
+        let worths = [self.worth(0), self.worth(1)];
+        let zero = N::zero();
+        let mut worth: Vec<N> = (0..self.mdp.states()).map(|s| mix([&worths[0][s], &worths[1][s]])).collect();
+        let rewards: Option<Vec<N>> = self.has_costs.then(|| {
+            let reward = |number: usize, choice: usize| {
+                self.objectives[number].rewards.as_ref().map_or(&zero, |rewards| &rewards[choice])
+            };
+            (0..self.mdp.choice_count()).map(|choice| mix([reward(0, choice), reward(1, choice)])).collect()
+        });
+        if !self.has_costs {
+            // Two probabilities: never reaching a target is allowed, and loses both.
+            let all = weights[0].plus(&weights[1]);
+            for worth in &mut worth {
+                *worth = all.minus(worth);
+            }
+        }
+        let problem = Problem {
+            mdp: self.mdp,
+            direction: if self.has_costs { Direction::Min } else { Direction::Max },
+            rewards: rewards.as_deref(),
+            terminal: &self.terminal,
+            terminal_values: Some(&worth),
+            blocked: Some(&self.blocked),
+            allowed,
+        };
+        let solution = solve(problem, None).ok_or(Exhausted)?;
+        let kept = conserving(&problem, &solution);
+        Ok((solution, kept))
+    }
+
+    /// What a policy loses by each objective.
+    fn point(&self, policy: Vec<u32>) -> Result<Point<N>, Exhausted> {
+        let allowed = choices_of(self.mdp, &policy);
+        let unit = [[N::one(), N::zero()], [N::zero(), N::one()]];
+        let mut losses = Vec::new();
+        for weights in &unit {
+            let (solution, _) = self.solve(weights, Some(&allowed))?;
+            let value = solution.values[0].clone();
+            losses.push(if self.has_costs { value } else { N::one().minus(&value) });
+        }
+        let losses = <[N; 2]>::try_from(losses).map_err(|_| Exhausted)?;
+        Ok(Point { losses, policy })
+    }
+
+    /// The best point for one objective, and for the other among those.
+    fn extreme(&self, first: usize, allowed: Option<&FixedBitSet>) -> Result<Option<Point<N>>, Exhausted> {
+        let unit = |number: usize| {
+            let mut weights = [N::zero(), N::zero()];
+            weights[number] = N::one();
+            weights
+        };
+        let (best, kept) = self.solve(&unit(first), allowed)?;
+        if best.infinite.contains(0) {
+            return Ok(None);
+        }
+        let (second, _) = self.solve(&unit(1 - first), Some(&kept))?;
+        let policy = second.policy.iter().zip(&best.policy).map(|(s, b)| if *s == NONE { *b } else { *s });
+        self.point(policy.collect()).map(Some)
+    }
+
+    /// The vertices of the front, by the first objective; no vertex where a cost is infinite whatever is done.
+    ///
+    /// # Errors
+    /// Exact arithmetic takes too long.
+    pub fn vertices(&self, allowed: Option<&FixedBitSet>) -> Result<Vec<Point<N>>, Exhausted> {
+        let Some(first) = self.extreme(0, allowed)? else { return Ok(Vec::new()) };
+        let Some(last) = self.extreme(1, allowed)? else { return Ok(Vec::new()) };
+        let mut done = Vec::new();
+        let mut open = vec![last];
+        let mut at = first;
+        while let Some(next) = open.last() {
+            let weights = [at.losses[1].minus(&next.losses[1]), next.losses[0].minus(&at.losses[0])];
+            let flat = weights.iter().any(|w| !clearly_positive(w));
+            let between = if flat || done.len() + open.len() > VERTICES {
+                None
+            } else {
+                let (solution, _) = self.solve(&weights, allowed)?;
+                let point = self.point(solution.policy)?;
+                let worth =
+                    |p: &Point<N>| p.losses[0].times(&weights[0]).plus(&p.losses[1].times(&weights[1]));
+                let gain = worth(&at).minus(&worth(&point));
+                let enough = N::EXACT || gain.to_f64() > 1e-9 * worth(&at).to_f64().abs().max(1e-300);
+                (N::zero() < gain && enough).then_some(point)
+            };
+            if let Some(point) = between {
+                open.push(point);
+            } else {
+                let next = open.pop();
+                if flat && done.is_empty() && open.is_empty() {
+                    // Both objectives have the same best point.
+                    return Ok(vec![at]);
+                }
+                done.push(std::mem::replace(&mut at, next.ok_or(Exhausted)?));
+            }
+        }
+        done.push(at);
+        Ok(done)
+    }
+
+    /// The least first loss where the second one is at most `limit`; none where no policy keeps it.
+    ///
+    /// # Errors
+    /// Exact arithmetic takes too long.
+    pub fn constrained(&self, limit: &N) -> Result<Option<Constrained<N>>, Exhausted> {
+        let vertices = self.vertices(None)?;
+        let Some((randomised, _)) = lower_hull(&vertices, limit) else { return Ok(None) };
+        let deterministic = self.deterministic(limit)?;
+        Ok(Some(Constrained { randomised, deterministic }))
+    }
+
+    /// Branch and bound over the choices at states where two neighbouring vertices differ; the randomised optimum of a
+    /// restricted process bounds what is left.
+    fn deterministic(&self, limit: &N) -> Result<Option<(N, bool)>, Exhausted> {
+        let mut best: Option<N> = None;
+        let mut all = FixedBitSet::with_capacity(self.mdp.choice_count());
+        all.insert_range(..);
+        let mut open = vec![all];
+        let mut tried = 0;
+        while let Some(allowed) = open.pop() {
+            tried += 1;
+            if tried > BRANCHES {
+                return Ok(best.map(|best| (best, false)));
+            }
+            let vertices = self.vertices(Some(&allowed))?;
+            for vertex in &vertices {
+                let better = best.as_ref().is_none_or(|best| vertex.losses[0] < *best);
+                if keeps(&vertex.losses[1], limit) && better {
+                    best = Some(vertex.losses[0].clone());
+                }
+            }
+            let Some((bound, segment)) = lower_hull(&vertices, limit) else { continue };
+            if best.as_ref().is_some_and(|best| !bound.clearly_less(best)) {
+                continue;
+            }
+            let Some((left, right)) = segment else { continue };
+            let Some(state) = self.difference(&vertices[left].policy, &vertices[right].policy) else {
+                continue;
+            };
+            for choice in self.mdp.choices(state).filter(|choice| allowed.contains(*choice)) {
+                let mut restricted = allowed.clone();
+                for other in self.mdp.choices(state) {
+                    restricted.set(other, other == choice);
+                }
+                open.push(restricted);
+            }
+        }
+        Ok(best.map(|best| (best, true)))
+    }
+
+    /// The first state on the way of a policy at which another one does something else.
+    fn difference(&self, policy: &[u32], other: &[u32]) -> Option<usize> {
+        let mut seen = FixedBitSet::with_capacity(self.mdp.states());
+        let mut queue = vec![0];
+        seen.insert(0);
+        let mut at = 0;
+        while at < queue.len() {
+            let state = queue[at];
+            at += 1;
+            if policy[state] == NONE || self.terminal.contains(state) {
+                continue;
+            }
+            if policy[state] != other[state] {
+                return Some(state);
+            }
+            for target in self.mdp.targets(policy[state] as usize) {
+                if !seen.put(*target as usize) {
+                    queue.push(*target as usize);
+                }
+            }
+        }
+        None
+    }
+}
+
+fn problem<'p, N: Number>(mdp: &'p Mdp<N>, objective: &'p Objective<N>) -> Problem<'p, N> {
+    Problem {
+        mdp,
+        direction: if objective.rewards.is_some() { Direction::Min } else { Direction::Max },
+        rewards: objective.rewards.as_deref(),
+        terminal: &objective.target,
+        terminal_values: None,
+        blocked: None,
+        allowed: None,
+    }
+}
+
+fn clearly_positive<N: Number>(value: &N) -> bool {
+    if N::EXACT { N::zero() < *value } else { value.to_f64() > 1e-12 }
+}
+
+fn keeps<N: Number>(loss: &N, limit: &N) -> bool {
+    if N::EXACT { loss <= limit } else { loss.to_f64() <= limit.to_f64() + 1e-12 }
+}
+
+/// The least first loss of mixtures of vertices that keep the limit; with the two vertices that are mixed, if it takes two.
+fn lower_hull<N: Number>(vertices: &[Point<N>], limit: &N) -> Option<(N, Option<(usize, usize)>)> {
+    // Vertices go from small first losses to small second ones.
+    let right = vertices.iter().position(|vertex| keeps(&vertex.losses[1], limit))?;
+    if right == 0 {
+        return Some((vertices[0].losses[0].clone(), None));
+    }
+    let (a, b) = (&vertices[right - 1].losses, &vertices[right].losses);
+    let share = a[1].minus(limit).over(&a[1].minus(&b[1]));
+    let value = a[0].plus(&share.times(&b[0].minus(&a[0])));
+    Some((value, Some((right - 1, right))))
+}

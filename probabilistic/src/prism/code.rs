@@ -1,0 +1,259 @@
+//! Expressions with names resolved and types known, and their evaluation.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::ToPrimitive;
+
+use crate::number::Number;
+use crate::prism::ast::{BinaryOp, Function, Type};
+
+/// An expression over the values of the variables; truth values are 0 and 1.
+#[derive(Debug, Clone)]
+pub enum Code<N> {
+    /// A whole number or a truth value.
+    Whole(i64),
+    /// Any other number.
+    Number(N),
+    /// A variable.
+    Variable(u32),
+    /// `!`.
+    Not(Box<Self>),
+    /// `-`.
+    Negative(Box<Self>, Type),
+    /// All of them hold.
+    All(Vec<Self>),
+    /// One of them holds.
+    Any(Vec<Self>),
+    /// Both hold or neither does.
+    Iff(Box<Self>, Box<Self>),
+    /// A comparison; the type is that of both sides together.
+    Compare(BinaryOp, Type, Box<Self>, Box<Self>),
+    /// Arithmetic; the type is that of the result.
+    Arithmetic(BinaryOp, Type, Box<Self>, Box<Self>),
+    /// `condition ? then : otherwise`.
+    If(Box<Self>, Box<Self>, Box<Self>),
+    /// A function; the type is that of the result.
+    Call(Function, Type, Vec<Self>),
+}
+
+/// An evaluation that has no result.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault(pub &'static str);
+
+type Result<T> = std::result::Result<T, Fault>;
+
+const OVERFLOW: Fault = Fault("an integer grows out of its range");
+
+impl<N: Number> Code<N> {
+    /// Its truth value.
+    pub fn holds(&self, values: &[i64]) -> Result<bool> {
+        Ok(match self {
+            Self::Whole(value) => *value != 0,
+            Self::Variable(variable) => values[*variable as usize] != 0,
+            Self::Not(inner) => !inner.holds(values)?,
+            Self::All(parts) => {
+                for part in parts {
+                    if !part.holds(values)? {
+                        return Ok(false);
+                    }
+                }
+                true
+            }
+            Self::Any(parts) => {
+                for part in parts {
+                    if part.holds(values)? {
+                        return Ok(true);
+                    }
+                }
+                false
+            }
+            Self::Iff(left, right) => left.holds(values)? == right.holds(values)?,
+            Self::Compare(op, Type::Double, left, right) => {
+                compare(*op, left.number(values)?.partial_cmp(&right.number(values)?))
+            }
+            Self::Compare(op, _, left, right) => {
+                compare(*op, Some(left.whole(values)?.cmp(&right.whole(values)?)))
+            }
+            Self::If(condition, then, otherwise) => {
+                if condition.holds(values)? {
+                    then.holds(values)?
+                } else {
+                    otherwise.holds(values)?
+                }
+            }
+            _ => self.whole(values)? != 0,
+        })
+    }
+
+    /// Its value, for whole numbers and truth values.
+    pub fn whole(&self, values: &[i64]) -> Result<i64> {
+        Ok(match self {
+            Self::Whole(value) => *value,
+            Self::Variable(variable) => values[*variable as usize],
+            Self::Negative(inner, _) => inner.whole(values)?.checked_neg().ok_or(OVERFLOW)?,
+            Self::Arithmetic(op, _, left, right) => {
+                let (left, right) = (left.whole(values)?, right.whole(values)?);
+                let result = match op {
+                    BinaryOp::Plus => left.checked_add(right),
+                    BinaryOp::Minus => left.checked_sub(right),
+                    _ => left.checked_mul(right),
+                };
+                result.ok_or(OVERFLOW)?
+            }
+            Self::If(condition, then, otherwise) => {
+                if condition.holds(values)? {
+                    then.whole(values)?
+                } else {
+                    otherwise.whole(values)?
+                }
+            }
+            Self::Call(function, _, arguments) => whole_call(*function, arguments, values)?,
+            Self::Number(_) => return Err(Fault("a whole number is needed here")),
+            _ => i64::from(self.holds(values)?),
+        })
+    }
+
+    /// Its value as a number.
+    pub fn number(&self, values: &[i64]) -> Result<N> {
+        Ok(match self {
+            Self::Number(value) => value.clone(),
+            Self::Negative(inner, Type::Double) => N::zero().minus(&inner.number(values)?),
+            Self::Arithmetic(op, Type::Double, left, right) => {
+                let (left, right) = (left.number(values)?, right.number(values)?);
+                match op {
+                    BinaryOp::Plus => left.plus(&right),
+                    BinaryOp::Minus => left.minus(&right),
+                    BinaryOp::Times => left.times(&right),
+                    _ if right.is_zero() => return Err(Fault("a division by zero")),
+                    _ => left.over(&right),
+                }
+            }
+            Self::If(condition, then, otherwise) => {
+                if condition.holds(values)? {
+                    then.number(values)?
+                } else {
+                    otherwise.number(values)?
+                }
+            }
+            Self::Call(function, Type::Double, arguments) => number_call(*function, arguments, values)?,
+            _ => from_whole(self.whole(values)?),
+        })
+    }
+
+    /// Whether no variable occurs in it.
+    pub fn is_constant(&self) -> bool {
+        match self {
+            Self::Whole(_) | Self::Number(_) => true,
+            Self::Variable(_) => false,
+            Self::Not(inner) | Self::Negative(inner, _) => inner.is_constant(),
+            Self::All(parts) | Self::Any(parts) | Self::Call(_, _, parts) => {
+                parts.iter().all(Self::is_constant)
+            }
+            Self::Iff(left, right)
+            | Self::Compare(_, _, left, right)
+            | Self::Arithmetic(_, _, left, right) => left.is_constant() && right.is_constant(),
+            Self::If(condition, then, otherwise) => {
+                condition.is_constant() && then.is_constant() && otherwise.is_constant()
+            }
+        }
+    }
+}
+
+/// A whole number as a number.
+pub fn from_whole<N: Number>(value: i64) -> N {
+    N::from_rational(&BigRational::from(BigInt::from(value)))
+}
+
+fn compare(op: BinaryOp, order: Option<std::cmp::Ordering>) -> bool {
+    let Some(order) = order else { return false };
+    match op {
+        BinaryOp::Equal => order.is_eq(),
+        BinaryOp::NotEqual => order.is_ne(),
+        BinaryOp::Less => order.is_lt(),
+        BinaryOp::LessEqual => order.is_le(),
+        BinaryOp::Greater => order.is_gt(),
+        _ => order.is_ge(),
+    }
+}
+
+fn whole_call<N: Number>(function: Function, arguments: &[Code<N>], values: &[i64]) -> Result<i64> {
+    let whole = |at: usize| arguments[at].whole(values);
+    match function {
+        Function::Min | Function::Max => {
+            let mut best = whole(0)?;
+            for at in 1..arguments.len() {
+                let value = whole(at)?;
+                best = if function == Function::Min { best.min(value) } else { best.max(value) };
+            }
+            Ok(best)
+        }
+        Function::Mod => {
+            let (left, right) = (whole(0)?, whole(1)?);
+            if right <= 0 {
+                Err(Fault("`mod` by a number that is not positive"))
+            } else {
+                Ok(left.rem_euclid(right))
+            }
+        }
+        Function::Pow => {
+            let exponent = u32::try_from(whole(1)?).map_err(|_| Fault("a negative power of an integer"))?;
+            whole(0)?.checked_pow(exponent).ok_or(OVERFLOW)
+        }
+        Function::Floor | Function::Ceil | Function::Round => {
+            let value = arguments[0].number(values)?;
+            let rounded = match (value.to_rational(), function) {
+                (Some(exact), Function::Floor) => exact.floor().to_i64(),
+                (Some(exact), Function::Ceil) => exact.ceil().to_i64(),
+                (Some(exact), _) => (exact + half()).floor().to_i64(),
+                (None, Function::Floor) => value.to_f64().floor().to_i64(),
+                (None, Function::Ceil) => value.to_f64().ceil().to_i64(),
+                (None, _) => (value.to_f64() + 0.5).floor().to_i64(),
+            };
+            rounded.ok_or(OVERFLOW)
+        }
+        Function::Log => Err(Fault("a whole number is needed here")),
+    }
+}
+
+fn half() -> BigRational {
+    BigRational::new(BigInt::from(1), BigInt::from(2))
+}
+
+fn number_call<N: Number>(function: Function, arguments: &[Code<N>], values: &[i64]) -> Result<N> {
+    let number = |at: usize| arguments[at].number(values);
+    match function {
+        Function::Min | Function::Max => {
+            let mut best = number(0)?;
+            for at in 1..arguments.len() {
+                let value = number(at)?;
+                if (value < best) == (function == Function::Min) && value != best {
+                    best = value;
+                }
+            }
+            Ok(best)
+        }
+        Function::Pow => {
+            let (base, exponent) = (number(0)?, number(1)?);
+            let whole = exponent.to_f64();
+            if whole.fract() == 0.0 && whole.abs() <= 1000.0 {
+                let power = (0..whole.abs() as u32).fold(N::one(), |power, _| power.times(&base));
+                return match whole < 0.0 {
+                    true if power.is_zero() => Err(Fault("a division by zero")),
+                    true => Ok(N::one().over(&power)),
+                    false => Ok(power),
+                };
+            }
+            irrational(base.to_f64().powf(whole))
+        }
+        Function::Log => irrational(number(0)?.to_f64().log(number(1)?.to_f64())),
+        Function::Floor | Function::Ceil | Function::Round | Function::Mod => {
+            whole_call(function, arguments, values).map(from_whole)
+        }
+    }
+}
+
+/// The double nearest to a number that is not rational.
+fn irrational<N: Number>(value: f64) -> Result<N> {
+    let exact = BigRational::from_float(value).ok_or(Fault("a number that is not finite"))?;
+    Ok(N::from_rational(&exact))
+}

@@ -1,0 +1,393 @@
+//! Names, types and constants: the syntax tree's expressions to code.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
+
+use crate::error::{Diagnostic, Error, Place};
+use crate::number::{Number, parse_decimal};
+use crate::prism::ast::{BinaryOp, Expr, ExprKind, Function, Model, Type};
+use crate::prism::code::{Code, Fault};
+use crate::prism::expression::Cursor;
+use crate::prism::lexer::{Kind, tokens};
+
+/// What a name stands for.
+#[derive(Debug, Clone)]
+enum Meaning<N> {
+    Constant(Code<N>, Type),
+    Variable(u32, Type),
+    /// Its place in the list of formulas.
+    Formula(usize),
+}
+
+/// All names of a model, with the values of its constants.
+#[derive(Debug, Clone)]
+pub struct Names<N> {
+    meanings: FxHashMap<String, Meaning<N>>,
+    formulas: Vec<Expr>,
+    labels: FxHashMap<String, Expr>,
+    /// Formulas and labels that are being written out.
+    open: Vec<String>,
+}
+
+/// Values of constants from outside, by name, as text.
+pub type Settings = BTreeMap<String, String>;
+
+impl<N: Number> Names<N> {
+    /// Names of constants, formulas and labels; variables come with [`Names::variable`].
+    ///
+    /// # Errors
+    /// Constants without value, values that do not fit, names that are given twice.
+    pub fn new(model: &Model, settings: &Settings) -> Result<Self, Error> {
+        let mut names = Self {
+            meanings: FxHashMap::default(),
+            formulas: model.formulas.iter().map(|formula| formula.expression.clone()).collect(),
+            labels: FxHashMap::default(),
+            open: Vec::new(),
+        };
+        let mut problems = Vec::new();
+        for label in &model.labels {
+            if names.labels.insert(label.name.clone(), label.expression.clone()).is_some() {
+                problems.push(twice(&format!("label `\"{}\"`", label.name), label.place));
+            }
+        }
+        for (number, formula) in model.formulas.iter().enumerate() {
+            names.declare(&formula.name, Meaning::Formula(number), formula.place, &mut problems);
+        }
+        for name in settings.keys() {
+            if !model.constants.iter().any(|constant| constant.name == *name) {
+                let known: Vec<_> = model.constants.iter().map(|constant| constant.name.as_str()).collect();
+                return Err(Error::Constant(format!(
+                    "the model has no constant `{name}`; it has: {}",
+                    known.join(", ")
+                )));
+            }
+        }
+        let mut missing = Vec::new();
+        // Constants may use constants that come later; each round settles those whose names are settled.
+        let mut waiting: Vec<_> = model.constants.iter().collect();
+        while !waiting.is_empty() {
+            let before = waiting.len();
+            let mut next = Vec::new();
+            for constant in waiting {
+                let setting = settings.get(&constant.name);
+                let code = match (setting, &constant.value) {
+                    (Some(text), _) => setting_code(text, constant.kind, &constant.name)?,
+                    (None, None) => {
+                        missing.push(constant.name.as_str());
+                        zero(constant.kind)
+                    }
+                    (None, Some(value)) => {
+                        if names.waits(value, model) {
+                            next.push(constant);
+                            continue;
+                        }
+                        match names.constant(value, constant.kind) {
+                            Ok(code) => code,
+                            Err(problem) => {
+                                problems.push(problem);
+                                zero(constant.kind)
+                            }
+                        }
+                    }
+                };
+                let meaning = Meaning::Constant(code, constant.kind);
+                names.declare(&constant.name, meaning, constant.place, &mut problems);
+            }
+            waiting = next;
+            if waiting.len() == before {
+                for constant in waiting.drain(..) {
+                    let text = format!("the value of `{}` depends on itself", constant.name);
+                    problems.push(Diagnostic::new("Q204", constant.place, text));
+                }
+            }
+        }
+        if !problems.is_empty() {
+            return Err(Error::Model(problems));
+        }
+        if !missing.is_empty() {
+            return Err(Error::Constant(format!("constants without value: {}", missing.join(", "))));
+        }
+        Ok(names)
+    }
+
+    /// Whether an expression uses a constant that has no value yet.
+    fn waits(&self, value: &Expr, model: &Model) -> bool {
+        let mut used = Vec::new();
+        value.names(&mut used);
+        let mut waits = false;
+        let mut at = 0;
+        while at < used.len() {
+            let name = used[at].0;
+            waits |= !self.meanings.contains_key(name) && model.constants.iter().any(|c| c.name == name);
+            if let Some(formula) = model.formulas.iter().find(|formula| formula.name == name)
+                && !used[..at].iter().any(|(known, _)| *known == name)
+            {
+                formula.expression.names(&mut used);
+            }
+            at += 1;
+        }
+        waits
+    }
+
+    fn declare(&mut self, name: &str, meaning: Meaning<N>, place: Place, problems: &mut Vec<Diagnostic>) {
+        if self.meanings.insert(name.to_owned(), meaning).is_some() {
+            problems.push(twice(&format!("name `{name}`"), place));
+        }
+    }
+
+    /// Adds a variable.
+    pub fn variable(
+        &mut self,
+        name: &str,
+        number: u32,
+        kind: Type,
+        place: Place,
+        problems: &mut Vec<Diagnostic>,
+    ) {
+        self.declare(name, Meaning::Variable(number, kind), place, problems);
+    }
+
+    /// The number and type of a variable.
+    pub fn find_variable(&self, name: &str) -> Option<(u32, Type)> {
+        match self.meanings.get(name)? {
+            Meaning::Variable(number, kind) => Some((*number, *kind)),
+            _ => None,
+        }
+    }
+
+    /// The names of all labels, sorted.
+    pub fn labels(&self) -> Vec<&str> {
+        let mut labels: Vec<_> = self.labels.keys().map(String::as_str).collect();
+        labels.sort_unstable();
+        labels
+    }
+
+    /// The value of an expression without variables.
+    pub fn constant(&mut self, value: &Expr, kind: Type) -> Result<Code<N>, Diagnostic> {
+        let code = self.typed(value, kind)?;
+        if !code.is_constant() {
+            return Err(Diagnostic::new("Q205", value.place, "a value without variables is needed here"));
+        }
+        fold(&code, kind).map_err(|Fault(text)| Diagnostic::new("Q303", value.place, text))
+    }
+
+    /// An expression of a type; whole numbers serve as numbers, too.
+    pub fn typed(&mut self, expression: &Expr, wanted: Type) -> Result<Code<N>, Diagnostic> {
+        let (code, found) = self.compile(expression)?;
+        if found == wanted || wanted == Type::Double && found == Type::Int {
+            return Ok(code);
+        }
+        let text = format!("the type here must be `{}`, not `{}`", wanted.name(), found.name());
+        Err(Diagnostic::new("Q203", expression.place, text))
+    }
+
+    /// An expression as code, with its type.
+    pub fn compile(&mut self, expression: &Expr) -> Result<(Code<N>, Type), Diagnostic> {
+        Ok(match &expression.kind {
+            ExprKind::Bool(value) => (Code::Whole(i64::from(*value)), Type::Bool),
+            ExprKind::Int(value) => (Code::Whole(*value), Type::Int),
+            ExprKind::Number(value) => (Code::Number(N::from_rational(value)), Type::Double),
+            ExprKind::Name(name) => self.name(name, expression.place)?,
+            ExprKind::Label(label) => {
+                let Some(inner) = self.labels.get(label).cloned() else {
+                    let text =
+                        format!("there is no label `\"{label}\"`; there are: {}", self.labels().join(", "));
+                    return Err(Diagnostic::new("Q202", expression.place, text));
+                };
+                self.nested(&format!("\"{label}\""), &inner, expression.place)?
+            }
+            ExprKind::Not(inner) => (Code::Not(Box::new(self.typed(inner, Type::Bool)?)), Type::Bool),
+            ExprKind::Negative(inner) => {
+                let (code, kind) = self.numeric(inner)?;
+                (Code::Negative(Box::new(code), kind), kind)
+            }
+            ExprKind::Binary(op, left, right) => self.binary(*op, left, right, expression.place)?,
+            ExprKind::If(condition, then, otherwise) => {
+                let condition = self.typed(condition, Type::Bool)?;
+                let (then, a) = self.compile(then)?;
+                let (other, b) = self.compile(otherwise)?;
+                let Some(kind) = common(a, b) else {
+                    return Err(Diagnostic::new(
+                        "Q203",
+                        otherwise.place,
+                        format!("the two sides of `:` are `{}` and `{}`", a.name(), b.name()),
+                    ));
+                };
+                (Code::If(Box::new(condition), Box::new(then), Box::new(other)), kind)
+            }
+            ExprKind::Call(function, arguments) => self.call(*function, arguments, expression.place)?,
+        })
+    }
+
+    fn name(&mut self, name: &str, place: Place) -> Result<(Code<N>, Type), Diagnostic> {
+        match self.meanings.get(name) {
+            Some(Meaning::Constant(code, kind)) => Ok((code.clone(), *kind)),
+            Some(Meaning::Variable(number, kind)) => Ok((Code::Variable(*number), *kind)),
+            Some(Meaning::Formula(formula)) => {
+                let inner = self.formulas[*formula].clone();
+                self.nested(name, &inner, place)
+            }
+            None => {
+                let text = format!("`{name}` is no constant, formula or variable of the model");
+                Err(Diagnostic::new("Q201", place, text))
+            }
+        }
+    }
+
+    fn nested(&mut self, name: &str, inner: &Expr, place: Place) -> Result<(Code<N>, Type), Diagnostic> {
+        if self.open.iter().any(|open| open == name) {
+            return Err(Diagnostic::new(
+                "Q204",
+                place,
+                format!("`{name}` stands for something with itself in it"),
+            ));
+        }
+        self.open.push(name.to_owned());
+        let result = self.compile(inner);
+        self.open.pop();
+        result
+    }
+
+    fn numeric(&mut self, expression: &Expr) -> Result<(Code<N>, Type), Diagnostic> {
+        let (code, kind) = self.compile(expression)?;
+        match kind {
+            Type::Bool => {
+                Err(Diagnostic::new("Q203", expression.place, "a number is needed here, not `bool`"))
+            }
+            _ => Ok((code, kind)),
+        }
+    }
+
+    fn binary(
+        &mut self,
+        op: BinaryOp,
+        left: &Expr,
+        right: &Expr,
+        place: Place,
+    ) -> Result<(Code<N>, Type), Diagnostic> {
+        match op {
+            BinaryOp::And | BinaryOp::Or => {
+                let mut parts = Vec::new();
+                flatten(op, left, &mut parts);
+                flatten(op, right, &mut parts);
+                let codes = parts.into_iter().map(|part| self.typed(part, Type::Bool));
+                let codes: Vec<_> = codes.collect::<Result<_, _>>()?;
+                Ok((if op == BinaryOp::And { Code::All(codes) } else { Code::Any(codes) }, Type::Bool))
+            }
+            BinaryOp::Iff | BinaryOp::Implies => {
+                let (left, right) = (self.typed(left, Type::Bool)?, self.typed(right, Type::Bool)?);
+                let code = match op {
+                    BinaryOp::Iff => Code::Iff(Box::new(left), Box::new(right)),
+                    _ => Code::Any(vec![Code::Not(Box::new(left)), right]),
+                };
+                Ok((code, Type::Bool))
+            }
+            BinaryOp::Equal | BinaryOp::NotEqual => {
+                let ((left, a), (right, b)) = (self.compile(left)?, self.compile(right)?);
+                let Some(kind) = common(a, b) else {
+                    let text = format!("`{}` and `{}` cannot be compared", a.name(), b.name());
+                    return Err(Diagnostic::new("Q203", place, text));
+                };
+                Ok((Code::Compare(op, kind, Box::new(left), Box::new(right)), Type::Bool))
+            }
+            BinaryOp::Less | BinaryOp::LessEqual | BinaryOp::Greater | BinaryOp::GreaterEqual => {
+                let ((left, a), (right, b)) = (self.numeric(left)?, self.numeric(right)?);
+                let kind = common(a, b).unwrap_or(Type::Double);
+                Ok((Code::Compare(op, kind, Box::new(left), Box::new(right)), Type::Bool))
+            }
+            BinaryOp::Plus | BinaryOp::Minus | BinaryOp::Times | BinaryOp::Divide => {
+                let ((left, a), (right, b)) = (self.numeric(left)?, self.numeric(right)?);
+                let kind =
+                    if op == BinaryOp::Divide { Type::Double } else { common(a, b).unwrap_or(Type::Double) };
+                Ok((Code::Arithmetic(op, kind, Box::new(left), Box::new(right)), kind))
+            }
+        }
+    }
+
+    fn call(
+        &mut self,
+        function: Function,
+        arguments: &[Expr],
+        place: Place,
+    ) -> Result<(Code<N>, Type), Diagnostic> {
+        let mut codes = Vec::new();
+        let mut all = Type::Int;
+        for argument in arguments {
+            let (code, kind) = self.numeric(argument)?;
+            all = common(all, kind).unwrap_or(Type::Double);
+            codes.push(code);
+        }
+        if function == Function::Mod && all != Type::Int {
+            return Err(Diagnostic::new("Q203", place, "`mod` takes integers"));
+        }
+        let kind = match function {
+            Function::Min | Function::Max | Function::Pow => all,
+            Function::Floor | Function::Ceil | Function::Round | Function::Mod => Type::Int,
+            Function::Log => Type::Double,
+        };
+        Ok((Code::Call(function, kind, codes), kind))
+    }
+}
+
+fn twice(what: &str, place: Place) -> Diagnostic {
+    Diagnostic::new("Q206", place, format!("the {what} is given a second time here"))
+}
+
+/// The operands of a chain of one operator.
+fn flatten<'a>(op: BinaryOp, expression: &'a Expr, parts: &mut Vec<&'a Expr>) {
+    let mut rest = Vec::from([expression]);
+    while let Some(next) = rest.pop() {
+        match &next.kind {
+            ExprKind::Binary(found, left, right) if *found == op => {
+                rest.push(right);
+                rest.push(left);
+            }
+            _ => parts.push(next),
+        }
+    }
+}
+
+fn common(a: Type, b: Type) -> Option<Type> {
+    match (a, b) {
+        (Type::Bool, Type::Bool) => Some(Type::Bool),
+        (Type::Bool, _) | (_, Type::Bool) => None,
+        (Type::Int, Type::Int) => Some(Type::Int),
+        _ => Some(Type::Double),
+    }
+}
+
+fn zero<N: Number>(kind: Type) -> Code<N> {
+    if kind == Type::Double { Code::Number(N::zero()) } else { Code::Whole(0) }
+}
+
+fn fold<N: Number>(code: &Code<N>, kind: Type) -> Result<Code<N>, Fault> {
+    match kind {
+        Type::Double => code.number(&[]).map(Code::Number),
+        Type::Int => code.whole(&[]).map(Code::Whole),
+        Type::Bool => code.holds(&[]).map(|value| Code::Whole(i64::from(value))),
+    }
+}
+
+/// A value from outside: a number, a fraction, a truth value, or an expression of these.
+fn setting_code<N: Number>(text: &str, kind: Type, name: &str) -> Result<Code<N>, Error> {
+    let wrong = || Error::Constant(format!("`{text}` is no value of type `{}` for `{name}`", kind.name()));
+    if kind == Type::Double
+        && let Some(exact) = parse_decimal(text)
+    {
+        return Ok(Code::Number(N::from_rational(&exact)));
+    }
+    let tokens = tokens(text).map_err(|_| wrong())?;
+    let mut cursor = Cursor::new(&tokens);
+    let expression = cursor.expression().map_err(|_| wrong())?;
+    if *cursor.peek() != Kind::End {
+        return Err(wrong());
+    }
+    let mut names = Names {
+        meanings: FxHashMap::default(),
+        formulas: Vec::new(),
+        labels: FxHashMap::default(),
+        open: Vec::new(),
+    };
+    names.constant(&expression, kind).map_err(|_| wrong())
+}

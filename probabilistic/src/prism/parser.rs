@@ -1,0 +1,285 @@
+//! Tokens to the syntax tree of a model.
+
+use crate::error::{Diagnostic, Place};
+use crate::prism::ast::{
+    Command, Constant, Expr, Model, ModelKind, Module, Named, RewardItem, Rewards, Type, Update, Variable,
+};
+use crate::prism::expression::{Cursor, Read};
+use crate::prism::lexer::{Kind, tokens};
+use crate::prism::rename;
+
+/// Reads a model.
+///
+/// # Errors
+/// All that is wrong with its syntax; after a wrong part, reading goes on with the next one.
+pub fn parse(text: &str) -> Result<Model, Vec<Diagnostic>> {
+    let tokens = tokens(text)?;
+    let mut cursor = Cursor::new(&tokens);
+    let mut model = Model {
+        kind: ModelKind::Mdp,
+        remark: String::new(),
+        constants: Vec::new(),
+        formulas: Vec::new(),
+        globals: Vec::new(),
+        modules: Vec::new(),
+        rewards: Vec::new(),
+        labels: Vec::new(),
+    };
+    let mut problems = Vec::new();
+    let mut kind = None;
+    while *cursor.peek() != Kind::End {
+        if let Err(problem) = part(&mut cursor, &mut model, &mut kind) {
+            problems.push(problem);
+            skip(&mut cursor);
+        }
+    }
+    if kind.is_none() && problems.is_empty() {
+        let text = "the model does not say what it is; write `mdp` or `dtmc` at its start";
+        problems.push(Diagnostic::new("Q107", Place { line: 1, column: 1 }, text));
+    }
+    if model.modules.is_empty() && problems.is_empty() {
+        problems.push(Diagnostic::new("Q107", cursor.place(), "the model has no module"));
+    }
+    model.kind = kind.unwrap_or(ModelKind::Mdp);
+    if problems.is_empty() { Ok(model) } else { Err(problems) }
+}
+
+/// After a mistake: to the end of a declaration, or to a word that starts another.
+fn skip(cursor: &mut Cursor<'_>) {
+    cursor.reset();
+    loop {
+        match cursor.peek() {
+            Kind::End => return,
+            Kind::Sign(";") => {
+                cursor.advance();
+                return;
+            }
+            Kind::Name(word) if word.starts_with("end") && super::is_reserved(word) => {
+                cursor.advance();
+                return;
+            }
+            Kind::Name(word)
+                if ["module", "rewards", "label", "formula", "const"].contains(&word.as_str()) =>
+            {
+                return;
+            }
+            _ => cursor.advance(),
+        }
+    }
+}
+
+fn part(cursor: &mut Cursor<'_>, model: &mut Model, kind: &mut Option<ModelKind>) -> Read<()> {
+    let place = cursor.place();
+    let Kind::Name(word) = cursor.peek() else { return Err(cursor.expected("a declaration")) };
+    let mut is_kind = |found: ModelKind| match kind.replace(found) {
+        None => Ok(()),
+        Some(_) => Err(Diagnostic::new("Q107", place, "the model has said before what it is")),
+    };
+    match word.as_str() {
+        "mdp" | "nondeterministic" => is_kind(ModelKind::Mdp)?,
+        "dtmc" | "probabilistic" => is_kind(ModelKind::Dtmc)?,
+        "const" => return constant(cursor, model),
+        "formula" | "label" => return named(cursor, model),
+        "global" => {
+            cursor.advance();
+            let variable = variable(cursor)?;
+            model.globals.push(variable);
+            return Ok(());
+        }
+        "module" => return module(cursor, model),
+        "rewards" => return rewards(cursor, model),
+        "ctmc" | "stochastic" | "pta" | "pomdp" | "popta" | "smg" | "csg" | "idtmc" | "imdp" | "ma" => {
+            cursor.advance();
+            let text = format!("models of the kind `{word}` are not handled; `mdp` and `dtmc` are");
+            return Err(Diagnostic::new("Q401", place, text));
+        }
+        "system" | "init" | "observables" | "invariant" | "player" => {
+            cursor.advance();
+            let text = format!("`{word}` declarations are not handled");
+            return Err(Diagnostic::new("Q401", place, text));
+        }
+        _ => return Err(cursor.expected("a declaration (`const`, `formula`, `module`, `rewards`, `label`)")),
+    }
+    cursor.advance();
+    Ok(())
+}
+
+fn constant(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
+    cursor.advance();
+    let kind = match cursor.peek() {
+        Kind::Name(word) => match word.as_str() {
+            "int" => Some(Type::Int),
+            "double" | "rate" | "prob" => Some(Type::Double),
+            "bool" => Some(Type::Bool),
+            _ => None,
+        },
+        _ => None,
+    };
+    if kind.is_some() {
+        cursor.advance();
+    }
+    let (name, place) = cursor.name("the name of a constant")?;
+    let value = if cursor.take("=") { Some(cursor.expression()?) } else { None };
+    cursor.need(";")?;
+    model.constants.push(Constant { name, kind: kind.unwrap_or(Type::Int), value, place });
+    Ok(())
+}
+
+fn named(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
+    let is_label = cursor.is_word("label");
+    cursor.advance();
+    let place = cursor.place();
+    let name = match cursor.peek() {
+        Kind::Quoted(label) if is_label => {
+            cursor.advance();
+            label.clone()
+        }
+        _ if is_label => return Err(cursor.expected("the name of a label in quotation marks")),
+        _ => cursor.name("the name of a formula")?.0,
+    };
+    cursor.need("=")?;
+    let expression = cursor.expression()?;
+    cursor.need(";")?;
+    let list = if is_label { &mut model.labels } else { &mut model.formulas };
+    list.push(Named { name, expression, place });
+    Ok(())
+}
+
+fn variable(cursor: &mut Cursor<'_>) -> Read<Variable> {
+    let (name, place) = cursor.name("the name of a variable")?;
+    cursor.need(":")?;
+    let range = if cursor.take_word("bool") {
+        None
+    } else if cursor.take("[") {
+        let least = cursor.expression()?;
+        cursor.need("..")?;
+        let greatest = cursor.expression()?;
+        cursor.need("]")?;
+        Some((least, greatest))
+    } else if cursor.is_word("int") || cursor.is_word("clock") || cursor.is_word("double") {
+        let text = "variables need a finite range: write `[least..greatest]` or `bool`";
+        return Err(Diagnostic::new("Q402", cursor.place(), text));
+    } else {
+        return Err(cursor.expected("`bool` or a range `[least..greatest]`"));
+    };
+    let initial = if cursor.take_word("init") { Some(cursor.expression()?) } else { None };
+    cursor.need(";")?;
+    Ok(Variable { name, range, initial, place })
+}
+
+fn module(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
+    cursor.advance();
+    let (name, place) = cursor.name("the name of a module")?;
+    if cursor.take("=") {
+        let (original, original_place) = cursor.name("the name of a module")?;
+        let mut pairs = Vec::new();
+        cursor.need("[")?;
+        while !cursor.is("]") {
+            let (old, _) = cursor.name("a name to replace")?;
+            cursor.need("=")?;
+            pairs.push((old, cursor.name("a new name")?.0));
+            if !cursor.take(",") {
+                break;
+            }
+        }
+        cursor.need("]")?;
+        cursor.need_word("endmodule")?;
+        let known = model.modules.iter().find(|module| module.name == original);
+        let Some(known) = known else {
+            let text = format!("there is no module `{original}` above");
+            return Err(Diagnostic::new("Q201", original_place, text));
+        };
+        let module = rename::module(known, &name, place, &pairs, &model.formulas);
+        model.modules.push(module);
+        return Ok(());
+    }
+    let mut module = Module { name, variables: Vec::new(), commands: Vec::new(), place };
+    while !cursor.take_word("endmodule") {
+        if cursor.is("[") {
+            module.commands.push(command(cursor)?);
+        } else if cursor.is_word("invariant") {
+            return Err(Diagnostic::new("Q401", cursor.place(), "`invariant` is not handled"));
+        } else if matches!(cursor.peek(), Kind::Name(_)) && matches!(cursor.peek_at(1), Kind::Sign(":")) {
+            module.variables.push(variable(cursor)?);
+        } else {
+            return Err(cursor.expected("a variable, a command `[action] guard -> updates;` or `endmodule`"));
+        }
+    }
+    model.modules.push(module);
+    Ok(())
+}
+
+fn action(cursor: &mut Cursor<'_>) -> Read<Option<String>> {
+    cursor.need("[")?;
+    let action = if cursor.is("]") { None } else { Some(cursor.name("the name of an action")?.0) };
+    cursor.need("]")?;
+    Ok(action)
+}
+
+fn command(cursor: &mut Cursor<'_>) -> Read<Command> {
+    let place = cursor.place();
+    let action = action(cursor)?;
+    let guard = cursor.expression()?;
+    cursor.need("->")?;
+    let mut updates = Vec::new();
+    if starts_assignments(cursor) {
+        updates.push(Update { probability: None, assignments: assignments(cursor)? });
+    } else {
+        loop {
+            let probability = cursor.expression()?;
+            cursor.need(":")?;
+            updates.push(Update { probability: Some(probability), assignments: assignments(cursor)? });
+            if !cursor.take("+") {
+                break;
+            }
+        }
+    }
+    cursor.need(";")?;
+    Ok(Command { action, guard, updates, place })
+}
+
+/// Whether an update without probability follows: `true`, or `(name'=`.
+fn starts_assignments(cursor: &Cursor<'_>) -> bool {
+    let is_true = cursor.is_word("true") && matches!(cursor.peek_at(1), Kind::Sign(";"));
+    is_true || cursor.is("(") && matches!(cursor.peek_at(2), Kind::Sign("'"))
+}
+
+fn assignments(cursor: &mut Cursor<'_>) -> Read<Vec<(String, Expr, Place)>> {
+    if cursor.take_word("true") {
+        return Ok(Vec::new());
+    }
+    let mut assignments = Vec::new();
+    loop {
+        cursor.need("(")?;
+        let (name, place) = cursor.name("the variable of an assignment")?;
+        cursor.need("'")?;
+        cursor.need("=")?;
+        assignments.push((name, cursor.expression()?, place));
+        cursor.need(")")?;
+        if !cursor.take("&") {
+            return Ok(assignments);
+        }
+    }
+}
+
+fn rewards(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
+    let place = cursor.place();
+    cursor.advance();
+    let mut name = String::new();
+    if let Kind::Quoted(text) = cursor.peek() {
+        name.clone_from(text);
+        cursor.advance();
+    }
+    let mut items = Vec::new();
+    while !cursor.take_word("endrewards") {
+        let place = cursor.place();
+        let action = if cursor.is("[") { Some(action(cursor)?) } else { None };
+        let guard = cursor.expression()?;
+        cursor.need(":")?;
+        let reward = cursor.expression()?;
+        cursor.need(";")?;
+        items.push(RewardItem { action, guard, reward, place });
+    }
+    model.rewards.push(Rewards { name, items, place });
+    Ok(())
+}

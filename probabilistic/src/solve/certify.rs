@@ -1,0 +1,118 @@
+//! The values that policy iteration found to how far they can be from the truth.
+//!
+//! Let w count the expected steps under the policies that are almost optimal. If v + δw does not increase by any
+//! choice's equation (greatest value), or v − δw does not decrease (least value), then it bounds the value from that
+//! side, because repeating the equation only improves it (the inductive argument of Hartmanns and Kaminski, Optimistic
+//! Value Iteration, CAV 2020). On the other side the found policy itself is a bound, and the same δw covers it. All is
+//! checked with rounding errors added; where the check fails, the error is infinite, which is honest if useless.
+
+use crate::number::Number;
+use crate::solve::Direction;
+use crate::solve::chain::solve_chain;
+use crate::solve::component::Quotient;
+use crate::solve::local::NONE;
+
+/// Rounds of policy iteration for the longest way.
+const ROUNDS: usize = 200;
+
+/// For each block how far its value can be from the truth, apart from errors outside the component.
+pub fn certify<N: Number>(
+    quotient: &Quotient<N>,
+    policy: &[u32],
+    values: &[N],
+    direction: Direction,
+) -> Vec<f64> {
+    let blocks = values.len();
+    let v: Vec<f64> = values.iter().map(Number::to_f64).collect();
+    let rows: Vec<(f64, f64)> = (0..quotient.choices.len())
+        .map(|row| {
+            let value = quotient.rows.apply(row, values).to_f64();
+            (value, (64 + 3 * quotient.rows.range(row).len()) as f64 * f64::EPSILON * value)
+        })
+        .collect();
+    // How much worse a row is than the value that was found; negative where rounding makes it better.
+    let loss = |block: usize, row: usize| match direction {
+        Direction::Min => rows[row].0 - v[block],
+        Direction::Max => v[block] - rows[row].0,
+    };
+    if blocks == 1 {
+        let scale = rows.iter().fold(v[0], |scale, (value, _)| scale.max(*value));
+        return vec![64.0 * f64::EPSILON * scale.min(v[0] * 2.0)];
+    }
+    for threshold in [1e-8, 1e-12] {
+        let near = |block: usize, row: usize| {
+            loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] == row as u32
+        };
+        let Some(steps) = longest(quotient, policy, near) else { continue };
+        let own_rounding = |block: usize| 4.0 * f64::EPSILON * v[block];
+        let mut delta = 0.0_f64;
+        for (block, chosen) in policy.iter().enumerate() {
+            for row in quotient.range(block).filter(|row| near(block, *row)) {
+                let rounding = rows[row].1 + own_rounding(block);
+                delta = delta.max(rounding - loss(block, row));
+                if *chosen == row as u32 {
+                    delta = delta.max(rounding + loss(block, row));
+                }
+            }
+        }
+        delta *= 2.0;
+        let holds = (0..blocks).all(|block| {
+            quotient.range(block).all(|row| {
+                let after: f64 = quotient
+                    .rows
+                    .range(row)
+                    .map(|at| {
+                        quotient.rows.probabilities[at].to_f64() * steps[quotient.rows.columns[at] as usize]
+                    })
+                    .sum();
+                let growth = delta * (after - steps[block]) + delta * 1e-9 * (after + steps[block]);
+                loss(block, row) - rows[row].1 - own_rounding(block) >= growth
+            })
+        });
+        if holds {
+            return steps.iter().map(|steps| delta * steps * (1.0 + 1e-9)).collect();
+        }
+    }
+    vec![f64::INFINITY; blocks]
+}
+
+/// Expected steps, at most, by rows that are near the best ones.
+fn longest<N: Number>(
+    quotient: &Quotient<N>,
+    policy: &[u32],
+    near: impl Fn(usize, usize) -> bool,
+) -> Option<Vec<f64>> {
+    let mut rows = crate::solve::chain::Rows::<f64>::new();
+    for row in 0..quotient.choices.len() {
+        for at in quotient.rows.range(row) {
+            rows.columns.push(quotient.rows.columns[at]);
+            rows.probabilities.push(quotient.rows.probabilities[at].to_f64());
+        }
+        rows.end(1.0, quotient.rows.leaving[row].to_f64());
+    }
+    let idle = rows.len() as u32;
+    rows.end(1.0, 1.0);
+    let mut policy: Vec<u32> = policy.iter().map(|row| if *row == NONE { idle } else { *row }).collect();
+    for _ in 0..ROUNDS {
+        let steps = solve_chain(&rows, &policy, |_| 1.0)?;
+        if steps.iter().any(|steps| !steps.is_finite()) {
+            return None;
+        }
+        let mut changed = false;
+        for (block, chosen) in policy.iter_mut().enumerate() {
+            let mut best = steps[block];
+            for row in quotient.range(block).filter(|row| near(block, *row)) {
+                let value = rows.apply(row, &steps);
+                if value > best + 0.01 {
+                    best = value;
+                    *chosen = row as u32;
+                    changed = true;
+                }
+            }
+        }
+        if !changed {
+            return Some(steps);
+        }
+    }
+    None
+}

@@ -1,0 +1,452 @@
+//! The equations of one component with cycles to the values of its states: end components merged, policy iteration.
+
+use crate::number::Number;
+use crate::solve::certify::certify;
+use crate::solve::chain::{Rows, solve_chain};
+use crate::solve::local::{EndComponents, Local, NONE, attractor, end_components};
+use crate::solve::{Direction, Run};
+
+/// Rounds of policy iteration after which the best policy so far is taken; the certificate tells what it is worth.
+const ROUNDS: usize = 1000;
+/// Sweeps between two solutions of the chain, where components are large.
+const SWEEPS: usize = 40;
+/// Blocks from which on sweeps pay off.
+const LARGE: usize = 200;
+
+/// A component with its end components merged into blocks.
+pub struct Quotient<N> {
+    /// For each block its first row, and the end.
+    pub first: Vec<u32>,
+    /// What each choice that leaves its block leads to; columns are blocks, own loops are divided out.
+    pub rows: Rows<N>,
+    /// For each row its local choice.
+    pub choices: Vec<u32>,
+}
+
+impl<N: Number> Quotient<N> {
+    fn blocks(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// The rows of a block.
+    pub fn range(&self, block: usize) -> std::ops::Range<usize> {
+        self.first[block] as usize..self.first[block + 1] as usize
+    }
+}
+
+impl<N: Number> Run<'_, N> {
+    /// Solves a component of more than one state; none where exact arithmetic takes too long.
+    pub fn component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
+        self.cut(component, local, |_, _| true);
+        let members = self.sure_members(local);
+        if self.problem.rewards.is_some() {
+            for (state, sure) in local.states.iter().zip(&members) {
+                self.solution.infinite.set(*state as usize, !sure);
+            }
+        }
+        let settled = self.problem.rewards.is_none() && self.sure_is_one();
+        let rest: Vec<u32> =
+            component_part(&local.states, &members, !settled, self.problem.rewards.is_some());
+        for (state, sure) in local.states.iter().zip(&members) {
+            if *sure {
+                self.solution.sure.insert(*state as usize);
+                if settled {
+                    self.solution.values[*state as usize] = N::one();
+                }
+            }
+        }
+        if settled {
+            self.reach_surely(local, &members);
+        }
+        if rest.is_empty() {
+            return Some(());
+        }
+        let must_be_sure = self.problem.rewards.is_some() && self.problem.direction == Direction::Min;
+        self.cut(&rest, local, |run, choice| {
+            !must_be_sure
+                || run.problem.mdp.targets(choice).iter().all(|t| run.solution.sure.contains(*t as usize))
+        });
+        self.values(local)
+    }
+
+    /// The sure states among those of the component.
+    fn sure_members(&mut self, local: &Local<N>) -> Vec<bool> {
+        let outside_sure = |choice: usize| {
+            self.problem.mdp.targets(local.choices[choice] as usize).iter().all(|target| {
+                self.position[*target as usize] != NONE || self.solution.sure.contains(*target as usize)
+            })
+        };
+        if self.sure_by_choice() {
+            return attractor(local, outside_sure).0;
+        }
+        // Not sure: where one can stay, leave for a state that is not sure, or get to such a state.
+        let ends = end_components(local, |_| true);
+        let mut unsure = ends.inside;
+        let owners = local.owners();
+        let mut users: Vec<Vec<u32>> = vec![Vec::new(); local.states.len()];
+        for choice in 0..local.choices.len() {
+            unsure[owners[choice] as usize] |= !outside_sure(choice);
+            for target in &local.rows.columns[local.rows.range(choice)] {
+                users[*target as usize].push(owners[choice]);
+            }
+        }
+        let mut queue: Vec<usize> = (0..unsure.len()).filter(|state| unsure[*state]).collect();
+        while let Some(state) = queue.pop() {
+            for user in &users[state] {
+                if !std::mem::replace(&mut unsure[*user as usize], true) {
+                    queue.push(*user as usize);
+                }
+            }
+        }
+        unsure.into_iter().map(|unsure| !unsure).collect()
+    }
+
+    /// A policy for the states from which the goal is reached for sure.
+    fn reach_surely(&mut self, local: &mut Local<N>, members: &[bool]) {
+        let sure = component_part(&local.states, members, true, true);
+        if sure.is_empty() {
+            return;
+        }
+        self.cut(&sure, local, |run, choice| {
+            run.problem.mdp.targets(choice).iter().all(|t| run.solution.sure.contains(*t as usize))
+        });
+        let (_, policy) = attractor(local, |_| true);
+        for (state, choice) in local.states.iter().zip(policy) {
+            if choice != NONE {
+                self.solution.policy[*state as usize] = local.choices[choice as usize];
+            }
+        }
+    }
+
+    /// Cuts states out of the process; `position` tells their numbers afterwards.
+    fn cut(&mut self, states: &[u32], local: &mut Local<N>, keep: impl Fn(&Self, usize) -> bool) {
+        for state in &local.states {
+            self.position[*state as usize] = NONE;
+        }
+        local.clear();
+        local.states.extend_from_slice(states);
+        for (number, state) in states.iter().enumerate() {
+            self.position[*state as usize] = number as u32;
+        }
+        for state in states {
+            for choice in self.problem.choices(*state as usize) {
+                if !keep(self, choice) {
+                    continue;
+                }
+                let reward = self.problem.reward(choice);
+                local.paid.push(!reward.is_zero());
+                let (mut constant, mut leaving) = (reward, N::zero());
+                for (target, probability) in self.problem.mdp.transitions(choice) {
+                    let position = self.position[target];
+                    if position == NONE {
+                        constant = constant.plus(&probability.times(&self.solution.values[target]));
+                        leaving = leaving.plus(probability);
+                    } else {
+                        local.rows.columns.push(position);
+                        local.rows.probabilities.push(probability.clone());
+                    }
+                }
+                local.rows.end(constant, leaving);
+                local.choices.push(choice as u32);
+            }
+            local.first.push(local.choices.len() as u32);
+        }
+    }
+
+    fn values(&mut self, local: &mut Local<N>) -> Option<()> {
+        let costs = self.problem.rewards.is_some();
+        let mut ends = end_components(local, |choice| !costs || !local.paid[choice]);
+        if !costs && self.problem.direction == Direction::Min && ends.inside.contains(&true) {
+            // Staying in an end component is worth 0, and nothing is worth less.
+            let mut rest = Vec::new();
+            for (number, state) in local.states.iter().enumerate() {
+                if ends.inside[number] {
+                    self.solution.values[*state as usize] = N::zero();
+                    self.solution.policy[*state as usize] = stay(local, &ends, number);
+                } else {
+                    rest.push(*state);
+                }
+            }
+            if rest.is_empty() {
+                return Some(());
+            }
+            self.cut(&rest, local, |_, _| true);
+            ends = end_components(local, |_| false);
+        }
+        let quotient = quotient(local, &ends);
+        let Some((policy, values)) = self.iterate(local, &quotient) else {
+            if N::EXACT {
+                return None;
+            }
+            self.unknown(local);
+            return Some(());
+        };
+        let errors =
+            if N::EXACT { Vec::new() } else { certify(&quotient, &policy, &values, self.problem.direction) };
+        let outside = self.outside_error(local);
+        for (number, state) in local.states.iter().enumerate() {
+            let (block, state) = (ends.block[number] as usize, *state as usize);
+            self.solution.values[state] = values[block].clone();
+            if !N::EXACT {
+                let own = if values[block].is_zero() { 0.0 } else { errors[block] };
+                self.solution.errors[state] = own + outside;
+            }
+        }
+        self.write_policy(local, &ends, &quotient, &policy);
+        Some(())
+    }
+
+    /// The greatest error of a state outside that a choice leads to.
+    fn outside_error(&self, local: &Local<N>) -> f64 {
+        if N::EXACT {
+            return 0.0;
+        }
+        let targets = local.choices.iter().flat_map(|choice| self.problem.mdp.targets(*choice as usize));
+        targets
+            .filter(|target| self.position[**target as usize] == NONE)
+            .fold(0.0, |error, target| error.max(self.solution.errors[*target as usize]))
+    }
+
+    /// Nothing is known but what rewards and probabilities have in common.
+    fn unknown(&mut self, local: &Local<N>) {
+        for state in &local.states {
+            self.solution.errors[*state as usize] = f64::INFINITY;
+        }
+    }
+
+    /// Policy iteration from a proper policy.
+    fn iterate(&mut self, local: &Local<N>, quotient: &Quotient<N>) -> Option<(Vec<u32>, Vec<N>)> {
+        let direction = self.problem.direction;
+        let mut policy = self.start(local, quotient);
+        let mut values = chain(quotient, &policy)?;
+        for _ in 0..ROUNDS {
+            let mut improved = false;
+            let large = !N::EXACT && quotient.blocks() >= LARGE;
+            for _ in 0..if large { SWEEPS } else { 1 } {
+                let changed = improve(quotient, &mut policy, &mut values, direction, large);
+                improved |= changed;
+                if !changed {
+                    break;
+                }
+            }
+            self.work += values.iter().map(Number::size).sum::<u64>() * 8 * u64::from(N::EXACT);
+            if N::EXACT && self.work > super::EXACT_WORK {
+                return None;
+            }
+            if !improved {
+                return Some((policy, values));
+            }
+            values = chain(quotient, &policy)?;
+        }
+        Some((policy, values))
+    }
+
+    /// The policy of the hint where there is one, else one that leaves the component for sure.
+    fn start(&self, local: &Local<N>, quotient: &Quotient<N>) -> Vec<u32> {
+        let mut policy = vec![NONE; quotient.blocks()];
+        if let Some(hint) = self.hint {
+            for (block, row) in policy.iter_mut().enumerate() {
+                let hinted = |row: &usize| {
+                    let choice = local.choices[quotient.choices[*row] as usize];
+                    hint[self.problem.mdp.owner(choice as usize)] == choice
+                };
+                *row = quotient.range(block).find(hinted).map_or(NONE, |row| row as u32);
+            }
+            let complete = (0..policy.len()).all(|b| policy[b] != NONE || quotient.range(b).is_empty());
+            if complete {
+                return policy;
+            }
+        }
+        leave(quotient)
+    }
+
+    fn write_policy(
+        &mut self,
+        local: &Local<N>,
+        ends: &EndComponents,
+        quotient: &Quotient<N>,
+        policy: &[u32],
+    ) {
+        let owners = local.owners();
+        let mut chosen = vec![NONE; local.states.len()];
+        let mut queue = Vec::new();
+        for row in policy.iter().filter(|row| **row != NONE) {
+            let choice = quotient.choices[*row as usize];
+            let owner = owners[choice as usize];
+            chosen[owner as usize] = choice;
+            queue.push(owner);
+        }
+        if ends.inside.contains(&true) {
+            to_exits(local, ends, &owners, &mut chosen, queue);
+        }
+        for (number, state) in local.states.iter().enumerate() {
+            self.solution.policy[*state as usize] = match chosen[number] {
+                NONE => stay(local, ends, number),
+                choice => local.choices[choice as usize],
+            };
+        }
+    }
+}
+
+/// The other states of an end component go to the one that leaves it.
+fn to_exits<N: Number>(
+    local: &Local<N>,
+    ends: &EndComponents,
+    owners: &[u32],
+    chosen: &mut [u32],
+    mut queue: Vec<u32>,
+) {
+    let mut users: Vec<Vec<u32>> = vec![Vec::new(); local.states.len()];
+    for choice in (0..local.choices.len()).filter(|choice| ends.alive[*choice]) {
+        for target in &local.rows.columns[local.rows.range(choice)] {
+            users[*target as usize].push(choice as u32);
+        }
+    }
+    let mut at = 0;
+    while at < queue.len() {
+        for choice in &users[queue[at] as usize] {
+            let owner = owners[*choice as usize];
+            if chosen[owner as usize] == NONE {
+                chosen[owner as usize] = *choice;
+                queue.push(owner);
+            }
+        }
+        at += 1;
+    }
+}
+
+/// The states of a component that are sure or not; where `all_sure_only` is false, the unsure ones.
+fn component_part(states: &[u32], members: &[bool], sure_too: bool, only_sure: bool) -> Vec<u32> {
+    let wanted = |sure: bool| if only_sure { sure } else { sure_too || !sure };
+    states.iter().zip(members).filter(|(_, sure)| wanted(**sure)).map(|(state, _)| *state).collect()
+}
+
+/// A choice that stays in the end component of a state.
+fn stay<N: Number>(local: &Local<N>, ends: &EndComponents, state: usize) -> u32 {
+    let mut choices = local.range(state);
+    choices.find(|choice| ends.alive[*choice]).map_or(NONE, |choice| local.choices[choice])
+}
+
+fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32]) -> Option<Vec<N>> {
+    // Blocks that nothing leaves are worth nothing; they get an empty row.
+    if policy.contains(&NONE) {
+        let mut padded = Rows::new();
+        let mut chosen = Vec::with_capacity(policy.len());
+        for row in policy {
+            if *row != NONE {
+                for at in quotient.rows.range(*row as usize) {
+                    padded.columns.push(quotient.rows.columns[at]);
+                    padded.probabilities.push(quotient.rows.probabilities[at].clone());
+                }
+            }
+            let constant =
+                if *row == NONE { N::zero() } else { quotient.rows.constants[*row as usize].clone() };
+            let leaving = if *row == NONE { N::one() } else { quotient.rows.leaving[*row as usize].clone() };
+            chosen.push(padded.len() as u32);
+            padded.end(constant, leaving);
+        }
+        return solve_chain(&padded, &chosen, |row| padded.constants[row].clone());
+    }
+    solve_chain(&quotient.rows, policy, |row| quotient.rows.constants[row].clone())
+}
+
+/// Takes the best row of each block; `sweep` writes its value, too. Whether any changed.
+fn improve<N: Number>(
+    quotient: &Quotient<N>,
+    policy: &mut [u32],
+    values: &mut [N],
+    direction: Direction,
+    sweep: bool,
+) -> bool {
+    let mut changed = false;
+    let old: Option<Vec<N>> = (!sweep).then(|| values.to_vec());
+    for block in 0..quotient.blocks() {
+        for row in quotient.range(block) {
+            if policy[block] == row as u32 {
+                continue;
+            }
+            let value = quotient.rows.apply(row, old.as_deref().unwrap_or(values));
+            let better = match direction {
+                Direction::Min => value.clearly_less(&values[block]),
+                Direction::Max => values[block].clearly_less(&value),
+            };
+            if better {
+                policy[block] = row as u32;
+                values[block] = value;
+                changed = true;
+            }
+        }
+    }
+    changed
+}
+
+/// A policy under which every block is left, by rows that get closer to the outside.
+fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
+    let mut policy = vec![NONE; quotient.blocks()];
+    let mut users: Vec<Vec<(u32, u32)>> = vec![Vec::new(); quotient.blocks()];
+    let mut queue = Vec::new();
+    for (block, chosen) in policy.iter_mut().enumerate() {
+        for row in quotient.range(block) {
+            if *chosen == NONE && !quotient.rows.leaving[row].is_zero() {
+                *chosen = row as u32;
+                queue.push(block);
+            }
+            for at in quotient.rows.range(row) {
+                users[quotient.rows.columns[at] as usize].push((block as u32, row as u32));
+            }
+        }
+    }
+    let mut at = 0;
+    while at < queue.len() {
+        for (block, row) in &users[queue[at]] {
+            if policy[*block as usize] == NONE {
+                policy[*block as usize] = *row;
+                queue.push(*block as usize);
+            }
+        }
+        at += 1;
+    }
+    policy
+}
+
+fn quotient<N: Number>(local: &Local<N>, ends: &EndComponents) -> Quotient<N> {
+    let mut members: Vec<Vec<u32>> = vec![Vec::new(); ends.blocks];
+    for (state, block) in ends.block.iter().enumerate() {
+        members[*block as usize].push(state as u32);
+    }
+    let mut result = Quotient { first: vec![0], rows: Rows::new(), choices: Vec::new() };
+    let mut entries: Vec<(u32, N)> = Vec::new();
+    for (block, states) in members.iter().enumerate() {
+        for state in states {
+            for choice in local.range(*state as usize) {
+                entries.clear();
+                let (mut leaves, mut loops) = (local.rows.leaving[choice].clone(), false);
+                for at in local.rows.range(choice) {
+                    let target = ends.block[local.rows.columns[at] as usize];
+                    if target as usize == block {
+                        loops = true;
+                        continue;
+                    }
+                    let probability = &local.rows.probabilities[at];
+                    leaves = leaves.plus(probability);
+                    match entries.iter_mut().find(|(known, _)| *known == target) {
+                        Some((_, sum)) => *sum = sum.plus(probability),
+                        None => entries.push((target, probability.clone())),
+                    }
+                }
+                if leaves.is_zero() {
+                    continue;
+                }
+                let scaled = |value: &N| if loops { value.over(&leaves) } else { value.clone() };
+                for (target, probability) in &entries {
+                    result.rows.columns.push(*target);
+                    result.rows.probabilities.push(scaled(probability));
+                }
+                result.rows.end(scaled(&local.rows.constants[choice]), scaled(&local.rows.leaving[choice]));
+                result.choices.push(choice as u32);
+            }
+        }
+        result.first.push(result.choices.len() as u32);
+    }
+    result
+}

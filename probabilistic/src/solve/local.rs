@@ -1,0 +1,204 @@
+//! One strongly connected component of a process, cut out: its choices with what they lead to inside, and what
+//! they are worth outside; and its end components.
+
+use crate::graph::components;
+use crate::number::Number;
+use crate::solve::chain::Rows;
+
+/// No number.
+pub const NONE: u32 = u32::MAX;
+
+/// The choices of some states; local numbers count the states and the choices from 0.
+#[derive(Debug, Clone)]
+pub struct Local<N> {
+    /// The states' own numbers.
+    pub states: Vec<u32>,
+    /// For each local state its first local choice, and the end.
+    pub first: Vec<u32>,
+    /// The choices' own numbers.
+    pub choices: Vec<u32>,
+    /// A row for each choice; columns are local states.
+    pub rows: Rows<N>,
+    /// Whether a choice has a positive reward.
+    pub paid: Vec<bool>,
+}
+
+impl<N: Number> Local<N> {
+    /// Nothing.
+    pub fn new() -> Self {
+        Self { states: vec![], first: vec![0], choices: vec![], rows: Rows::new(), paid: vec![] }
+    }
+
+    /// Forgets everything, keeps the memory.
+    pub fn clear(&mut self) {
+        self.states.clear();
+        self.first.truncate(1);
+        self.choices.clear();
+        self.paid.clear();
+        self.rows.first.truncate(1);
+        self.rows.columns.clear();
+        self.rows.probabilities.clear();
+        self.rows.constants.clear();
+        self.rows.leaving.clear();
+    }
+
+    /// The local choices of a local state.
+    pub fn range(&self, state: usize) -> std::ops::Range<usize> {
+        self.first[state] as usize..self.first[state + 1] as usize
+    }
+
+    /// Whether a choice stays inside for sure.
+    pub fn is_closed(&self, choice: usize) -> bool {
+        self.rows.leaving[choice].is_zero()
+    }
+
+    /// For each choice the local state that it belongs to.
+    pub fn owners(&self) -> Vec<u32> {
+        let mut owners = vec![0; self.choices.len()];
+        for state in 0..self.states.len() {
+            owners[self.range(state)].fill(state as u32);
+        }
+        owners
+    }
+}
+
+/// The maximal end components among the choices that are eligible.
+#[derive(Debug, Clone)]
+pub struct EndComponents {
+    /// For each local state the number of its block; states outside end components are blocks of their own.
+    pub block: Vec<u32>,
+    /// How many blocks there are.
+    pub blocks: usize,
+    /// Whether the state lies in an end component.
+    pub inside: Vec<bool>,
+    /// The choices of the end components.
+    pub alive: Vec<bool>,
+}
+
+/// Maximal end components of the closed choices that `eligible` accepts (de Alfaro 1997): components of the graph,
+/// without the choices that leave one, until none does.
+pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> bool) -> EndComponents {
+    let n = local.states.len();
+    let mut alive: Vec<bool> =
+        (0..local.choices.len()).map(|choice| local.is_closed(choice) && eligible(choice)).collect();
+    if !alive.contains(&true) {
+        return EndComponents { block: (0..n as u32).collect(), blocks: n, inside: vec![false; n], alive };
+    }
+    if let Some(whole) = whole(local, &alive) {
+        return whole;
+    }
+    let mut block = vec![0_u32; n];
+    loop {
+        let (mut starts, mut edges) = (vec![0_u32], Vec::new());
+        for state in 0..n {
+            for choice in local.range(state).filter(|choice| alive[*choice]) {
+                edges.extend_from_slice(&local.rows.columns[local.rows.range(choice)]);
+            }
+            starts.push(edges.len() as u32);
+        }
+        let found = components(n, |s| &edges[starts[s as usize] as usize..starts[s as usize + 1] as usize]);
+        for (number, component) in found.iter().enumerate() {
+            for state in component {
+                block[*state as usize] = number as u32;
+            }
+        }
+        let mut changed = false;
+        for state in 0..n {
+            for choice in local.range(state) {
+                let targets = &local.rows.columns[local.rows.range(choice)];
+                if alive[choice] && targets.iter().any(|t| block[*t as usize] != block[state]) {
+                    alive[choice] = false;
+                    changed = true;
+                }
+            }
+        }
+        if !changed {
+            let inside = (0..n).map(|state| local.range(state).any(|choice| alive[choice])).collect();
+            return EndComponents { block, blocks: found.len(), inside, alive };
+        }
+    }
+}
+
+/// The frequent case of free reconfiguration: the whole component is one end component.
+fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
+    let n = local.states.len();
+    if n > 64 {
+        return None;
+    }
+    let (mut forward, mut backward) = ([0_u64; 64], [0_u64; 64]);
+    for (state, out) in forward.iter_mut().enumerate().take(n) {
+        for choice in local.range(state).filter(|choice| alive[*choice]) {
+            for target in &local.rows.columns[local.rows.range(choice)] {
+                *out |= 1 << target;
+                backward[*target as usize] |= 1 << state;
+            }
+        }
+    }
+    let all = u64::MAX >> (64 - n);
+    let covers = |edges: &[u64; 64]| {
+        let (mut seen, mut open) = (1_u64, 1_u64);
+        while open != 0 {
+            let state = open.trailing_zeros() as usize;
+            open &= open - 1;
+            let new = edges[state] & !seen;
+            seen |= new;
+            open |= new;
+        }
+        seen == all
+    };
+    (covers(&forward) && covers(&backward)).then(|| EndComponents {
+        block: vec![0; n],
+        blocks: 1,
+        inside: vec![true; n],
+        alive: alive.to_vec(),
+    })
+}
+
+/// Which states can surely be left for good, and how: the greatest set of states in which each has a choice that
+/// stays in the set, or is left, and from which leaving is reachable by such choices.
+///
+/// `fits` says of a choice whether what it leads to outside is good.
+pub fn attractor<N: Number>(local: &Local<N>, fits: impl Fn(usize) -> bool) -> (Vec<bool>, Vec<u32>) {
+    let n = local.states.len();
+    let owners = local.owners();
+    let mut users: Vec<Vec<u32>> = vec![Vec::new(); n];
+    for choice in 0..local.choices.len() {
+        for target in &local.rows.columns[local.rows.range(choice)] {
+            users[*target as usize].push(choice as u32);
+        }
+    }
+    let mut usable: Vec<bool> = (0..local.choices.len()).map(&fits).collect();
+    let mut candidate = vec![true; n];
+    loop {
+        let (mut reached, mut policy) = (vec![false; n], vec![NONE; n]);
+        let mut queue: Vec<u32> = Vec::new();
+        for choice in 0..local.choices.len() {
+            let owner = owners[choice] as usize;
+            if usable[choice] && !local.is_closed(choice) && !reached[owner] && candidate[owner] {
+                reached[owner] = true;
+                policy[owner] = choice as u32;
+                queue.push(owner as u32);
+            }
+        }
+        let mut at = 0;
+        while at < queue.len() {
+            for choice in &users[queue[at] as usize] {
+                let owner = owners[*choice as usize] as usize;
+                if usable[*choice as usize] && !reached[owner] && candidate[owner] {
+                    reached[owner] = true;
+                    policy[owner] = *choice;
+                    queue.push(owner as u32);
+                }
+            }
+            at += 1;
+        }
+        if reached == candidate {
+            return (reached, policy);
+        }
+        for (choice, usable) in usable.iter_mut().enumerate() {
+            let targets = &local.rows.columns[local.rows.range(choice)];
+            *usable = *usable && targets.iter().all(|target| reached[*target as usize]);
+        }
+        candidate = reached;
+    }
+}

@@ -1,0 +1,265 @@
+//! A process and what is asked of it to the value of each state, with bounds, and a policy.
+//!
+//! The components of the graph are solved in reverse topological order, so that what an acyclic part (a battery
+//! that only falls) is worth comes from one exact sweep. Inside a component: first what holds by the shape of the
+//! graph alone (values 0, 1 and ∞; Forejt et al., "Automated Verification Techniques for Probabilistic Systems", SFM
+//! 2011, section 4), then end components are merged so that the equations have one solution (Haddad and Monmege,
+//! TCS 735, 2018; zero-reward end components: Bertsekas and Tsitsiklis, Math. OR 16(3), 1991), then policy
+//! iteration with direct solution of each chain, then a certificate of its error (`certify`).
+
+pub(crate) mod certify;
+pub(crate) mod chain;
+mod component;
+pub(crate) mod local;
+
+use fixedbitset::FixedBitSet;
+
+use crate::graph::components;
+use crate::mdp::Mdp;
+use crate::number::Number;
+
+pub use local::NONE;
+
+/// Which policy is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// The one with the least value.
+    Min,
+    /// The one with the greatest value.
+    Max,
+}
+
+/// What is asked of a process.
+///
+/// Without rewards: the expected value of the first terminal state that is reached, 0 if none is. With rewards: the
+/// expected sum of rewards until then, infinite if one may never be reached.
+#[derive(Debug)]
+pub struct Problem<'a, N> {
+    /// The process.
+    pub mdp: &'a Mdp<N>,
+    /// Least or greatest.
+    pub direction: Direction,
+    /// For each choice its reward, at least zero.
+    pub rewards: Option<&'a [N]>,
+    /// The states at which it ends.
+    pub terminal: &'a FixedBitSet,
+    /// What they are worth, for each state; otherwise 1 without rewards, and 0 with them.
+    pub terminal_values: Option<&'a [N]>,
+    /// States that must not be entered: nothing that comes after them counts.
+    pub blocked: Option<&'a FixedBitSet>,
+    /// The choices that may be made; all of them otherwise. Each state that is not terminal needs one.
+    pub allowed: Option<&'a FixedBitSet>,
+}
+
+impl<N> Clone for Problem<'_, N> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<N> Copy for Problem<'_, N> {}
+
+impl<N: Number> Problem<'_, N> {
+    pub(crate) fn is_sink(&self, state: usize) -> bool {
+        self.terminal.contains(state) || self.blocked.is_some_and(|blocked| blocked.contains(state))
+    }
+
+    pub(crate) fn choices(&self, state: usize) -> impl Iterator<Item = usize> + use<'_, N> {
+        self.mdp.choices(state).filter(|choice| self.allowed.is_none_or(|allowed| allowed.contains(*choice)))
+    }
+
+    pub(crate) fn reward(&self, choice: usize) -> N {
+        self.rewards.map_or_else(N::zero, |rewards| rewards[choice].clone())
+    }
+
+    fn worth(&self, state: usize) -> N {
+        match (self.terminal.contains(state), self.terminal_values) {
+            (true, Some(values)) => values[state].clone(),
+            (true, None) if self.rewards.is_none() => N::one(),
+            (true, None) | (false, _) => N::zero(),
+        }
+    }
+}
+
+/// The values of all states.
+#[derive(Debug, Clone)]
+pub struct Solution<N> {
+    /// For each state its value; 0 where it is infinite.
+    pub values: Vec<N>,
+    /// How far a value can be from the truth; empty where arithmetic is exact.
+    pub errors: Vec<f64>,
+    /// The states whose value is infinite.
+    pub infinite: FixedBitSet,
+    /// The states from which a terminal state is reached with probability 1: by some policy where the best one is
+    /// looked for (greatest probability, least reward), else by all.
+    pub sure: FixedBitSet,
+    /// For each state the number of its choice, [`NONE`] where nothing is to be chosen.
+    pub policy: Vec<u32>,
+}
+
+impl<N: Number> Solution<N> {
+    /// Bounds on the value of a state, none if it is infinite. They enclose the true value; as doubles also where
+    /// arithmetic is exact.
+    pub fn bounds(&self, state: usize) -> Option<(f64, f64)> {
+        if self.infinite.contains(state) {
+            return None;
+        }
+        if let Some(exact) = self.values[state].to_rational() {
+            return Some(crate::number::enclosing(&exact));
+        }
+        let (value, error) = (self.values[state].to_f64(), self.errors[state]);
+        let lower = if error == 0.0 { value } else { (value - error).next_down().max(0.0) };
+        Some((lower, if error == 0.0 { value } else { (value + error).next_up() }))
+    }
+}
+
+/// How much exact arithmetic may cost, in bits touched, before it is given up.
+const EXACT_WORK: u64 = 40_000_000_000;
+
+/// What the components share while a problem is solved.
+pub(crate) struct Run<'a, N> {
+    pub problem: Problem<'a, N>,
+    pub solution: Solution<N>,
+    /// A policy to start from.
+    pub hint: Option<&'a [u32]>,
+    /// For each state its number in the component at work.
+    pub position: Vec<u32>,
+    pub work: u64,
+}
+
+/// Solves a problem; none where exact arithmetic takes too long.
+///
+/// `hint` is a policy to start from, as a solution in doubles has it.
+pub fn solve<N: Number>(problem: Problem<'_, N>, hint: Option<&[u32]>) -> Option<Solution<N>> {
+    let n = problem.mdp.states();
+    let values = (0..n).map(|state| problem.worth(state)).collect();
+    let solution = Solution {
+        values,
+        errors: if N::EXACT { Vec::new() } else { vec![0.0; n] },
+        infinite: FixedBitSet::with_capacity(n),
+        sure: problem.terminal.clone(),
+        policy: vec![NONE; n],
+    };
+    let order = components(n, |state| {
+        if problem.is_sink(state as usize) { &[] } else { problem.mdp.successors(state as usize) }
+    });
+    let mut run = Run { problem, solution, hint, position: vec![NONE; n], work: 0 };
+    run.solution.sure.grow(n);
+    let mut local = local::Local::new();
+    for component in order.iter() {
+        if run.problem.is_sink(component[0] as usize) {
+            if run.problem.rewards.is_some() && !run.problem.terminal.contains(component[0] as usize) {
+                run.solution.infinite.insert(component[0] as usize);
+            }
+            continue;
+        }
+        match component {
+            [state] => run.single(*state as usize),
+            _ => run.component(component, &mut local)?,
+        }
+        if N::EXACT && run.work > EXACT_WORK {
+            return None;
+        }
+    }
+    Some(run.solution)
+}
+
+impl<N: Number> Run<'_, N> {
+    /// Whether the sure states are those of the best policy, or those of all policies.
+    pub fn sure_by_choice(&self) -> bool {
+        self.problem.rewards.is_some() == (self.problem.direction == Direction::Min)
+    }
+
+    /// Whether the value of sure states is 1 for that reason alone.
+    pub fn sure_is_one(&self) -> bool {
+        self.problem.rewards.is_none() && self.problem.terminal_values.is_none()
+    }
+
+    /// A state that is a component by itself: at most loops, and everything else is known.
+    fn single(&mut self, state: usize) {
+        let (mut sure, mut all_sure) = (NONE, true);
+        for choice in self.problem.choices(state) {
+            let mut leaves = false;
+            let good = self.problem.mdp.targets(choice).iter().all(|target| {
+                leaves |= *target as usize != state;
+                *target as usize == state || self.solution.sure.contains(*target as usize)
+            });
+            match good && leaves {
+                true if sure == NONE => sure = choice as u32,
+                true => {}
+                false => all_sure = false,
+            }
+        }
+        let by_choice = self.sure_by_choice();
+        let is_sure = sure != NONE && (by_choice || all_sure);
+        if is_sure {
+            self.solution.sure.insert(state);
+        } else if self.problem.rewards.is_some() {
+            self.solution.infinite.insert(state);
+            return;
+        }
+        if is_sure && self.sure_is_one() {
+            self.solution.values[state] = N::one();
+            self.solution.policy[state] = sure;
+            return;
+        }
+        let must_be_sure = by_choice && self.problem.rewards.is_some();
+        let mut best: Option<(N, u32)> = None;
+        let mut error = 0.0_f64;
+        let problem = self.problem;
+        for choice in problem.choices(state) {
+            if let Some((value, spread)) = self.single_choice(state, choice, must_be_sure) {
+                error = error.max(spread);
+                let better = best.as_ref().is_none_or(|(known, _)| match self.problem.direction {
+                    Direction::Min => value < *known,
+                    Direction::Max => value > *known,
+                });
+                if better {
+                    best = Some((value, choice as u32));
+                }
+            }
+        }
+        if let Some((value, choice)) = best {
+            self.work += value.size();
+            if !N::EXACT {
+                self.solution.errors[state] = if value.is_zero() { 0.0 } else { error };
+            }
+            self.solution.values[state] = value;
+            self.solution.policy[state] = choice;
+        }
+    }
+
+    /// What a choice is worth, with the error of that; none for one that is never made.
+    fn single_choice(&mut self, state: usize, choice: usize, must_be_sure: bool) -> Option<(N, f64)> {
+        let mdp = self.problem.mdp;
+        let (mut sum, mut leaving, mut looping) = (self.problem.reward(choice), N::zero(), false);
+        let (mut error, mut terms) = (0.0_f64, 4.0);
+        for (target, probability) in mdp.transitions(choice) {
+            if target == state {
+                looping = true;
+                continue;
+            }
+            if must_be_sure && !self.solution.sure.contains(target) {
+                return None;
+            }
+            sum = sum.plus(&probability.times(&self.solution.values[target]));
+            leaving = leaving.plus(probability);
+            terms += 2.0;
+            if !N::EXACT {
+                error = error.max(self.solution.errors[target]);
+            }
+            self.work += if N::EXACT { sum.size() * 4 } else { 0 };
+        }
+        if leaving.is_zero() {
+            // It stays for ever: worth nothing where that is allowed.
+            return self.problem.rewards.is_none().then(|| (N::zero(), 0.0));
+        }
+        if looping {
+            sum = sum.over(&leaving);
+        }
+        let size = sum.to_f64();
+        // Sums of a few exact products (deterministic choices with whole rewards) carry no error of their own.
+        let exact = error == 0.0 && terms < 7.0 && !looping && size.fract() == 0.0 && size < 9e15;
+        Some((sum, if exact { 0.0 } else { error + terms * f64::EPSILON * size }))
+    }
+}

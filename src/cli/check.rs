@@ -1,0 +1,244 @@
+//! `metaplan check`.
+
+use std::fmt::Write as _;
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use metaplan::message::Message;
+use metaplan::mission::source;
+use probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Report, check};
+use probabilistic::explore::Bounds;
+use probabilistic::prism::Settings;
+use probabilistic::{Diagnostic, Error, prism, property};
+use serde_json::{Map, Value, json};
+
+use crate::cli::{Common, Exit, Failure, Format, output, setting};
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A model in the PRISM language.
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// What is asked: `Pmax=? [ F "goal" ]`, `R{"time"}min=? [ F "goal" ]`, `multi(…, …)`.
+    #[arg(value_name = "PROPERTY")]
+    property: String,
+    /// The value of a constant (repeatable, or separated by commas).
+    #[arg(long = "const", value_name = "NAME=VALUE", value_delimiter = ',', value_parser = setting)]
+    constants: Vec<(String, String)>,
+    /// Write the best policy to a file.
+    #[arg(long, value_name = "FILE")]
+    policy: Option<PathBuf>,
+    /// Evaluate the policy of a file in place of the best one.
+    #[arg(long, value_name = "FILE", conflicts_with = "policy")]
+    evaluate: Option<PathBuf>,
+    /// The reward that a policy keeps small where the property leaves a choice; the number of steps by default.
+    #[arg(long, value_name = "REWARD")]
+    secondary: Option<String>,
+    /// Stop beyond so many states.
+    #[arg(long, value_name = "N", default_value_t = 20_000_000)]
+    state_limit: usize,
+    /// Solve in rational numbers, however large the model is.
+    #[arg(long, conflicts_with = "inexact")]
+    exact: bool,
+    /// Solve in doubles with certified bounds, however small the model is.
+    #[arg(long)]
+    inexact: bool,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let file = source(&arguments.model)?;
+    let model = prism::parse(file.text()).map_err(|problems| in_file(&problems, file.name()))?;
+    let property = property::parse(&arguments.property).map_err(|error| failure(error, file.name()))?;
+    let bar = progress(common);
+    let told = |states: usize| {
+        bar.set_message(format!("{states} states"));
+        true
+    };
+    let options = Options {
+        settings: arguments.constants.iter().cloned().collect::<Settings>(),
+        bounds: Bounds { states: arguments.state_limit, progress: &told },
+        exactness: match (arguments.exact, arguments.inexact) {
+            (true, _) => Exactness::Always,
+            (_, true) => Exactness::Never,
+            _ => Exactness::Auto,
+        },
+        secondary: arguments.secondary.clone(),
+        policy: arguments.policy.is_some(),
+        evaluate: arguments.evaluate.as_deref().map(read_policy).transpose()?,
+    };
+    let report = check(&model, &property, &options);
+    bar.finish_and_clear();
+    let report = report.map_err(|error| failure(error, file.name()))?;
+    if let Some(path) = &arguments.policy {
+        let Some(policy) = &report.policy else {
+            let text = "this property has no policy to write; ask for one value with `F`, `G` or `U`";
+            return Err(Failure::usage(Message::error("M107", text)));
+        };
+        output::write_file(path, &output::pretty(&policy.to_json()))?;
+    }
+    match common.format {
+        Format::Json => output::json_answer(&as_json(&arguments.property, &report)),
+        _ => output::answer(&as_text(&report, common.verbose)),
+    }
+    Ok(match &report.outcome {
+        Outcome::Undecided(_) => Exit::NotProved,
+        _ => Exit::Done,
+    })
+}
+
+fn progress(common: &Common) -> ProgressBar {
+    let shown = !common.quiet && std::io::stderr().is_terminal();
+    let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let bar = ProgressBar::with_draw_target(None, target);
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+fn read_policy(path: &Path) -> Result<PolicyTable, Failure> {
+    let file = source(path)?;
+    PolicyTable::from_json(file.text()).map_err(|error| failure(error, file.name()))
+}
+
+fn in_file(problems: &[Diagnostic], file: &str) -> Failure {
+    let message = |problem: &Diagnostic| {
+        let place = Some((problem.place.line, problem.place.column));
+        Message::at(problem.code, file, place, problem.message.clone())
+    };
+    problems.iter().map(message).collect::<Vec<_>>().into()
+}
+
+/// What the library reports, with the file that it is about.
+pub fn failure(error: Error, file: &str) -> Failure {
+    match error {
+        Error::Model(problems) => in_file(&problems, file),
+        Error::Property(problems) => in_file(&problems, "property"),
+        Error::Constant(text) => Failure::usage(Message::error("Q504", text)),
+        Error::StateLimit { .. } | Error::Interrupted { .. } => Failure {
+            exit: Exit::NothingFound,
+            messages: vec![Message::at("Q505", file, None, error.to_string())],
+        },
+        other => Message::at("Q506", file, None, other.to_string()).into(),
+    }
+}
+
+fn as_text(report: &Report, verbose: bool) -> String {
+    let mut text = match &report.outcome {
+        Outcome::Value(answer) => format!("{}\n", shown(answer)),
+        Outcome::Truth(holds, answer) => {
+            let value = answer.as_ref().map(|answer| format!(" ({})", shown(answer))).unwrap_or_default();
+            format!("{holds}{value}\n")
+        }
+        Outcome::Undecided(answer) => format!("not decided: {}\n", shown(answer)),
+        Outcome::Front(vertices) => {
+            let rows = vertices.iter().map(|pair| pair.iter().map(shown).collect());
+            output::table(&["first", "second"], rows)
+        }
+        Outcome::Constrained { randomised, deterministic, proved } => {
+            let note = if *proved { "" } else { " (perhaps not the least)" };
+            format!("randomised: {}\ndeterministic: {}{note}\n", shown(randomised), shown(deterministic))
+        }
+    };
+    if verbose {
+        let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
+        let _ = writeln!(
+            text,
+            "{states} states, {choices} choices, {transitions} transitions, {deadlocks} deadlocks; \
+             built in {:.3} s, solved in {:.3} s",
+            build.as_secs_f64(),
+            solve.as_secs_f64()
+        );
+    }
+    text
+}
+
+/// A value for people: exactly, or with its bounds.
+pub fn shown(answer: &Answer) -> String {
+    match answer {
+        Answer::Infinite => "infinite".to_owned(),
+        Answer::Undefined => "undefined: no policy does this".to_owned(),
+        Answer::Finite(quantity) => match &quantity.exact {
+            Some(exact) if exact.is_integer() => exact.to_string(),
+            Some(exact) if exact.denom().bits() + exact.numer().bits() <= 128 => {
+                format!("{} ({exact})", quantity.value)
+            }
+            Some(_) => format!("{} (exact, rounded)", quantity.value),
+            None if quantity.lower >= quantity.upper => quantity.value.to_string(),
+            None => format!("{} (between {} and {})", quantity.value, quantity.lower, quantity.upper),
+        },
+    }
+}
+
+/// A value for programs: `value`, `lower` and `upper` are null where it is infinite or undefined, which `status` says;
+/// `exact` is a fraction, `inf`, or null.
+pub fn answer_fields(answer: &Answer) -> Map<String, Value> {
+    let number = |value: f64| if value.is_finite() { json!(value) } else { Value::Null };
+    let fields = match answer {
+        Answer::Finite(quantity) => json!({
+            "status": "finite",
+            "value": number(quantity.value),
+            "lower": number(quantity.lower),
+            "upper": number(quantity.upper),
+            "exact": quantity.exact.as_ref().map(ToString::to_string),
+        }),
+        Answer::Infinite => {
+            json!({ "status": "infinite", "value": null, "lower": null, "upper": null, "exact": "inf" })
+        }
+        Answer::Undefined => {
+            json!({ "status": "undefined", "value": null, "lower": null, "upper": null, "exact": null })
+        }
+    };
+    match fields {
+        Value::Object(fields) => fields,
+        _ => Map::new(),
+    }
+}
+
+fn as_json(property: &str, report: &Report) -> Value {
+    let mut fields = Map::new();
+    fields.insert("format".to_owned(), json!("metaplan-check/1"));
+    fields.insert("property".to_owned(), json!(property));
+    match &report.outcome {
+        Outcome::Value(answer) => fields.extend(answer_fields(answer)),
+        Outcome::Truth(holds, answer) => {
+            fields.extend(answer.iter().flat_map(answer_fields));
+            fields.insert("holds".to_owned(), json!(holds));
+        }
+        Outcome::Undecided(answer) => {
+            fields.extend(answer_fields(answer));
+            fields.insert("holds".to_owned(), Value::Null);
+        }
+        Outcome::Front(vertices) => {
+            let pairs: Vec<_> =
+                vertices.iter().map(|pair| json!(pair.each_ref().map(answer_fields))).collect();
+            fields.insert("vertices".to_owned(), json!(pairs));
+        }
+        Outcome::Constrained { randomised, deterministic, proved } => {
+            fields.extend(answer_fields(randomised));
+            fields.insert("randomised".to_owned(), json!(answer_fields(randomised)));
+            let mut deterministic = answer_fields(deterministic);
+            deterministic.insert("proved".to_owned(), json!(proved));
+            fields.insert("deterministic".to_owned(), json!(deterministic));
+        }
+    }
+    let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
+    let milliseconds = json!({ "build": build.as_secs_f64() * 1e3, "solve": solve.as_secs_f64() * 1e3 });
+    fields.insert(
+        "statistics".to_owned(),
+        json!({
+            "states": states,
+            "choices": choices,
+            "transitions": transitions,
+            "deadlocks": deadlocks,
+            "milliseconds": milliseconds,
+        }),
+    );
+    Value::Object(fields)
+}
