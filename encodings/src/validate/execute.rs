@@ -101,6 +101,20 @@ impl<'e, 'p> Execution<'e, 'p> {
         Err(first_violation.unwrap_or_else(|| unresolved(self.world, step, time)))
     }
 
+    /// As [`Execution::begin`], whether or not its conditions hold.
+    pub(super) fn begin_anyway(
+        &self,
+        step: &'e Step<'p>,
+        time: &BigRational,
+    ) -> Result<Running<'e, 'p>, Box<Violation>> {
+        let Some(instance) = step.instances.first() else {
+            return Err(unresolved(self.world, step, time));
+        };
+        let duration = self.duration(step, instance, time)?;
+        let end = time + &duration;
+        Ok(Running { step, instance: instance.clone(), duration, end })
+    }
+
     fn begin_as(
         &self,
         step: &'e Step<'p>,

@@ -8,6 +8,7 @@
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003. \[2\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL
 //! axioms, AIJ 168, 2005.
 
+mod advance;
 mod concurrent;
 mod derive;
 mod effects;
@@ -30,6 +31,7 @@ use rustc_hash::FxHashSet;
 use crate::pddl::ast::{Action, ActionBody, Domain, Effect, Name, Problem};
 use crate::pddl::number::to_decimal;
 
+pub use advance::{Advance, ValueChange, advance, metric_after};
 pub use plan::{PlanStep, PlanText};
 pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
 
