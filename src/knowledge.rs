@@ -1,11 +1,14 @@
 //! A knowledge base at run time: OWL documents and rule files in an engine, kept in step with the robot.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use num_rational::BigRational;
+use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::{self, Status};
 use ontology::{Equality, ReadOptions};
-use rules::{Delta, Engine, Fact, Literal, Prefixes, Program, Symbols};
+use rules::{Delta, Engine, Fact, Literal, Prefixes, Program, Symbols, Value};
 
 use crate::message::Message;
 
@@ -28,9 +31,67 @@ pub struct Sources {
 /// Knowledge about a robot: what is stated, and what follows.
 #[derive(Debug, Clone)]
 pub struct Knowledge {
-    engine: Engine,
+    runtime: Runtime,
+    /// As it was read; shares with `runtime` what has not changed since.
+    origin: Runtime,
     rule_count: usize,
     warnings: Vec<Message>,
+}
+
+/// A stated fact, with names and values in place of symbols.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Statement {
+    /// The IRI of the class or property.
+    pub predicate: String,
+    /// Names as they are; literals as lexical form, datatype.
+    pub arguments: Vec<Part>,
+}
+
+/// An argument of a [`Statement`].
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// An individual.
+    Name(String),
+    /// A literal: its lexical form and the IRI of its datatype.
+    Literal(String, String),
+}
+
+/// How statements differ from those of the documents.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Statements {
+    /// Stated now, and not in the documents.
+    pub added: Vec<Statement>,
+    /// Stated in the documents, and not now.
+    pub removed: Vec<Statement>,
+}
+
+impl Statement {
+    fn of(engine: &Engine, fact: &Fact) -> Self {
+        let symbols = engine.symbols();
+        let part = |symbol| match symbols.value(symbol) {
+            Value::Name(name) => Part::Name(name.to_string()),
+            Value::Literal(literal) => Part::Literal(literal.lexical(), literal.datatype().to_owned()),
+        };
+        Self {
+            predicate: symbols.value(fact.predicate).as_name().unwrap_or_default().to_owned(),
+            arguments: fact.arguments.iter().map(|argument| part(*argument)).collect(),
+        }
+    }
+
+    fn intern(&self, symbols: &mut Symbols) -> Fact {
+        let predicate = symbols.name(&self.predicate);
+        let arguments: Vec<_> = self
+            .arguments
+            .iter()
+            .map(|part| match part {
+                Part::Name(name) => symbols.name(name),
+                Part::Literal(lexical, datatype) => {
+                    symbols.literal(Literal::parse(lexical, Some(datatype), None))
+                }
+            })
+            .collect();
+        Fact::new(predicate, arguments)
+    }
 }
 
 /// Something that the knowledge contradicts.
@@ -84,7 +145,8 @@ impl Knowledge {
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let mistakes = ontology::tomasys::check(&ontology, &engine);
         warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
-        Ok(Self { engine, rule_count, warnings })
+        let runtime = Runtime::new(engine, Mode::Retract);
+        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings })
     }
 
     /// What is questionable about the documents.
@@ -99,12 +161,22 @@ impl Knowledge {
 
     /// The typed view on what holds now.
     pub fn view(&self) -> View<'_> {
-        View::new(&self.engine)
+        self.runtime.view()
     }
 
     /// The engine, to ask for facts and derivations.
     pub fn engine(&self) -> &Engine {
-        &self.engine
+        self.runtime.engine()
+    }
+
+    /// What the robot reports, as updates of the engine.
+    pub fn runtime(&self) -> &Runtime {
+        &self.runtime
+    }
+
+    /// As [`Knowledge::runtime`], to change it.
+    pub fn runtime_mut(&mut self) -> &mut Runtime {
+        &mut self.runtime
     }
 
     /// Marks a component, named by IRI or local name, as failed.
@@ -112,15 +184,23 @@ impl Knowledge {
     /// # Errors
     /// There is no such component.
     pub fn fail(&mut self, component: &str) -> Result<(), Message> {
-        let delta = change::component_status(&mut self.engine, component, Status::Failed);
-        self.change(delta)
+        self.report(component, Status::Failed).map(|_| ())
     }
 
-    /// Sets the measured value of an attribute, named by the IRI or local name of its type.
+    /// A component, named by IRI or local name, has a status from now on; returns what holds since, and what no more.
+    ///
+    /// # Errors
+    /// There is no such component.
+    pub fn report(&mut self, component: &str, status: Status) -> Result<Delta, Message> {
+        self.runtime.report_component(component, status).map_err(|error| Message::from_ontology(&error))
+    }
+
+    /// Sets the measured value of an attribute, named by the IRI or local name of its type; returns what holds since,
+    /// and what no more.
     ///
     /// # Errors
     /// There is no such attribute, or the value is no number.
-    pub fn measure(&mut self, attribute: &str, value: &str) -> Result<(), Message> {
+    pub fn measure(&mut self, attribute: &str, value: &str) -> Result<Delta, Message> {
         let literal = Literal::parse(value, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
         if literal.as_rational().is_none() {
             return Err(Message::error(
@@ -128,8 +208,120 @@ impl Knowledge {
                 format!("the value `{value}` of {attribute} is no decimal number"),
             ));
         }
-        let delta = change::measured_value(&mut self.engine, attribute, literal);
-        self.change(delta)
+        self.runtime.measure(attribute, literal).map_err(|error| Message::from_ontology(&error))
+    }
+
+    /// A component has a status from now on, unless that contradicts what is known; returns what holds since, and what
+    /// no more.
+    ///
+    /// # Errors
+    /// There is no such component, or a contradiction; nothing has changed then.
+    pub fn try_report(&mut self, component: &str, status: Status) -> Result<Delta, Message> {
+        let delta = change::component_status(self.runtime.engine_mut(), component, status);
+        self.change(delta.map_err(|error| Message::from_ontology(&error))?)
+    }
+
+    /// An attribute has a measured value from now on, unless that contradicts what is known; returns what holds since,
+    /// and what no more.
+    ///
+    /// # Errors
+    /// There is no such attribute, or a contradiction; nothing has changed then.
+    pub fn try_measure(&mut self, attribute: &str, value: &BigRational) -> Result<Delta, Message> {
+        let literal = Literal::Decimal(rules::Decimal::from_rational(value));
+        let delta = change::measured_value(self.runtime.engine_mut(), attribute, literal);
+        self.change(delta.map_err(|error| Message::from_ontology(&error))?)
+    }
+
+    /// Changes statements, or nothing where a contradiction follows.
+    fn change(&mut self, delta: Delta) -> Result<Delta, Message> {
+        let engine = self.runtime.engine();
+        let inverse = Delta {
+            insert: delta.delete.iter().filter(|fact| engine.is_asserted(fact)).cloned().collect(),
+            delete: delta.insert.iter().filter(|fact| !engine.is_asserted(fact)).cloned().collect(),
+        };
+        let net = self.runtime.apply(delta).map_err(|error| Message::from_ontology(&error))?;
+        if let Some(first) = self.contradictions().first() {
+            let text =
+                format!("this contradicts what is known: {}: {}", first.violated, first.facts.join(", "));
+            self.apply(inverse)?;
+            return Err(Message::error("M110", text));
+        }
+        Ok(net)
+    }
+
+    /// Makes functions, and no others, the objectives of the robot, each grounded with a design; both by local name.
+    /// Objectives of a function are named `o_<function>`.
+    ///
+    /// # Errors
+    /// There is no such function or design.
+    pub fn pursue(&mut self, configuration: &[(String, String)]) -> Result<(), Message> {
+        let error = |error: ontology::Error| Message::from_ontology(&error);
+        let name = |function: &str| format!("o_{function}");
+        let objectives = self.runtime.objectives();
+        for objective in &objectives {
+            let function = objective.function.as_ref().map(|function| function.name.as_str());
+            let ours = function.is_some_and(|function| objective.individual.name == name(function));
+            let wanted = configuration.iter().any(|(wanted, _)| Some(wanted.as_str()) == function);
+            if ours && !wanted {
+                self.runtime.remove_objective(&objective.individual.iri).map_err(error)?;
+            }
+        }
+        for (function, design) in configuration {
+            let objective = name(function);
+            let known = objectives.iter().find(|known| known.individual.name == objective);
+            let grounded = known.is_some_and(|known| {
+                known.groundings.iter().any(|g| g.design.as_ref().is_some_and(|d| d.name == *design))
+            });
+            if known.is_none() {
+                let new = NewObjective {
+                    name: &objective,
+                    function,
+                    requirements: Vec::new(),
+                    always_improve: false,
+                };
+                self.runtime.add_objective(&new).map_err(error)?;
+            }
+            if !grounded {
+                self.runtime.ground(&objective, design).map_err(error)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What is stated now and was not when the documents were read, and what is stated no more; sorted.
+    pub fn statements(&self) -> Statements {
+        let stated = |runtime: &Runtime| -> BTreeSet<Statement> {
+            let engine = runtime.engine();
+            let facts = engine.facts().filter(|fact| engine.is_asserted(fact));
+            facts.map(|fact| Statement::of(engine, &fact)).collect()
+        };
+        let (before, now) = (stated(&self.origin), stated(&self.runtime));
+        Statements {
+            added: now.difference(&before).cloned().collect(),
+            removed: before.difference(&now).cloned().collect(),
+        }
+    }
+
+    /// Knowledge as it was read, changed by these statements. All that the history since has left behind is forgotten,
+    /// such as names of values that were measured once.
+    ///
+    /// # Errors
+    /// A rule runs away; nothing has changed then.
+    pub fn restore(&mut self, statements: &Statements) -> Result<(), Message> {
+        let mut runtime = self.origin.clone();
+        let mut facts = |statements: &[Statement]| -> Vec<Fact> {
+            statements.iter().map(|statement| statement.intern(runtime.engine_mut().symbols_mut())).collect()
+        };
+        let delta = Delta { insert: facts(&statements.added), delete: facts(&statements.removed) };
+        runtime.apply(delta).map_err(|error| Message::from_ontology(&error))?;
+        self.runtime = runtime;
+        Ok(())
+    }
+
+    /// How many names and values have been interned since the documents were read.
+    pub fn growth(&self) -> usize {
+        let count = |runtime: &Runtime| runtime.engine().symbols().len();
+        count(&self.runtime).saturating_sub(count(&self.origin))
     }
 
     /// Whether some attribute type has this local name or IRI.
@@ -137,17 +329,12 @@ impl Knowledge {
         self.view().attribute_types().iter().any(|attribute| attribute.name == name || attribute.iri == name)
     }
 
-    fn change(&mut self, delta: Result<Delta, ontology::Error>) -> Result<(), Message> {
-        let delta = delta.map_err(|error| Message::from_ontology(&error))?;
-        self.apply(delta)
-    }
-
     /// Inserts and deletes stated facts.
     ///
     /// # Errors
     /// A rule runs away.
     pub fn apply(&mut self, delta: Delta) -> Result<(), Message> {
-        self.engine.apply(delta).map(|_| ()).map_err(|error| Message::from_rules(&error))
+        self.runtime.apply(delta).map(|_| ()).map_err(|error| Message::from_ontology(&error))
     }
 
     /// The assertions of a document (without its imports and rules) as facts, to insert or delete.
@@ -158,18 +345,18 @@ impl Knowledge {
         let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
         let ontology = ontology::read_files(&[file], &options)
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
-        Ok(ontology::lower(&ontology, self.engine.symbols_mut()).facts)
+        Ok(ontology::lower(&ontology, self.runtime.engine_mut().symbols_mut()).facts)
     }
 
     /// What follows and is not stated, in the order of its N-Triples.
     pub fn inferred(&self) -> Vec<Fact> {
-        self.engine.facts().filter(|fact| !self.engine.is_asserted(fact)).collect()
+        self.engine().facts().filter(|fact| !self.engine().is_asserted(fact)).collect()
     }
 
     /// All contradictions; empty if the knowledge is consistent.
     pub fn contradictions(&self) -> Vec<Contradiction> {
-        let symbols = self.engine.symbols();
-        let violations = self.engine.violations().into_iter();
+        let symbols = self.engine().symbols();
+        let violations = self.engine().violations().into_iter();
         violations
             .map(|violation| Contradiction {
                 violated: match &violation.cause {

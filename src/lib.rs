@@ -5,6 +5,8 @@
 
 pub use {encodings, ontology, probabilistic, rules};
 
+pub mod journal;
 pub mod knowledge;
+pub mod mapek;
 pub mod message;
 pub mod mission;

@@ -122,6 +122,9 @@ impl Message {
 
     /// An error of reading a knowledge base.
     pub fn from_ontology(error: &ontology::Error) -> Self {
+        if let ontology::Error::Engine(error) = error {
+            return Self::from_rules(error);
+        }
         Self::from_text("error", error.code(), &error.to_string())
     }
 

@@ -8,6 +8,7 @@ mod objectives;
 mod output;
 mod plan;
 mod reason;
+mod run;
 mod validate;
 
 use std::path::PathBuf;
@@ -105,6 +106,8 @@ enum Command {
     Check(check::Arguments),
     /// A mission for other planners, with what the knowledge base has contributed.
     Export(export::Arguments),
+    /// The adaptation loop: events in, adaptations out, one JSON object a line.
+    Run(run::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
     Validate(validate::Arguments),
 }
@@ -282,6 +285,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Convert(arguments) => convert::run(arguments, &cli.common),
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Export(arguments) => export::run(arguments, &cli.common),
+        Command::Run(arguments) => run::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),
     }
 }

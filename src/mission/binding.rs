@@ -60,6 +60,12 @@ impl Bindings {
         self.predicate(predicate) == Some(Query::Available)
     }
 
+    /// Whether a numeric function without parameters is the measured value of an attribute.
+    pub(super) fn is_measured(&self, declared: &Declaration, attribute: &str) -> bool {
+        let query = self.function(declared);
+        declared.parameters.is_empty() && matches!(query, Query::Measured(name) if name == attribute)
+    }
+
     fn r#type(&self, name: &Name) -> Option<Query> {
         self.own.get(name).cloned().or_else(|| {
             let class = match name.as_str().to_ascii_lowercase().as_str() {

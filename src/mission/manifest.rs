@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use num_rational::BigRational;
 use ontology::ReadOptions;
 use serde::Deserialize;
 
 use crate::knowledge::{COADAPTATION, Sources, TOMASYS};
+use crate::mapek::{Settings, number};
 use crate::message::Message;
 use crate::mission::binding::Bindings;
 use crate::mission::source;
@@ -25,6 +28,8 @@ pub struct Manifest {
     /// PDDL symbol to query, beyond the defaults.
     #[serde(default)]
     bindings: BTreeMap<String, String>,
+    #[serde(default)]
+    adaptation: AdaptationSection,
     /// Situations by name.
     #[serde(default)]
     pub scenarios: BTreeMap<String, Scenario>,
@@ -51,6 +56,14 @@ struct KnowledgeSection {
 struct PlanningSection {
     domain: PathBuf,
     problem: PathBuf,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AdaptationSection {
+    minimum_benefit: Option<toml::Value>,
+    settle: Option<toml::Value>,
+    time_limit: Option<toml::Value>,
 }
 
 /// A situation: what has failed, and what has changed.
@@ -125,6 +138,42 @@ impl Manifest {
     /// The problem file.
     pub fn problem(&self) -> PathBuf {
         self.path(&self.planning.problem)
+    }
+
+    /// How eager the adaptation loop is.
+    ///
+    /// # Errors
+    /// A value that is no number, or negative.
+    pub fn settings(&self) -> Result<Settings, Message> {
+        let mut settings = Settings::default();
+        let section = &self.adaptation;
+        if let Some(value) = &section.minimum_benefit {
+            settings.minimum_benefit = self.number("minimum_benefit", value)?;
+        }
+        let seconds = |name: &str, value: &toml::Value| {
+            let number = self.number(name, value)?;
+            let wrong = || Message::at("M105", &self.file, None, format!("`{name}` is too long"));
+            Duration::try_from_secs_f64(number::to_f64(&number)).map_err(|_| wrong())
+        };
+        if let Some(value) = &section.settle {
+            settings.settle = seconds("settle", value)?;
+        }
+        if let Some(value) = &section.time_limit {
+            settings.time_limit = Some(seconds("time_limit", value)?);
+        }
+        Ok(settings)
+    }
+
+    fn number(&self, name: &str, value: &toml::Value) -> Result<BigRational, Message> {
+        let text = match value {
+            toml::Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        let number = number::exact(&text).filter(|number| *number >= BigRational::default());
+        number.ok_or_else(|| {
+            let text = format!("`{name}` is {value}, but should be a decimal number, not negative");
+            Message::at("M105", &self.file, None, text)
+        })
     }
 
     /// The bindings, the defaults among them.

@@ -4,6 +4,7 @@
 //! and the values of quality attributes from the knowledge base, by the bindings of the manifest.
 
 mod binding;
+mod live;
 mod manifest;
 mod settings;
 
@@ -14,6 +15,7 @@ use encodings::pddl::{self, Severity, Source};
 use encodings::{GroundConfig, Limits, Task};
 
 use crate::knowledge::Knowledge;
+use crate::mapek::Settings;
 use crate::message::Message;
 
 pub use binding::Bindings;
@@ -31,6 +33,7 @@ pub struct Mission {
     domain: Domain,
     problem: Problem,
     warnings: Vec<Message>,
+    settings: Settings,
 }
 
 impl Mission {
@@ -41,13 +44,15 @@ impl Mission {
     pub fn read(manifest: &Path) -> Result<(Self, Manifest), Vec<Message>> {
         let manifest = Manifest::read(manifest).map_err(|message| vec![message])?;
         let knowledge = Knowledge::read(&manifest.sources());
-        let mission = Self::new(
+        let settings = manifest.settings().map_err(|message| vec![message])?;
+        let mut mission = Self::new(
             &manifest.name,
             Some(knowledge),
             manifest.bindings().map_err(|message| vec![message])?,
             source(&manifest.domain()),
             source(&manifest.problem()),
         )?;
+        mission.settings = settings;
         Ok((mission, manifest))
     }
 
@@ -87,12 +92,28 @@ impl Mission {
             }
         };
         let name = name.to_owned();
-        Ok(Self { name, knowledge, bindings, domain_source, problem_source, domain, problem, warnings })
+        let settings = Settings::default();
+        Ok(Self {
+            name,
+            knowledge,
+            bindings,
+            domain_source,
+            problem_source,
+            domain,
+            problem,
+            warnings,
+            settings,
+        })
     }
 
     /// What is questionable about the files.
     pub fn warnings(&self) -> impl Iterator<Item = &Message> {
         self.warnings.iter().chain(self.knowledge.iter().flat_map(Knowledge::warnings))
+    }
+
+    /// How eager the adaptation loop is.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
     }
 
     /// The knowledge base, if the mission has one.
@@ -134,10 +155,7 @@ impl Mission {
     /// What the knowledge base contributes does not fit the domain.
     pub fn filled(&self) -> Result<(Problem, Vec<Message>), Vec<Message>> {
         let mut problem = self.problem.clone();
-        let mut warnings = Vec::new();
-        if let Some(knowledge) = &self.knowledge {
-            warnings = binding::fill(&self.domain, &mut problem, &knowledge.view(), &self.bindings);
-        }
+        let mut warnings = self.fill(&mut problem);
         let found = pddl::check(&self.domain, &self.domain_source, &problem, &self.problem_source);
         let (errors, questionable): (Vec<_>, Vec<_>) =
             found.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);

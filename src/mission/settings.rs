@@ -29,8 +29,17 @@ impl Mission {
                 );
                 return Err(Message::error("M106", text));
             }
-            return knowledge.measure(name.trim(), value);
+            return knowledge.measure(name.trim(), value).map(|_| ());
         }
+        self.set_in_problem(name, value)
+    }
+
+    /// As [`Mission::set`], without the knowledge base.
+    ///
+    /// # Errors
+    /// Nothing of the problem fits.
+    pub(crate) fn set_in_problem(&mut self, name: &str, value: &str) -> Result<(), Message> {
+        let value = value.trim();
         let words: Vec<&str> = name.split_whitespace().collect();
         let Some((symbol, arguments)) = words.split_first() else {
             return Err(Message::error("M106", "`--set` needs a name before the equals sign"));

@@ -1,0 +1,160 @@
+//! `metaplan run`: lines of events to lines of adaptations.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use metaplan::journal::{Journal, Policy, Sync};
+use metaplan::mapek::{Answer, Clock as _, LONGEST_LINE, Loop, Observation, SystemClock};
+use metaplan::message::Message;
+use serde_json::{Value, json};
+
+use crate::cli::{Common, Exit, Failure, Situation, output};
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission's manifest, or a PDDL domain and a PDDL problem.
+    #[arg(required = true, num_args = 1..=2, value_name = "MISSION | DOMAIN PROBLEM")]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    situation: Situation,
+    /// Where events come from, one JSON object a line; `-` is standard input.
+    #[arg(long, value_name = "FILE", default_value = "-")]
+    events: PathBuf,
+    /// Write events and decisions there first, and go on from there after a crash.
+    #[arg(long, value_name = "DIR")]
+    journal: Option<PathBuf>,
+    /// When the journal is forced to the disk.
+    #[arg(long, value_enum, default_value_t = Fsync::Effects, requires = "journal")]
+    fsync: Fsync,
+    /// After so many events the journal gets a snapshot.
+    #[arg(long, value_name = "N", default_value_t = 1000, requires = "journal",
+          value_parser = clap::value_parser!(u64).range(1..))]
+    snapshot_every: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Fsync {
+    /// After every event.
+    Always,
+    /// Before effects.
+    Effects,
+    /// When the operating system sees fit.
+    Never,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let mission = arguments.situation.mission(&arguments.inputs)?;
+    output::warnings(common, mission.warnings());
+    let (name, settings) = (mission.name.clone(), mission.settings().clone());
+    let mut control = Loop::new(mission, settings)?;
+    let mut events = Lines::open(&arguments.events)?;
+    let mut stdout = io::stdout().lock();
+    let mut ready = json!({ "answer": "ready", "format": "metaplan-events/1", "mission": name });
+    let (mut journal, answers) = match &arguments.journal {
+        None => (None, control.start()),
+        Some(directory) => {
+            let sync = match arguments.fsync {
+                Fsync::Always => Sync::Always,
+                Fsync::Effects => Sync::Effects,
+                Fsync::Never => Sync::Never,
+            };
+            let policy = Policy { sync, snapshot_every: arguments.snapshot_every };
+            let (journal, recovery) = Journal::open(directory, policy, &mut control)?;
+            ready["resumed"] = json!(recovery.replayed.is_some());
+            ready["lines"] = json!(control.knowledge().lines());
+            ready["seq"] = json!(control.knowledge().sequence());
+            ready["cut_bytes"] = json!(recovery.cut);
+            (Some(journal), recovery.answers)
+        }
+    };
+    let lost = |error: io::Error| Message::error("M109", format!("the answer cannot be written: {error}"));
+    writeln!(stdout, "{ready}").map_err(lost)?;
+    write(&mut stdout, control.knowledge().lines(), &answers).map_err(lost)?;
+    let mut clock = SystemClock::default();
+    let begun = control.knowledge().now();
+    while let Some(line) = events.next()? {
+        let read = Instant::now();
+        let now = begun + clock.now();
+        let answers = match &mut journal {
+            None => control.handle(&Observation::parse(&line), now),
+            Some(journal) => journal
+                .handle(&mut control, &line, now)
+                .map_err(|error| Message::error("M321", format!("the journal cannot be written: {error}")))?,
+        };
+        let number = control.knowledge().lines();
+        let written =
+            write(&mut stdout, number, &answers).and_then(|()| handled(&mut stdout, number, read.elapsed()));
+        match written {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Done),
+            other => other.map_err(lost)?,
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// Writes the answers to a line, each with the line's number.
+fn write(stdout: &mut impl io::Write, number: u64, answers: &[Answer]) -> io::Result<()> {
+    for answer in answers {
+        let mut object = answer.to_json();
+        object["line"] = Value::from(number);
+        writeln!(stdout, "{object}")?;
+    }
+    stdout.flush()
+}
+
+fn handled(stdout: &mut impl io::Write, number: u64, latency: Duration) -> io::Result<()> {
+    let micros = u64::try_from(latency.as_micros()).unwrap_or(u64::MAX);
+    writeln!(stdout, "{}", json!({ "answer": "handled", "line": number, "microseconds": micros }))?;
+    stdout.flush()
+}
+
+/// Lines of a file or of standard input, without those that are blank. Of a line that is far too long only the
+/// beginning is kept, which is no event.
+struct Lines {
+    name: String,
+    reader: Box<dyn BufRead>,
+}
+
+impl Lines {
+    fn open(path: &Path) -> Result<Self, Message> {
+        let name = path.display().to_string();
+        let reader: Box<dyn BufRead> = if name == "-" {
+            Box::new(BufReader::new(io::stdin()))
+        } else {
+            let file = File::open(path)
+                .map_err(|error| Message::at("M101", &name, None, format!("cannot be read: {error}")))?;
+            Box::new(BufReader::new(file))
+        };
+        Ok(Self { name, reader })
+    }
+
+    fn next(&mut self) -> Result<Option<String>, Message> {
+        loop {
+            let line = self
+                .read_line()
+                .map_err(|error| Message::at("M101", &self.name, None, format!("cannot be read: {error}")))?;
+            match line {
+                Some(bytes) if bytes.trim_ascii().is_empty() => {}
+                Some(bytes) => return Ok(Some(String::from_utf8_lossy(bytes.trim_ascii()).into_owned())),
+                None => return Ok(None),
+            }
+        }
+    }
+
+    fn read_line(&mut self) -> io::Result<Option<Vec<u8>>> {
+        let mut bytes = Vec::new();
+        let limit = LONGEST_LINE as u64 + 2;
+        if self.reader.by_ref().take(limit).read_until(b'\n', &mut bytes)? == 0 {
+            return Ok(None);
+        }
+        if bytes.len() as u64 == limit && !bytes.ends_with(b"\n") {
+            self.reader.skip_until(b'\n')?;
+        }
+        Ok(Some(bytes))
+    }
+}

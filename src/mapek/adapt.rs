@@ -1,0 +1,245 @@
+//! From what has changed to whether a plan is needed, and to the plan: Algorithm 1 of the paper.
+//!
+//! The paper plans when the available designs have changed or an objective is in error. Here a plan that is still valid and
+//! that uses none of the lost designs is kept, because it is still the best: of fewer choices none is better. Where a
+//! design of the action under way is lost, that action and the rest of the plan are configured anew together, see
+//! [`super::resume`]; if that is impossible, the action is cancelled first.
+
+use encodings::validate::{Options, Verdict, Violation, advance, validate};
+use num_rational::BigRational;
+
+use super::Loop;
+use super::analyze::Findings;
+use super::answer::{Answer, Command};
+use super::knowledge::Running;
+use super::monitor::Changes;
+use super::number;
+use super::plan::Outcome;
+use super::step::{PlannedStep, plan_text};
+
+/// How often one step may fail in a row before something has to change.
+const FAILURES: u32 = 3;
+
+/// What stands among designs for facts that have changed.
+const FACTS: &str = "facts";
+
+impl Loop {
+    /// Reacts to what has changed, up to a plan.
+    pub(super) fn adapt(&mut self, mut changes: Changes, answers: &mut Vec<Answer>) {
+        let findings = if changes.knowledge { self.analyze(answers) } else { Findings::default() };
+        self.chances(&findings, &changes);
+        let is_change = changes.facts || !changes.must.is_empty() || !findings.gained.is_empty();
+        if self.gave_up(&changes, answers) {
+            return;
+        }
+        if let Some(running) = self.knowledge.running.clone() {
+            if running.cancelling {
+                return;
+            }
+            if let Some(reason) = self.trouble(&running, &changes) {
+                self.replan(vec![reason], true, answers);
+                return;
+            }
+        }
+        let lost: Vec<&String> = self.planned().filter(|design| !self.is_available(design)).collect();
+        if let Some(design) = lost.first() {
+            changes.must.push(format!("{design}, which the plan uses, is not available any more"));
+        }
+        changes.must.extend(findings.errors);
+        if changes.must.is_empty() && changes.facts && self.knowledge.plan.is_some() {
+            changes.must.extend(self.violation());
+        }
+        if changes.must.is_empty() && self.knowledge.stuck && is_change {
+            changes.must.push("the situation has changed, and there is no plan".to_owned());
+        }
+        if changes.must.is_empty() {
+            if !findings.lost.is_empty() && self.knowledge.plan.is_some() {
+                let because = "it uses none of the designs that are not available any more".to_owned();
+                answers.push(Answer::PlanKept { because });
+            }
+            self.improve(answers);
+        } else {
+            self.knowledge.reached = false;
+            self.replan(changes.must, true, answers);
+        }
+    }
+
+    /// After the same failure again and again no plan is looked for until something else happens.
+    fn gave_up(&mut self, changes: &Changes, answers: &mut Vec<Answer>) -> bool {
+        match &self.knowledge.failures {
+            Some((step, count)) if *count >= FAILURES && !changes.must.is_empty() => {
+                let because = format!("`{}` has failed {count} times in a row", step.summary());
+                answers.push(Answer::PlanNone { status: "failed", because });
+                self.knowledge.failures = None;
+                self.knowledge.plan = None;
+                self.knowledge.stuck = true;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Notes what may lead to a better plan.
+    fn chances(&mut self, findings: &Findings, changes: &Changes) {
+        let hopes = &mut self.knowledge.hopes;
+        hopes.retain(|design| !findings.lost.contains(design));
+        let before = hopes.len();
+        hopes.extend(findings.gained.iter().cloned());
+        hopes.extend(changes.predicates.then(|| FACTS.to_owned()));
+        if hopes.len() > before {
+            self.knowledge.hoped = self.knowledge.now;
+        }
+    }
+
+    fn is_available(&self, design: &str) -> bool {
+        self.knowledge.mission.knowledge().is_none() || self.knowledge.available.contains(design)
+    }
+
+    /// The designs of the steps that are still to be requested.
+    fn planned(&self) -> impl Iterator<Item = &String> {
+        let steps = self.knowledge.plan.iter().flatten();
+        steps.flat_map(|step| step.configuration.iter().map(|(_, design)| design))
+    }
+
+    /// Why the action under way cannot go on as it is.
+    fn trouble(&self, running: &Running, changes: &Changes) -> Option<String> {
+        let lost = running.step.configuration.iter().find(|(_, design)| !self.is_available(design));
+        if let Some((_, design)) = lost {
+            return Some(format!(
+                "{design}, which action {} uses, is not available any more",
+                running.action
+            ));
+        }
+        if !changes.facts {
+            return None;
+        }
+        self.obstacle(running).map(|obstacle| format!("action {}: {obstacle}", running.action))
+    }
+
+    /// What the validator says of the plan, the action under way included.
+    fn verdict(&self) -> Verdict {
+        let running = self.knowledge.running.iter().map(|running| &running.step);
+        let steps = running.chain(self.knowledge.plan.iter().flatten());
+        let (domain, problem) = self.left();
+        validate(&domain, &problem, &plan_text(steps), &Options::default())
+    }
+
+    /// Why what is left of the action under way cannot be done.
+    fn obstacle(&self, running: &Running) -> Option<String> {
+        let (domain, problem) = self.left();
+        let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;
+        Some(violation.message.clone())
+    }
+
+    /// Why the plan, with what is left of the action under way, does not fit the situation as it is believed.
+    pub fn violation(&self) -> Option<String> {
+        self.verdict().violation.map(|violation| sentence(&violation))
+    }
+
+    /// Looks for a better plan if there may be one, and there has been for long enough.
+    fn improve(&mut self, answers: &mut Vec<Answer>) {
+        let has_plan = self.knowledge.plan.is_some() && !self.knowledge.reached;
+        if !has_plan {
+            self.knowledge.hopes.clear();
+        } else if !self.knowledge.hopes.is_empty()
+            && self.knowledge.now >= self.knowledge.hoped + self.settings.settle
+        {
+            self.replan(vec!["there may be a better plan".to_owned()], false, answers);
+        }
+    }
+
+    /// Looks for a plan, and adopts it if it must, or if it is better by enough.
+    pub(super) fn replan(&mut self, because: Vec<String>, must: bool, answers: &mut Vec<Answer>) {
+        let reason = because.first().cloned().unwrap_or_default();
+        answers.push(Answer::PlanRequested { because });
+        self.knowledge.hopes.clear();
+        let (domain, problem) = self.left();
+        let domain = domain.into_owned();
+        let outcome = self.planner.plan(&self.knowledge.mission, &domain, &problem);
+        let Some(steps) = &outcome.steps else {
+            self.without_plan(&reason, must, outcome, answers);
+            return;
+        };
+        self.knowledge.stuck = false;
+        if self.is_current(steps) {
+            answers.push(Answer::PlanKept { because: "it is still the best".to_owned() });
+        } else if let Some(because) = (!must).then(|| self.not_worth_it(&outcome)).flatten() {
+            answers.push(Answer::PlanKept { because });
+        } else {
+            self.adopt(outcome, answers);
+        }
+    }
+
+    /// Whether these are the action under way and the plan at hand.
+    fn is_current(&self, steps: &[PlannedStep]) -> bool {
+        let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
+        let Some(plan) = &self.knowledge.plan else { return false };
+        let running = self.knowledge.running.iter().map(|running| &running.step);
+        running.chain(plan).map(key).eq(steps.iter().map(key))
+    }
+
+    /// Why a plan that need not be adopted is not.
+    fn not_worth_it(&self, outcome: &Outcome) -> Option<String> {
+        let mission = &self.knowledge.mission;
+        let maximize = mission
+            .problem()
+            .metric
+            .as_ref()
+            .is_some_and(|metric| metric.direction == encodings::pddl::ast::Direction::Maximize);
+        let kept = self.verdict().metric?;
+        let benefit = if maximize { &outcome.cost - &kept } else { &kept - &outcome.cost };
+        let zero = BigRational::from_integer(0.into());
+        let enough = benefit > zero && benefit >= self.settings.minimum_benefit;
+        (!enough).then(|| {
+            format!(
+                "the benefit of another plan is {}, the minimum is {}",
+                number::decimal(&benefit),
+                number::decimal(&self.settings.minimum_benefit)
+            )
+        })
+    }
+
+    /// Takes a plan over; the action under way gets its designs.
+    fn adopt(&mut self, outcome: Outcome, answers: &mut Vec<Answer>) {
+        let Outcome { steps, proved, .. } = outcome;
+        let steps = steps.unwrap_or_default();
+        let cost = steps.iter().map(|step| step.cost.clone()).sum();
+        answers.push(Answer::PlanFound { cost, optimal: proved, steps: steps.clone() });
+        let mut steps: std::collections::VecDeque<PlannedStep> = steps.into();
+        if let Some(mut running) = self.knowledge.running.take() {
+            if let Some(first) = steps.pop_front() {
+                running.step = first;
+            }
+            self.reconfigure(running.action, &running.step.clone(), answers);
+            self.knowledge.running = Some(running);
+        }
+        self.knowledge.plan = Some(steps);
+    }
+
+    /// There is no plan that goes on with the action under way, or none at all.
+    fn without_plan(&mut self, reason: &str, must: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
+        let impossible = self.knowledge.running.clone().filter(|running| {
+            let lost = running.step.configuration.iter().any(|(_, design)| !self.is_available(design));
+            lost || self.obstacle(running).is_some()
+        });
+        if let Some(running) = impossible {
+            self.knowledge.plan = None;
+            let because = format!("{reason}; no other design serves");
+            self.effect(running.action, Command::Cancel { because }, answers);
+            self.knowledge.running = Some(Running { cancelling: true, ..running });
+            return;
+        }
+        let status = if outcome.proved { "unsolvable" } else { "unknown" };
+        answers.push(Answer::PlanNone { status, because: outcome.because });
+        if must {
+            self.knowledge.plan = None;
+            self.knowledge.stuck = true;
+        }
+    }
+}
+
+/// What is wrong with a plan.
+fn sentence(violation: &Violation) -> String {
+    let unmet = violation.unmet.first().map(|unmet| format!(": {}", unmet.condition)).unwrap_or_default();
+    format!("the plan does not fit the situation: {}{unmet}", violation.message)
+}

@@ -1,0 +1,142 @@
+//! Analyze: from what is known to which designs are available, which objectives are in error, and what has changed.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rules::{Fact, Literal, Reason};
+
+use super::Loop;
+use super::answer::{Answer, DesignChange, ObjectiveChange};
+use crate::knowledge::Knowledge;
+
+/// What the analysis has found.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    /// Designs that are available no more.
+    pub(super) lost: BTreeSet<String>,
+    /// Designs that are available again.
+    pub(super) gained: BTreeSet<String>,
+    /// Objectives that have come into error, with their statuses.
+    pub(super) errors: Vec<String>,
+}
+
+/// The designs that are available, by local name.
+pub(super) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
+    let designs = knowledge.runtime().available_designs(None).unwrap_or_default();
+    designs.into_iter().map(|design| design.name).collect()
+}
+
+impl Loop {
+    /// Compares what follows now with what followed before, and reports the difference.
+    pub(super) fn analyze(&mut self, answers: &mut Vec<Answer>) -> Findings {
+        let mut findings = Findings::default();
+        let Some(knowledge) = self.knowledge.mission.knowledge() else { return findings };
+        let now = available(knowledge);
+        let changed: Vec<String> = self.knowledge.available.symmetric_difference(&now).cloned().collect();
+        let designs: Vec<DesignChange> = changed
+            .into_iter()
+            .map(|design| {
+                let available = now.contains(&design);
+                let because = if available { Vec::new() } else { ruled_out(knowledge, &design) };
+                DesignChange { design, available, because }
+            })
+            .collect();
+        for change in &designs {
+            let set = if change.available { &mut findings.gained } else { &mut findings.lost };
+            set.insert(change.design.clone());
+        }
+        let statuses = statuses(knowledge);
+        let mut objectives = Vec::new();
+        let names: BTreeSet<&String> = statuses.keys().chain(self.knowledge.statuses.keys()).collect();
+        for name in names {
+            let (before, after) = (self.knowledge.statuses.get(name), statuses.get(name));
+            if before == after {
+                continue;
+            }
+            let statuses = after.cloned().unwrap_or_default();
+            if !statuses.is_empty() {
+                findings.errors.push(format!("{name} is {}", statuses.join(", ")));
+            }
+            let because = why_objective(knowledge, name);
+            objectives.push(ObjectiveChange { objective: name.clone(), statuses, because });
+        }
+        self.knowledge.available = now;
+        self.knowledge.statuses = statuses;
+        if !designs.is_empty() || !objectives.is_empty() {
+            answers.push(Answer::Inferred { designs, objectives });
+        }
+        findings
+    }
+}
+
+/// Objectives that have a status which calls for another design.
+fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
+    let objectives = knowledge.runtime().objectives().into_iter();
+    let in_error = objectives.filter(ontology::runtime::Objective::is_in_error);
+    in_error.map(|objective| (objective.individual.name, objective.statuses)).collect()
+}
+
+/// The rules and stated facts by which a design is ruled out.
+pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
+    let engine = knowledge.engine();
+    let symbols = engine.symbols();
+    let designs = knowledge.view().individuals_of_class_named("FunctionDesign");
+    let Some(individual) = designs.into_iter().find(|individual| individual.name == design) else {
+        return Vec::new();
+    };
+    let (Some(subject), Some(falsehood)) =
+        (symbols.find_name(&individual.iri), symbols.find_literal(&Literal::Boolean(false)))
+    else {
+        return Vec::new();
+    };
+    let names = ["fd_realisability", "fd_available"].map(|name| {
+        [ontology::vocab::tomasys::NS, ontology::vocab::pddl_tomasys::NS]
+            .map(|space| format!("{space}{name}"))
+    });
+    let predicates = names.iter().flatten().filter_map(|name| symbols.find_name(name));
+    let mut because = Vec::new();
+    for predicate in predicates {
+        if let Some(derivation) = engine.why(&Fact::new(predicate, [subject, falsehood])) {
+            because.extend(reasons(knowledge, &derivation));
+        }
+    }
+    because
+}
+
+fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
+    let derivations = knowledge.runtime().why(objective).unwrap_or_default();
+    derivations.iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
+}
+
+/// A derivation as lines: the labels of its rules, then the stated facts that it rests on.
+fn reasons(knowledge: &Knowledge, derivation: &rules::Derivation) -> Vec<String> {
+    let symbols = knowledge.engine().symbols();
+    let mut lines = Vec::new();
+    for step in &derivation.steps {
+        if let Reason::Rule { identity, .. } = &step.reason {
+            let label = identity.label.clone().unwrap_or_else(|| identity.to_string().into());
+            lines.push(format!("rule: {label}"));
+        }
+    }
+    for step in &derivation.steps {
+        if matches!(step.reason, Reason::Asserted) {
+            lines.push(local(&step.fact.display(symbols).to_string()));
+        }
+    }
+    lines
+}
+
+/// A fact with local names in place of IRIs.
+pub(crate) fn local(text: &str) -> String {
+    let mut parts = text.split('<');
+    let mut short = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        if let Some((iri, rest)) = part.split_once('>') {
+            short += ontology::vocab::local_name(iri);
+            short += rest;
+        } else {
+            short.push('<');
+            short += part;
+        }
+    }
+    short
+}

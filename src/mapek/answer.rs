@@ -1,0 +1,197 @@
+//! What the loop answers: conclusions, plans and effects, one JSON object each, in the format `metaplan-events/1`.
+
+use num_rational::BigRational;
+use serde_json::{Map, Value, json};
+
+use super::number;
+use super::step::PlannedStep;
+
+/// One line of output.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Answer {
+    /// What follows has changed.
+    Inferred {
+        /// Designs whose availability has changed.
+        designs: Vec<DesignChange>,
+        /// Objectives whose status has changed.
+        objectives: Vec<ObjectiveChange>,
+    },
+    /// A plan is looked for.
+    PlanRequested {
+        /// Why, in sentences.
+        because: Vec<String>,
+    },
+    /// A plan is adopted.
+    PlanFound {
+        /// What its steps add to the metric, in the metric's unit.
+        cost: BigRational,
+        /// Whether it is proved that no plan has a better metric.
+        optimal: bool,
+        /// What is to be done; the first step is the action that is under way if there is one.
+        steps: Vec<PlannedStep>,
+    },
+    /// The plan stays as it is.
+    PlanKept {
+        /// Why, in a sentence.
+        because: String,
+    },
+    /// There is no plan.
+    PlanNone {
+        /// `unsolvable`, `unknown` or `failed`.
+        status: &'static str,
+        /// Why, in a sentence.
+        because: String,
+    },
+    /// Something is to be done.
+    Effect(Effect),
+    /// The goal holds; nothing is to be done.
+    GoalReached,
+    /// The line was seen before and has changed nothing.
+    Duplicate {
+        /// Its number.
+        sequence: u64,
+    },
+    /// The line, or a part of it, has changed nothing.
+    Error {
+        /// A stable code.
+        code: String,
+        /// One sentence.
+        message: String,
+    },
+}
+
+/// A design that has become available, or is available no more.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DesignChange {
+    /// Its local name.
+    pub design: String,
+    /// Whether it is available from now on.
+    pub available: bool,
+    /// The rules and facts that rule it out.
+    pub because: Vec<String>,
+}
+
+/// An objective whose status has changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ObjectiveChange {
+    /// Its local name.
+    pub objective: String,
+    /// Its statuses from now on; none while all is well.
+    pub statuses: Vec<String>,
+    /// The rules and facts that say so.
+    pub because: Vec<String>,
+}
+
+/// Something that the managed system is to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// Its number, from 1; the same again if it has to be repeated.
+    pub number: u64,
+    /// The number of the action that it is about.
+    pub action: u64,
+    /// What is to be done.
+    pub command: Command,
+    /// Whether it may have been asked for before the program was started again.
+    pub repeated: bool,
+}
+
+/// What the managed system is to do.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Command {
+    /// A function gets another design.
+    Reconfigure {
+        /// The function.
+        function: String,
+        /// The design before, if there was one.
+        from: Option<String>,
+        /// The design from now on.
+        to: String,
+    },
+    /// An action begins.
+    Request {
+        /// The action with its configuration.
+        step: PlannedStep,
+    },
+    /// An action is brought to a safe end.
+    Cancel {
+        /// Why, in a sentence.
+        because: String,
+    },
+}
+
+impl Answer {
+    /// The answer as an object of the format.
+    pub fn to_json(&self) -> Value {
+        match self {
+            Self::Inferred { designs, objectives } => json!({
+                "answer": "inferred",
+                "designs": designs.iter().map(DesignChange::to_json).collect::<Vec<_>>(),
+                "objectives": objectives.iter().map(ObjectiveChange::to_json).collect::<Vec<_>>(),
+            }),
+            Self::PlanRequested { because } => json!({ "answer": "plan_requested", "because": because }),
+            Self::PlanFound { cost, optimal, steps } => json!({
+                "answer": "plan_found",
+                "cost": number::to_json(cost),
+                "optimal": optimal,
+                "steps": steps.iter().map(PlannedStep::to_json).collect::<Vec<_>>(),
+            }),
+            Self::PlanKept { because } => json!({ "answer": "plan_kept", "because": because }),
+            Self::PlanNone { status, because } => {
+                json!({ "answer": "plan_none", "status": status, "because": because })
+            }
+            Self::Effect(effect) => effect.to_json(),
+            Self::GoalReached => json!({ "answer": "goal_reached" }),
+            Self::Duplicate { sequence } => json!({ "answer": "duplicate", "seq": sequence }),
+            Self::Error { code, message } => json!({ "answer": "error", "code": code, "message": message }),
+        }
+    }
+
+    /// The effect, if it is one.
+    pub fn effect(&self) -> Option<&Effect> {
+        match self {
+            Self::Effect(effect) => Some(effect),
+            _ => None,
+        }
+    }
+}
+
+impl DesignChange {
+    fn to_json(&self) -> Value {
+        json!({ "design": self.design, "available": self.available, "because": self.because })
+    }
+}
+
+impl ObjectiveChange {
+    fn to_json(&self) -> Value {
+        json!({ "objective": self.objective, "statuses": self.statuses, "because": self.because })
+    }
+}
+
+impl Effect {
+    /// The effect as an object of the format.
+    pub fn to_json(&self) -> Value {
+        let mut object = match &self.command {
+            Command::Reconfigure { function, from, to } => {
+                json!({ "answer": "reconfigure", "function": function, "from": from, "to": to })
+            }
+            Command::Request { step } => {
+                let mut object = step.to_json();
+                object["answer"] = json!("request_action");
+                let name = object["action"].take();
+                object["name"] = name;
+                object
+            }
+            Command::Cancel { because } => json!({ "answer": "cancel_action", "because": because }),
+        };
+        object["action"] = json!(self.action);
+        object["effect"] = json!(self.number);
+        if self.repeated {
+            object["repeated"] = json!(true);
+        }
+        // The kind of the answer comes first.
+        let fields = object.as_object_mut().map(std::mem::take).unwrap_or_default();
+        let (kind, rest): (Map<_, _>, Map<_, _>) = fields.into_iter().partition(|(name, _)| name == "answer");
+        Value::Object(kind.into_iter().chain(rest).collect())
+    }
+}

@@ -1,0 +1,364 @@
+//! Text to events: what the managed system reports, one JSON object each, in the format `metaplan-events/1`.
+//!
+//! Objects of the shape of `diagnostic_msgs/DiagnosticArray`, as the MROS observers publish them, are taken as they are
+//! \[1\]. What is not understood is a [`Fault`], which changes nothing.
+//!
+//! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
+
+use std::time::Duration;
+
+use num_rational::BigRational;
+use ontology::tomasys::change::Status;
+use serde_json::{Map, Value, json};
+
+use super::number;
+
+/// Lines of more bytes are not read as events.
+pub const LONGEST_LINE: usize = 1 << 20;
+
+/// Something that has happened.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Event {
+    /// A sensor reports the value of a quality attribute, or of a function of the problem without parameters.
+    Measured {
+        /// Local name or IRI.
+        attribute: String,
+        /// In the attribute's unit.
+        value: BigRational,
+    },
+    /// A component reports how it is.
+    Component {
+        /// Local name or IRI.
+        component: String,
+        /// How it is.
+        status: Status,
+    },
+    /// A requested action has begun.
+    Started {
+        /// The number of the request.
+        action: u64,
+    },
+    /// A requested action has done all that it should.
+    Succeeded {
+        /// The number of the request.
+        action: u64,
+    },
+    /// A requested action has ended without success.
+    Failed {
+        /// The number of the request.
+        action: u64,
+        /// Why, in words.
+        reason: String,
+    },
+    /// An action has been brought to a safe end, as asked for.
+    Cancelled {
+        /// The number of the request.
+        action: u64,
+    },
+    /// How much of an action is done.
+    Progress {
+        /// The number of the request.
+        action: u64,
+        /// From 0 to 1, in hundredths.
+        fraction: BigRational,
+    },
+    /// Another goal from now on, as a PDDL condition.
+    Goal {
+        /// The condition.
+        goal: String,
+    },
+    /// A fact or a value of the problem, as for `--set`.
+    Fact {
+        /// `battery`, `robot_at`, `pipeline_found pl1`.
+        name: String,
+        /// The value, the last argument, or a truth value.
+        value: String,
+    },
+    /// An effect has reached the managed system.
+    Acknowledged {
+        /// The number of the effect.
+        effect: u64,
+    },
+    /// Time passes.
+    Tick,
+}
+
+/// Why a line, or a part of it, is no event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// A stable code.
+    pub code: &'static str,
+    /// One sentence.
+    pub message: String,
+}
+
+impl Fault {
+    pub(crate) fn new(code: &'static str, message: impl Into<String>) -> Self {
+        Self { code, message: message.into() }
+    }
+}
+
+/// One line of input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observation {
+    /// A number that grows from line to line, if the sender counts; a line with a number that was seen is left out.
+    pub sequence: Option<u64>,
+    /// When it was made, since the start of the mission, if the sender says so.
+    pub time: Option<Duration>,
+    /// What it says; a diagnostic array says several things.
+    pub events: Vec<Result<Event, Fault>>,
+}
+
+impl From<Event> for Observation {
+    fn from(event: Event) -> Self {
+        Self { sequence: None, time: None, events: vec![Ok(event)] }
+    }
+}
+
+impl Observation {
+    /// Reads a line.
+    pub fn parse(text: &str) -> Self {
+        let mut observation = Self { sequence: None, time: None, events: Vec::new() };
+        match observation.read(text) {
+            Ok(events) => observation.events = events,
+            Err(fault) => observation.events.push(Err(fault)),
+        }
+        observation
+    }
+
+    fn read(&mut self, text: &str) -> Result<Vec<Result<Event, Fault>>, Fault> {
+        if text.len() > LONGEST_LINE {
+            return Err(Fault::new("M301", format!("a line of {} bytes is too long", text.len())));
+        }
+        let value: Value = serde_json::from_str(text)
+            .map_err(|error| Fault::new("M301", format!("this is no JSON: {error}")))?;
+        let Value::Object(mut fields) = value else {
+            return Err(Fault::new("M301", "an event is a JSON object"));
+        };
+        if fields.contains_key("status") && !fields.contains_key("event") {
+            return diagnostics(&fields);
+        }
+        // The number and the time count even if the rest is wrong.
+        self.sequence = take(&mut fields, "seq", "a whole number", Value::as_u64)?;
+        self.time = take(&mut fields, "time", "a number of seconds, not negative", seconds)?;
+        event(&mut fields).map(|event| vec![Ok(event)])
+    }
+}
+
+fn seconds(value: &Value) -> Option<Duration> {
+    number::from_json(value).and_then(|value| Duration::try_from_secs_f64(number::to_f64(&value)).ok())
+}
+
+/// Takes an optional field away.
+fn take<T>(
+    fields: &mut Map<String, Value>,
+    name: &str,
+    wanted: &str,
+    read: impl Fn(&Value) -> Option<T>,
+) -> Result<Option<T>, Fault> {
+    match fields.remove(name) {
+        None => Ok(None),
+        Some(value) => match read(&value) {
+            Some(read) => Ok(Some(read)),
+            None => Err(Fault::new("M302", format!("`{name}` is {value}, but should be {wanted}"))),
+        },
+    }
+}
+
+fn need<T>(
+    fields: &mut Map<String, Value>,
+    name: &str,
+    wanted: &str,
+    read: impl Fn(&Value) -> Option<T>,
+) -> Result<T, Fault> {
+    let missing = || Fault::new("M302", format!("the field `{name}` is missing; it should be {wanted}"));
+    take(fields, name, wanted, read)?.ok_or_else(missing)
+}
+
+fn text(value: &Value) -> Option<String> {
+    value.as_str().map(str::trim).filter(|text| !text.is_empty()).map(ToOwned::to_owned)
+}
+
+fn fraction(value: &Value) -> Option<BigRational> {
+    let (zero, one) = (BigRational::from_integer(0.into()), BigRational::from_integer(1.into()));
+    let percent = BigRational::from_integer(100.into());
+    let fraction = number::from_json(value).filter(|fraction| (zero..=one).contains(fraction))?;
+    Some((fraction * &percent).round() / percent)
+}
+
+/// The value of a fact: a word, a number or a truth value.
+fn word(value: &Value) -> Option<String> {
+    match value {
+        Value::Bool(truth) => Some(truth.to_string()),
+        Value::Number(number) => Some(number.to_string()),
+        other => text(other),
+    }
+}
+
+fn event(fields: &mut Map<String, Value>) -> Result<Event, Fault> {
+    let kind = need(fields, "event", "the kind of the event", text)?;
+    let number = "the number of a requested action";
+    let event = match kind.as_str() {
+        "measured" => Event::Measured {
+            attribute: need(fields, "attribute", "the name of an attribute", text)?,
+            value: need(fields, "value", "a decimal number", number::from_json)?,
+        },
+        "component_status" => Event::Component {
+            component: need(fields, "component", "the name of a component", text)?,
+            status: need(fields, "status", STATUSES, |value| status(&word(value)?))?,
+        },
+        "action_started" => Event::Started { action: need(fields, "action", number, Value::as_u64)? },
+        "action_succeeded" => Event::Succeeded { action: need(fields, "action", number, Value::as_u64)? },
+        "action_failed" => Event::Failed {
+            action: need(fields, "action", number, Value::as_u64)?,
+            reason: take(fields, "reason", "a sentence", text)?.unwrap_or_default(),
+        },
+        "action_cancelled" => Event::Cancelled { action: need(fields, "action", number, Value::as_u64)? },
+        "action_progress" => Event::Progress {
+            action: need(fields, "action", number, Value::as_u64)?,
+            fraction: need(fields, "fraction", "a number from 0 to 1", fraction)?,
+        },
+        "goal_changed" => Event::Goal { goal: need(fields, "goal", "a PDDL condition", text)? },
+        "fact_changed" => Event::Fact {
+            name: need(fields, "name", "a function or predicate, with arguments", text)?,
+            value: need(fields, "value", "a number, an object or a truth value", word)?,
+        },
+        "acknowledged" => {
+            Event::Acknowledged { effect: need(fields, "effect", "the number of an effect", Value::as_u64)? }
+        }
+        "tick" => Event::Tick,
+        other => {
+            let text = format!("there is no event `{other}`; there are: {}", KINDS.join(", "));
+            return Err(Fault::new("M303", text));
+        }
+    };
+    match fields.keys().next() {
+        None => Ok(event),
+        Some(field) => Err(Fault::new("M302", format!("`{kind}` has no field `{field}`"))),
+    }
+}
+
+const KINDS: [&str; 11] = [
+    "measured",
+    "component_status",
+    "action_started",
+    "action_succeeded",
+    "action_failed",
+    "action_cancelled",
+    "action_progress",
+    "goal_changed",
+    "fact_changed",
+    "acknowledged",
+    "tick",
+];
+
+const STATUSES: &str = "`FALSE` or `ERROR`, `RECOVERED`, `TRUE` or `OK`, or a truth value";
+
+/// A status in the spelling of MROS, of PLANTA, or as a truth value.
+fn status(text: &str) -> Option<Status> {
+    match text.to_ascii_uppercase().as_str() {
+        "FALSE" | "ERROR" => Some(Status::Failed),
+        "RECOVERED" => Some(Status::Recovered),
+        "TRUE" | "OK" => Some(Status::Working),
+        _ => None,
+    }
+}
+
+/// The statuses of a diagnostic array that are about attributes and components; others are of no concern here.
+fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Fault>>, Fault> {
+    let Some(statuses) = fields.get("status").and_then(Value::as_array) else {
+        return Err(Fault::new("M304", "`status` of a diagnostic array is a list"));
+    };
+    let mut events = Vec::new();
+    for entry in statuses {
+        let message = entry.get("message").and_then(Value::as_str).unwrap_or_default();
+        let values = entry.get("values").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+        // SUAVE's thruster monitor says one thing twice, once in the words of MROS and once in those of PLANTA: of
+        // several values for one key, the first counts.
+        let mut seen: Vec<&str> = Vec::new();
+        for pair in values {
+            let part = |name: &str| pair.get(name).and_then(Value::as_str).map(str::trim);
+            let (Some(key), Some(value)) = (part("key"), part("value")) else {
+                events.push(Err(Fault::new(
+                    "M304",
+                    "a value of a diagnostic status has a `key` and a `value`",
+                )));
+                continue;
+            };
+            if seen.contains(&key) {
+                continue;
+            }
+            seen.push(key);
+            match message {
+                "QA status" => events.push(measured(key, value)),
+                "Component status" => events.push(component(key, value)),
+                _ => {}
+            }
+        }
+    }
+    Ok(events)
+}
+
+fn measured(attribute: &str, value: &str) -> Result<Event, Fault> {
+    let wrong = || Fault::new("M304", format!("the value `{value}` of {attribute} is no decimal number"));
+    Ok(Event::Measured { attribute: attribute.to_owned(), value: number::exact(value).ok_or_else(wrong)? })
+}
+
+fn component(component: &str, value: &str) -> Result<Event, Fault> {
+    let wrong = || {
+        Fault::new("M304", format!("the status `{value}` of {component} is none; it should be {STATUSES}"))
+    };
+    Ok(Event::Component { component: component.to_owned(), status: status(value).ok_or_else(wrong)? })
+}
+
+impl Event {
+    /// The event as an object of the format.
+    pub fn to_json(&self) -> Value {
+        match self {
+            Self::Measured { attribute, value } => {
+                json!({ "event": "measured", "attribute": attribute, "value": number::to_json(value) })
+            }
+            Self::Component { component, status } => {
+                let status = match status {
+                    Status::Failed => "FALSE",
+                    Status::Recovered => "RECOVERED",
+                    Status::Working => "TRUE",
+                };
+                json!({ "event": "component_status", "component": component, "status": status })
+            }
+            Self::Started { action } => json!({ "event": "action_started", "action": action }),
+            Self::Succeeded { action } => json!({ "event": "action_succeeded", "action": action }),
+            Self::Failed { action, reason } => {
+                let mut object = json!({ "event": "action_failed", "action": action });
+                if !reason.is_empty() {
+                    object["reason"] = json!(reason);
+                }
+                object
+            }
+            Self::Cancelled { action } => json!({ "event": "action_cancelled", "action": action }),
+            Self::Progress { action, fraction } => {
+                json!({ "event": "action_progress", "action": action, "fraction": number::to_json(fraction) })
+            }
+            Self::Goal { goal } => json!({ "event": "goal_changed", "goal": goal }),
+            Self::Fact { name, value } => json!({ "event": "fact_changed", "name": name, "value": value }),
+            Self::Acknowledged { effect } => json!({ "event": "acknowledged", "effect": effect }),
+            Self::Tick => json!({ "event": "tick" }),
+        }
+    }
+}
+
+impl Observation {
+    /// The observation as one line; only what is an event is written.
+    pub fn to_line(&self) -> String {
+        let Some(Ok(event)) = self.events.first() else { return "{}".to_owned() };
+        let mut object = event.to_json();
+        if let Some(sequence) = self.sequence {
+            object["seq"] = json!(sequence);
+        }
+        if let Some(time) = self.time {
+            object["time"] = json!(time.as_secs_f64());
+        }
+        object.to_string()
+    }
+}

@@ -1,0 +1,84 @@
+//! Exact numbers as text and JSON, and back: what robots report is decimal, and stays so.
+
+use num_rational::BigRational;
+use num_traits::{ToPrimitive, Zero};
+use serde_json::Value;
+
+/// Numbers of more characters, or with more powers of ten than this, are refused: they would only fill memory.
+const LONGEST: usize = 40;
+
+/// Values of the problem are rounded to so many decimals, so that a robot's floating-point numbers do not make the
+/// planner's integers huge.
+const DECIMALS: u32 = 6;
+
+/// An exact number from a decimal, with or without an exponent: `-12`, `0.25`, `1e-2`.
+pub(crate) fn exact(text: &str) -> Option<BigRational> {
+    let text = text.trim();
+    if text.len() > LONGEST {
+        return None;
+    }
+    let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+    let exponent: i32 =
+        exponent.parse().ok().filter(|power: &i32| power.unsigned_abs() as usize <= LONGEST)?;
+    let literal = rules::Literal::parse(mantissa, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
+    let power = num_traits::pow(BigRational::from_integer(10.into()), exponent.unsigned_abs() as usize);
+    let value = literal.as_rational()?;
+    Some(if exponent < 0 { value / power } else { value * power })
+}
+
+/// The nearest number with few decimals.
+pub(crate) fn rounded(value: &BigRational) -> BigRational {
+    let scale = BigRational::from_integer(10_i64.pow(DECIMALS).into());
+    (value * &scale).round() / scale
+}
+
+/// A number of JSON, or a string that is one.
+pub(crate) fn from_json(value: &Value) -> Option<BigRational> {
+    match value {
+        Value::Number(number) => exact(&number.to_string()),
+        Value::String(text) => exact(text),
+        _ => None,
+    }
+}
+
+/// As decimal text; a fraction that is no decimal is rounded.
+pub(crate) fn decimal(value: &BigRational) -> String {
+    rules::Decimal::from_rational(value).to_string()
+}
+
+/// As a number of JSON.
+pub(crate) fn to_json(value: &BigRational) -> Value {
+    decimal(value).parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
+}
+
+/// The nearest double.
+pub(crate) fn to_f64(value: &BigRational) -> f64 {
+    if value.is_zero() { 0.0 } else { value.to_f64().unwrap_or(f64::MAX) }
+}
+
+/// An exact number of the planner.
+pub(crate) fn of_plan(value: encodings::Exact) -> BigRational {
+    BigRational::new(value.numerator.into(), value.denominator.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{decimal, exact, rounded};
+
+    fn check(text: &str, expected: Option<&str>) {
+        assert_eq!(exact(text).map(|value| decimal(&rounded(&value))).as_deref(), expected, "{text}");
+    }
+
+    #[test]
+    fn decimals_are_exact_and_bounded() {
+        check("12", Some("12"));
+        check("-0.25", Some("-0.25"));
+        check("1e-2", Some("0.01"));
+        check("1.5E2", Some("150"));
+        check("0.30000000000000004", Some("0.3"));
+        check("1e999999999", None);
+        check("NaN", None);
+        check("", None);
+        check(&"9".repeat(60), None);
+    }
+}

@@ -1,0 +1,260 @@
+//! A loop to data and back: decisions as the journal keeps them, and snapshots of all that a loop knows.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use encodings::pddl::ast::{Atom, Identifier, InitialElement, Name, Span, Term};
+use serde_json::{Value, json};
+
+use super::answer::{Answer, Command, Effect};
+use super::knowledge::Running;
+use super::plan::Outcome;
+use super::step::PlannedStep;
+use super::{Loop, Observation, analyze};
+use crate::knowledge::{Part, Statement, Statements};
+use crate::message::Message;
+
+/// What one observation has led to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decision {
+    /// The answers, as objects of the format.
+    pub answers: Vec<Value>,
+    /// The plans that were made.
+    pub plans: Vec<Value>,
+}
+
+/// All that a loop knows, as data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snapshot(pub Value);
+
+impl Loop {
+    /// The decision of which these are the answers, to be called once after each step.
+    pub fn decision(&mut self, answers: &[Answer]) -> Decision {
+        let made = std::mem::take(&mut self.planner.made);
+        Decision {
+            answers: answers.iter().map(Answer::to_json).collect(),
+            plans: made.iter().map(Outcome::to_record).collect(),
+        }
+    }
+
+    /// As [`Loop::start`], with the plans that were made then.
+    pub fn start_again(&mut self, plans: &[Value]) -> Vec<Answer> {
+        self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
+        let answers = self.start();
+        self.planner.recorded.clear();
+        answers
+    }
+
+    /// As [`Loop::handle`], with the plans that were made then.
+    pub fn handle_again(&mut self, observation: &Observation, now: Duration, plans: &[Value]) -> Vec<Answer> {
+        self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
+        let answers = self.handle(observation, now);
+        self.planner.recorded.clear();
+        answers
+    }
+
+    /// All that the loop knows.
+    pub fn snapshot(&self) -> Snapshot {
+        let known = &self.knowledge;
+        let statements =
+            known.mission.knowledge().map(crate::knowledge::Knowledge::statements).unwrap_or_default();
+        let steps =
+            |steps: &VecDeque<PlannedStep>| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>();
+        let running = known.running.as_ref().map(|running| {
+            json!([
+                running.action,
+                running.step.to_record(),
+                running.progress.to_string(),
+                running.cancelling
+            ])
+        });
+        Snapshot(json!({
+            "goal": known.goal,
+            "init": known.mission.problem().init.iter().filter_map(element_to_record).collect::<Vec<_>>(),
+            "added": statements.added.iter().map(statement_to_record).collect::<Vec<_>>(),
+            "removed": statements.removed.iter().map(statement_to_record).collect::<Vec<_>>(),
+            "available": known.available,
+            "statuses": known.statuses,
+            "configuration": known.configuration,
+            "plan": known.plan.as_ref().map(steps),
+            "running": running,
+            "reached": known.reached,
+            "stuck": known.stuck,
+            "failures": known.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
+            "hopes": known.hopes,
+            "hoped": micros(known.hoped),
+            "actions": known.actions,
+            "effects": known.effects,
+            "outstanding": known.outstanding.values().map(effect_to_record).collect::<Vec<_>>(),
+            "lines": known.lines,
+            "sequence": known.sequence,
+            "now": micros(known.now),
+        }))
+    }
+
+    /// Takes over what a loop of the same mission knew.
+    ///
+    /// # Errors
+    /// The snapshot is damaged, or belongs to another mission.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
+        let wrong =
+            |what: &str| Message::error("M320", format!("the snapshot does not fit the mission: {what}"));
+        self.restore_mission(&snapshot.0).ok_or_else(|| wrong("facts or statements"))?;
+        self.restore_work(&snapshot.0).ok_or_else(|| wrong("plan or effects"))?;
+        if let Some(base) = self.knowledge.mission.knowledge()
+            && analyze::available(base) != self.knowledge.available
+        {
+            return Err(wrong("other designs are available"));
+        }
+        Ok(())
+    }
+
+    fn restore_mission(&mut self, data: &Value) -> Option<()> {
+        let records = |name: &str| data.get(name).and_then(Value::as_array);
+        let statements =
+            |name: &str| records(name)?.iter().map(statement_from_record).collect::<Option<Vec<_>>>();
+        let known = &mut self.knowledge;
+        let statements = Statements { added: statements("added")?, removed: statements("removed")? };
+        if let Some(base) = known.mission.knowledge_mut() {
+            base.restore(&statements).ok()?;
+        }
+        let timed = known.mission.problem().init.iter().filter(|e| matches!(e, InitialElement::Timed(..)));
+        let mut init: Vec<InitialElement> = timed.cloned().collect();
+        init.extend(records("init")?.iter().map(element_from_record).collect::<Option<Vec<_>>>()?);
+        known.mission.set_init(init);
+        known.goal = data.get("goal")?.as_str().map(ToOwned::to_owned);
+        if let Some(goal) = &known.goal {
+            let goal = known.mission.goal(goal).ok()?;
+            known.mission.set_goal(goal);
+        }
+        Some(())
+    }
+
+    fn restore_work(&mut self, data: &Value) -> Option<()> {
+        let known = &mut self.knowledge;
+        let number = |name: &str| data.get(name).and_then(Value::as_u64);
+        let truth = |name: &str| data.get(name).and_then(Value::as_bool);
+        let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
+        let texts = |value: &Value| value.as_array()?.iter().map(text).collect::<Option<Vec<_>>>();
+        let pairs = |name: &str| data.get(name).and_then(Value::as_object);
+        known.available = texts(data.get("available")?)?.into_iter().collect();
+        let status = |(name, value): (&String, &Value)| Some((name.clone(), texts(value)?));
+        known.statuses = pairs("statuses")?.iter().map(status).collect::<Option<BTreeMap<_, _>>>()?;
+        let pair = |(name, value): (&String, &Value)| Some((name.clone(), text(value)?));
+        known.configuration = pairs("configuration")?.iter().map(pair).collect::<Option<BTreeMap<_, _>>>()?;
+        known.plan = match data.get("plan")? {
+            Value::Null => None,
+            steps => Some(steps.as_array()?.iter().map(PlannedStep::from_record).collect::<Option<_>>()?),
+        };
+        known.running = match data.get("running")? {
+            Value::Null => None,
+            record => Some(running_from_record(record)?),
+        };
+        known.failures = match data.get("failures")? {
+            Value::Null => None,
+            record => Some((PlannedStep::from_record(record.get(0)?)?, record.get(1)?.as_u64()? as u32)),
+        };
+        (known.reached, known.stuck) = (truth("reached")?, truth("stuck")?);
+        known.hopes = texts(data.get("hopes")?)?.into_iter().collect();
+        known.hoped = Duration::from_micros(number("hoped")?);
+        (known.actions, known.effects, known.lines) =
+            (number("actions")?, number("effects")?, number("lines")?);
+        known.sequence = number("sequence");
+        known.now = Duration::from_micros(number("now")?);
+        let effects = data.get("outstanding")?.as_array()?.iter().map(effect_from_record);
+        known.outstanding =
+            effects.collect::<Option<Vec<_>>>()?.into_iter().map(|effect| (effect.number, effect)).collect();
+        Some(())
+    }
+}
+
+fn micros(time: Duration) -> u64 {
+    u64::try_from(time.as_micros()).unwrap_or(u64::MAX)
+}
+
+fn running_from_record(record: &Value) -> Option<Running> {
+    Some(Running {
+        action: record.get(0)?.as_u64()?,
+        step: PlannedStep::from_record(record.get(1)?)?,
+        progress: record.get(2)?.as_str()?.parse().ok()?,
+        cancelling: record.get(3)?.as_bool()?,
+    })
+}
+
+fn effect_to_record(effect: &Effect) -> Value {
+    let command = match &effect.command {
+        Command::Reconfigure { function, from, to } => json!(["reconfigure", function, from, to]),
+        Command::Request { step } => json!(["request", step.to_record()]),
+        Command::Cancel { because } => json!(["cancel", because]),
+    };
+    json!([effect.number, effect.action, command])
+}
+
+fn effect_from_record(record: &Value) -> Option<Effect> {
+    let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
+    let command = record.get(2)?;
+    let command = match command.get(0)?.as_str()? {
+        "reconfigure" => Command::Reconfigure {
+            function: text(command.get(1)?)?,
+            from: text(command.get(2)?),
+            to: text(command.get(3)?)?,
+        },
+        "request" => Command::Request { step: PlannedStep::from_record(command.get(1)?)? },
+        "cancel" => Command::Cancel { because: text(command.get(1)?)? },
+        _ => return None,
+    };
+    let (number, action) = (record.get(0)?.as_u64()?, record.get(1)?.as_u64()?);
+    Some(Effect { number, action, command, repeated: false })
+}
+
+fn statement_to_record(statement: &Statement) -> Value {
+    let part = |part: &Part| match part {
+        Part::Name(name) => json!(name),
+        Part::Literal(lexical, datatype) => json!([lexical, datatype]),
+    };
+    json!([statement.predicate, statement.arguments.iter().map(part).collect::<Vec<_>>()])
+}
+
+fn statement_from_record(record: &Value) -> Option<Statement> {
+    let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
+    let part = |part: &Value| match part {
+        Value::Array(pair) => Some(Part::Literal(text(pair.first()?)?, text(pair.get(1)?)?)),
+        name => Some(Part::Name(text(name)?)),
+    };
+    let arguments = record.get(1)?.as_array()?.iter().map(part).collect::<Option<_>>()?;
+    Some(Statement { predicate: text(record.get(0)?)?, arguments })
+}
+
+/// An entry of `:init`; timed ones never change and are not recorded.
+fn element_to_record(element: &InitialElement) -> Option<Value> {
+    let words = |atom: &Atom| -> Vec<String> {
+        let arguments = atom.arguments.iter().map(|term| match term {
+            Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.to_string(),
+        });
+        std::iter::once(atom.predicate.name.to_string()).chain(arguments).collect()
+    };
+    match element {
+        InitialElement::Fact(atom) => Some(json!([words(atom), true])),
+        InitialElement::NegatedFact(atom) => Some(json!([words(atom), false])),
+        InitialElement::Value(atom, value, _) => Some(json!([words(atom), value.to_string()])),
+        InitialElement::Timed(..) => None,
+    }
+}
+
+fn element_from_record(record: &Value) -> Option<InitialElement> {
+    let identifier =
+        |value: &Value| Some(Identifier { name: Name::new(value.as_str()?), span: Span::default() });
+    let words = record.get(0)?.as_array()?;
+    let (predicate, arguments) = words.split_first()?;
+    let arguments = arguments.iter().map(|word| identifier(word).map(Term::Constant));
+    let atom = Atom {
+        predicate: identifier(predicate)?,
+        arguments: arguments.collect::<Option<_>>()?,
+        span: Span::default(),
+    };
+    match record.get(1)? {
+        Value::Bool(true) => Some(InitialElement::Fact(atom)),
+        Value::Bool(false) => Some(InitialElement::NegatedFact(atom)),
+        value => Some(InitialElement::Value(atom, value.as_str()?.parse().ok()?, Span::default())),
+    }
+}

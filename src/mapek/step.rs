@@ -1,0 +1,131 @@
+//! Steps of a plan as the loop keeps them: with exact numbers, and so that they can be written to the journal.
+
+use encodings::pddl::ast::Name;
+use encodings::validate::{PlanStep, PlanText};
+use num_rational::BigRational;
+use serde_json::{Map, Value, json};
+
+use super::number;
+
+/// An action with its configuration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedStep {
+    /// The name of the action schema.
+    pub action: String,
+    /// All arguments in the order of the schema's parameters, designs among them.
+    pub arguments: Vec<String>,
+    /// The function and the design chosen for it, in the order of the parameters.
+    pub configuration: Vec<(String, String)>,
+    /// How long it takes, in the domain's time unit.
+    pub duration: BigRational,
+    /// What it adds to the metric.
+    pub cost: BigRational,
+}
+
+impl From<&encodings::Step> for PlannedStep {
+    fn from(step: &encodings::Step) -> Self {
+        Self {
+            action: step.action.clone(),
+            arguments: step.arguments.clone(),
+            configuration: step.configuration.clone(),
+            duration: number::of_plan(step.duration),
+            cost: number::of_plan(step.cost),
+        }
+    }
+}
+
+impl PlannedStep {
+    /// `move wp1 wp2 (f_localization = fd_amcl_kinect)`: without functions and designs among the arguments.
+    pub fn summary(&self) -> String {
+        let configured = |word: &str| self.configuration.iter().any(|(f, d)| f == word || d == word);
+        let mut text = self.action.clone();
+        for argument in self.arguments.iter().filter(|argument| !configured(argument)) {
+            text.push(' ');
+            text += argument;
+        }
+        let pairs: Vec<String> = self.configuration.iter().map(|(f, d)| format!("{f} = {d}")).collect();
+        if pairs.is_empty() { text } else { format!("{text} ({})", pairs.join(", ")) }
+    }
+
+    /// The arguments without those that say which design fills which function.
+    pub fn context(&self) -> Vec<Option<&str>> {
+        let is_design = |word: &str| self.configuration.iter().any(|(_, design)| design == word);
+        self.arguments.iter().map(|word| (!is_design(word)).then_some(word.as_str())).collect()
+    }
+
+    /// The design of a function.
+    pub fn design(&self, function: &str) -> Option<&str> {
+        self.configuration.iter().find(|(known, _)| known == function).map(|(_, design)| design.as_str())
+    }
+
+    /// The same action with another design for a function.
+    #[must_use]
+    pub fn with_design(&self, function: &str, design: &str) -> Self {
+        let Some(old) = self.design(function).map(ToOwned::to_owned) else { return self.clone() };
+        let mut step = self.clone();
+        for word in step.arguments.iter_mut().filter(|word| **word == old) {
+            design.clone_into(word);
+        }
+        for (_, word) in step.configuration.iter_mut().filter(|(known, _)| known == function) {
+            design.clone_into(word);
+        }
+        step
+    }
+
+    /// The step for the validator.
+    pub(crate) fn to_plan_step(&self) -> PlanStep {
+        PlanStep {
+            action: Name::new(&self.action),
+            arguments: self.arguments.iter().map(|argument| Name::new(argument)).collect(),
+            start: None,
+            // What the planner has chosen; where the domain says how long it takes, the validator compares.
+            duration: None,
+            line: 0,
+        }
+    }
+
+    /// The step as an object of the format.
+    pub fn to_json(&self) -> Value {
+        let configuration: Map<String, Value> =
+            self.configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect();
+        json!({
+            "action": self.action,
+            "arguments": self.arguments,
+            "configuration": configuration,
+            "duration": number::to_json(&self.duration),
+            "cost": number::to_json(&self.cost),
+        })
+    }
+
+    /// Everything, for the journal.
+    pub(crate) fn to_record(&self) -> Value {
+        json!([
+            self.action,
+            self.arguments,
+            self.configuration,
+            self.duration.to_string(),
+            self.cost.to_string()
+        ])
+    }
+
+    /// The inverse of [`PlannedStep::to_record`].
+    pub(crate) fn from_record(record: &Value) -> Option<Self> {
+        let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
+        let [action, arguments, configuration, duration, cost] = record.as_array()?.as_slice() else {
+            return None;
+        };
+        let pair = |value: &Value| Some((text(value.get(0)?)?, text(value.get(1)?)?));
+        Some(Self {
+            action: text(action)?,
+            arguments: arguments.as_array()?.iter().map(text).collect::<Option<_>>()?,
+            configuration: configuration.as_array()?.iter().map(pair).collect::<Option<_>>()?,
+            duration: duration.as_str()?.parse().ok()?,
+            cost: cost.as_str()?.parse().ok()?,
+        })
+    }
+}
+
+/// Steps for the validator.
+pub(crate) fn plan_text<'a>(steps: impl IntoIterator<Item = &'a PlannedStep>) -> PlanText {
+    PlanText { steps: steps.into_iter().map(PlannedStep::to_plan_step).collect() }
+}

@@ -1,0 +1,93 @@
+//! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
+
+use encodings::pddl::ast::{Condition, Declaration, Domain, InitialElement, Name, Problem};
+use encodings::pddl::{self, Severity, Source};
+
+use super::{Mission, binding};
+use crate::knowledge::Knowledge;
+use crate::message::Message;
+
+impl Mission {
+    /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
+    pub(crate) fn fill(&self, problem: &mut Problem) -> Vec<Message> {
+        self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
+            binding::fill(&self.domain, problem, &knowledge.view(), &self.bindings)
+        })
+    }
+
+    /// The knowledge base, to change it.
+    pub(crate) fn knowledge_mut(&mut self) -> Option<&mut Knowledge> {
+        self.knowledge.as_mut()
+    }
+
+    /// The problem as it is believed now, without what the knowledge base contributes.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// Whether a measured attribute, by local name, gives a function of the problem its value, and which.
+    pub(crate) fn fed_by(&self, attribute: &str) -> Option<String> {
+        let fed = |declared: &&Declaration| self.bindings.is_measured(declared, attribute);
+        self.domain.functions.iter().find(fed).map(|declared| declared.identifier.name.to_string())
+    }
+
+    /// Whether the problem has a numeric function of that name and number of arguments.
+    pub(crate) fn is_function(&self, name: &str) -> bool {
+        let mut words = name.split_whitespace();
+        let symbol = words.next().map(Name::new);
+        let arguments = words.count();
+        let declared = self.domain.functions.iter();
+        declared
+            .into_iter()
+            .any(|d| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments)
+    }
+
+    /// Replaces the facts and values of the problem.
+    pub(crate) fn set_init(&mut self, init: Vec<InitialElement>) {
+        self.problem.init = init;
+    }
+
+    /// Replaces the goal.
+    pub(crate) fn set_goal(&mut self, goal: Condition) {
+        self.problem.goal = goal;
+    }
+
+    /// A goal from its text, checked against the domain and all objects.
+    ///
+    /// # Errors
+    /// All that is wrong with it.
+    pub(crate) fn goal(&self, text: &str) -> Result<Condition, Vec<Message>> {
+        let text = format!("(define (problem goal) (:domain {}) (:goal {text}))", self.domain.name.name);
+        let source = Source::new("goal", text);
+        let (tree, diagnostics) = pddl::parse_problem(&source);
+        let errors = Message::from_pddl(&diagnostics, &[&source]);
+        let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else { return Err(errors) };
+        let mut problem = self.problem.clone();
+        problem.goal = tree.goal;
+        self.fill(&mut problem);
+        let found = pddl::check(&self.domain, &self.domain_source, &problem, &source);
+        let wrong = found.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
+        // Only the goal has places in this text; all else was checked before.
+        let wrong: Vec<_> = wrong.filter(|diagnostic| diagnostic.file == "goal").collect();
+        if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source])) }
+    }
+
+    /// Grounds a filled problem with a variant of the domain.
+    ///
+    /// # Errors
+    /// As [`Mission::ground`].
+    pub(crate) fn ground_with(
+        &self,
+        domain: &Domain,
+        problem: &Problem,
+        limits: &encodings::Limits,
+    ) -> Result<encodings::Task, Vec<Message>> {
+        let config = encodings::GroundConfig {
+            solves: self.bindings.solves(),
+            limits: limits.clone(),
+            ..encodings::GroundConfig::default()
+        };
+        encodings::ground(domain, problem, &config)
+            .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
+    }
+}

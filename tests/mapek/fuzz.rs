@@ -1,0 +1,223 @@
+//! Random events, valid and invalid, and what must hold after each of them.
+
+use std::collections::BTreeSet;
+
+use metaplan::mapek::{Answer, Loop, PlannedStep};
+use rules::{Engine, Fact};
+use serde_json::{Value, json};
+
+use crate::common::{control, feed};
+
+/// What a mission can report.
+pub struct World {
+    pub mission: &'static str,
+    components: &'static [&'static str],
+    /// Name, and the range of values.
+    measured: &'static [(&'static str, f64, f64)],
+    /// Name, and possible values.
+    facts: &'static [(&'static str, &'static [&'static str])],
+    goals: &'static [&'static str],
+}
+
+pub const WORLDS: [World; 2] = [
+    World {
+        mission: "ugv",
+        components: &["c_kinect", "c_lidar", "c_camera", "c_flashlight"],
+        measured: &[("ambient_light", 0.0, 1.2), ("battery", 0.0, 100.0)],
+        facts: &[
+            ("robot_at", &["wp1", "wp2", "wp3", "wp4", "wp5", "wp6", "wp7", "wp8", "wp9"]),
+            ("battery", &["100", "30", "12.5", "3"]),
+            ("travel_time wp2 wp3", &["1", "3"]),
+            ("corridor wp5 wp8", &["true", "false"]),
+        ],
+        goals: &["(robot_at wp9)", "(robot_at wp7)", "(robot_at wp1)", "(and (robot_at wp3))"],
+    },
+    World {
+        mission: "uuv",
+        components: &["c_thruster_1", "c_thruster_3", "c_camera", "c_sonar", "c_charging_port"],
+        measured: &[("water_visibility", 0.0, 5.0), ("battery", 0.0, 100.0)],
+        facts: &[
+            ("battery", &["100", "70", "25", "15", "5"]),
+            ("pipeline_found pl1", &["true", "false"]),
+            ("pipeline_inspected pl1", &["true", "false"]),
+            ("search_area pl1", &["3", "2"]),
+        ],
+        goals: &["(pipeline_inspected pl1)", "(pipeline_found pl1)", "(>= (battery) 60)"],
+    },
+];
+
+const INVALID: [&str; 14] = [
+    "",
+    "no JSON",
+    "[]",
+    "{}",
+    r#"{"event":"unheard_of"}"#,
+    r#"{"event":"measured","attribute":"ambient_light"}"#,
+    r#"{"event":"measured","attribute":"nothing","value":1}"#,
+    r#"{"event":"measured","attribute":"battery","value":"NaN"}"#,
+    r#"{"event":"component_status","component":"c_none","status":"FALSE"}"#,
+    r#"{"event":"component_status","component":"c_kinect","status":"perhaps"}"#,
+    r#"{"event":"action_succeeded","action":999999999}"#,
+    r#"{"event":"goal_changed","goal":"(robot_at nowhere)"}"#,
+    r#"{"event":"fact_changed","name":"robot_at","value":"nowhere"}"#,
+    r#"{"event":"tick","extra":1}"#,
+];
+
+/// A source of events.
+pub struct Fuzz {
+    pub world: &'static World,
+    pub random: fastrand::Rng,
+    /// A loop to which nothing has happened.
+    pristine: Loop,
+}
+
+fn pick<'a, T>(random: &mut fastrand::Rng, all: &'a [T]) -> &'a T {
+    &all[random.usize(..all.len())]
+}
+
+impl Fuzz {
+    pub fn new(world: &'static World, seed: u64) -> Self {
+        Self { world, random: fastrand::Rng::with_seed(seed), pristine: control(world.mission) }
+    }
+
+    /// A loop that has begun.
+    pub fn begin(&self) -> Loop {
+        let mut control = self.pristine.clone();
+        control.start();
+        control
+    }
+
+    /// The next line, and whether it is valid.
+    pub fn next(&mut self, control: &Loop) -> (String, bool) {
+        let random = &mut self.random;
+        if random.u32(..10) == 0 {
+            return ((*pick(random, &INVALID)).to_owned(), false);
+        }
+        let running = control.knowledge().running().map(|(action, _)| action);
+        let event = match random.u32(..20) {
+            0..=2 => {
+                let status = *pick(random, &["FALSE", "RECOVERED", "TRUE", "ERROR", "OK"]);
+                json!({ "event": "component_status", "component": pick(random, self.world.components), "status": status })
+            }
+            3..=7 => {
+                let (name, low, high) = *pick(random, self.world.measured);
+                json!({ "event": "measured", "attribute": name, "value": low + random.f64() * (high - low) })
+            }
+            8 => {
+                let (name, values) = *pick(random, self.world.facts);
+                json!({ "event": "fact_changed", "name": name, "value": pick(random, values) })
+            }
+            9 if random.u32(..4) == 0 || control.knowledge().reached() => {
+                json!({ "event": "goal_changed", "goal": pick(random, self.world.goals) })
+            }
+            10 => json!({ "event": "tick" }),
+            kind => match (running, kind) {
+                (Some(action), 11..=12) => {
+                    json!({ "event": "action_progress", "action": action, "fraction": random.f64() })
+                }
+                (Some(action), 13) => json!({ "event": "action_failed", "action": action }),
+                (Some(action), 14..=15) => json!({ "event": "action_cancelled", "action": action }),
+                (Some(action), 16) => json!({ "event": "action_started", "action": action }),
+                (Some(action), _) => json!({ "event": "action_succeeded", "action": action }),
+                (None, _) => json!({ "event": "tick" }),
+            },
+        };
+        (event.to_string(), true)
+    }
+}
+
+/// Feeds `count` random lines, checking after each.
+pub fn run(world: &'static World, seed: u64, count: usize) -> Loop {
+    let mut fuzz = Fuzz::new(world, seed);
+    let mut loop_ = fuzz.begin();
+    for number in 0..count {
+        step(&mut loop_, &mut fuzz, number);
+    }
+    loop_
+}
+
+/// Feeds one line and checks what must hold.
+pub fn step(control: &mut Loop, fuzz: &mut Fuzz, number: usize) -> Vec<Answer> {
+    let (line, valid) = fuzz.next(control);
+    let before = (!valid).then(|| without_counters(control));
+    let answers = feed(control, &line);
+    // The plans that were made are for the journal; without one nobody else takes them away.
+    let _ = control.decision(&answers);
+    let context = || format!("line {number} of {}: {line}\n{answers:#?}", fuzz.world.mission);
+    if let Some(before) = before {
+        assert!(answers.iter().all(|answer| matches!(answer, Answer::Error { .. })), "{}", context());
+        assert_eq!(answers.len(), 1, "{}", context());
+        assert_eq!(without_counters(control), before, "{}", context());
+    }
+    invariants(control, &context);
+    if number.is_multiple_of(50) {
+        incremental_is_from_scratch(control, &context);
+    }
+    if number.is_multiple_of(200) {
+        restored_is_equal(control, fuzz.pristine.clone(), &context);
+    }
+    answers
+}
+
+fn without_counters(control: &Loop) -> Value {
+    let mut snapshot = control.snapshot().0;
+    for counter in ["lines", "now"] {
+        snapshot.as_object_mut().expect("an object").remove(counter);
+    }
+    snapshot
+}
+
+fn invariants(control: &Loop, context: &dyn Fn() -> String) {
+    let known = control.knowledge();
+    let mission = known.mission();
+    let base = mission.knowledge().expect("a knowledge base");
+    let designs = base.view().function_designs();
+    let available: BTreeSet<String> =
+        designs.into_iter().filter(|design| design.available).map(|design| design.individual.name).collect();
+    assert_eq!(*known.available(), available, "{}", context());
+    assert!(base.contradictions().is_empty(), "{}", context());
+    assert!(known.outstanding().count() < 32, "{}", context());
+    let cancelling = known.cancelling();
+    let Some(plan) = known.plan() else { return };
+    assert!(!cancelling, "a plan beside an action to be cancelled: {}", context());
+    let running = known.running().map(|(_, step)| step);
+    let steps: Vec<&PlannedStep> = running.into_iter().chain(plan).collect();
+    for step in &steps {
+        for (_, design) in &step.configuration {
+            assert!(available.contains(design), "{design} is not available: {}", context());
+        }
+    }
+    assert_eq!(control.violation(), None, "{}", context());
+}
+
+fn incremental_is_from_scratch(control: &Loop, context: &dyn Fn() -> String) {
+    let engine = control.knowledge().mission().knowledge().expect("a knowledge base").engine();
+    let stated: Vec<Fact> = engine.facts().filter(|fact| engine.is_asserted(fact)).collect();
+    let scratch =
+        Engine::new(engine.symbols().clone(), engine.program().clone(), stated).expect("it comes to an end");
+    let texts = |engine: &Engine| -> BTreeSet<String> {
+        engine.facts().map(|fact| fact.display(engine.symbols()).to_string()).collect()
+    };
+    assert_eq!(texts(engine), texts(&scratch), "{}", context());
+}
+
+fn restored_is_equal(loop_: &Loop, mut other: Loop, context: &dyn Fn() -> String) {
+    other.restore(&loop_.snapshot()).expect("the snapshot fits");
+    assert_eq!(other.snapshot(), loop_.snapshot(), "{}", context());
+    let facts = |loop_: &Loop| {
+        let engine = loop_.knowledge().mission().knowledge().expect("a knowledge base").engine();
+        let facts: BTreeSet<String> =
+            engine.facts().map(|fact| fact.display(engine.symbols()).to_string()).collect();
+        facts
+    };
+    assert_eq!(facts(&other), facts(loop_), "{}", context());
+}
+
+#[test]
+fn random_events_leave_the_loop_sound() {
+    for world in &WORLDS {
+        for seed in 0..3 {
+            run(world, seed, 300);
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! The journal, in this process: cut at any byte, it brings the loop back, and no acknowledged effect is repeated.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use metaplan::journal::{Journal, Policy, Recovery, Sync};
+use metaplan::mapek::{Answer, Effect, Loop};
+
+use crate::common::control;
+
+pub const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 7 };
+
+/// What a robot reports on its way through the UGV mission, with every kind of event.
+pub fn script() -> Vec<String> {
+    let events = [
+        r#""event":"action_started","action":1"#,
+        r#""event":"action_progress","action":1,"fraction":0.4"#,
+        r#""event":"fact_changed","name":"battery","value":99.1"#,
+        r#""event":"measured","attribute":"ambient_light","value":0.5"#,
+        r#""event":"action_succeeded","action":1"#,
+        r#""event":"action_started","action":2"#,
+        r#""event":"component_status","component":"c_kinect","status":"FALSE""#,
+        r#""event":"acknowledged","effect":4"#,
+        r#""event":"nonsense""#,
+        r#""event":"action_cancelled","action":2"#,
+        r#""event":"acknowledged","effect":5"#,
+        r#""event":"action_started","action":3"#,
+        r#""event":"tick""#,
+        r#""event":"component_status","component":"c_kinect","status":"RECOVERED""#,
+        r#""event":"acknowledged","effect":7"#,
+        r#""event":"action_succeeded","action":3"#,
+        r#""event":"goal_changed","goal":"(robot_at wp8)""#,
+        r#""event":"action_failed","action":4,"reason":"lost""#,
+        r#""event":"action_started","action":5"#,
+        r#""event":"fact_changed","name":"robot_at","value":"wp5""#,
+        r#""event":"action_cancelled","action":5"#,
+        r#""event":"action_succeeded","action":6"#,
+    ];
+    let line =
+        |(index, event): (usize, &&str)| format!(r#"{{{event},"seq":{},"time":{}.25}}"#, index + 1, index);
+    events.iter().enumerate().map(line).collect()
+}
+
+/// What has left the program, by number.
+#[derive(Debug, Default, PartialEq)]
+pub struct Robot {
+    pub effects: BTreeMap<u64, Effect>,
+}
+
+impl Robot {
+    fn take(&mut self, control: &Loop, answers: &[Answer]) {
+        for effect in answers.iter().filter_map(Answer::effect) {
+            let plain = Effect { repeated: false, ..effect.clone() };
+            let before = self.effects.insert(effect.number, plain.clone());
+            assert!(before.is_none() || effect.repeated, "{effect:?} comes twice without a word");
+            assert!(before.is_none_or(|before| before == plain), "{effect:?} has changed");
+            if effect.repeated {
+                let waiting = control.knowledge().outstanding().any(|other| other.number == effect.number);
+                assert!(waiting, "{effect:?} was acknowledged");
+            }
+        }
+    }
+}
+
+fn open(directory: &Path, pristine: &Loop) -> (Journal, Loop, Recovery) {
+    let mut control = pristine.clone();
+    let (journal, recovery) = Journal::open(directory, POLICY, &mut control).expect("the journal opens");
+    (journal, control, recovery)
+}
+
+/// Sends all lines that were not handled yet.
+fn go_on(journal: &mut Journal, control: &mut Loop, robot: &mut Robot) {
+    for (index, line) in script().iter().enumerate() {
+        if control.knowledge().sequence() < Some(index as u64 + 1) {
+            let answers = journal.handle(control, line, Duration::ZERO).expect("written");
+            robot.take(control, &answers);
+        }
+    }
+}
+
+/// The state and the effects of a run that nothing disturbs.
+fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let (mut journal, mut control, recovery) = open(directory.path(), pristine);
+    let mut robot = Robot::default();
+    robot.take(&control, &recovery.answers);
+    go_on(&mut journal, &mut control, &mut robot);
+    assert!(control.knowledge().reached(), "{:?}", control.snapshot());
+    (control.snapshot().0, robot, directory)
+}
+
+#[test]
+fn a_journal_cut_anywhere_brings_the_loop_back() {
+    check(60);
+}
+
+#[test]
+#[ignore = "takes a minute"]
+fn a_journal_cut_at_five_hundred_places_brings_the_loop_back() {
+    check(500);
+}
+
+/// Cuts the journal at so many places.
+fn check(cuts: usize) {
+    let pristine = control("ugv");
+    let (state, effects, _directory) = undisturbed(&pristine);
+    let mut random = fastrand::Rng::with_seed(3);
+    let received = received(&pristine);
+    for _ in 0..cuts {
+        let directory = tempfile::tempdir().expect("a directory");
+        let (mut journal, mut control, recovery) = open(directory.path(), &pristine);
+        let mut robot = Robot::default();
+        robot.take(&control, &recovery.answers);
+        let stop = random.usize(1..=script().len());
+        for line in &script()[..stop] {
+            let answers = journal.handle(&mut control, line, Duration::ZERO).expect("written");
+            robot.take(&control, &answers);
+        }
+        drop(journal);
+        // The last line or two of the last segment are not there, or not whole: only what was not sent may be lost,
+        // so what the robot has received from lost lines is forgotten.
+        let last = last_segment(directory.path());
+        let text = std::fs::read(&last).expect("a journal");
+        let lines: Vec<&[u8]> = text.split_inclusive(|&byte| byte == b'\n').collect();
+        let sound: usize = lines[..lines.len().saturating_sub(2).max(1)].iter().map(|line| line.len()).sum();
+        let keep = random.usize(sound..=text.len());
+        std::fs::write(&last, &text[..keep]).expect("cut");
+        let (mut journal, mut control, recovery) = open(directory.path(), &pristine);
+        let known = control.knowledge().sequence().unwrap_or(0);
+        let mut robot = Robot { effects: received[known.saturating_sub(1) as usize].clone() };
+        let torn = keep - sound > 0 && text[keep - 1] != b'\n';
+        assert_eq!(recovery.cut > 0, torn);
+        robot.take(&control, &recovery.answers);
+        go_on(&mut journal, &mut control, &mut robot);
+        assert_eq!(control.snapshot().0, state, "stopped after {stop}, kept {keep} of {}", text.len());
+        assert_eq!(robot, effects);
+    }
+}
+
+/// What a robot has received when it has sent so many lines, by their number.
+fn received(pristine: &Loop) -> Vec<BTreeMap<u64, Effect>> {
+    let mut control = pristine.clone();
+    let mut robot = Robot::default();
+    let answers = control.start();
+    robot.take(&control, &answers);
+    let mut all = vec![robot.effects.clone()];
+    for line in script() {
+        let answers = crate::common::feed(&mut control, &line);
+        robot.take(&control, &answers);
+        all.push(robot.effects.clone());
+    }
+    all
+}
+
+fn last_segment(directory: &Path) -> std::path::PathBuf {
+    let entries =
+        std::fs::read_dir(directory).expect("a directory").map(|entry| entry.expect("an entry").path());
+    let journals = entries.filter(|path| path.to_string_lossy().contains("journal-"));
+    journals.max().expect("a journal")
+}
+
+#[test]
+fn damage_is_not_a_crash() {
+    let pristine = control("ugv");
+    let (_, _, directory) = undisturbed(&pristine);
+    let last = last_segment(directory.path());
+    let mut text = std::fs::read(&last).expect("a journal");
+    text[60] ^= 1;
+    std::fs::write(&last, &text).expect("damaged");
+    let refused = Journal::open(directory.path(), POLICY, &mut pristine.clone());
+    let message = refused.expect_err("a damaged journal").message.clone();
+    assert!(message.contains("is damaged, and sound lines follow"), "{message}");
+}
+
+#[test]
+fn a_journal_belongs_to_its_mission() {
+    let (_, _, directory) = undisturbed(&control("ugv"));
+    let refused = Journal::open(directory.path(), POLICY, &mut control("uuv"));
+    let message = refused.expect_err("another mission's journal").message.clone();
+    assert!(message.contains("belongs to another mission"), "{message}");
+}

@@ -1,0 +1,8 @@
+//! The adaptation loop as a library: the paper's experiments event by event, the journal under crashes, random events.
+
+mod common;
+mod experiments;
+mod fuzz;
+mod journal;
+mod kill;
+mod soak;

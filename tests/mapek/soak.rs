@@ -1,0 +1,92 @@
+//! Long runs, to be asked for: `cargo test --release --test mapek -- --ignored --nocapture`.
+
+#![expect(clippy::print_stdout, reason = "figures are what these tests are for")]
+
+use std::time::{Duration, Instant};
+
+use crate::common::feed;
+use crate::fuzz::{Fuzz, WORLDS, step};
+
+/// How long the soak lasts, in seconds, unless `METAPLAN_SOAK_SECONDS` says otherwise.
+const SOAK_SECONDS: u64 = 3600;
+
+/// Resident memory in kilobytes; none where the system does not say.
+fn resident() -> Option<usize> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
+    line.split_whitespace().nth(1)?.parse().ok()
+}
+
+#[test]
+#[ignore = "takes an hour"]
+fn an_hour_of_random_events() {
+    let seconds = std::env::var("METAPLAN_SOAK_SECONDS").ok().and_then(|text| text.parse().ok());
+    let length = Duration::from_secs(seconds.unwrap_or(SOAK_SECONDS));
+    let begun = Instant::now();
+    let mut loops: Vec<_> = WORLDS
+        .iter()
+        .map(|world| {
+            let fuzz = Fuzz::new(world, 7);
+            (fuzz.begin(), fuzz)
+        })
+        .collect();
+    let (mut number, mut memory, mut reported) = (0, Vec::new(), Duration::ZERO);
+    while begun.elapsed() < length {
+        for (control, fuzz) in &mut loops {
+            step(control, fuzz, number);
+        }
+        number += 1;
+        if begun.elapsed() >= reported {
+            reported += length / 60;
+            memory.extend(resident());
+            println!("{:>5} s: {} events, {:?} kB", begun.elapsed().as_secs(), 2 * number, memory.last());
+        }
+    }
+    // After a tenth of the time everything that is kept is there.
+    let tenth = memory.len() / 10;
+    if let (Some(early), Some(late)) = (memory[tenth..].iter().take(12).max(), memory.last()) {
+        assert!(*late <= early + early / 5, "memory has grown from {early} to {late} kB");
+    }
+}
+
+#[test]
+#[ignore = "measures; only a release build is of interest"]
+fn reaction_times() {
+    for world in &WORLDS {
+        let mut fuzz = Fuzz::new(world, 1);
+        let mut control = fuzz.begin();
+        let mut times: Vec<Duration> = Vec::new();
+        let mut adaptations: Vec<Duration> = Vec::new();
+        for _ in 0..10_000 {
+            let (line, _) = fuzz.next(&control);
+            let begun = Instant::now();
+            let answers = feed(&mut control, &line);
+            let text: String = answers.iter().map(|answer| answer.to_json().to_string()).collect();
+            let time = begun.elapsed();
+            let _ = control.decision(&answers);
+            times.push(time);
+            if text.contains("plan_requested") {
+                adaptations.push(time);
+            }
+        }
+        report(world.mission, "all events", &mut times);
+        report(world.mission, "events that led to planning", &mut adaptations);
+        let limit = |share: usize| times[times.len() * share / 100];
+        assert!(limit(50) < Duration::from_millis(5), "median");
+        assert!(limit(99) < Duration::from_millis(20), "p99");
+    }
+}
+
+fn report(mission: &str, what: &str, times: &mut [Duration]) {
+    times.sort_unstable();
+    let at = |share: usize| times[(times.len() - 1) * share / 1000];
+    println!(
+        "{mission}, {what}: {} of them, median {:?}, p90 {:?}, p99 {:?}, p99.9 {:?}, most {:?}",
+        times.len(),
+        at(500),
+        at(900),
+        at(990),
+        at(999),
+        at(1000)
+    );
+}
