@@ -1,12 +1,13 @@
 //! Atoms to finite-domain variables, rationals to integers: the last step of grounding.
 
 use std::collections::BTreeMap;
+use std::hash::BuildHasher;
 use std::sync::Arc;
 
-use indexmap::IndexSet;
 use num_integer::Integer;
 use num_traits::ToPrimitive;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 
 use crate::error::Error;
 use crate::ground::derived::components;
@@ -44,8 +45,7 @@ pub(crate) fn finish(
     let mut durations = durations.integers()?;
     let mut slots = Slots::new(&task.operators);
 
-    let mut operators: IndexSet<Operator, FxBuildHasher> = IndexSet::default();
-    operators.reserve(task.operators.len());
+    let mut operators = Distinct::with_capacity(task.operators.len());
     for ground in std::mem::take(&mut task.operators) {
         let condition = condition(&ground.condition, &atoms, &mut numbers)?;
         if contradictory(&condition) {
@@ -85,7 +85,7 @@ pub(crate) fn finish(
         axioms,
         initial: State { values: atoms.initial, numbers: std::mem::take(&mut numbers.initial) },
         slots: slots.all,
-        operators: operators.into_iter().collect(),
+        operators: operators.operators,
         goal,
         objective: objectives.remove(0),
         others: objectives,
@@ -96,6 +96,29 @@ pub(crate) fn finish(
     task.close(&mut initial);
     task.initial = initial;
     Ok(task)
+}
+
+/// Operators without repetitions, in order.
+struct Distinct {
+    operators: Vec<Operator>,
+    /// Positions by hash.
+    positions: FxHashMap<u64, SmallVec<[u32; 2]>>,
+}
+
+impl Distinct {
+    fn with_capacity(capacity: usize) -> Self {
+        let mut positions = FxHashMap::default();
+        positions.reserve(capacity);
+        Self { operators: Vec::with_capacity(capacity), positions }
+    }
+
+    fn insert(&mut self, operator: Operator) {
+        let positions = self.positions.entry(FxBuildHasher.hash_one(&operator)).or_default();
+        if positions.iter().all(|position| self.operators[*position as usize] != operator) {
+            positions.push(self.operators.len() as u32);
+            self.operators.push(operator);
+        }
+    }
 }
 
 /// The objectives, and what makes integers of the costs by each.

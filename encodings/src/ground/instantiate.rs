@@ -85,7 +85,9 @@ pub(crate) fn instantiate<'a>(
 ) -> Result<GroundTask<'a>, Vec<Error>> {
     let mut world = World::new(lifted, reached);
     let timeline = Timeline::new(&mut world, &lifted.events);
-    let (mut operators, mut errors): (Vec<GroundOperator>, _) = (Vec::new(), Vec::new());
+    // Growing would move operators that are large and many; most instances become one.
+    let mut operators = Vec::with_capacity(reached.instances.iter().map(Vec::len).sum());
+    let mut errors = Vec::new();
     for (((schema, slots), instances), index) in
         lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0..)
     {
