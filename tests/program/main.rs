@@ -8,3 +8,4 @@ mod reason;
 mod reference;
 mod ugv;
 mod uuv;
+mod validate;
