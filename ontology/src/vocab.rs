@@ -98,6 +98,7 @@ vocabulary! {
         QA_VALUE = "QAvalue", ACTION = "Action", REQUIREMENT = "Requirement",
         SOLVES_F = "solvesF", REQUIRES_F = "requiresF", REQUIRES_C = "requiresC",
         HAS_REQUIREMENT = "hasRequirement", HAS_MINIMUM = "hasMinimum", HAS_MAXIMUM = "hasMaximum",
+        REQUIRES_QUALITY = "requiresQuality", IN_CONTEXT = "inContext",
         IS_QA_TYPE = "isQAtype", HAS_VALUE = "hasValue", HAS_QA_ESTIMATION = "hasQAestimation",
         IS_MEASURED = "isMeasured", C_STATUS = "c_status", FD_REALISABILITY = "fd_realisability",
         FD_AVAILABLE = "fd_available", FD_EFFICACY = "fd_efficacy",

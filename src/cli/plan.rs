@@ -140,10 +140,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         ));
     };
     if arguments.pareto.is_some() {
-        let front = encodings::pareto(&task, &config, &mut report);
+        let mut front = encodings::pareto(&task, &config, &mut report);
         progress.finish_and_clear();
-        for point in &front.points {
+        for point in &mut front.points {
             objectives.confirm(&mission, &problem, point)?;
+            point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
         }
         let text = match common.format {
             Format::Json => output::pretty(&objectives.front_json(&mission.name, &front, &stages)),
@@ -155,9 +156,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         }
         return Ok(exit(front.status));
     }
-    let point = encodings::lexicographic(&task, &config, &mut report);
+    let mut point = encodings::lexicographic(&task, &config, &mut report);
     progress.finish_and_clear();
     objectives.confirm(&mission, &problem, &point)?;
+    // What `validate` executes has the designs, what the user's own domain has no place for them has not.
+    if arguments.plan_format != Some(PlanFormat::Ipc) {
+        point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
+    }
     let solution = &point.solution;
     if let Some(reason) = &solution.statistics.failure {
         let text = format!("the SAT solver gave up: {reason}");

@@ -30,6 +30,13 @@ enum Query {
     Estimation(String),
     /// A numeric function without parameters: the measured value of an attribute.
     Measured(String),
+    /// A numeric function without parameters of a plain domain: the sum of an attribute over the designs that are
+    /// chosen for an action.
+    Chosen(String),
+    /// The same over those designs that were not at work before.
+    Reconfigured(String),
+    /// An action of a plain domain: that action.
+    Action(String),
 }
 
 /// PDDL symbols and what they stand for.
@@ -53,6 +60,35 @@ impl Bindings {
     pub fn solves(&self) -> Vec<Name> {
         let own = self.own.iter().filter(|(_, query)| **query == Query::Solves).map(|(name, _)| name.clone());
         own.chain(GroundConfig::default().solves).collect()
+    }
+
+    /// Whether a type is that of function designs.
+    pub(super) fn is_design(&self, name: &Name) -> bool {
+        self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
+    }
+
+    /// Whether an action of a plain domain is an action of the knowledge base, by its local name.
+    pub(super) fn is_action(&self, name: &Name, known: &str) -> bool {
+        match self.own.get(name) {
+            Some(Query::Action(own)) => own == known,
+            _ => Name::new(known) == *name || Name::new(known) == Name::new(&format!("a_{name}")),
+        }
+    }
+
+    /// The attribute that a function sums over chosen designs, if that is stated.
+    pub(super) fn chosen(&self, name: &Name) -> Option<String> {
+        match self.own.get(name) {
+            Some(Query::Chosen(attribute)) => Some(attribute.clone()),
+            _ => None,
+        }
+    }
+
+    /// The attribute that a function sums over changed designs.
+    pub(super) fn reconfigured(&self, name: &Name) -> Option<String> {
+        match self.own.get(name) {
+            Some(Query::Reconfigured(attribute)) => Some(attribute.clone()),
+            _ => None,
+        }
     }
 
     /// Whether a predicate says which designs are available.
@@ -108,13 +144,17 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
         ("class", name) if !name.is_empty() => Ok(Query::Class(name.to_owned())),
         ("estimation", name) if !name.is_empty() => Ok(Query::Estimation(name.to_owned())),
         ("measured", name) if !name.is_empty() => Ok(Query::Measured(name.to_owned())),
+        ("chosen", name) if !name.is_empty() => Ok(Query::Chosen(name.to_owned())),
+        ("reconfigured", name) if !name.is_empty() => Ok(Query::Reconfigured(name.to_owned())),
+        ("action", name) if !name.is_empty() => Ok(Query::Action(name.to_owned())),
         ("requires", "") => Ok(Query::Requires(None)),
         ("requires", name) => Ok(Query::Requires(Some(name.to_owned()))),
         ("solves", "") => Ok(Query::Solves),
         ("available", "") => Ok(Query::Available),
         _ => Err(format!(
             "`{symbol}` is bound to `{query}`, which is no query; queries are `class:NAME`, `solves`, `available`, \
-             `requires`, `requires:ACTION`, `estimation:ATTRIBUTE` and `measured:ATTRIBUTE`"
+             `requires`, `requires:ACTION`, `estimation:ATTRIBUTE`, `measured:ATTRIBUTE`, and in plain domains `action:NAME`, `chosen:ATTRIBUTE` and \
+             `reconfigured:ATTRIBUTE`"
         )),
     }
 }
@@ -130,9 +170,11 @@ pub(super) fn fill(
     let mut fill = Fill { problem, view, designs: view.function_designs(), warnings: Vec::new() };
     let types = domain.types.iter().map(|declared| &declared.identifier.name);
     let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
-    let known: BTreeSet<&Name> = types.chain(symbols).collect();
+    let actions = domain.actions.iter().map(|action| &action.identifier.name);
+    let known: BTreeSet<&Name> = types.chain(symbols).chain(actions).collect();
     for name in bindings.own.keys().filter(|name| !known.contains(name)) {
-        let text = format!("`{name}` is bound, but the domain declares no such type, predicate or function");
+        let text =
+            format!("`{name}` is bound, but the domain declares no such type, predicate, function or action");
         fill.warnings.push(Message::warning("M204", text));
     }
     for declared in &domain.types {
@@ -293,7 +335,7 @@ pub(super) fn atom(predicate: &Name, arguments: &[&str]) -> Atom {
     }
 }
 
-fn is_pddl_name(name: &str) -> bool {
+pub(super) fn is_pddl_name(name: &str) -> bool {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     !name.is_empty() && name.chars().all(allowed)
 }

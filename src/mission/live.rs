@@ -11,6 +11,9 @@ impl Mission {
     /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
     pub(crate) fn fill(&self, problem: &mut Problem) -> Vec<Message> {
         self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
+            if let Some(adaptation) = &self.adaptation {
+                adaptation.fill(problem, &knowledge.view());
+            }
             binding::fill(&self.domain, problem, &knowledge.view(), &self.bindings)
         })
     }

@@ -6,13 +6,14 @@
 mod binding;
 mod live;
 mod manifest;
+mod native;
 mod settings;
 
 use std::path::Path;
 
 use encodings::pddl::ast::{Direction, Domain, Metric, Problem};
 use encodings::pddl::{self, Severity, Source};
-use encodings::{GroundConfig, Limits, Task};
+use encodings::{GroundConfig, Limits, Plan, Task};
 
 use crate::knowledge::Knowledge;
 use crate::mapek::Settings;
@@ -20,6 +21,7 @@ use crate::message::Message;
 
 pub use binding::Bindings;
 pub use manifest::{Manifest, Scenario};
+pub use native::CoAdaptation;
 
 /// A mission that can be planned.
 #[derive(Debug, Clone)]
@@ -32,6 +34,7 @@ pub struct Mission {
     problem_source: Source,
     domain: Domain,
     problem: Problem,
+    adaptation: Option<CoAdaptation>,
     warnings: Vec<Message>,
     settings: Settings,
 }
@@ -91,6 +94,11 @@ impl Mission {
                 return Err(errors);
             }
         };
+        let adaptation = match &knowledge {
+            Some(knowledge) => CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?,
+            None => None,
+        };
+        let domain = adaptation.as_ref().map_or_else(|| domain.clone(), |own| own.explicit(&domain));
         let name = name.to_owned();
         let settings = Settings::default();
         Ok(Self {
@@ -101,6 +109,7 @@ impl Mission {
             problem_source,
             domain,
             problem,
+            adaptation,
             warnings,
             settings,
         })
@@ -175,7 +184,22 @@ impl Mission {
         Err(messages)
     }
 
-    /// The domain.
+    /// What the knowledge base adds to the actions of a plain domain; none if the domain is explicit.
+    pub fn adaptation(&self) -> Option<&CoAdaptation> {
+        self.adaptation.as_ref()
+    }
+
+    /// The plan with the arguments that the domain's file gives its actions: without the designs that the knowledge base has
+    /// added to a plain domain. The configuration of each step has them.
+    #[must_use]
+    pub fn written(&self, mut plan: Plan) -> Plan {
+        if let Some(adaptation) = &self.adaptation {
+            plan.steps.iter_mut().for_each(|step| adaptation.written(step));
+        }
+        plan
+    }
+
+    /// The domain, in explicit form if its file is plain.
     pub fn domain(&self) -> &Domain {
         &self.domain
     }

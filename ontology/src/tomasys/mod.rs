@@ -93,6 +93,19 @@ pub struct Action {
     pub individual: Individual,
     /// The functions that must be solved while it runs.
     pub requires: Vec<Individual>,
+    /// Bounds that the designs must keep which are chosen for these functions.
+    pub quality: Vec<Quality>,
+}
+
+/// Bounds on an estimated attribute of the designs that are chosen for an action.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Quality {
+    /// The individual that states the bounds.
+    pub individual: Individual,
+    /// The attribute and its bounds.
+    pub bounds: Requirement,
+    /// The predicate of the planning domain that says where the bounds count; everywhere if there is none.
+    pub context: Option<String>,
 }
 
 /// Values by subject.
@@ -184,9 +197,24 @@ impl<'a> View<'a> {
 
     /// All actions with the functions that they require.
     pub fn actions(&self) -> Vec<Action> {
-        let requires = |action: &Individual| self.objects(&action.iri, terms::REQUIRES_F);
-        let actions = self.members(terms::ACTION).into_iter();
-        actions.map(|individual| Action { requires: requires(&individual), individual }).collect()
+        let action = |individual: Individual| {
+            let requires = self.objects(&individual.iri, terms::REQUIRES_F);
+            let quality = self.objects(&individual.iri, terms::REQUIRES_QUALITY).into_iter();
+            let quality = quality.filter_map(|individual| {
+                let context = self.literals(&individual.iri, terms::IN_CONTEXT).into_iter().next();
+                let bounds = self.requirement(&individual)?;
+                Some(Quality { bounds, context: context.map(Literal::lexical), individual })
+            });
+            Action { requires, quality: quality.collect(), individual }
+        };
+        self.members(terms::ACTION).into_iter().map(action).collect()
+    }
+
+    fn requirement(&self, individual: &Individual) -> Option<Requirement> {
+        let attribute = self.objects(&individual.iri, terms::IS_TYPE).into_iter().next()?.name;
+        let minimum = self.number(&individual.iri, terms::HAS_MINIMUM);
+        let maximum = self.number(&individual.iri, terms::HAS_MAXIMUM);
+        Some(Requirement { attribute, minimum, maximum })
     }
 
     fn function_design(&self, individual: Individual) -> FunctionDesign {
@@ -195,12 +223,8 @@ impl<'a> View<'a> {
         let estimation =
             |value: &Individual| Some((attribute(value)?.name, self.number(&value.iri, terms::HAS_VALUE)?));
         let estimations = self.objects(iri, terms::HAS_ESTIMATION).iter().filter_map(estimation).collect();
-        let requirement = |value: &Individual| {
-            let minimum = self.number(&value.iri, terms::HAS_MINIMUM);
-            let maximum = self.number(&value.iri, terms::HAS_MAXIMUM);
-            Some(Requirement { attribute: attribute(value)?.name, minimum, maximum })
-        };
-        let requirements = self.objects(iri, terms::HAS_REQUIREMENT).iter().filter_map(requirement).collect();
+        let requirements = self.objects(iri, terms::HAS_REQUIREMENT);
+        let requirements = requirements.iter().filter_map(|value| self.requirement(value)).collect();
         let denied = |term| self.literals(iri, term).contains(&&Literal::Boolean(false));
         let mut components = self.objects(iri, terms::REQUIRES_C);
         components.extend(self.subjects(iri, terms::REQUIRED_BY));

@@ -29,6 +29,9 @@ pub(crate) const REQUIREMENT: Term = &[t::REQUIREMENT];
 pub(crate) const HAS_REQUIREMENT: Term = &[t::HAS_REQUIREMENT];
 pub(crate) const HAS_MINIMUM: Term = &[t::HAS_MINIMUM];
 pub(crate) const HAS_MAXIMUM: Term = &[t::HAS_MAXIMUM];
+/// From the action to bounds on the designs that are chosen for it.
+pub(crate) const REQUIRES_QUALITY: Term = &[t::REQUIRES_QUALITY];
+pub(crate) const IN_CONTEXT: Term = &[t::IN_CONTEXT];
 pub(crate) const IS_MEASURED: Term = &[t::IS_MEASURED];
 pub(crate) const STATUS: Term = &[t::C_STATUS, www::C_STATUS];
 pub(crate) const REALISABILITY: Term = &[t::FD_REALISABILITY, www::FD_REALISABILITY];

@@ -1,0 +1,262 @@
+//! Plain domains whose actions get their designs from the knowledge base: the same optimum as in the explicit form.
+
+#[path = "../encodings/tests/random/mod.rs"]
+mod random;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use encodings::pddl::Source;
+use encodings::{Config, Limits, Status, lexicographic};
+use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
+use metaplan::message::Message;
+use metaplan::mission::{Bindings, Mission};
+use ontology::ReadOptions;
+use random::Random;
+
+/// The status and cost of a mission's best plan, and its configurations by step.
+type Answer = (Status, Option<String>, Vec<Vec<(String, String)>>);
+
+fn answer(mission: &Mission) -> Answer {
+    let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
+    let task =
+        mission.ground(&problem, &[], &Limits::none()).unwrap_or_else(|messages| panic!("{messages:#?}"));
+    let solution = lexicographic(&task, &Config::default(), &mut |_| {}).solution;
+    let plan = solution.plan.map(|plan| mission.written(plan));
+    let configurations =
+        plan.iter().flat_map(|plan| plan.steps.iter().map(|step| step.configuration.clone()));
+    (solution.status, plan.as_ref().map(|plan| plan.cost.to_string()), configurations.collect())
+}
+
+/// A shipped mission in a situation.
+fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
+    let (mut mission, _) = Mission::read(&manifest).unwrap_or_else(|messages| panic!("{messages:#?}"));
+    situation(&mut mission);
+    mission
+}
+
+/// Both forms of a shipped mission have the same optimum, with the same designs at each step.
+fn check(name: &str, situation: &dyn Fn(&mut Mission), expected: Option<&str>) {
+    let explicit = answer(&shipped(name, situation));
+    let native = answer(&shipped(&format!("{name}_plain"), situation));
+    assert_eq!(explicit, native, "{name}");
+    assert_eq!(native.1.as_deref(), expected, "{name}");
+}
+
+#[test]
+fn shipped_missions_have_the_same_optimum_in_both_forms() {
+    let set = |name: &'static str, value: &'static str| {
+        move |mission: &mut Mission| mission.set(name, value).expect("a setting")
+    };
+    let fail =
+        |component: &'static str| move |mission: &mut Mission| mission.fail(component).expect("a component");
+    check("ugv", &|_| {}, Some("408"));
+    check("ugv", &fail("c_kinect"), Some("516"));
+    check("ugv", &set("ambient_light", "0.9"), Some("516"));
+    check("ugv", &set("battery", "7"), None);
+    check("uuv", &|_| {}, Some("28"));
+    check("uuv", &set("battery", "15"), Some("60"));
+    check("uuv", &set("water_visibility", "1.5"), Some("40"));
+    check("uuv", &fail("c_sonar"), None);
+}
+
+#[test]
+fn a_plan_is_written_in_the_arguments_of_the_plain_domain() {
+    let mission = shipped("ugv_plain", &|_| {});
+    assert!(mission.adaptation().is_some());
+    let (problem, _) = mission.filled().expect("a problem");
+    let task = mission.ground(&problem, &[], &Limits::none()).expect("a task");
+    let plan = lexicographic(&task, &Config::default(), &mut |_| {}).solution.plan.expect("a plan");
+    assert_eq!(plan.steps[0].arguments, ["wp1", "wp2", "fd_amcl_kinect"]);
+    assert_eq!(mission.written(plan).steps[0].arguments, ["wp1", "wp2"]);
+    assert!(shipped("ugv", &|_| {}).adaptation().is_none());
+}
+
+/// A random mission: a map with contexts, functions with designs, bounds, a battery, and what a change of designs costs.
+struct Generated {
+    knowledge: String,
+    explicit: String,
+    plain: String,
+    problem: String,
+    bindings: BTreeMap<String, String>,
+}
+
+const PREFIX: &str = "@prefix : <urn:m#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
+    @prefix t: <http://metacontrol.org/tomasys#> .\n<urn:m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n";
+
+impl Generated {
+    fn new(seed: u64) -> Self {
+        let mut random = Random(seed);
+        let functions = 1 + random.below(2) as usize;
+        let reconfiguration = random.below(2) == 0;
+        let mut knowledge = PREFIX.to_owned();
+        for attribute in ["slowness", "energy", "safety", "change"] {
+            let _ = writeln!(knowledge, ":{attribute} a t:QualityAttributeType .");
+        }
+        let required: Vec<_> = (0..functions).map(|f| format!(":f{f}")).collect();
+        let bound = 1 + random.below(3);
+        let _ = writeln!(
+            knowledge,
+            ":a_move a t:Action ; t:requiresF {} ; t:requiresQuality :careful .\n\
+             :careful a t:Requirement ; t:isQAtype :safety ; t:hasMinimum {bound}.0 ; t:inContext \"narrow\" .\n\
+             :f_other a t:Function . :c0 a t:Component ; t:c_status \"FALSE\" .",
+            required.join(" , ")
+        );
+        for function in 0..functions {
+            let _ = writeln!(knowledge, ":f{function} a t:Function .");
+            for design in 0..2 + random.below(3) {
+                let name = format!("d{function}_{design}");
+                let needs = if random.below(6) == 0 { "t:requiresC :c0 ; " } else { "" };
+                let mut values = vec![("slowness", 1 + random.below(4)), ("energy", 1 + random.below(4))];
+                if function == 0 {
+                    values.push(("safety", random.below(5)));
+                }
+                values.push(("change", random.below(4)));
+                let all: Vec<_> = values.iter().map(|(a, _)| format!(":{name}_{a}")).collect();
+                let _ = writeln!(
+                    knowledge,
+                    ":{name} a t:FunctionDesign ; t:solvesF :f{function} ; {needs}t:hasQAestimation {} .",
+                    all.join(" , ")
+                );
+                for (attribute, value) in values {
+                    let _ = writeln!(
+                        knowledge,
+                        ":{name}_{attribute} a t:QAvalue ; t:isQAtype :{attribute} ; t:hasValue {value}.0 ."
+                    );
+                }
+            }
+        }
+        let mut bindings = BTreeMap::new();
+        if reconfiguration {
+            bindings.insert("reconfiguration".to_owned(), "reconfigured:change".to_owned());
+        }
+        Self {
+            knowledge,
+            explicit: explicit(functions, bound, reconfiguration),
+            plain: plain(reconfiguration),
+            problem: problem(&mut random),
+            bindings,
+        }
+    }
+
+    fn mission(&self, domain: &str, directory: &Path) -> Mission {
+        let file = |name: &str, text: &str| -> PathBuf {
+            let path = directory.join(name);
+            std::fs::write(&path, text).expect("a file");
+            path
+        };
+        let sources = Sources {
+            documents: vec![file("kb.ttl", &self.knowledge)],
+            rules: vec![COADAPTATION.to_owned()],
+            options: ReadOptions::default(),
+        };
+        let bindings = if domain == self.plain { self.bindings.clone() } else { BTreeMap::new() };
+        let mission: Result<Mission, Vec<Message>> = Mission::new(
+            "generated",
+            Some(Knowledge::read(&sources)),
+            Bindings::with(&bindings).expect("bindings"),
+            Ok(Source::new("domain", domain)),
+            Ok(Source::new("problem", self.problem.as_str())),
+        );
+        mission.unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}"))
+    }
+}
+
+/// The domain with function and design parameters; a change of designs is an action of its own.
+fn explicit(functions: usize, bound: i64, reconfiguration: bool) -> String {
+    let each = |text: &dyn Fn(usize) -> String| (0..functions).map(text).collect::<Vec<_>>().join(" ");
+    let sum = |attribute: &str| format!("(+ 0 {})", each(&|f| format!("({attribute} ?d{f})")));
+    let (works, change) = if reconfiguration {
+        (
+            each(&|f| format!("(at_work ?d{f} f{f})")),
+            "(:action set :parameters (?f - function ?d - functiondesign)
+                :precondition (and (unset ?f) (fd_solve_f ?d ?f) (fd_available ?d))
+                :effect (at_work ?d ?f))
+              (:action reconfigure :parameters (?f - function ?old ?new - functiondesign)
+                :precondition (and (at_work ?old ?f) (fd_solve_f ?new ?f) (fd_available ?new) (not (= ?old ?new)))
+                :effect (and (not (at_work ?old ?f)) (at_work ?new ?f) (increase (total-cost) (change ?new))))",
+        )
+    } else {
+        (String::new(), "")
+    };
+    let move_over = |name: &str, condition: &str| {
+        format!(
+            "(:action {name} :parameters (?a ?b - place {})
+               :precondition (and (at ?a) {condition} {} {works}
+                 (>= (battery) (* (length ?a ?b) {energy})))
+               :effect (and (not (at ?a)) (at ?b) (decrease (battery) (* (length ?a ?b) {energy}))
+                 (increase (total-cost) (+ (length ?a ?b) (* (length ?a ?b) {})))))",
+            each(&|f| format!("?d{f} - functiondesign")),
+            each(&|f| format!("(fd_solve_f ?d{f} f{f}) (fd_available ?d{f})")),
+            sum("slowness"),
+            energy = sum("energy"),
+        )
+    };
+    format!(
+        "(define (domain m) (:types place function functiondesign) (:constants {} - function)
+          (:predicates (at ?p - place) (wide ?a ?b - place) (narrow ?a ?b - place) (charger ?p - place)
+            (fd_solve_f ?d - functiondesign ?f - function) (fd_available ?d - functiondesign)
+            (at_work ?d - functiondesign ?f - function) (unset ?f - function))
+          (:functions (total-cost) (battery) (length ?a ?b - place) (slowness ?d - functiondesign)
+            (energy ?d - functiondesign) (safety ?d - functiondesign) (change ?d - functiondesign))
+          (:derived (unset ?f - function) (not (exists (?d - functiondesign) (at_work ?d ?f))))
+          {} {} (:action charge :parameters (?p - place) :precondition (and (at ?p) (charger ?p))
+            :effect (and (assign (battery) 12) (increase (total-cost) 5))) {change})",
+        each(&|f| format!("f{f}")),
+        move_over("move", "(wide ?a ?b)"),
+        move_over("squeeze", &format!("(narrow ?a ?b) (>= (safety ?d0) {bound})")),
+    )
+}
+
+/// The domain without a word of designs.
+fn plain(reconfiguration: bool) -> String {
+    let (function, effect) = if reconfiguration {
+        ("(reconfiguration)", "(increase (total-cost) (reconfiguration))")
+    } else {
+        ("", "")
+    };
+    format!(
+        "(define (domain m) (:types place)
+          (:predicates (at ?p - place) (wide ?a ?b - place) (narrow ?a ?b - place) (charger ?p - place))
+          (:functions (total-cost) (battery) (length ?a ?b - place) (slowness) (energy) {function})
+          (:action move :parameters (?a ?b - place)
+            :precondition (and (at ?a) (or (wide ?a ?b) (narrow ?a ?b)) (>= (battery) (* (length ?a ?b) (energy))))
+            :effect (and (not (at ?a)) (at ?b) (decrease (battery) (* (length ?a ?b) (energy)))
+              (increase (total-cost) (+ (length ?a ?b) (* (length ?a ?b) (slowness)))) {effect}))
+          (:action charge :parameters (?p - place) :precondition (and (at ?p) (charger ?p))
+            :effect (and (assign (battery) 12) (increase (total-cost) 5))))"
+    )
+}
+
+fn problem(random: &mut Random) -> String {
+    let mut init = format!("(at p0) (charger p{}) (= (battery) 12) (= (total-cost) 0)", random.below(4));
+    for a in 0..4 {
+        for b in 0..4 {
+            if a != b && random.below(2) == 0 {
+                let way = if random.below(3) == 0 { "narrow" } else { "wide" };
+                let _ = write!(init, " ({way} p{a} p{b}) (= (length p{a} p{b}) {})", 1 + random.below(3));
+            }
+        }
+    }
+    format!(
+        "(define (problem p) (:domain m) (:objects p0 p1 p2 p3 - place) (:init {init}) (:goal (at p3))
+          (:metric minimize (total-cost)))"
+    )
+}
+
+#[test]
+fn generated_missions_have_the_same_optimum_in_both_forms() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let mut solved = [0, 0];
+    for seed in 0..100 {
+        let generated = Generated::new(seed);
+        let explicit = answer(&generated.mission(&generated.explicit, directory.path()));
+        let native = answer(&generated.mission(&generated.plain, directory.path()));
+        assert_eq!((explicit.0, &explicit.1), (native.0, &native.1), "seed {seed}\n{}", generated.knowledge);
+        assert!([Status::Optimal, Status::Unsolvable].contains(&native.0), "seed {seed}");
+        solved[usize::from(!generated.bindings.is_empty())] += usize::from(native.1.is_some());
+    }
+    assert!(solved[0] > 20 && solved[1] > 20, "{solved:?} missions have a plan");
+}
