@@ -5,6 +5,7 @@
 
 pub use {encodings, ontology, probabilistic, rules};
 
+pub mod certificate;
 pub mod journal;
 pub mod knowledge;
 pub mod mapek;

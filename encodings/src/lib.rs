@@ -19,6 +19,7 @@ mod quantity;
 mod task;
 
 mod bounds;
+mod certificate;
 mod encode;
 mod limits;
 mod objectives;
@@ -34,6 +35,7 @@ mod transitions;
 #[cfg(test)]
 mod tests;
 
+pub use certificate::{Certificate, Checked, Fault, certify, check as check_certificate, describes};
 pub use encode::Semantics;
 pub use error::{Error, File, Place};
 pub use ground::{Config as GroundConfig, ground};

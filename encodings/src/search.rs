@@ -63,30 +63,61 @@ struct Search<'a> {
 
 /// Searches a task whose operators all cost at least 0.
 pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
-    let monotone = is_monotone(task);
-    let mut choices = Vec::with_capacity(task.operators.len());
-    for operator in &task.operators {
-        if operator.sizes().iter().product::<usize>() > CHOICE_LIMIT {
-            return Found::Unknown;
-        }
-        choices.push(undominated(operator, monotone, false));
-    }
-    let mut search = Search {
-        task,
-        bounds,
-        choices,
-        index: OperatorIndex::new(task),
-        nodes: Vec::new(),
-        seen: FxHashMap::default(),
-        open: BinaryHeap::new(),
-        monotone,
-        incomplete: false,
-    };
-    search.push(task.initial.clone(), 0, 0, None);
-    search.run(limits)
+    Search::new(task, bounds).map_or(Found::Unknown, |mut search| search.run(limits))
 }
 
-impl Search<'_> {
+/// A state's basic values and numbers, and what was paid on the way to it.
+pub(crate) type ClosedLabel = (Vec<u32>, Vec<i64>, i64);
+
+/// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
+/// nothing left; none if there is a cheaper plan, or if a limit comes first.
+pub(crate) fn closed_labels(
+    task: &Task,
+    bounds: &Bounds,
+    limits: &Limits,
+    cost: Option<i64>,
+) -> Option<Vec<ClosedLabel>> {
+    let mut search = Search::new(task, bounds)?;
+    match (search.run(limits), cost) {
+        (Found::Optimal(plan), Some(cost)) if plan.cost >= cost => {}
+        (Found::None, None) => {}
+        _ => return None,
+    }
+    let below = |node: &&Node| {
+        let estimate = bounds.estimate(&node.state);
+        !node.dominated && estimate.is_some_and(|more| cost.is_none_or(|cost| node.cost + more < cost))
+    };
+    let label =
+        |node: &Node| (node.state.values[..task.basic].to_vec(), node.state.numbers.clone(), node.cost);
+    Some(search.nodes.iter().filter(below).map(label).collect())
+}
+
+impl<'a> Search<'a> {
+    /// None if some operator has too many combinations of designs.
+    fn new(task: &'a Task, bounds: &'a Bounds) -> Option<Self> {
+        let monotone = is_monotone(task);
+        let mut choices = Vec::with_capacity(task.operators.len());
+        for operator in &task.operators {
+            if operator.sizes().iter().product::<usize>() > CHOICE_LIMIT {
+                return None;
+            }
+            choices.push(undominated(operator, monotone, false));
+        }
+        let mut search = Search {
+            task,
+            bounds,
+            choices,
+            index: OperatorIndex::new(task),
+            nodes: Vec::new(),
+            seen: FxHashMap::default(),
+            open: BinaryHeap::new(),
+            monotone,
+            incomplete: false,
+        };
+        search.push(task.initial.clone(), 0, 0, None);
+        Some(search)
+    }
+
     fn run(&mut self, limits: &Limits) -> Found {
         let mut expanded = 0_usize;
         while let Some(Reverse((_, steps, id))) = self.open.pop() {

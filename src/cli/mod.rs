@@ -10,6 +10,7 @@ mod plan;
 mod reason;
 mod run;
 mod validate;
+mod verify;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -110,6 +111,8 @@ enum Command {
     Run(run::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
     Validate(validate::Arguments),
+    /// Checks a certificate without trusting the planner.
+    Verify(verify::Arguments),
 }
 
 /// A mission, or a domain and a problem, and the situation to plan for.
@@ -287,5 +290,6 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Run(arguments) => run::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),
+        Command::Verify(arguments) => verify::run(arguments, &cli.common),
     }
 }

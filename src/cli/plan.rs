@@ -13,6 +13,7 @@ use encodings::{
     Step, Unbounded,
 };
 use indicatif::{ProgressBar, ProgressStyle};
+use metaplan::certificate;
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use num_rational::BigRational;
@@ -52,6 +53,10 @@ pub struct Arguments {
     /// All plans that are best by one of two objectives without being worse by the other.
     #[arg(long, value_name = "EXPRESSION,EXPRESSION", conflicts_with_all = ["minimize", "plan_format"])]
     pareto: Option<String>,
+    /// Write all that is needed to check that the answer is optimal, or that there is no plan, into a new directory;
+    /// `metaplan verify` checks it.
+    #[arg(long, value_name = "DIR", conflicts_with = "pareto")]
+    certificate: Option<PathBuf>,
     /// Only the plan, in a format that other tools read.
     #[arg(long, value_enum)]
     plan_format: Option<PlanFormat>,
@@ -167,6 +172,18 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(reason) = &solution.statistics.failure {
         let text = format!("the SAT solver gave up: {reason}");
         output::warnings(common, &[Message::warning("M114", text)]);
+    }
+
+    if let Some(directory) = &arguments.certificate {
+        let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(plan, PlanFormat::Ipc));
+        let mut problem = problem.clone();
+        if let [metric] = &objectives.metrics[..] {
+            problem.metric = Some(metric.clone());
+        }
+        let files = (mission.domain(), &problem);
+        if let Err(message) = certificate::write(directory, files, &task, solution, &plan, &config.limits) {
+            output::warnings(common, &[message]);
+        }
     }
 
     let text = match (arguments.plan_format, common.format) {
@@ -439,8 +456,8 @@ pub(super) fn json(name: &str, solution: &Solution, stages: &Stages) -> Value {
 
 /// The plan in the formats of the planning competitions and of `PlanSys2`.
 fn plan_text(plan: &Plan, format: PlanFormat) -> String {
-    let temporal =
-        plan.steps.iter().any(|step| step.duration.numerator != 0) || format == PlanFormat::Plansys2;
+    let timed = |step: &Step| step.duration.numerator != 0 || step.start.numerator != 0;
+    let temporal = plan.steps.iter().any(timed) || format == PlanFormat::Plansys2;
     let mut text = if format == PlanFormat::Plansys2 { "Solution Found\n".to_owned() } else { String::new() };
     for step in &plan.steps {
         let call: Vec<&str> =

@@ -14,6 +14,7 @@ pub(crate) use projection::Projection;
 use resources::Resource;
 
 use crate::limits::Limits;
+use crate::quantity::NumericId;
 use crate::task::{State, Task};
 
 /// Longest plan that step bounds are computed for.
@@ -86,6 +87,15 @@ impl Bounds {
         }
         let enough = |resource: &Resource| resource.suffices(state, &self.projections);
         self.resources.iter().all(enough).then_some(best)
+    }
+
+    /// What must be left of resources: the number, the projection, and a value for each of its abstract states.
+    pub(crate) fn needs(&self) -> impl Iterator<Item = (NumericId, &Projection, &[Option<i64>])> {
+        let projection = |position: &usize| &self.projections[*position];
+        self.resources.iter().flat_map(move |resource| {
+            let needs = resource.needs.iter();
+            needs.map(move |(position, values)| (resource.variable, projection(position), &values[..]))
+        })
     }
 
     /// What is known of plans with cost at most `limit` and at most `horizon` steps, where either is given.

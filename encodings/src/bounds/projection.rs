@@ -208,6 +208,11 @@ impl Projection {
         self.to_go[self.state(state) as usize]
     }
 
+    /// The cost to go from each abstract state.
+    pub(crate) fn costs(&self) -> &[Option<i64>] {
+        &self.to_go
+    }
+
     pub(crate) fn to_go(&self, state: u32) -> Option<i64> {
         self.to_go[state as usize]
     }

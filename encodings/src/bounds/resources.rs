@@ -13,8 +13,9 @@ use crate::task::{Operator, State, Task};
 
 /// A resource, and what each abstract state needs of it, by projection.
 pub(super) struct Resource {
-    variable: NumericId,
-    needs: Vec<(usize, Vec<Option<i64>>)>,
+    pub(super) variable: NumericId,
+    /// By position of the projection.
+    pub(super) needs: Vec<(usize, Vec<Option<i64>>)>,
 }
 
 impl Resource {

@@ -1,0 +1,172 @@
+//! What a written task means: states, operators and what they cost. Slow and plain; all arithmetic is exact.
+
+use crate::certificate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
+
+/// Values of all variables and numbers.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct State {
+    pub(super) values: Vec<u32>,
+    pub(super) numbers: Vec<i128>,
+}
+
+/// Whether the value of a number is small enough to calculate with.
+pub(super) fn in_range(number: i128) -> bool {
+    number.abs() < 1 << 62
+}
+
+impl Model {
+    /// A state with these basic values; the derived ones follow.
+    pub(super) fn state(&self, basic: &[u32], numbers: &[i64]) -> State {
+        let mut values = basic.to_vec();
+        values.resize(self.variables.len(), 0);
+        let mut state = State { values, numbers: numbers.iter().map(|number| i128::from(*number)).collect() };
+        self.derive(&mut state);
+        state
+    }
+
+    pub(super) fn initial(&self) -> State {
+        self.state(&self.values[..self.basic], &self.numbers)
+    }
+
+    /// Gives derived variables their values: the least fixpoint of the rules, layer by layer.
+    fn derive(&self, state: &mut State) {
+        for variable in self.basic..self.variables.len() {
+            state.values[variable] = self.variables[variable].len() as u32 - 1;
+        }
+        for layer in &self.axioms {
+            loop {
+                let holds = |(head, body): &&(Fact, Condition)| {
+                    state.values[head.0 as usize] != head.1 && self.holds(body, state, &[], &[])
+                };
+                let new: Vec<Fact> = layer.rules.iter().filter(holds).map(|(head, _)| *head).collect();
+                for (variable, value) in &new {
+                    state.values[*variable as usize] = *value;
+                }
+                if new.is_empty() {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// How many designs suit each slot of an operator.
+    pub(super) fn sizes(&self, operator: &Operator) -> Vec<usize> {
+        self.uses[operator.uses as usize].iter().map(|(_, designs)| designs.len()).collect()
+    }
+
+    /// All combinations of designs that an operator admits.
+    pub(super) fn choices(&self, operator: &Operator) -> Vec<Vec<u16>> {
+        let mut all: Vec<Vec<u16>> = vec![Vec::new()];
+        for size in self.sizes(operator) {
+            let longer = |choice: Vec<u16>| {
+                (0..size as u16).map(move |design| choice.iter().copied().chain([design]).collect())
+            };
+            all = all.into_iter().flat_map(longer).collect();
+        }
+        let exclusions = &self.exclusions[operator.exclusions as usize];
+        all.retain(|choice| {
+            !exclusions.iter().any(|exclusion| {
+                let chosen: Vec<u16> = exclusion.slots.iter().map(|slot| choice[*slot as usize]).collect();
+                exclusion.combinations.contains(&chosen)
+            })
+        });
+        all
+    }
+
+    /// The value of a quantity for a combination of designs.
+    pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u16], sizes: &[usize]) -> i128 {
+        let mut sum = i128::from(quantity.constant);
+        for (slots, table) in &quantity.tables {
+            let mut row = 0;
+            for slot in slots {
+                row = row * sizes[*slot as usize] + choice[*slot as usize] as usize;
+            }
+            sum += i128::from(self.tables[*table as usize][row]);
+        }
+        sum
+    }
+
+    /// A lower bound on a quantity for all combinations of designs.
+    pub(super) fn least(&self, quantity: &Quantity) -> i128 {
+        let least = |table: &u32| self.tables[*table as usize].iter().min().copied().unwrap_or(0);
+        let tables = quantity.tables.iter().map(|(_, table)| i128::from(least(table)));
+        i128::from(quantity.constant) + tables.sum::<i128>()
+    }
+
+    /// An upper bound, as `least` is a lower one.
+    pub(super) fn most(&self, quantity: &Quantity) -> i128 {
+        let most = |table: &u32| self.tables[*table as usize].iter().max().copied().unwrap_or(0);
+        let tables = quantity.tables.iter().map(|(_, table)| i128::from(most(table)));
+        i128::from(quantity.constant) + tables.sum::<i128>()
+    }
+
+    pub(super) fn linear(&self, linear: &Linear, state: &State, choice: &[u16], sizes: &[usize]) -> i128 {
+        let numbers = linear.factors.iter();
+        let numbers = numbers.map(|(number, factor)| state.numbers[*number as usize] * i128::from(*factor));
+        self.quantity(&linear.quantity, choice, sizes) + numbers.sum::<i128>()
+    }
+
+    /// Whether a condition holds; its finite-domain part does not depend on designs.
+    pub(super) fn holds(
+        &self,
+        condition: &Condition,
+        state: &State,
+        choice: &[u16],
+        sizes: &[usize],
+    ) -> bool {
+        holds_without_numbers(condition, state)
+            && condition.comparisons.iter().all(|linear| self.linear(linear, state, choice, sizes) >= 0)
+    }
+
+    /// The state after an applicable operator; none if a number gets out of hand.
+    pub(super) fn successor(
+        &self,
+        operator: &Operator,
+        state: &State,
+        choice: &[u16],
+        sizes: &[usize],
+    ) -> Option<State> {
+        let mut next = state.clone();
+        for (variable, value) in &operator.effects {
+            next.values[*variable as usize] = *value;
+        }
+        for conditional in &operator.conditional {
+            if conditional.condition.iter().all(|literal| literal_holds(literal, state)) {
+                for (variable, value) in &conditional.effects {
+                    next.values[*variable as usize] = *value;
+                }
+            }
+        }
+        for (number, value) in &operator.changes {
+            let value = self.linear(value, state, choice, sizes);
+            if !in_range(value) {
+                return None;
+            }
+            next.numbers[*number as usize] = value;
+        }
+        self.derive(&mut next);
+        Some(next)
+    }
+
+    /// Whether more of any number never hurts: no factor in any condition or change is negative, and no derived variable
+    /// depends on numbers.
+    pub(super) fn more_never_hurts(&self) -> bool {
+        let rules = self.axioms.iter().flat_map(|layer| &layer.rules);
+        let conditions = self.operators.iter().map(|operator| &operator.condition).chain([&self.goal]);
+        let changes =
+            self.operators.iter().flat_map(|operator| operator.changes.iter().map(|(_, value)| value));
+        let mut linears = conditions.flat_map(|condition| &condition.comparisons).chain(changes);
+        rules.into_iter().all(|(_, body)| body.comparisons.is_empty())
+            && linears.all(|linear| linear.factors.iter().all(|(_, factor)| *factor >= 0))
+    }
+}
+
+pub(super) fn holds_without_numbers(condition: &Condition, state: &State) -> bool {
+    let fact = |(variable, value): &Fact| state.values[*variable as usize] == *value;
+    condition.facts.iter().all(fact)
+        && condition.clauses.iter().all(|clause| clause.iter().any(|literal| literal_holds(literal, state)))
+}
+
+fn literal_holds(((variable, value), positive): &Literal, state: &State) -> bool {
+    (state.values[*variable as usize] == *value) == *positive
+}

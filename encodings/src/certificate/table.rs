@@ -1,0 +1,175 @@
+//! Tables of lower bounds by the values of a few variables, and why they are bounds.
+//!
+//! A potential is a lower bound on the cost to the goal if it is at most 0 wherever the goal can hold, and no operator lowers it by
+//! more than it costs. A need is a lower bound on what must be left of a number if no operator makes up for it
+//! otherwise: one that uses the number requires that it stays at least 0, and whatever else changes it may only stand where
+//! nothing is needed.
+
+use crate::certificate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
+use crate::certificate::semantics::State;
+
+/// A value (none for infinity) for each combination of values of the pattern.
+pub(super) struct Table<'t> {
+    pattern: &'t [u32],
+    sizes: Vec<usize>,
+    values: &'t [Option<i64>],
+}
+
+impl<'t> Table<'t> {
+    pub(super) fn new(model: &Model, pattern: &'t [u32], values: &'t [Option<i64>]) -> Self {
+        let sizes = pattern.iter().map(|variable| model.variables[*variable as usize].len()).collect();
+        Self { pattern, sizes, values }
+    }
+
+    pub(super) fn at(&self, state: &State) -> Option<i128> {
+        let values: Vec<u32> = self.pattern.iter().map(|variable| state.values[*variable as usize]).collect();
+        self.value(&values)
+    }
+
+    fn value(&self, values: &[u32]) -> Option<i128> {
+        let row = self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize);
+        self.values[row].map(i128::from)
+    }
+
+    /// Every combination that agrees with some facts.
+    fn matching(&self, facts: &[Fact]) -> Vec<Vec<u32>> {
+        let mut all = vec![Vec::new()];
+        for (variable, size) in self.pattern.iter().zip(&self.sizes) {
+            let fixed = facts.iter().find(|fact| fact.0 == *variable).map(|fact| fact.1);
+            let range = fixed.map_or(0..*size as u32, |value| value..value + 1);
+            let longer = |values: Vec<u32>| {
+                range.clone().map(move |value| values.iter().copied().chain([value]).collect())
+            };
+            all = all.into_iter().flat_map(longer).collect();
+        }
+        all
+    }
+
+    fn after(&self, values: &[u32], effects: &[Fact]) -> Vec<u32> {
+        let effect = |variable: u32| effects.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
+        self.pattern.iter().zip(values).map(|(variable, value)| effect(*variable).unwrap_or(*value)).collect()
+    }
+
+    fn touches(&self, operator: &Operator) -> bool {
+        let conditional = operator.conditional.iter().flat_map(|conditional| &conditional.effects);
+        let mut facts = operator.condition.facts.iter().chain(&operator.effects).chain(conditional);
+        facts.any(|fact| self.pattern.contains(&fact.0))
+    }
+
+    /// Where an operator may lead from some values: what a conditional effect asks for beyond the pattern may hold or not.
+    fn targets(&self, operator: &Operator, values: &[u32]) -> Vec<Vec<u32>> {
+        let truth = |((variable, value), positive): &Literal| {
+            let position = self.pattern.iter().position(|own| own == variable)?;
+            Some((values[position] == *value) == *positive)
+        };
+        let mut targets = vec![self.after(values, &operator.effects)];
+        for Conditional { condition, effects } in &operator.conditional {
+            if condition.iter().any(|literal| truth(literal) == Some(false)) {
+                continue;
+            }
+            let fired: Vec<_> = targets.iter().map(|target| self.after(target, effects)).collect();
+            if condition.iter().all(|literal| truth(literal) == Some(true)) {
+                targets = fired;
+            } else {
+                targets.extend(fired);
+                targets.sort_unstable();
+                targets.dedup();
+            }
+        }
+        targets
+    }
+
+    /// Calls `check` with the values before and after, for every operator that touches the pattern. `false` is an error.
+    fn each_transition(
+        &self,
+        model: &Model,
+        check: &dyn Fn(&Operator, Option<i128>, Option<i128>) -> bool,
+    ) -> Result<(), String> {
+        for (operator, position) in model.operators.iter().zip(0..) {
+            if !self.touches(operator) {
+                // It leads from each combination to itself; any finite value stands for all.
+                let finite = self.values.iter().flatten().max().map(|most| i128::from(*most));
+                if finite.is_some() && !check(operator, finite, finite) {
+                    return Err(format!("operator {position}, which changes nothing that the table knows"));
+                }
+                continue;
+            }
+            for values in self.matching(&operator.condition.facts) {
+                for target in self.targets(operator, &values) {
+                    if !check(operator, self.value(&values), self.value(&target)) {
+                        return Err(format!("operator {position} leads from {values:?} to {target:?}"));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether `left ≤ right + step`, where none is infinite.
+fn at_most(left: Option<i128>, right: Option<i128>, step: i128) -> bool {
+    right.is_none_or(|right| left.is_some_and(|left| left <= right + step))
+}
+
+/// Checks that a table bounds the cost to the goal from below.
+pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), String> {
+    for values in table.matching(&model.goal.facts) {
+        if !at_most(table.value(&values), Some(0), 0) {
+            return Err(format!("the goal may hold at {values:?}"));
+        }
+    }
+    table.each_transition(model, &|operator, before, after| {
+        at_most(before, after, model.least(&operator.cost))
+    })
+}
+
+/// What an operator does to a number.
+enum Use {
+    /// It lowers it by at least so much (≥ 0), and requires that at least 0 is left then.
+    Lowers(i128),
+    /// Anything else.
+    Other,
+}
+
+fn use_of(model: &Model, operator: &Operator, number: u32) -> Use {
+    let mut changes = operator.changes.iter().filter(|(own, _)| *own == number);
+    let Some((_, value)) = changes.next() else { return Use::Lowers(0) };
+    let most = model.most(&value.quantity);
+    let guarded =
+        most == 0 && value.quantity.tables.is_empty() || operator.condition.comparisons.contains(value);
+    if changes.next().is_none() && value.factors == [(number, 1)] && most <= 0 && guarded {
+        Use::Lowers(-most)
+    } else {
+        Use::Other
+    }
+}
+
+/// Checks that a table bounds from below what must be left of a number, where it is not 0.
+pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Result<(), String> {
+    if table.values.iter().flatten().any(|need| *need < 0) {
+        return Err("it is negative".into());
+    }
+    let left = model
+        .goal
+        .comparisons
+        .iter()
+        .filter_map(|linear| lower_end(linear, number))
+        .max()
+        .unwrap_or(0)
+        .max(0);
+    for values in table.matching(&model.goal.facts) {
+        if !at_most(table.value(&values), Some(left), 0) {
+            return Err(format!("the goal may hold at {values:?}"));
+        }
+    }
+    table.each_transition(model, &|operator, before, after| match use_of(model, operator, number) {
+        Use::Lowers(least) => at_most(before, after, least),
+        Use::Other => before == Some(0) || (before.is_none() && after.is_none()),
+    })
+}
+
+/// The value that a number must have for a comparison to hold, if it is about that number alone.
+fn lower_end(linear: &Linear, number: u32) -> Option<i128> {
+    let Quantity { constant, tables } = &linear.quantity;
+    (linear.factors == [(number, 1)] && tables.is_empty()).then(|| -i128::from(*constant))
+}
