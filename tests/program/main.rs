@@ -1,5 +1,6 @@
 //! The whole, end to end: the program run as its users run it.
 
+mod certificate;
 mod cli;
 mod common;
 mod export;

@@ -1,7 +1,7 @@
 //! Exact optima of generated instances, known from several planners and an exact oracle.
 //!
 //! `cargo test --release --test program reference -- --ignored --nocapture` prints one line for each instance: its name, the cost,
-//! what proves it, and the time of the whole program. Needs python3 (its standard library only) for the generators.
+//! what proves it, and the time of the whole program; then how long the same takes with a certificate, and verifying that. Needs python3 (its standard library only) for the generators.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -42,10 +42,31 @@ fn plan(directory: &Path, name: &str) -> (String, String) {
     let result = if status == "optimal" { answer["cost"].to_string() } else { status };
     let seconds = started.elapsed().as_secs_f64();
     let line = format!(
-        "{name} {result} by {} in {seconds:.2} s",
-        answer["proof"]["by"].as_str().unwrap_or("nothing")
+        "{name} {result} by {} in {seconds:.2} s, {}",
+        answer["proof"]["by"].as_str().unwrap_or("nothing"),
+        verified(directory, name)
     );
     (result, line)
+}
+
+/// Plans once more with a certificate, and verifies it; what that takes.
+fn verified(directory: &Path, name: &str) -> String {
+    let (domain, problem) = (format!("{name}.domain.pddl"), format!("{name}.problem.pddl"));
+    let certificate = format!("{name}.certificate");
+    let started = Instant::now();
+    let arguments = ["plan", &domain, &problem, "--quiet", "--certificate", &certificate];
+    let planned = metaplan_in(directory, &arguments, "");
+    let planning = started.elapsed().as_secs_f64();
+    assert!(directory.join(&certificate).exists(), "{name}: no certificate: {planned:#?}");
+    let started = Instant::now();
+    let outcome = metaplan_in(directory, &["verify", &certificate], "");
+    let verifying = started.elapsed().as_secs_f64();
+    assert_eq!(outcome.status, 0, "{name}: {outcome:#?}");
+    let argument = outcome.stdout.lines().find(|line| line.starts_with("argument")).unwrap_or_default();
+    format!(
+        "certified in {planning:.2} s, verified in {verifying:.2} s ({:.1}): {argument}",
+        verifying / planning
+    )
 }
 
 #[allow(clippy::print_stdout)]
