@@ -31,7 +31,7 @@ pub(super) fn task(model: &Model) -> Found {
     require(model.values.len() == count, || "the initial state has not one value for each variable".into())?;
     require(model.variables.iter().all(|values| !values.is_empty()), || "a variable without values".into())?;
     for fact in (0..).zip(model.values.iter().copied()) {
-        model.check_fact(&fact)?;
+        model.check_fact(fact)?;
     }
     let small = model.tables.iter().flatten().all(|value| is_small(*value));
     require(small && model.numbers.iter().all(|number| in_range((*number).into())), || {
@@ -52,7 +52,7 @@ pub(super) fn task(model: &Model) -> Found {
         model.check_operator(operator).map_err(|reason| format!("operator {position}: {reason}"))?;
     }
     for (head, body) in model.axioms.iter().flat_map(|layer| &layer.rules) {
-        model.check_fact(head)?;
+        model.check_fact(*head)?;
         require(head.0 as usize >= model.basic && head.1 == 0, || "a rule of a basic variable".into())?;
         model.check_condition(body, &[])?;
     }
@@ -90,13 +90,13 @@ pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
 }
 
 impl Model {
-    fn check_fact(&self, (variable, value): &Fact) -> Found {
-        let size = self.variables.get(*variable as usize).map_or(0, Vec::len);
-        require((*value as usize) < size, || format!("variable {variable} has no value {value}"))
+    fn check_fact(&self, (variable, value): Fact) -> Found {
+        let size = self.variables.get(variable as usize).map_or(0, Vec::len);
+        require((value as usize) < size, || format!("variable {variable} has no value {value}"))
     }
 
     fn check_literals(&self, literals: &[Literal]) -> Found {
-        literals.iter().try_for_each(|(fact, _)| self.check_fact(fact))
+        literals.iter().try_for_each(|(fact, _)| self.check_fact(*fact))
     }
 
     fn check_operator(&self, operator: &Operator) -> Found {
@@ -117,7 +117,7 @@ impl Model {
         conditional.clone().try_for_each(|effect| self.check_literals(&effect.condition))?;
         let effects = operator.effects.iter().chain(conditional.flat_map(|effect| &effect.effects));
         for fact in effects {
-            self.check_fact(fact)?;
+            self.check_fact(*fact)?;
             require((fact.0 as usize) < self.basic, || "an effect on a derived variable".into())?;
         }
         for (number, value) in &operator.changes {
@@ -129,7 +129,7 @@ impl Model {
     }
 
     fn check_condition(&self, condition: &Condition, sizes: &[usize]) -> Found {
-        condition.facts.iter().try_for_each(|fact| self.check_fact(fact))?;
+        condition.facts.iter().try_for_each(|fact| self.check_fact(*fact))?;
         condition.clauses.iter().try_for_each(|clause| self.check_literals(clause))?;
         condition.comparisons.iter().try_for_each(|linear| self.check_linear(linear, sizes))
     }

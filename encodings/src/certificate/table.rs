@@ -8,6 +8,9 @@
 use crate::certificate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
 use crate::certificate::semantics::State;
 
+/// A bound; none is infinity.
+type Bound = Option<i128>;
+
 /// A value (none for infinity) for each combination of values of the pattern.
 pub(super) struct Table<'t> {
     pattern: &'t [u32],
@@ -83,7 +86,7 @@ impl<'t> Table<'t> {
     fn each_transition(
         &self,
         model: &Model,
-        check: &dyn Fn(&Operator, Option<i128>, Option<i128>) -> bool,
+        check: &dyn Fn(&Operator, Bound, Bound) -> bool,
     ) -> Result<(), String> {
         for (operator, position) in model.operators.iter().zip(0..) {
             if !self.touches(operator) {

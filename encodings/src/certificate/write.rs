@@ -97,9 +97,12 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
     }
 }
 
+/// Slots, each with the designs that suit.
+type Uses = Vec<(u32, Vec<u16>)>;
+
 struct Writer {
     tables: Pool<Arc<[i64]>, Vec<i64>>,
-    uses: Pool<Arc<[task::SlotUse]>, Vec<(u32, Vec<u16>)>>,
+    uses: Pool<Arc<[task::SlotUse]>, Uses>,
     exclusions: Pool<Arc<[task::Forbidden]>, Vec<Exclusion>>,
 }
 
@@ -110,7 +113,7 @@ fn model(task: &Task) -> Model {
         .axioms
         .iter()
         .map(|layer| Layer {
-            rules: layer.rules.iter().map(|rule| (fact(&rule.head), writer.condition(&rule.body))).collect(),
+            rules: layer.rules.iter().map(|rule| (fact(rule.head), writer.condition(&rule.body))).collect(),
             recursive: layer.recursive,
         })
         .collect();
@@ -142,12 +145,12 @@ fn model(task: &Task) -> Model {
     }
 }
 
-fn fact(fact: &task::Fact) -> (u32, u32) {
+fn fact(fact: task::Fact) -> (u32, u32) {
     (fact.variable.0, fact.value)
 }
 
 fn literal(literal: &task::Literal) -> ((u32, u32), bool) {
-    (fact(&literal.fact), literal.positive)
+    (fact(literal.fact), literal.positive)
 }
 
 impl Writer {
@@ -162,7 +165,7 @@ impl Writer {
         };
         let conditional = |effect: &task::ConditionalEffect| Conditional {
             condition: effect.condition.iter().map(literal).collect(),
-            effects: effect.effects.iter().map(fact).collect(),
+            effects: effect.effects.iter().copied().map(fact).collect(),
         };
         Operator {
             schema: operator.schema,
@@ -174,7 +177,7 @@ impl Writer {
                 .exclusions
                 .position(&operator.forbidden, |rules| rules.iter().map(exclusion).collect()),
             condition: self.condition(&operator.condition),
-            effects: operator.effects.iter().map(fact).collect(),
+            effects: operator.effects.iter().copied().map(fact).collect(),
             conditional: operator.conditional.iter().map(conditional).collect(),
             changes: operator
                 .numeric_effects
@@ -189,7 +192,7 @@ impl Writer {
 
     fn condition(&mut self, condition: &task::Condition) -> Condition {
         Condition {
-            facts: condition.facts.iter().map(fact).collect(),
+            facts: condition.facts.iter().copied().map(fact).collect(),
             clauses: condition.clauses.iter().map(|clause| clause.iter().map(literal).collect()).collect(),
             comparisons: condition.comparisons.iter().map(|linear| self.linear(linear)).collect(),
         }
