@@ -1,7 +1,7 @@
 //! `metaplan plan`.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -10,7 +10,7 @@ use encodings::pddl::ast::{Name, Problem};
 use encodings::validate::{Options, PlanStep, PlanText, validate};
 use encodings::{
     Backend, BackendError, Config, Exact, Improvement, Limits, Plan, Proof, Semantics, Solution, Status,
-    Step, Unbounded,
+    Step, Task, Unbounded,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::certificate;
@@ -175,15 +175,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
 
     if let Some(directory) = &arguments.certificate {
-        let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(plan, PlanFormat::Ipc));
-        let mut problem = problem.clone();
-        if let [metric] = &objectives.metrics[..] {
-            problem.metric = Some(metric.clone());
-        }
-        let files = (mission.domain(), &problem);
-        if let Err(message) = certificate::write(directory, files, &task, solution, &plan, &config.limits) {
-            output::warnings(common, &[message]);
-        }
+        certify(directory, &mission, &problem, &objectives, &task, solution, &config.limits)
+            .unwrap_or_else(|message| output::warnings(common, &[message]));
     }
 
     let text = match (arguments.plan_format, common.format) {
@@ -210,6 +203,24 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => output::answer(&text),
     }
     Ok(exit(solution.status))
+}
+
+/// Writes why nothing is better than the solution.
+fn certify(
+    directory: &Path,
+    mission: &Mission,
+    problem: &Problem,
+    objectives: &Objectives,
+    task: &Task,
+    solution: &Solution,
+    limits: &Limits,
+) -> Result<(), Message> {
+    let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(plan, PlanFormat::Ipc));
+    let mut problem = problem.clone();
+    if let [metric] = &objectives.metrics[..] {
+        problem.metric = Some(metric.clone());
+    }
+    certificate::write(directory, (mission.domain(), &problem), task, solution, &plan, limits)
 }
 
 /// Has the independent validator execute the plan; what it refuses is not shown.
