@@ -42,9 +42,23 @@ pub struct Choices<S, N> {
     rewards: Vec<N>,
 }
 
-impl<S, N: Number> Choices<S, N> {
-    fn new() -> Self {
+impl<S, N> Default for Choices<S, N> {
+    fn default() -> Self {
         Self { transitions: Vec::new(), ends: Vec::new(), rewards: Vec::new() }
+    }
+}
+
+/// The transitions of a choice and its rewards.
+pub type Written<'a, S, N> = (&'a [(S, N)], &'a [N]);
+
+impl<S: Clone, N: Number> Choices<S, N> {
+    /// Where the first choice with an action leads, and its rewards.
+    pub fn find(&self, action: u32) -> Option<Written<'_, S, N>> {
+        let at = self.ends.iter().position(|(known, _)| *known == action)?;
+        let begin = if at == 0 { 0 } else { self.ends[at - 1].1 as usize };
+        let kinds = self.rewards.len() / self.ends.len();
+        let rewards = &self.rewards[at * kinds..(at + 1) * kinds];
+        Some((&self.transitions[begin..self.ends[at].1 as usize], rewards))
     }
 
     /// Adds a transition to the choice that is being written. Those of probability 0 are dropped.
@@ -107,7 +121,7 @@ pub fn explore<N: Number, G: Generator<N>>(
     let mut mdp = Mdp::default();
     let kinds = generator.rewards();
     let mut rewards: Vec<Vec<N>> = vec![Vec::new(); kinds];
-    let mut choices = Choices::new();
+    let mut choices = Choices::default();
     let (mut at, mut deadlocks) = (0, 0);
     while at < states.len() {
         if at % 65_536 == 0 && !(bounds.progress)(states.len()) {

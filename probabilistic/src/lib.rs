@@ -11,6 +11,7 @@ pub mod check;
 pub mod error;
 pub mod explore;
 pub mod graph;
+pub mod jani;
 pub mod mdp;
 pub mod number;
 pub mod pareto;

@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use encodings::pddl::ast::Problem;
 use encodings::pddl::{portable, print_domain, print_problem};
 use metaplan::message::Message;
+use metaplan::mission::Mission;
+use metaplan::probabilistic::{Coadaptation, Risk, program};
 use serde_json::json;
 
 use crate::cli::{Common, Exit, Failure, Format, Situation, output};
@@ -20,7 +23,8 @@ pub struct Arguments {
     target: Target,
     #[command(flatten)]
     situation: Situation,
-    /// A directory for `domain.pddl` and `problem.pddl`, made if it is not there; standard output by default.
+    /// A directory for `domain.pddl` and `problem.pddl`, made if it is not there; for models, a file. Standard output by
+    /// default.
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -31,14 +35,20 @@ enum Target {
     /// The domain and the problem as they are planned, availability and values filled in, in a form that other
     /// planners accept.
     Pddl,
+    /// The co-adaptation process in the PRISM language, for PRISM and Storm.
+    Prism,
+    /// The co-adaptation process in JANI.
+    Jani,
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let Target::Pddl = arguments.target;
     let mission = arguments.situation.mission(&arguments.inputs)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
+    if !matches!(arguments.target, Target::Pddl) {
+        return process(arguments, common, &mission, &problem);
+    }
     let (domain, problem) = portable(mission.domain(), &problem);
     let (domain, problem) = (print_domain(&domain), print_problem(&problem));
     match &arguments.output {
@@ -55,6 +65,36 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             output::json_answer(&answer);
         }
         None => output::answer(&format!("{domain}\n{problem}")),
+    }
+    Ok(Exit::Done)
+}
+
+/// The co-adaptation process with everything that is uncertain in it.
+fn process(
+    arguments: &Arguments,
+    common: &Common,
+    mission: &Mission,
+    problem: &Problem,
+) -> Result<Exit, Failure> {
+    let coadaptation = Coadaptation::new(mission, problem, mission.roles())?;
+    let model = program(&coadaptation, Risk::all(&coadaptation));
+    let text = match arguments.target {
+        Target::Jani => match probabilistic::jani::write(&mission.name, &model) {
+            Ok(json) => output::pretty(&json),
+            Err(problems) => {
+                let message =
+                    |problem: &probabilistic::Diagnostic| Message::error(problem.code, &problem.message);
+                return Err(problems.iter().map(message).collect::<Vec<_>>().into());
+            }
+        },
+        _ => probabilistic::prism::write(&model),
+    };
+    match &arguments.output {
+        Some(file) => output::write_file(file, &text)?,
+        None if common.format == Format::Json => {
+            output::json_answer(&json!({ "format": "metaplan-export/1", "model": text }));
+        }
+        None => output::answer(&text),
     }
     Ok(Exit::Done)
 }

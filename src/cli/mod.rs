@@ -1,8 +1,10 @@
 //! Arguments to calls of the library, answers to standard output, everything else to standard error.
 
 mod check;
+mod compare;
 mod convert;
 mod export;
+mod import;
 mod memory;
 mod objectives;
 mod output;
@@ -105,6 +107,10 @@ enum Command {
     Convert(convert::Arguments),
     /// Model checking of a PRISM-language model: a value with bounds, and its policy.
     Check(check::Arguments),
+    /// Metaplan and probabilistic model checking side by side, on one co-adaptation mission.
+    Compare(compare::Arguments),
+    /// A mission from the files of another tool.
+    Import(import::Arguments),
     /// A mission for other planners, with what the knowledge base has contributed.
     Export(export::Arguments),
     /// The adaptation loop: events in, adaptations out, one JSON object a line.
@@ -287,6 +293,8 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Reason(arguments) => reason::run(arguments, &cli.common),
         Command::Convert(arguments) => convert::run(arguments, &cli.common),
         Command::Check(arguments) => check::run(arguments, &cli.common),
+        Command::Compare(arguments) => compare::run(arguments, &cli.common),
+        Command::Import(arguments) => import::run(arguments, &cli.common),
         Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Run(arguments) => run::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),

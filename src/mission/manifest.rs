@@ -30,6 +30,9 @@ pub struct Manifest {
     bindings: BTreeMap<String, String>,
     #[serde(default)]
     adaptation: AdaptationSection,
+    /// The symbols of the co-adaptation process, where they differ from the defaults.
+    #[serde(default)]
+    pub probabilistic: crate::probabilistic::Roles,
     /// Situations by name.
     #[serde(default)]
     pub scenarios: BTreeMap<String, Scenario>,

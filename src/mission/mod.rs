@@ -11,13 +11,14 @@ mod settings;
 
 use std::path::Path;
 
-use encodings::pddl::ast::{Direction, Domain, Metric, Problem};
+use encodings::pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use encodings::pddl::{self, Severity, Source};
 use encodings::{GroundConfig, Limits, Plan, Task};
 
 use crate::knowledge::Knowledge;
 use crate::mapek::Settings;
 use crate::message::Message;
+use crate::probabilistic::Roles;
 
 pub use binding::Bindings;
 pub use manifest::{Manifest, Scenario};
@@ -35,6 +36,7 @@ pub struct Mission {
     domain: Domain,
     problem: Problem,
     adaptation: Option<CoAdaptation>,
+    roles: Roles,
     warnings: Vec<Message>,
     settings: Settings,
 }
@@ -56,6 +58,7 @@ impl Mission {
             source(&manifest.problem()),
         )?;
         mission.settings = settings;
+        mission.roles = manifest.probabilistic.clone();
         Ok((mission, manifest))
     }
 
@@ -101,6 +104,7 @@ impl Mission {
         let domain = adaptation.as_ref().map_or_else(|| domain.clone(), |own| own.explicit(&domain));
         let name = name.to_owned();
         let settings = Settings::default();
+        let roles = Roles::default();
         Ok(Self {
             name,
             knowledge,
@@ -110,6 +114,7 @@ impl Mission {
             domain,
             problem,
             adaptation,
+            roles,
             warnings,
             settings,
         })
@@ -141,6 +146,23 @@ impl Mission {
                 "M103",
                 format!("there is no knowledge base that has a component `{component}`"),
             )),
+        }
+    }
+
+    /// Changes the goal: the last argument of its first atom with this predicate.
+    pub fn aim(&mut self, predicate: &str, object: &str) {
+        let mut parts = vec![&mut self.problem.goal];
+        while let Some(part) = parts.pop() {
+            match part {
+                Condition::And(more) => parts.extend(more.iter_mut().rev()),
+                Condition::Atom(atom) if atom.predicate.name.as_str().eq_ignore_ascii_case(predicate) => {
+                    if let Some(Term::Constant(last)) = atom.arguments.last_mut() {
+                        last.name = Name::new(object);
+                    }
+                    return;
+                }
+                _ => {}
+            }
         }
     }
 
@@ -200,6 +222,12 @@ impl Mission {
     }
 
     /// The domain, in explicit form if its file is plain.
+    /// The symbols of the co-adaptation process.
+    pub fn roles(&self) -> &Roles {
+        &self.roles
+    }
+
+    /// The domain.
     pub fn domain(&self) -> &Domain {
         &self.domain
     }

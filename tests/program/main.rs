@@ -4,6 +4,7 @@ mod certificate;
 mod cli;
 mod common;
 mod export;
+mod probabilistic;
 mod real;
 mod reason;
 mod reference;

@@ -27,6 +27,11 @@ impl<'a> Cursor<'a> {
         Self { tokens, at: 0, depth: 0 }
     }
 
+    /// How many tokens are read.
+    pub fn position(&self) -> usize {
+        self.at
+    }
+
     /// After a mistake: nothing is open any more.
     pub fn reset(&mut self) {
         self.depth = 0;

@@ -22,6 +22,7 @@ pub use compile::Settings;
 pub use model::Program;
 pub use parser::parse;
 pub use state::{Packed, Valuation};
+pub(crate) use write::decimal;
 pub use write::{identifier, write};
 
 /// The words that PRISM keeps for itself, and those that Storm does besides.

@@ -28,9 +28,13 @@ pub fn parse(text: &str) -> Result<Model, Vec<Diagnostic>> {
     let mut problems = Vec::new();
     let mut kind = None;
     while *cursor.peek() != Kind::End {
-        if let Err(problem) = part(&mut cursor, &mut model, &mut kind) {
+        let before = cursor.position();
+        if let Err(problem) = part(&mut cursor, &mut model, &mut kind, &mut problems) {
             problems.push(problem);
             skip(&mut cursor);
+            if cursor.position() == before {
+                cursor.advance();
+            }
         }
     }
     if kind.is_none() && problems.is_empty() {
@@ -54,12 +58,9 @@ fn skip(cursor: &mut Cursor<'_>) {
                 cursor.advance();
                 return;
             }
-            Kind::Name(word) if word.starts_with("end") && super::is_reserved(word) => {
-                cursor.advance();
-                return;
-            }
             Kind::Name(word)
-                if ["module", "rewards", "label", "formula", "const"].contains(&word.as_str()) =>
+                if ["endmodule", "module", "rewards", "label", "formula", "const"]
+                    .contains(&word.as_str()) =>
             {
                 return;
             }
@@ -68,7 +69,12 @@ fn skip(cursor: &mut Cursor<'_>) {
     }
 }
 
-fn part(cursor: &mut Cursor<'_>, model: &mut Model, kind: &mut Option<ModelKind>) -> Read<()> {
+fn part(
+    cursor: &mut Cursor<'_>,
+    model: &mut Model,
+    kind: &mut Option<ModelKind>,
+    problems: &mut Vec<Diagnostic>,
+) -> Read<()> {
     let place = cursor.place();
     let Kind::Name(word) = cursor.peek() else { return Err(cursor.expected("a declaration")) };
     let mut is_kind = |found: ModelKind| match kind.replace(found) {
@@ -86,7 +92,7 @@ fn part(cursor: &mut Cursor<'_>, model: &mut Model, kind: &mut Option<ModelKind>
             model.globals.push(variable);
             return Ok(());
         }
-        "module" => return module(cursor, model),
+        "module" => return module(cursor, model, problems),
         "rewards" => return rewards(cursor, model),
         "ctmc" | "stochastic" | "pta" | "pomdp" | "popta" | "smg" | "csg" | "idtmc" | "imdp" | "ma" => {
             cursor.advance();
@@ -167,7 +173,7 @@ fn variable(cursor: &mut Cursor<'_>) -> Read<Variable> {
     Ok(Variable { name, range, initial, place })
 }
 
-fn module(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
+fn module(cursor: &mut Cursor<'_>, model: &mut Model, problems: &mut Vec<Diagnostic>) -> Read<()> {
     cursor.advance();
     let (name, place) = cursor.name("the name of a module")?;
     if cursor.take("=") {
@@ -195,17 +201,31 @@ fn module(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     }
     let mut module = Module { name, variables: Vec::new(), commands: Vec::new(), place };
     while !cursor.take_word("endmodule") {
-        if cursor.is("[") {
-            module.commands.push(command(cursor)?);
-        } else if cursor.is_word("invariant") {
-            return Err(Diagnostic::new("Q401", cursor.place(), "`invariant` is not handled"));
-        } else if matches!(cursor.peek(), Kind::Name(_)) && matches!(cursor.peek_at(1), Kind::Sign(":")) {
-            module.variables.push(variable(cursor)?);
-        } else {
-            return Err(cursor.expected("a variable, a command `[action] guard -> updates;` or `endmodule`"));
+        if let Err(problem) = member(cursor, &mut module) {
+            problems.push(problem);
+            skip(cursor);
+        }
+        let is_over =
+            ["module", "rewards", "label", "formula", "const"].iter().any(|word| cursor.is_word(word));
+        if is_over || *cursor.peek() == Kind::End {
+            return Err(cursor.expected("`endmodule`"));
         }
     }
     model.modules.push(module);
+    Ok(())
+}
+
+/// A variable or a command.
+fn member(cursor: &mut Cursor<'_>, module: &mut Module) -> Read<()> {
+    if cursor.is("[") {
+        module.commands.push(command(cursor)?);
+    } else if cursor.is_word("invariant") {
+        return Err(Diagnostic::new("Q401", cursor.place(), "`invariant` is not handled"));
+    } else if matches!(cursor.peek(), Kind::Name(_)) && matches!(cursor.peek_at(1), Kind::Sign(":")) {
+        module.variables.push(variable(cursor)?);
+    } else {
+        return Err(cursor.expected("a variable, a command `[action] guard -> updates;` or `endmodule`"));
+    }
     Ok(())
 }
 

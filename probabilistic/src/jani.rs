@@ -1,0 +1,292 @@
+//! A model in the PRISM language to JANI (jani-spec.org, version 1), for other model checkers.
+//!
+//! One automaton with one location for each module; modules synchronise on their actions. Labels become transient
+//! variables of type bool, rewards transient variables of type real. Formulas are written out, so no name is used twice.
+
+use std::collections::BTreeMap;
+
+use num_traits::ToPrimitive;
+use serde_json::{Value, json};
+
+use crate::error::Diagnostic;
+use crate::prism::ast::{
+    BinaryOp, Command, Expr, ExprKind, Function, Model, ModelKind, Module, Named, RewardItem, Rewards, Type,
+    Variable,
+};
+
+/// A model as JANI. Constants without value become parameters of the JANI model.
+///
+/// # Errors
+/// What JANI cannot say: rewards of commands without action.
+pub fn write(name: &str, model: &Model) -> Result<Value, Vec<Diagnostic>> {
+    let writer = Writer { formulas: &model.formulas };
+    let mut problems = Vec::new();
+    let actions = actions(model);
+    let globals = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
+    let mut variables: Vec<Value> = globals.map(|variable| writer.variable(variable)).collect();
+    let taken = |text: &str| {
+        let declared = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
+        let mut names =
+            declared.map(|v| v.name.as_str()).chain(model.constants.iter().map(|c| c.name.as_str()));
+        names.any(|known| known == text)
+    };
+    for label in &model.labels {
+        let name = if taken(&label.name) { format!("label_{}", label.name) } else { label.name.clone() };
+        variables.push(json!({ "name": name, "type": "bool", "transient": true, "initial-value": false }));
+    }
+    for rewards in &model.rewards {
+        let name = reward_name(&rewards.name);
+        variables.push(json!({ "name": name, "type": "real", "transient": true, "initial-value": 0 }));
+    }
+    // Every automaton writes what belongs to it; labels and rewards of states belong to the first one.
+    let automata: Vec<Value> = model
+        .modules
+        .iter()
+        .enumerate()
+        .map(|(number, module)| writer.automaton(model, module, number == 0, &taken))
+        .collect();
+    for rewards in &model.rewards {
+        for item in rewards.items.iter().filter(|item| item.action == Some(None)) {
+            let text =
+                "rewards of commands without action cannot be written as JANI; give the commands a name";
+            problems.push(Diagnostic::new("Q404", item.place, text));
+        }
+    }
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let constants = model.constants.iter().map(|constant| {
+        let mut entry = json!({ "name": constant.name, "type": type_name(constant.kind) });
+        if let Some(value) = &constant.value {
+            entry["value"] = writer.expression(value);
+        }
+        entry
+    });
+    Ok(json!({
+        "jani-version": 1,
+        "name": name,
+        "type": if model.kind == ModelKind::Mdp { "mdp" } else { "dtmc" },
+        "features": ["derived-operators"],
+        "actions": actions.keys().map(|action| json!({ "name": action })).collect::<Vec<_>>(),
+        "constants": constants.collect::<Vec<_>>(),
+        "variables": variables,
+        "properties": [],
+        "automata": automata,
+        "system": system(model, &actions),
+    }))
+}
+
+fn reward_name(name: &str) -> String {
+    if name.is_empty() { "reward".to_owned() } else { format!("reward_{name}") }
+}
+
+fn type_name(kind: Type) -> &'static str {
+    if kind == Type::Double { "real" } else { kind.name() }
+}
+
+/// The actions, each with the modules that take part.
+fn actions(model: &Model) -> BTreeMap<&str, Vec<usize>> {
+    let mut actions: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (number, module) in model.modules.iter().enumerate() {
+        for action in module.commands.iter().filter_map(|command| command.action.as_deref()) {
+            let modules = actions.entry(action).or_default();
+            if modules.last() != Some(&number) {
+                modules.push(number);
+            }
+        }
+    }
+    actions
+}
+
+fn system(model: &Model, actions: &BTreeMap<&str, Vec<usize>>) -> Value {
+    let syncs = actions.iter().map(|(action, modules)| {
+        let part = |number: usize| if modules.contains(&number) { json!(action) } else { Value::Null };
+        json!({ "synchronise": (0..model.modules.len()).map(part).collect::<Vec<_>>(), "result": action })
+    });
+    json!({
+        "elements": model.modules.iter().map(|module| json!({ "automaton": module.name })).collect::<Vec<_>>(),
+        "syncs": syncs.collect::<Vec<_>>(),
+    })
+}
+
+struct Writer<'a> {
+    formulas: &'a [Named],
+}
+
+impl Writer<'_> {
+    fn automaton(
+        &self,
+        model: &Model,
+        module: &Module,
+        is_first: bool,
+        taken: &dyn Fn(&str) -> bool,
+    ) -> Value {
+        let mut transient = Vec::new();
+        if is_first {
+            for label in &model.labels {
+                let name =
+                    if taken(&label.name) { format!("label_{}", label.name) } else { label.name.clone() };
+                transient.push(json!({ "ref": name, "value": self.expression(&label.expression) }));
+            }
+            for rewards in &model.rewards {
+                let of_states = rewards.items.iter().filter(|item| item.action.is_none());
+                if let Some(value) = self.sum(of_states) {
+                    transient.push(json!({ "ref": reward_name(&rewards.name), "value": value }));
+                }
+            }
+        }
+        let edges: Vec<Value> =
+            module.commands.iter().map(|command| self.edge(model, module, command)).collect();
+        let mut location = json!({ "name": "run" });
+        if !transient.is_empty() {
+            location["transient-values"] = json!(transient);
+        }
+        json!({
+            "name": module.name,
+            "locations": [location],
+            "initial-locations": ["run"],
+            "edges": edges,
+        })
+    }
+
+    fn edge(&self, model: &Model, module: &Module, command: &Command) -> Value {
+        // Of the modules that share an action, the first one carries its rewards.
+        let action = command.action.as_deref();
+        let shares = |other: &&Module| other.commands.iter().any(|c| c.action.as_deref() == action);
+        let carries =
+            action.is_some() && model.modules.iter().find(shares).is_some_and(|m| m.name == module.name);
+        let mut assignments = Vec::new();
+        if carries {
+            for Rewards { name, items, .. } in &model.rewards {
+                let own = items.iter().filter(|item| item.action == Some(command.action.clone()));
+                if let Some(value) = self.sum(own) {
+                    assignments.push(json!({ "ref": reward_name(name), "value": value }));
+                }
+            }
+        }
+        let destinations: Vec<Value> = command
+            .updates
+            .iter()
+            .map(|update| {
+                let mut all = assignments.clone();
+                all.extend(
+                    update
+                        .assignments
+                        .iter()
+                        .map(|(name, value, _)| json!({ "ref": name, "value": self.expression(value) })),
+                );
+                let mut destination = json!({ "location": "run", "assignments": all });
+                if let Some(probability) = &update.probability {
+                    destination["probability"] = json!({ "exp": self.expression(probability) });
+                }
+                destination
+            })
+            .collect();
+        let mut edge = json!({
+            "location": "run",
+            "guard": { "exp": self.expression(&command.guard) },
+            "destinations": destinations,
+        });
+        if let Some(action) = &command.action {
+            edge["action"] = json!(action);
+        }
+        edge
+    }
+
+    /// The sum of rewards, each where its guard holds.
+    fn sum<'a>(&self, items: impl Iterator<Item = &'a RewardItem>) -> Option<Value> {
+        items
+            .map(|item| match item.guard.kind {
+                ExprKind::Bool(true) => self.expression(&item.reward),
+                _ => json!({
+                    "op": "ite",
+                    "if": self.expression(&item.guard),
+                    "then": self.expression(&item.reward),
+                    "else": 0,
+                }),
+            })
+            .reduce(|left, right| json!({ "op": "+", "left": left, "right": right }))
+    }
+
+    fn variable(&self, variable: &Variable) -> Value {
+        let (kind, least) = match &variable.range {
+            None => (json!("bool"), json!(false)),
+            Some((least, greatest)) => {
+                let (least, greatest) = (self.expression(least), self.expression(greatest));
+                let kind = json!({ "kind": "bounded", "base": "int", "lower-bound": least, "upper-bound": greatest });
+                (kind, least)
+            }
+        };
+        let initial = variable.initial.as_ref().map_or(least, |value| self.expression(value));
+        json!({ "name": variable.name, "type": kind, "initial-value": initial })
+    }
+
+    fn expression(&self, expression: &Expr) -> Value {
+        match &expression.kind {
+            ExprKind::Bool(value) => json!(value),
+            ExprKind::Int(value) => json!(value),
+            ExprKind::Number(value) => number(value),
+            ExprKind::Label(name) => json!(name),
+            ExprKind::Name(name) => match self.formulas.iter().find(|formula| formula.name == *name) {
+                Some(formula) => self.expression(&formula.expression),
+                None => json!(name),
+            },
+            ExprKind::Not(inner) => json!({ "op": "¬", "exp": self.expression(inner) }),
+            ExprKind::Negative(inner) => json!({ "op": "-", "left": 0, "right": self.expression(inner) }),
+            ExprKind::Binary(op, left, right) => {
+                json!({ "op": sign(*op), "left": self.expression(left), "right": self.expression(right) })
+            }
+            ExprKind::If(condition, then, otherwise) => json!({
+                "op": "ite",
+                "if": self.expression(condition),
+                "then": self.expression(then),
+                "else": self.expression(otherwise),
+            }),
+            ExprKind::Call(function, arguments) => self.call(*function, arguments),
+        }
+    }
+
+    fn call(&self, function: Function, arguments: &[Expr]) -> Value {
+        let values: Vec<Value> = arguments.iter().map(|argument| self.expression(argument)).collect();
+        match (function, &values[..]) {
+            (Function::Floor | Function::Ceil, [inner]) => json!({ "op": function.name(), "exp": inner }),
+            (Function::Round, [inner]) => {
+                json!({ "op": "floor", "exp": { "op": "+", "left": inner, "right": 0.5 } })
+            }
+            (Function::Mod, [left, right]) => json!({ "op": "%", "left": left, "right": right }),
+            _ => {
+                let pairs = values.into_iter();
+                pairs
+                    .reduce(|left, right| json!({ "op": function.name(), "left": left, "right": right }))
+                    .unwrap_or(Value::Null)
+            }
+        }
+    }
+}
+
+/// A decimal as a number; a fraction that is none as a division.
+fn number(value: &num_rational::BigRational) -> Value {
+    let (text, _) = crate::prism::decimal(value);
+    text.parse::<serde_json::Number>().map_or_else(
+        |_| match (value.numer().to_i64(), value.denom().to_i64()) {
+            (Some(numerator), Some(denominator)) => {
+                json!({ "op": "/", "left": numerator, "right": denominator })
+            }
+            _ => json!(crate::Number::to_f64(value)),
+        },
+        Value::Number,
+    )
+}
+
+fn sign(op: BinaryOp) -> &'static str {
+    match op {
+        BinaryOp::Iff => "⇔",
+        BinaryOp::Implies => "⇒",
+        BinaryOp::Or => "∨",
+        BinaryOp::And => "∧",
+        BinaryOp::NotEqual => "≠",
+        BinaryOp::LessEqual => "≤",
+        BinaryOp::GreaterEqual => "≥",
+        other => other.sign().0,
+    }
+}

@@ -1,0 +1,126 @@
+//! No text makes the reader or the checker panic, and what is written reads back as the same model.
+
+use metaplan_probabilistic::check::{Options, check};
+use metaplan_probabilistic::explore::Bounds;
+use metaplan_probabilistic::{jani, prism, property};
+use proptest::prelude::*;
+
+const MODEL: &str = "mdp
+const int N = 3;
+formula done = s=N | (d & !(s=0));
+global g : [0..2];
+module first
+  s : [0..N] init 0; d : bool init false;
+  [a] s<N -> 1/3:(s'=s+1) + 2/3:(s'=min(s,1))&(d'=!d);
+  [b] s<N & g=0 -> (s'=N);
+  [] g<2 & mod(s,2)=0 -> (g'=g+1);
+endmodule
+module second = first [s=t, d=e, a=c] endmodule
+rewards \"cost\"
+  [a] d : 2; [c] true : s+0.5; done : 1;
+endrewards
+label \"goal\" = done & t>=1;
+";
+
+const WORDS: [&str; 24] = [
+    "module",
+    "endmodule",
+    "[",
+    "]",
+    "(",
+    ")",
+    "->",
+    "true",
+    "s",
+    "'",
+    "=",
+    "+",
+    ":",
+    ";",
+    "..",
+    "?",
+    "label",
+    "\"goal\"",
+    "-",
+    "9999999999999999999",
+    "0.5",
+    "rewards",
+    "endrewards",
+    "init",
+];
+
+fn survive(text: &str) {
+    if let Ok(model) = prism::parse(text) {
+        let property = property::parse("Pmax=? [ F \"goal\" ]").expect("a property");
+        let options = Options { bounds: Bounds { states: 2000, ..Bounds::default() }, ..Options::default() };
+        let _ = check(&model, &property, &options);
+        let _ = jani::write("model", &model);
+    }
+}
+
+#[test]
+fn what_is_written_reads_back() {
+    let model = prism::parse(MODEL).expect("a model");
+    let text = prism::write(&model);
+    let again = prism::parse(&text).unwrap_or_else(|problems| panic!("{problems:?}\n{text}"));
+    assert_eq!(prism::write(&again), text);
+    for question in [
+        "Pmax=? [ F \"goal\" ]",
+        "R{\"cost\"}min=? [ F done ]",
+        "Pmin=? [ d=false U s=N ]",
+        "Pmin=? [ G<=5 s<N ]",
+    ] {
+        let property = property::parse(question).expect("a property");
+        let outcome = |model| check(model, &property, &Options::default()).expect("an answer").outcome;
+        assert_eq!(outcome(&model), outcome(&again), "{question}");
+    }
+}
+
+#[test]
+fn exact_and_rounded_answers_agree() {
+    use metaplan_probabilistic::check::{Exactness, Outcome};
+    let model = prism::parse(MODEL).expect("a model");
+    for question in [
+        "Pmax=? [ F \"goal\" ]",
+        "Pmin=? [ F \"goal\" ]",
+        "R{\"cost\"}min=? [ F done ]",
+        "R{\"cost\"}max=? [ F done ]",
+        "Pmax=? [ X d ]",
+        "Pmax=? [ F<=4 \"goal\" ]",
+        "R{\"cost\"}max=? [ C<=7 ]",
+    ] {
+        let property = property::parse(question).expect("a property");
+        let [exact, rounded] = [Exactness::Always, Exactness::Never].map(|exactness| {
+            let options = Options { exactness, ..Options::default() };
+            check(&model, &property, &options).expect("an answer").outcome
+        });
+        let (Outcome::Value(exact), Outcome::Value(rounded)) = (exact, rounded) else { panic!("{question}") };
+        match (exact.quantity(), rounded.quantity()) {
+            (Some(exact), Some(rounded)) => assert!(
+                rounded.lower <= exact.upper
+                    && exact.lower <= rounded.upper
+                    && (exact.value - rounded.value).abs() < 1e-9,
+                "{question}: {exact:?} {rounded:?}"
+            ),
+            (None, None) => {}
+            other => panic!("{question}: {other:?}"),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn broken_models_are_refused_without_panic(at in 0..MODEL.len(), length in 0_usize..40, word in 0..WORDS.len()) {
+        let end = (at + length).min(MODEL.len());
+        survive(&format!("{}{}{}", &MODEL[..at], WORDS[word], &MODEL[end..]));
+    }
+
+    #[test]
+    fn words_in_any_order_are_refused_without_panic(words in prop::collection::vec(0..WORDS.len(), 0..40)) {
+        let text: Vec<&str> = words.into_iter().map(|word| WORDS[word]).collect();
+        survive(&format!("mdp {}", text.join(" ")));
+        let _ = property::parse(&text.join(" "));
+    }
+}

@@ -1,0 +1,119 @@
+//! `metaplan import`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use metaplan::message::Message;
+use metaplan::mission::source;
+use metaplan::probabilistic::{MapOptions, import_map};
+use serde_json::json;
+
+use crate::cli::{Common, Exit, Failure, Format, output};
+
+/// Arguments of `import`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// The map of Cámara et al. (`map-p2cp3.json` and maps of its form) as a mission with probabilities.
+    CamaraMap(CamaraMap),
+}
+
+#[derive(Debug, Args)]
+struct CamaraMap {
+    /// The map.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Where the mission starts, as the map names it.
+    #[arg(long, default_value = "l1")]
+    start: String,
+    /// Where it ends.
+    #[arg(long, default_value = "l18")]
+    goal: String,
+    /// The configuration at the start.
+    #[arg(long, default_value = "amcl-lidar")]
+    configuration: String,
+    /// Neighbouring places with no light between them, which the map does not say (repeatable, or separated by commas).
+    #[arg(long, value_name = "A-B", value_delimiter = ',', value_parser = two)]
+    dark: Vec<(String, String)>,
+    /// The battery at the start, in the unit of the arcs' energy.
+    #[arg(long, value_name = "UNITS", default_value_t = 32_560, conflicts_with = "no_battery")]
+    battery: u32,
+    /// A mission in which the battery does not matter.
+    #[arg(long)]
+    no_battery: bool,
+    /// Seconds that enabling or disabling one component takes.
+    #[arg(long, value_name = "SECONDS", default_value_t = 5)]
+    switch: u32,
+    /// Which probabilities are imported.
+    #[arg(long, value_enum, default_value_t = Risk::All)]
+    risk: Risk,
+    /// The mission's name.
+    #[arg(long, default_value = "camara")]
+    name: String,
+    /// A directory for the mission's files, made if it is not there.
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Risk {
+    /// None of them.
+    None,
+    /// Those of collisions.
+    Collisions,
+    /// Those of collisions, and of moves that do not get to their end.
+    All,
+}
+
+fn two(text: &str) -> Result<(String, String), String> {
+    let pair = text.split_once('-').ok_or_else(|| format!("`{text}` is not of the form A-B"))?;
+    Ok((pair.0.trim().to_owned(), pair.1.trim().to_owned()))
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let What::CamaraMap(map) = &arguments.what;
+    let is_name = !map.name.is_empty() && map.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if !is_name {
+        let text = format!("`{}` cannot name a mission; use letters, digits and `_`", map.name);
+        return Err(Failure::usage(Message::error("M107", text)));
+    }
+    let file = source(&map.file)?;
+    let options = MapOptions {
+        name: map.name.clone(),
+        start: map.start.clone(),
+        goal: map.goal.clone(),
+        configuration: map.configuration.clone(),
+        dark: map.dark.clone(),
+        battery: (!map.no_battery).then_some(map.battery),
+        switch_seconds: map.switch,
+        collisions: map.risk != Risk::None,
+        failures: map.risk == Risk::All,
+    };
+    let files = import_map(file.name(), file.text(), &options)?;
+    std::fs::create_dir_all(&map.output).map_err(|error| {
+        let text = format!("cannot be made: {}", error.kind());
+        Message::at("M109", &map.output.display().to_string(), None, text)
+    })?;
+    let manifest = format!("{}.toml", map.name);
+    let written = [
+        (manifest.clone(), &files.manifest),
+        (format!("{}.ttl", map.name), &files.knowledge),
+        ("domain.pddl".to_owned(), &files.domain),
+        ("problem.pddl".to_owned(), &files.problem),
+    ];
+    for (name, text) in &written {
+        output::write_file(&map.output.join(name), text)?;
+    }
+    let manifest = map.output.join(manifest).display().to_string();
+    match common.format {
+        Format::Json => output::json_answer(&json!({ "format": "metaplan-import/1", "mission": manifest })),
+        _ => output::answer(&format!("{manifest}\n")),
+    }
+    Ok(Exit::Done)
+}

@@ -1,0 +1,376 @@
+//! A filled problem to places, arcs, configurations and what they cost: the data of the co-adaptation process.
+//!
+//! The PDDL symbols have default names; a manifest's section `[probabilistic]` gives others.
+
+use std::collections::BTreeMap;
+
+use encodings::pddl::ast::{Atom, Condition, InitialElement, Problem, Term};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, ToPrimitive, Zero};
+use ontology::tomasys::View;
+use serde::Deserialize;
+
+use crate::message::Message;
+use crate::mission::Mission;
+
+/// Which PDDL symbols stand for what; the section `[probabilistic]` of a manifest.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs, reason = "the names are those of the roles")]
+pub struct Roles {
+    pub location: String,
+    pub configured: String,
+    pub available: String,
+    /// `(suits DESIGN FROM TO)`.
+    pub suits: String,
+    /// `(time FROM TO DESIGN)`, and so on.
+    pub time: String,
+    pub energy: String,
+    pub success: String,
+    pub hit: String,
+    /// `(switch_time OLD NEW)`, and so on.
+    pub switch_time: String,
+    pub switch_energy: String,
+    pub switch_success: String,
+    pub battery: String,
+    pub reserve: String,
+    /// How much battery one level of the process stands for, in the unit of the problem.
+    pub battery_unit: u32,
+    /// The component that may be lost on the way, if there is one.
+    pub loss_component: Option<String>,
+    /// The probability of losing it, for each move.
+    pub loss_rate: f64,
+}
+
+impl Default for Roles {
+    fn default() -> Self {
+        let name = str::to_owned;
+        Self {
+            location: name("robot_at"),
+            configured: name("configured"),
+            available: name("fd_available"),
+            suits: name("suits"),
+            time: name("time"),
+            energy: name("energy"),
+            success: name("success"),
+            hit: name("hit"),
+            switch_time: name("switch_time"),
+            switch_energy: name("switch_energy"),
+            switch_success: name("switch_success"),
+            battery: name("battery"),
+            reserve: name("reserve"),
+            battery_unit: 1,
+            loss_component: None,
+            loss_rate: 0.0,
+        }
+    }
+}
+
+/// One way to traverse an arc.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traversal {
+    /// In the mission's time unit.
+    pub time: BigRational,
+    /// In the mission's unit of energy.
+    pub energy: BigRational,
+    /// The probability of getting to the end, collision or not.
+    pub success: BigRational,
+    /// The probability of a collision on the way, if the end is reached.
+    pub hit: BigRational,
+}
+
+/// What a change of configuration takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Switch {
+    /// In the mission's time unit.
+    pub time: BigRational,
+    /// In the mission's unit of energy.
+    pub energy: BigRational,
+    /// The probability that it works; else the old configuration stays.
+    pub success: BigRational,
+}
+
+/// A directed arc.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arc {
+    /// Where it starts, as a number of a place.
+    pub from: usize,
+    /// Where it ends.
+    pub to: usize,
+    /// For each configuration how it is traversed, if it can be.
+    pub by: Vec<Option<Traversal>>,
+}
+
+/// A configuration: a design of the function that moving requires.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Configuration {
+    /// The design's name.
+    pub name: String,
+    /// The components that it needs.
+    pub components: Vec<String>,
+    /// Whether it is available at the start.
+    pub available: bool,
+}
+
+/// A battery in whole levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Battery {
+    /// How many levels there are at the start.
+    pub initial: u32,
+    /// No move may leave less than this.
+    pub reserve: u32,
+    /// What one level stands for, in the mission's unit of energy.
+    pub unit: u32,
+}
+
+/// A component that may be lost on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loss {
+    /// Its name.
+    pub component: String,
+    /// The probability for each move.
+    pub rate: BigRational,
+}
+
+/// A co-adaptation mission.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coadaptation {
+    /// The names of the places.
+    pub places: Vec<String>,
+    /// Where it starts.
+    pub start: usize,
+    /// Where it ends.
+    pub goal: usize,
+    /// The configurations.
+    pub configurations: Vec<Configuration>,
+    /// The one at the start.
+    pub initial: usize,
+    /// The arcs, by start and end.
+    pub arcs: Vec<Arc>,
+    /// From each configuration to each other one, where that is possible.
+    pub switches: Vec<Vec<Option<Switch>>>,
+    /// The battery, if there is one.
+    pub battery: Option<Battery>,
+    /// What may be lost.
+    pub loss: Option<Loss>,
+}
+
+impl Coadaptation {
+    /// The co-adaptation process of a mission, as [`Mission::filled`] has filled its problem.
+    ///
+    /// # Errors
+    /// Everything that is missing.
+    pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Vec<Message>> {
+        let facts = Facts::new(problem);
+        let mut problems = Vec::new();
+        let mut need = |what: &str, found: Option<String>| {
+            found.unwrap_or_else(|| {
+                let text =
+                    format!("the problem has no fact `({what} …)` at the start, which the process needs");
+                problems.push(Message::error("M120", text));
+                String::new()
+            })
+        };
+        let start = need(&roles.location, facts.single(&roles.location));
+        let configured = need(&roles.configured, facts.single(&roles.configured));
+        let goal = need(&format!("{} as goal", roles.location), goal(&problem.goal, &roles.location));
+        if facts.of(&roles.suits).is_empty() {
+            need(&roles.suits, None);
+        }
+        if !problems.is_empty() {
+            return Err(problems);
+        }
+        let mut places: Vec<String> = vec![start.clone(), goal.clone()];
+        let mut designs: Vec<String> = vec![configured.clone()];
+        for arguments in facts.of(&roles.suits) {
+            if let [design, from, to] = &arguments[..] {
+                designs.push(design.clone());
+                places.extend([from.clone(), to.clone()]);
+            }
+        }
+        designs.extend(facts.of(&roles.available).iter().filter_map(|arguments| arguments.first().cloned()));
+        natural(&mut places);
+        natural(&mut designs);
+        let place = |name: &str| places.iter().position(|known| known == name).unwrap_or_default();
+        let design = |name: &str| designs.iter().position(|known| known == name).unwrap_or_default();
+        let view = mission.knowledge().map(crate::knowledge::Knowledge::view);
+        let configurations: Vec<_> = designs
+            .iter()
+            .map(|name| Configuration {
+                name: name.clone(),
+                components: view.as_ref().map(|view| components(view, name)).unwrap_or_default(),
+                available: facts.of(&roles.available).iter().any(|arguments| arguments[..] == [name.clone()]),
+            })
+            .collect();
+        let arcs = facts.arcs(roles, &places, &designs)?;
+        let switch = |old: &String, new: &String| {
+            let value = |role: &str| facts.value(role, &[old, new]);
+            (old != new).then(|| Switch {
+                time: value(&roles.switch_time).unwrap_or_else(BigRational::zero),
+                energy: value(&roles.switch_energy).unwrap_or_else(BigRational::zero),
+                success: value(&roles.switch_success).unwrap_or_else(BigRational::one),
+            })
+        };
+        let switches =
+            designs.iter().map(|old| designs.iter().map(|new| switch(old, new)).collect()).collect();
+        let unit = BigRational::from(BigInt::from(roles.battery_unit.max(1)));
+        let reserve = facts.value(&roles.reserve, &[]).unwrap_or_else(BigRational::zero);
+        let battery = facts
+            .value(&roles.battery, &[])
+            .and_then(|value| (value / &unit).floor().to_integer().to_u32())
+            .map(|initial| Battery {
+                initial,
+                reserve: (reserve / &unit).ceil().to_integer().to_u32().unwrap_or(0),
+                unit: roles.battery_unit.max(1),
+            });
+        let loss = roles.loss_component.clone().map(|component| Loss {
+            component,
+            rate: probabilistic::number::from_shortest_decimal(roles.loss_rate)
+                .unwrap_or_else(BigRational::zero),
+        });
+        Ok(Self {
+            start: place(&start),
+            goal: place(&goal),
+            initial: design(&configured),
+            places,
+            configurations,
+            arcs,
+            switches,
+            battery,
+            loss,
+        })
+    }
+
+    /// The configurations that the loss of the component takes away.
+    pub fn lost(&self, configuration: usize) -> bool {
+        self.loss
+            .as_ref()
+            .is_some_and(|loss| self.configurations[configuration].components.contains(&loss.component))
+    }
+
+    /// The same without one component, and what needs it.
+    #[must_use]
+    pub fn without(&self, component: &str) -> Self {
+        let mut result = self.clone();
+        for configuration in &mut result.configurations {
+            configuration.available &= !configuration.components.iter().any(|known| known == component);
+        }
+        result
+    }
+}
+
+/// Numbers in names count as numbers: `l2` before `l10`.
+fn natural(names: &mut Vec<String>) {
+    let key = |name: &String| {
+        let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
+        (name.len() - digits.len(), name[..name.len() - digits.len()].to_owned(), digits.len(), name.clone())
+    };
+    names.sort_by_key(key);
+    names.dedup();
+}
+
+fn components(view: &View<'_>, design: &str) -> Vec<String> {
+    let found = view.function_designs().into_iter().find(|known| known.individual.name == design);
+    found
+        .map(|found| found.components.iter().map(|component| component.name.clone()).collect())
+        .unwrap_or_default()
+}
+
+/// The facts and values of a problem by symbol.
+struct Facts {
+    facts: BTreeMap<String, Vec<Vec<String>>>,
+    values: BTreeMap<Vec<String>, BigRational>,
+}
+
+impl Facts {
+    fn new(problem: &Problem) -> Self {
+        let mut result = Self { facts: BTreeMap::new(), values: BTreeMap::new() };
+        for element in &problem.init {
+            match element {
+                InitialElement::Fact(atom) => {
+                    let (name, arguments) = words(atom);
+                    result.facts.entry(name).or_default().push(arguments);
+                }
+                InitialElement::Value(atom, value, _) => {
+                    let (name, arguments) = words(atom);
+                    let key = std::iter::once(name).chain(arguments).collect();
+                    result.values.insert(key, value.clone());
+                }
+                _ => {}
+            }
+        }
+        result
+    }
+
+    /// The arcs with their traversals.
+    fn arcs(&self, roles: &Roles, places: &[String], designs: &[String]) -> Result<Vec<Arc>, Vec<Message>> {
+        let index =
+            |names: &[String], name: &str| names.iter().position(|known| known == name).unwrap_or_default();
+        let (place, design) = (|name: &str| index(places, name), |name: &str| index(designs, name));
+        let mut problems = Vec::new();
+        let mut arcs: BTreeMap<(usize, usize), Arc> = BTreeMap::new();
+        for arguments in self.of(&roles.suits) {
+            let [name, from, to] = &arguments[..] else { continue };
+            let value = |role: &str| self.value(role, &[from, to, name]);
+            let Some(time) = value(&roles.time) else {
+                let text = format!("`({} {from} {to} {name})` has no value", roles.time);
+                problems.push(Message::error("M121", text));
+                continue;
+            };
+            let traversal = Traversal {
+                time,
+                energy: value(&roles.energy).unwrap_or_else(BigRational::zero),
+                success: value(&roles.success).unwrap_or_else(BigRational::one),
+                hit: value(&roles.hit).unwrap_or_else(BigRational::zero),
+            };
+            for (role, probability) in [(&roles.success, &traversal.success), (&roles.hit, &traversal.hit)] {
+                if *probability < BigRational::zero() || *probability > BigRational::one() {
+                    let text = format!("`({role} {from} {to} {name})` is no probability: {probability}");
+                    problems.push(Message::error("M122", text));
+                }
+            }
+            let key = (place(from), place(to));
+            let arc = arcs.entry(key).or_insert_with(|| Arc {
+                from: key.0,
+                to: key.1,
+                by: vec![None; designs.len()],
+            });
+            arc.by[design(name)] = Some(traversal);
+        }
+        if problems.is_empty() { Ok(arcs.into_values().collect()) } else { Err(problems) }
+    }
+
+    fn of(&self, name: &str) -> &[Vec<String>] {
+        self.facts.get(&name.to_ascii_lowercase()).map_or(&[], Vec::as_slice)
+    }
+
+    fn single(&self, name: &str) -> Option<String> {
+        self.of(name).first().and_then(|arguments| arguments.last().cloned())
+    }
+
+    fn value(&self, name: &str, arguments: &[&String]) -> Option<BigRational> {
+        let mut key = vec![name.to_ascii_lowercase()];
+        key.extend(arguments.iter().map(|argument| (*argument).clone()));
+        self.values.get(&key).cloned()
+    }
+}
+
+fn words(atom: &Atom) -> (String, Vec<String>) {
+    let argument = |term: &Term| match term {
+        Term::Variable(name) | Term::Constant(name) => name.name.as_str().to_owned(),
+    };
+    (atom.predicate.name.as_str().to_ascii_lowercase(), atom.arguments.iter().map(argument).collect())
+}
+
+/// The last argument of the goal's atom with this predicate.
+fn goal(condition: &Condition, location: &str) -> Option<String> {
+    match condition {
+        Condition::Atom(atom) => {
+            let (name, arguments) = words(atom);
+            arguments.last().filter(|_| name == location.to_ascii_lowercase()).cloned()
+        }
+        Condition::And(parts) => parts.iter().find_map(|part| goal(part, location)),
+        _ => None,
+    }
+}

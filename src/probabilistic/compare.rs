@@ -1,0 +1,342 @@
+//! Both approaches in one referee: policies of model checking, and plans with and without re-planning, are played in the
+//! same decision process, and measured exactly there.
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use num_rational::BigRational;
+use probabilistic::Error;
+use probabilistic::explore::{Bounds, explore};
+
+use crate::message::Message;
+use crate::probabilistic::coadaptation::Coadaptation;
+use crate::probabilistic::loss::{self, LossReport};
+use crate::probabilistic::play::{Measures, play};
+use crate::probabilistic::process::{Action, Process, REWARDS, Risk, Situation, State};
+use crate::probabilistic::published::{published, shortest_routes};
+use crate::probabilistic::referee::Referee;
+use crate::probabilistic::route::best_on_route;
+
+/// A plan from a situation, and what it cost to find it.
+#[derive(Debug, Clone, Default)]
+pub struct Planned {
+    /// What to do; none if there is no plan.
+    pub actions: Option<Vec<Action>>,
+    /// Variables of the largest formula.
+    pub variables: u64,
+    /// Its clauses.
+    pub clauses: u64,
+    /// How long it took.
+    pub time: Duration,
+}
+
+/// Finds plans; asked once for each situation.
+pub type Planner<'a> = dyn FnMut(&Situation) -> Result<Planned, Vec<Message>> + 'a;
+
+/// How a comparison is made.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// What is uncertain in the referee.
+    pub risk: Risk,
+    /// The time that a failed mission costs; ten times the fastest plan's if not given.
+    pub penalty: Option<f64>,
+    /// The priority of the published procedure: time (0), energy (1) or safety (2).
+    pub priority: usize,
+    /// More states than this are an error.
+    pub states: usize,
+}
+
+/// One way to decide, and what comes of it.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Which kind it is: `a` to `f`.
+    pub kind: char,
+    /// What it is.
+    pub name: String,
+    /// What comes of it.
+    pub measures: Measures,
+}
+
+/// What both sides take.
+#[derive(Debug, Clone, Default)]
+pub struct Costs {
+    /// Of the process.
+    pub states: usize,
+    /// Of the process.
+    pub transitions: usize,
+    /// To build the process.
+    pub build: Duration,
+    /// To solve it, for all objectives together.
+    pub solve: Duration,
+    /// How many plans were made.
+    pub plans: usize,
+    /// The first one (cold).
+    pub first_plan: Duration,
+    /// The other ones together (warm).
+    pub more_plans: Duration,
+    /// Of the largest formula.
+    pub variables: u64,
+    /// Of the largest formula.
+    pub clauses: u64,
+}
+
+/// The table.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// The rows.
+    pub candidates: Vec<Candidate>,
+    /// The vertices of the front of time and probability of success without collision, where each time is finite.
+    pub front: Vec<[f64; 2]>,
+    /// A time that no way to decide gets below, even one that knows beforehand what will be lost.
+    pub hindsight: Option<f64>,
+    /// The penalty for failed missions.
+    pub penalty: f64,
+    /// Why re-planning cannot be worse than the best policy, where that is known without computing it.
+    pub no_price: Option<&'static str>,
+    /// What the loss of the component does, step by step.
+    pub loss: Option<LossReport>,
+    /// What both sides take.
+    pub costs: Costs,
+}
+
+impl Comparison {
+    /// The penalised time of a kind of candidate.
+    fn penalised(&self, kind: char) -> Option<f64> {
+        self.candidates.iter().find(|candidate| candidate.kind == kind)?.measures.penalised_time
+    }
+
+    /// The penalised time that the plan with re-planning takes above the best policy: the price of determinism.
+    pub fn price_of_determinism(&self) -> Option<f64> {
+        Some(self.penalised('c')? - self.penalised('a')?)
+    }
+
+    /// The penalised time that the plan without re-planning takes above the best policy: the price of the open loop.
+    pub fn price_of_open_loop(&self) -> Option<f64> {
+        Some(self.penalised('b')? - self.penalised('a')?)
+    }
+
+    /// The penalised time that re-planning saves.
+    pub fn value_of_replanning(&self) -> Option<f64> {
+        Some(self.penalised('b')? - self.penalised('c')?)
+    }
+}
+
+/// Compares all candidates. The planner is asked for the plan at the start, and wherever re-planning is needed.
+///
+/// # Errors
+/// The planner's, or a limit on states.
+pub fn compare(
+    mission: &Coadaptation,
+    config: &Config,
+    planner: &mut Planner<'_>,
+) -> Result<Comparison, Failure> {
+    let mut costs = Costs::default();
+    let started = Instant::now();
+    let process = Process::<f64>::new(mission, config.risk, &REWARDS);
+    let bounds = Bounds { states: config.states, ..Bounds::default() };
+    let explored = explore(&process, &bounds)?;
+    costs.build = started.elapsed();
+    costs.states = explored.mdp.states();
+    costs.transitions = explored.mdp.transition_count();
+    let mut memo = Memo { planner, plans: BTreeMap::new(), costs };
+    let first = memo.plan(&process_start(mission, config.risk))?;
+    let fastest = first.as_ref().map(|plan| time_of(mission, plan));
+    let penalty = config.penalty.unwrap_or_else(|| 10.0 * fastest.unwrap_or(1000.0).max(1.0));
+    let referee = Referee { mission, risk: config.risk, penalty, explored };
+    let mut candidates = Vec::new();
+    let started = Instant::now();
+    let policies = referee.policies();
+    let (front, vertices) = referee.front();
+    memo.costs.solve = started.elapsed();
+    let mut anticipating = None;
+    for (name, policy) in policies.into_iter().chain(vertices) {
+        let measures = referee.play_policy(&policy)?;
+        candidates.push(Candidate { kind: 'a', name, measures });
+        anticipating.get_or_insert(policy);
+    }
+    if let Some(plan) = &first {
+        let measures = referee.play_plan(plan)?;
+        candidates.push(Candidate { kind: 'b', name: "our plan, open loop".to_owned(), measures });
+        let measures = memo.play(&referee)?;
+        candidates.push(Candidate { kind: 'c', name: "our plan, re-planning".to_owned(), measures });
+    }
+    if let Some(found) = published(mission, config.priority) {
+        let measures = referee.play_plan(&found.actions(mission))?;
+        candidates.push(Candidate { kind: 'd', name: "published procedure".to_owned(), measures });
+    }
+    if let Some(route) = shortest_routes(mission, 1).first()
+        && let Some(plan) = best_on_route(mission, route)
+    {
+        let measures = referee.play_plan(&plan)?;
+        let name = "fixed shortest route, best configurations".to_owned();
+        candidates.push(Candidate { kind: 'e', name, measures });
+    }
+    let loss = match &first {
+        Some(plan) if mission.loss.is_some() => {
+            Some(loss::report(&referee, plan, anticipating.as_deref().unwrap_or_default(), &mut memo)?)
+        }
+        _ => None,
+    };
+    let hindsight = loss::hindsight(mission, config.risk, penalty);
+    Ok(Comparison {
+        candidates,
+        front,
+        hindsight,
+        penalty,
+        no_price: referee.no_price(),
+        loss,
+        costs: memo.costs,
+    })
+}
+
+/// Why a comparison has no result.
+#[derive(Debug)]
+pub enum Failure {
+    /// Of the process.
+    Process(Error),
+    /// Of the planner.
+    Planner(Vec<Message>),
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Process(error)
+    }
+}
+
+impl From<Vec<Message>> for Failure {
+    fn from(messages: Vec<Message>) -> Self {
+        Self::Planner(messages)
+    }
+}
+
+fn process_start(mission: &Coadaptation, risk: Risk) -> Situation {
+    Situation {
+        place: mission.start,
+        configuration: mission.initial,
+        hit: false,
+        failed: false,
+        lost: false,
+        battery: mission.battery.filter(|_| risk.battery).map_or(0, |battery| battery.initial),
+    }
+}
+
+/// The time of a plan on which nothing goes wrong.
+pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
+    use probabilistic::Number;
+    let (mut configuration, mut time) = (mission.initial, 0.0);
+    for action in plan {
+        match action {
+            Action::Change(new) => {
+                time +=
+                    mission.switches[configuration][*new].as_ref().map_or(0.0, |switch| switch.time.to_f64());
+                configuration = *new;
+            }
+            Action::Move(arc) => {
+                time += mission.arcs[*arc].by[configuration].as_ref().map_or(0.0, |t| t.time.to_f64());
+            }
+        }
+    }
+    time
+}
+
+/// Plans by situation, each made once. The collision flag does not matter to a plan.
+pub(super) struct Memo<'a, 'b> {
+    planner: &'a mut Planner<'b>,
+    plans: BTreeMap<Situation, Option<Vec<Action>>>,
+    pub costs: Costs,
+}
+
+impl Memo<'_, '_> {
+    /// The plan from a situation.
+    pub fn plan(&mut self, situation: &Situation) -> Result<Option<Vec<Action>>, Vec<Message>> {
+        let key = Situation { hit: false, ..*situation };
+        if let Some(known) = self.plans.get(&key) {
+            return Ok(known.clone());
+        }
+        let planned = (self.planner)(&key)?;
+        if self.costs.plans == 0 {
+            self.costs.first_plan = planned.time;
+        } else {
+            self.costs.more_plans += planned.time;
+        }
+        self.costs.plans += 1;
+        self.costs.variables = self.costs.variables.max(planned.variables);
+        self.costs.clauses = self.costs.clauses.max(planned.clauses);
+        self.plans.insert(key, planned.actions.clone());
+        Ok(planned.actions)
+    }
+
+    /// Follows plans, and makes a new one wherever the state is not the one that the last plan expects.
+    fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, Failure> {
+        // What the plan in force wants to do in each state that it expects.
+        let mut expected: BTreeMap<Situation, Action> = BTreeMap::new();
+        let mut failure = None;
+        let unexpected = RefCell::new(BTreeSet::new());
+        let mission = referee.mission;
+        let mut decide = |state: State, _: u32| {
+            let situation = Situation { hit: false, ..state.situation() };
+            if situation.failed || situation.place == mission.goal {
+                return None;
+            }
+            if let Some(action) = expected.get(&situation) {
+                return Some(action.number());
+            }
+            match self.plan(&situation) {
+                Ok(Some(plan)) => {
+                    if situation != process_start(mission, referee.risk) {
+                        unexpected.borrow_mut().insert(situation);
+                    }
+                    follow(mission, situation, &plan, referee.risk, &mut expected);
+                }
+                Ok(None) => return None,
+                Err(messages) => failure = Some(messages),
+            }
+            expected.get(&situation).map(|action| action.number())
+        };
+        let replans =
+            |state: State| unexpected.borrow().contains(&Situation { hit: false, ..state.situation() });
+        let (process, reserve) = (referee.exact(), referee.reserve());
+        let measures = play(&process, false, referee.penalty, reserve, &replans, &mut decide);
+        if let Some(messages) = failure {
+            return Err(messages.into());
+        }
+        Ok(measures?)
+    }
+}
+
+/// Notes what a plan does in each state that it expects.
+fn follow(
+    mission: &Coadaptation,
+    mut at: Situation,
+    plan: &[Action],
+    risk: Risk,
+    expected: &mut BTreeMap<Situation, Action>,
+) {
+    for action in plan {
+        if expected.contains_key(&at) {
+            return;
+        }
+        expected.insert(at, *action);
+        at = after(mission, at, *action, risk);
+    }
+}
+
+/// The state after an action on which nothing goes wrong.
+pub(super) fn after(mission: &Coadaptation, at: Situation, action: Action, risk: Risk) -> Situation {
+    use probabilistic::Number;
+    let unit = mission.battery.map_or(1.0, |battery| f64::from(battery.unit));
+    let levels = |energy: &BigRational| if risk.battery { (energy.to_f64() / unit).ceil() as u32 } else { 0 };
+    match action {
+        Action::Change(new) => {
+            let energy = mission.switches[at.configuration][new].as_ref().map_or(0, |s| levels(&s.energy));
+            Situation { configuration: new, battery: at.battery.saturating_sub(energy), ..at }
+        }
+        Action::Move(arc) => {
+            let arc = &mission.arcs[arc];
+            let energy = arc.by[at.configuration].as_ref().map_or(0, |t| levels(&t.energy));
+            Situation { place: arc.to, battery: at.battery.saturating_sub(energy), ..at }
+        }
+    }
+}

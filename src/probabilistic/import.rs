@@ -1,0 +1,380 @@
+//! The map of Cámara et al. in its JSON form to a mission: a knowledge base, PDDL with probabilities, a manifest.
+//!
+//! The map's licence does not let it be passed on, so users bring their own copy. What the file does not say (the
+//! robot's configurations, their power, which corridors are dark) comes from options and from the table below.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::message::Message;
+
+/// Where the mission starts and ends, and what the file does not say.
+#[derive(Debug, Clone)]
+pub struct MapOptions {
+    /// The mission's name.
+    pub name: String,
+    /// Where it starts, as the map names it.
+    pub start: String,
+    /// Where it ends.
+    pub goal: String,
+    /// The configuration at the start.
+    pub configuration: String,
+    /// Pairs of neighbouring places with no light between them.
+    pub dark: Vec<(String, String)>,
+    /// The battery at the start, none for a mission without.
+    pub battery: Option<u32>,
+    /// Seconds that enabling or disabling one component takes.
+    pub switch_seconds: u32,
+    /// Whether the probabilities of collisions are imported.
+    pub collisions: bool,
+    /// Whether the probabilities that moves fail are imported.
+    pub failures: bool,
+}
+
+impl Default for MapOptions {
+    fn default() -> Self {
+        Self {
+            name: "camara".to_owned(),
+            start: "l1".to_owned(),
+            goal: "l18".to_owned(),
+            configuration: "amcl-lidar".to_owned(),
+            dark: Vec::new(),
+            battery: Some(32_560),
+            switch_seconds: 5,
+            collisions: true,
+            failures: true,
+        }
+    }
+}
+
+/// The files of a mission as texts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Files {
+    /// `NAME.toml`.
+    pub manifest: String,
+    /// `NAME.ttl`.
+    pub knowledge: String,
+    /// `domain.pddl`.
+    pub domain: String,
+    /// `problem.pddl`.
+    pub problem: String,
+}
+
+/// A configuration of the robot: name, power in milliwatts, whether it works in the dark, whose measurements count for
+/// it, and its components.
+struct Design(&'static str, f64, bool, &'static str, &'static [&'static str]);
+
+const DESIGNS: [Design; 6] = [
+    Design(
+        "amcl-kinect",
+        17_790.0,
+        false,
+        "amcl-kinect",
+        &["amcl", "kinect", "laserscan_nodelet", "map_server"],
+    ),
+    Design("amcl-lidar", 19_790.0, false, "amcl-lidar", &["amcl", "lidar", "map_server"]),
+    Design(
+        "mrpt-kinect",
+        18_942.0,
+        false,
+        "mrpt-kinect",
+        &["mrpt", "kinect", "laserscan_nodelet", "map_server"],
+    ),
+    Design("mrpt-lidar", 20_942.0, false, "mrpt-kinect", &["mrpt", "lidar", "map_server"]),
+    Design(
+        "aruco",
+        16_963.0,
+        false,
+        "aruco",
+        &["marker_localization", "marker_recognizer", "camera", "map_server_obstacles"],
+    ),
+    Design(
+        "aruco-headlamp",
+        26_963.0,
+        true,
+        "aruco",
+        &["marker_localization", "marker_recognizer", "camera", "headlamp", "map_server_obstacles"],
+    ),
+];
+
+/// Metres a second at which energy is computed.
+const SPEED: f64 = 0.68;
+/// Energy of a metre for each milliwatt at that speed, in the map's unit.
+const ENERGY: f64 = 0.01;
+/// Levels of the battery that are kept in reserve.
+const RESERVE: u32 = 500;
+
+#[derive(Deserialize)]
+struct Map {
+    #[serde(rename = "map")]
+    nodes: Vec<Node>,
+    #[serde(default)]
+    time: Vec<Value>,
+    #[serde(default)]
+    hitrate: Vec<Value>,
+    #[serde(default)]
+    successrate: Vec<Value>,
+}
+
+#[derive(Deserialize)]
+struct Node {
+    #[serde(rename = "node-id")]
+    id: String,
+    coords: Coordinates,
+    #[serde(rename = "connected-to", default)]
+    neighbours: Vec<String>,
+}
+
+#[derive(Deserialize)]
+struct Coordinates {
+    x: f64,
+    y: f64,
+}
+
+type Pair = (String, String);
+
+fn pair(a: &str, b: &str) -> Pair {
+    if a <= b { (a.to_owned(), b.to_owned()) } else { (b.to_owned(), a.to_owned()) }
+}
+
+/// One measurement for each arc and configuration; the last one counts where an arc has several.
+fn measured(list: &[Value], field: &str, digits: usize) -> BTreeMap<Pair, BTreeMap<&'static str, f64>> {
+    let mut result: BTreeMap<Pair, BTreeMap<&'static str, f64>> = BTreeMap::new();
+    for entry in list {
+        let (Some(from), Some(to)) = (entry["from"].as_str(), entry["to"].as_str()) else { continue };
+        let by = result.entry(pair(from, to)).or_default();
+        for Design(name, ..) in &DESIGNS {
+            if let Some(value) = entry[*name][field].as_f64() {
+                by.insert(name, rounded(value, digits));
+            }
+        }
+    }
+    result
+}
+
+fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.digits$}").parse().unwrap_or(value)
+}
+
+/// Reads a map and writes a mission.
+///
+/// # Errors
+/// The file is no such map, or has no such places.
+pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Vec<Message>> {
+    let map: Map = serde_json::from_str(text).map_err(|error| {
+        let text = format!("this is no map: {error}");
+        vec![Message::at("M123", file, Some((error.line().max(1), error.column().max(1))), text)]
+    })?;
+    let known: BTreeSet<&str> = map.nodes.iter().map(|node| node.id.as_str()).collect();
+    let asked =
+        [&options.start, &options.goal].into_iter().chain(options.dark.iter().flat_map(|(a, b)| [a, b]));
+    let mut problems: Vec<_> = asked
+        .filter(|name| !known.contains(name.as_str()))
+        .map(|name| Message::at("M124", file, None, format!("the map has no place `{name}`")))
+        .collect();
+    if !DESIGNS.iter().any(|Design(name, ..)| *name == options.configuration) {
+        let names: Vec<_> = DESIGNS.iter().map(|Design(name, ..)| *name).collect();
+        let text =
+            format!("there is no configuration `{}`; there are: {}", options.configuration, names.join(", "));
+        problems.push(Message::error("M124", text));
+    }
+    let strange = map.nodes.iter().flat_map(|node| {
+        let lost = node.neighbours.iter().filter(|name| !known.contains(name.as_str()));
+        lost.map(|name| {
+            Message::at("M124", file, None, format!("`{}` leads to `{name}`, which is no place", node.id))
+        })
+    });
+    problems.extend(strange);
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    Ok(Files {
+        manifest: manifest(&options.name),
+        knowledge: knowledge(&options.name),
+        domain: domain(options),
+        problem: problem(&map, options),
+    })
+}
+
+fn object(name: &str) -> String {
+    let safe: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    safe.to_ascii_lowercase()
+}
+
+fn design_object(name: &str) -> String {
+    format!("fd_{}", object(name))
+}
+
+fn manifest(name: &str) -> String {
+    format!(
+        "name = \"{name}\"\ndescription = \"A robot crosses a map; one of its configurations moves it along each arc.\"\n\n\
+         [knowledge]\nfiles = [\"{name}.ttl\"]\n\n[planning]\ndomain = \"domain.pddl\"\nproblem = \"problem.pddl\"\n\n\
+         [probabilistic]\n# One level of the battery in the process; 1 is exact, and the process as much larger.\nbattery_unit = 100\n\n\
+         [scenarios.kinect_failure]\ndescription = \"The Kinect fails.\"\nfail = [\"c_kinect\"]\n"
+    )
+}
+
+fn knowledge(name: &str) -> String {
+    let mut text = format!(
+        "# The configurations of a robot, by the components that they need.\n\n\
+         @prefix : <http://metacontrol.org/metaplan/{name}#> .\n\
+         @prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
+         @prefix t: <http://metacontrol.org/tomasys#> .\n\n\
+         <http://metacontrol.org/metaplan/{name}> a owl:Ontology ;\n    \
+         owl:imports <http://metacontrol.org/tomasys> .\n\n\
+         :f_move a owl:NamedIndividual , t:Function .\n\
+         :a_move a owl:NamedIndividual , t:Action ; t:requiresF :f_move .\n\n"
+    );
+    let components: BTreeSet<_> =
+        DESIGNS.iter().flat_map(|Design(.., components)| components.iter()).collect();
+    for component in components {
+        let _ = writeln!(text, ":c_{component} a owl:NamedIndividual , t:Component .");
+    }
+    text.push('\n');
+    for Design(name, .., components) in &DESIGNS {
+        let components: Vec<_> = components.iter().map(|component| format!(":c_{component}")).collect();
+        let _ = writeln!(
+            text,
+            ":{} a owl:NamedIndividual , t:FunctionDesign ; t:solvesF :f_move ;\n    t:requiresC {} .",
+            design_object(name),
+            components.join(" , ")
+        );
+    }
+    text
+}
+
+const DOMAIN: &str = "; A robot moves along arcs in one of its configurations. What a move takes depends on both; the probabilities of
+; success and of collisions are for the probabilistic approach, and no action reads them.
+(define (domain coadaptation)
+  (:requirements :typing :equality :negative-preconditions :numeric-fluents)
+  (:types waypoint functiondesign)
+  (:predicates
+    (robot_at ?at - waypoint)
+    (configured ?fd - functiondesign)
+    (fd_available ?fd - functiondesign)
+    (suits ?fd - functiondesign ?from ?to - waypoint))
+  (:functions
+    (time ?from ?to - waypoint ?fd - functiondesign)    ; seconds
+    (energy ?from ?to - waypoint ?fd - functiondesign)  ; units of the battery
+    (success ?from ?to - waypoint ?fd - functiondesign) ; probability of getting there
+    (hit ?from ?to - waypoint ?fd - functiondesign)     ; probability of a collision on the way
+    (switch_time ?old ?new - functiondesign)            ; seconds
+    (battery)
+    (reserve)
+    (total_time)
+    (total_energy))
+  (:action move
+    :parameters (?fd - functiondesign ?from ?to - waypoint)
+    :precondition (and (robot_at ?from) (configured ?fd) (fd_available ?fd) (suits ?fd ?from ?to)
+      (>= (battery) (+ (reserve) (energy ?from ?to ?fd))))
+    :effect (and (not (robot_at ?from)) (robot_at ?to)
+      (decrease (battery) (energy ?from ?to ?fd))
+      (increase (total_energy) (energy ?from ?to ?fd))
+      (increase (total_time) (time ?from ?to ?fd))))
+  (:action reconfigure
+    :parameters (?old ?new - functiondesign)
+    :precondition (and (configured ?old) (fd_available ?new) (not (= ?old ?new)))
+    :effect (and (not (configured ?old)) (configured ?new)
+      (increase (total_time) (switch_time ?old ?new)))))
+";
+
+/// Without a battery, the lines about it are left out.
+fn domain(options: &MapOptions) -> String {
+    if options.battery.is_some() {
+        return DOMAIN.to_owned();
+    }
+    let ends = DOMAIN.replace(
+        "(suits ?fd ?from ?to)\n      (>= (battery) (+ (reserve) (energy ?from ?to ?fd))))",
+        "(suits ?fd ?from ?to))",
+    );
+    let lines =
+        ends.lines().filter(|line| !["(battery)", "(reserve)"].iter().any(|word| line.contains(word)));
+    lines.fold(String::new(), |text, line| text + line + "\n")
+}
+
+fn problem(map: &Map, options: &MapOptions) -> String {
+    let times = measured(&map.time, "mean", 4);
+    let hits = measured(&map.hitrate, "hitrate", 9);
+    let successes = measured(&map.successrate, "successrate", 9);
+    let at: BTreeMap<&str, &Coordinates> =
+        map.nodes.iter().map(|node| (node.id.as_str(), &node.coords)).collect();
+    let arcs: BTreeSet<Pair> =
+        map.nodes.iter().flat_map(|node| node.neighbours.iter().map(|other| pair(&node.id, other))).collect();
+    let length =
+        |(a, b): &Pair| (at[a.as_str()].x - at[b.as_str()].x).hypot(at[a.as_str()].y - at[b.as_str()].y);
+    let dark: BTreeSet<Pair> = options.dark.iter().map(|(a, b)| pair(a, b)).collect();
+    // Where an arc was not measured, the mean speed over all measured ones serves.
+    let speed = |source: &str| {
+        let known = times.iter().filter(|(arc, _)| arcs.contains(*arc));
+        let (metres, seconds) = known
+            .filter_map(|(arc, by)| Some((rounded(length(arc), 6), *by.get(source)?)))
+            .filter(|(_, seconds)| *seconds > 0.0)
+            .fold((0.0, 0.0), |(m, s), (metres, seconds)| (m + metres, s + seconds));
+        rounded(if seconds > 0.0 { metres / seconds } else { SPEED }, 3)
+    };
+    let mut init = String::new();
+    for arc in &arcs {
+        for Design(name, power, sees, source, _) in &DESIGNS {
+            if dark.contains(arc) && !sees {
+                continue;
+            }
+            let metres = length(arc);
+            let value =
+                |table: &BTreeMap<Pair, BTreeMap<&'static str, f64>>| table.get(arc)?.get(source).copied();
+            let seconds = value(&times)
+                .filter(|seconds| *seconds > 0.0)
+                .unwrap_or_else(|| rounded(rounded(metres, 6) / speed(source), 4));
+            let energy = (metres * SPEED * power * ENERGY).trunc();
+            for (from, to) in [(&arc.0, &arc.1), (&arc.1, &arc.0)] {
+                let (from, to, design) = (object(from), object(to), design_object(name));
+                let _ = writeln!(init, "    (suits {design} {from} {to})");
+                let _ = writeln!(init, "    (= (time {from} {to} {design}) {seconds})");
+                let _ = writeln!(init, "    (= (energy {from} {to} {design}) {energy})");
+                let numbers = [
+                    ("success", value(&successes).filter(|_| options.failures), 1.0),
+                    ("hit", value(&hits).filter(|_| options.collisions), 0.0),
+                ];
+                for (role, value, usual) in numbers {
+                    if let Some(value) = value.filter(|value| (value - usual).abs() > 0.0) {
+                        let _ = writeln!(init, "    (= ({role} {from} {to} {design}) {value})");
+                    }
+                }
+            }
+        }
+    }
+    for Design(old, .., before) in &DESIGNS {
+        for Design(new, .., after) in DESIGNS.iter().filter(|Design(new, ..)| new != old) {
+            let off = before.iter().filter(|component| !after.contains(component)).count();
+            let on = after.iter().filter(|component| !before.contains(component)).count();
+            let seconds = (off + on) as u32 * options.switch_seconds;
+            let _ = writeln!(
+                init,
+                "    (= (switch_time {} {}) {seconds})",
+                design_object(old),
+                design_object(new)
+            );
+        }
+    }
+    let mut places: Vec<_> = arcs.iter().flat_map(|(a, b)| [object(a), object(b)]).collect();
+    places.extend([object(&options.start), object(&options.goal)]);
+    places.sort_by_key(|name| (name.len(), name.clone()));
+    places.dedup();
+    let designs: Vec<_> = DESIGNS.iter().map(|Design(name, ..)| design_object(name)).collect();
+    let battery =
+        options.battery.map(|battery| format!("    (= (battery) {battery}) (= (reserve) {RESERVE})\n"));
+    let battery = battery.unwrap_or_default();
+    format!(
+        "(define (problem {})\n  (:domain coadaptation)\n  (:objects\n    {} - waypoint\n    {} - functiondesign)\n  \
+         (:init\n    (robot_at {}) (configured {})\n{battery}    \
+         (= (total_time) 0) (= (total_energy) 0)\n{init}  )\n  (:goal (robot_at {}))\n  (:metric minimize (total_time)))\n",
+        object(&options.name),
+        places.join(" "),
+        designs.join(" "),
+        object(&options.start),
+        design_object(&options.configuration),
+        object(&options.goal)
+    )
+}

@@ -1,0 +1,25 @@
+//! The approach of Cámara, Schmerl and Garlan (Software Architecture and Task Plan Co-Adaptation for Mobile Service
+//! Robots, SEAMS 2020), beside Metaplan's own.
+//!
+//! A mission with routes and configurations becomes a Markov decision process ([`Coadaptation`]); the plan of the SAT
+//! planner and the policies of probabilistic model checking are evaluated in that one process ([`compare`]).
+
+mod coadaptation;
+mod compare;
+mod import;
+mod loss;
+mod play;
+mod process;
+mod program;
+mod published;
+mod referee;
+mod route;
+
+pub use coadaptation::{Arc, Battery, Coadaptation, Configuration, Loss, Roles, Switch, Traversal};
+pub use compare::{Candidate, Comparison, Config, Costs, Failure, Planned, Planner, compare};
+pub use import::{Files, MapOptions, import_map};
+pub use loss::{LossAt, LossReport};
+pub use play::Measures;
+pub use process::{Action, Process, REWARDS, Risk, Situation, State};
+pub use program::program;
+pub use published::{Published, published, shortest_routes};

@@ -1,0 +1,172 @@
+//! Something that decides (a policy, a plan, a planner) and the process to what comes of it, exactly.
+
+use std::cell::RefCell;
+
+use fixedbitset::FixedBitSet;
+use probabilistic::explore::{Bounds, Choices, Explored, Generator, explore};
+use probabilistic::policy::conditioned;
+use probabilistic::solve::solve;
+use probabilistic::{Direction, Error, Mdp, Number, Problem};
+
+use crate::probabilistic::process::{Process, State};
+
+/// Decides what to do in a state after so many steps, by the number of the action; none ends the mission.
+pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
+
+/// The process with its decisions made.
+struct Played<'a, 'b, N> {
+    process: &'a Process<N>,
+    decide: RefCell<&'a mut Decide<'b>>,
+    /// Whether decisions depend on the number of steps.
+    counts: bool,
+}
+
+impl<N: Number> Generator<N> for Played<'_, '_, N> {
+    type State = (State, u32);
+
+    fn initial(&self) -> (State, u32) {
+        (self.process.initial(), 0)
+    }
+
+    fn rewards(&self) -> usize {
+        self.process.rewards()
+    }
+
+    fn successors(
+        &self,
+        (state, step): &(State, u32),
+        choices: &mut Choices<(State, u32), N>,
+    ) -> Result<(), Error> {
+        let mut all = Choices::default();
+        self.process.successors(state, &mut all)?;
+        let Some(action) = (self.decide.borrow_mut())(*state, *step) else { return Ok(()) };
+        // What cannot be done ends the mission, too.
+        let Some((transitions, rewards)) = all.find(action) else { return Ok(()) };
+        let next = if self.counts { step + 1 } else { 0 };
+        for (target, probability) in transitions {
+            choices.to((*target, next), probability.clone());
+        }
+        choices.end(action, rewards.iter().cloned());
+        Ok(())
+    }
+}
+
+/// What comes of a way to decide. Sums are over the whole mission, until the goal or a failure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measures {
+    /// The probability of getting to the goal.
+    pub goal: f64,
+    /// The probability of getting there with the battery's reserve untouched.
+    pub goal_with_reserve: f64,
+    /// The probability of no collision at all.
+    pub no_collision: f64,
+    /// The expected number of collisions.
+    pub collisions: f64,
+    /// Expected time; none where the mission may go on for ever.
+    pub time: Option<f64>,
+    /// Expected energy.
+    pub energy: Option<f64>,
+    /// Expected reconfigurations.
+    pub reconfigurations: Option<f64>,
+    /// Expected time of missions that get to the goal; none if there are none.
+    pub time_if_successful: Option<f64>,
+    /// Expected energy of missions that get to the goal.
+    pub energy_if_successful: Option<f64>,
+    /// Expected time with the penalty for missions that fail.
+    pub penalised_time: Option<f64>,
+    /// How often a new plan is expected to be needed on the way.
+    pub replans: f64,
+    /// States that are visited.
+    pub states: usize,
+}
+
+/// Plays a way to decide. The process must have all its rewards. `replans` says, after all decisions are made, in which
+/// states a new plan was needed.
+///
+/// # Errors
+/// There are too many states.
+pub fn play<N: Number>(
+    process: &Process<N>,
+    counts: bool,
+    penalty: f64,
+    reserve: u32,
+    replans: &dyn Fn(State) -> bool,
+    decide: &mut Decide<'_>,
+) -> Result<Measures, Error> {
+    let played = Played { process, decide: RefCell::new(decide), counts };
+    let chain = explore(&played, &Bounds::default())?;
+    Ok(measure(process, &chain, penalty, reserve, replans))
+}
+
+fn measure<N: Number>(
+    process: &Process<N>,
+    chain: &Explored<(State, u32), N>,
+    penalty: f64,
+    reserve: u32,
+    replans: &dyn Fn(State) -> bool,
+) -> Measures {
+    let n = chain.mdp.states();
+    let set = |holds: &dyn Fn(State) -> bool| {
+        let mut set = FixedBitSet::with_capacity(n);
+        chain.states.iter().enumerate().for_each(|(number, (state, _))| set.set(number, holds(*state)));
+        set
+    };
+    let goal = set(&|state| process.is_goal(state));
+    let kept = set(&|state| process.is_goal(state) && state.situation().battery >= reserve);
+    let hit = set(&|state| state.situation().hit);
+    let mut end = FixedBitSet::with_capacity(n);
+    for state in 0..n {
+        let stays = chain.mdp.choices(state).all(|c| chain.mdp.action(c) == probabilistic::explore::DEADLOCK);
+        end.set(state, stays);
+    }
+    let value = |mdp: &Mdp<N>, rewards: Option<&[N]>, terminal: &FixedBitSet| {
+        let problem = Problem {
+            mdp,
+            direction: Direction::Max,
+            rewards,
+            terminal,
+            terminal_values: None,
+            blocked: None,
+            allowed: None,
+        };
+        solve(problem, None)
+    };
+    let first = |rewards: Option<&[N]>, terminal: &FixedBitSet| {
+        let solution = value(&chain.mdp, rewards, terminal)?;
+        (!solution.infinite.contains(0)).then(|| solution.values[0].to_f64())
+    };
+    let reached = value(&chain.mdp, None, &goal).map(|solution| solution.values).unwrap_or_default();
+    let success = reached.first().map_or(0.0, Number::to_f64);
+    let policy: Vec<u32> = (0..n).map(|state| chain.mdp.choices(state).start as u32).collect();
+    let if_successful = |reward: usize| {
+        if success <= 0.0 {
+            return None;
+        }
+        let (mdp, origin) = conditioned(&chain.mdp, &policy, &reached, &goal);
+        let rewards: Vec<N> = origin.iter().map(|c| chain.rewards[reward][*c as usize].clone()).collect();
+        let solution = value(&mdp, Some(&rewards), &goal)?;
+        Some(solution.values[0].to_f64())
+    };
+    let sum = |reward: usize| first(Some(&chain.rewards[reward]), &end);
+    let mut visits = vec![N::zero(); chain.mdp.choice_count()];
+    for (number, (state, _)) in chain.states.iter().enumerate() {
+        if !end.contains(number) && replans(*state) {
+            chain.mdp.choices(number).for_each(|choice| visits[choice] = N::one());
+        }
+    }
+    let time = sum(0);
+    Measures {
+        goal: success,
+        goal_with_reserve: first(None, &kept).unwrap_or(0.0),
+        no_collision: 1.0 - first(None, &hit).unwrap_or(0.0),
+        collisions: sum(2).unwrap_or(f64::NAN),
+        time,
+        energy: sum(1),
+        reconfigurations: sum(3),
+        time_if_successful: if_successful(0),
+        energy_if_successful: if_successful(1),
+        penalised_time: time.map(|time| time + penalty * (1.0 - success)),
+        replans: first(Some(&visits), &end).unwrap_or(f64::NAN),
+        states: n,
+    }
+}

@@ -1,0 +1,285 @@
+//! A co-adaptation mission to a Markov decision process, with successors computed natively.
+//!
+//! This is the corrected reading of the approach: every route, reconfiguration anywhere, a collision that is not
+//! forgotten, and a move only where the battery stays above the reserve.
+
+use probabilistic::explore::{Choices, Generator};
+use probabilistic::{Error, Number};
+
+use crate::probabilistic::coadaptation::Coadaptation;
+
+/// The rewards that the process has, in this order: time, energy, collisions, reconfigurations, moves.
+pub const REWARDS: [&str; 5] = ["time", "energy", "collisions", "reconfigurations", "moves"];
+
+/// What is uncertain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
+pub struct Risk {
+    /// Collisions, which are remembered.
+    pub collisions: bool,
+    /// Moves that fail and end the mission.
+    pub failures: bool,
+    /// The loss of a component.
+    pub loss: bool,
+    /// Whether the battery is part of the state.
+    pub battery: bool,
+}
+
+impl Risk {
+    /// Everything that the mission has.
+    pub fn all(mission: &Coadaptation) -> Self {
+        Self {
+            collisions: true,
+            failures: true,
+            loss: mission.loss.is_some(),
+            battery: mission.battery.is_some(),
+        }
+    }
+}
+
+/// A state: place, configuration, flags and battery, in one number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct State(u64);
+
+/// What a state says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[allow(missing_docs, reason = "the names say it")]
+pub struct Situation {
+    pub place: usize,
+    pub configuration: usize,
+    pub hit: bool,
+    pub failed: bool,
+    pub lost: bool,
+    pub battery: u32,
+}
+
+impl State {
+    /// What it says.
+    pub fn situation(self) -> Situation {
+        Situation {
+            place: (self.0 & 0xFFFF) as usize,
+            configuration: (self.0 >> 16 & 0xFFF) as usize,
+            hit: self.0 >> 28 & 1 == 1,
+            failed: self.0 >> 29 & 1 == 1,
+            lost: self.0 >> 30 & 1 == 1,
+            battery: (self.0 >> 32) as u32,
+        }
+    }
+}
+
+impl From<Situation> for State {
+    fn from(s: Situation) -> Self {
+        let flags = u64::from(s.hit) << 28 | u64::from(s.failed) << 29 | u64::from(s.lost) << 30;
+        Self(s.place as u64 | (s.configuration as u64) << 16 | flags | u64::from(s.battery) << 32)
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Move<N> {
+    arc: u32,
+    to: usize,
+    time: N,
+    energy: N,
+    levels: u32,
+    /// Success without and with a collision, and failure; by whether the component is lost then.
+    outcomes: [[N; 3]; 2],
+    collisions: N,
+}
+
+#[derive(Debug, Clone)]
+struct Change<N> {
+    to: usize,
+    time: N,
+    energy: N,
+    levels: u32,
+    success: N,
+    failure: N,
+}
+
+/// The process of a mission in one kind of number.
+#[derive(Debug, Clone)]
+pub struct Process<N> {
+    goal: usize,
+    initial: State,
+    reserve: u32,
+    /// For each place and configuration.
+    moves: Vec<Vec<Vec<Move<N>>>>,
+    /// For each configuration.
+    changes: Vec<Vec<Change<N>>>,
+    /// Which configurations the loss takes away.
+    lost: Vec<bool>,
+    risk: Risk,
+    rewards: Vec<usize>,
+}
+
+impl<N: Number> Process<N> {
+    /// The process with some risks, and with some of the [`REWARDS`].
+    pub fn new(mission: &Coadaptation, risk: Risk, rewards: &[&str]) -> Self {
+        let number = |value| N::from_rational(value);
+        let unit = mission.battery.map_or(1, |battery| battery.unit);
+        let levels = |energy: &num_rational::BigRational| {
+            let levels = (N::from_rational(energy).to_f64() / f64::from(unit)).ceil();
+            if risk.battery { levels as u32 } else { 0 }
+        };
+        let rate =
+            mission.loss.as_ref().filter(|_| risk.loss).map_or_else(N::zero, |loss| number(&loss.rate));
+        let designs = mission.configurations.len();
+        let mut moves: Vec<Vec<Vec<Move<N>>>> = vec![vec![Vec::new(); designs]; mission.places.len()];
+        for (index, arc) in mission.arcs.iter().enumerate() {
+            for (design, traversal) in arc.by.iter().enumerate() {
+                let Some(traversal) = traversal.as_ref().filter(|_| mission.configurations[design].available)
+                else {
+                    continue;
+                };
+                let hit = if risk.collisions { number(&traversal.hit) } else { N::zero() };
+                let success = if risk.failures { number(&traversal.success) } else { N::one() };
+                let ends =
+                    [success.times(&N::one().minus(&hit)), success.times(&hit), N::one().minus(&success)];
+                let keep = N::one().minus(&rate);
+                moves[arc.from][design].push(Move {
+                    arc: index as u32,
+                    to: arc.to,
+                    time: number(&traversal.time),
+                    energy: number(&traversal.energy),
+                    levels: levels(&traversal.energy),
+                    collisions: ends[1].clone(),
+                    outcomes: [
+                        ends.each_ref().map(|p| p.times(&keep)),
+                        ends.each_ref().map(|p| p.times(&rate)),
+                    ],
+                });
+            }
+        }
+        let change = |old: usize, new: usize| {
+            let switch =
+                mission.switches[old][new].as_ref().filter(|_| mission.configurations[new].available)?;
+            let success = number(&switch.success);
+            Some(Change {
+                to: new,
+                time: number(&switch.time),
+                energy: number(&switch.energy),
+                levels: levels(&switch.energy),
+                failure: N::one().minus(&success),
+                success,
+            })
+        };
+        let changes =
+            (0..designs).map(|old| (0..designs).filter_map(|new| change(old, new)).collect()).collect();
+        let initial = Situation {
+            place: mission.start,
+            configuration: mission.initial,
+            hit: false,
+            failed: false,
+            lost: false,
+            battery: mission.battery.filter(|_| risk.battery).map_or(0, |battery| battery.initial),
+        };
+        Self {
+            goal: mission.goal,
+            initial: initial.into(),
+            reserve: mission.battery.filter(|_| risk.battery).map_or(0, |battery| battery.reserve),
+            moves,
+            changes,
+            lost: (0..designs).map(|design| risk.loss && mission.lost(design)).collect(),
+            risk,
+            rewards: rewards
+                .iter()
+                .filter_map(|name| REWARDS.iter().position(|known| known == name))
+                .collect(),
+        }
+    }
+
+    /// The same from another start.
+    #[must_use]
+    pub fn starting(mut self, state: State) -> Self {
+        self.initial = state;
+        self
+    }
+
+    /// Whether a state is at the goal.
+    pub fn is_goal(&self, state: State) -> bool {
+        let situation = state.situation();
+        situation.place == self.goal && !situation.failed
+    }
+
+    fn rewards_of<'r>(&'r self, all: &'r [N; 5]) -> impl Iterator<Item = N> + 'r {
+        self.rewards.iter().map(|index| all[*index].clone())
+    }
+
+    fn enough(&self, battery: u32, levels: u32) -> Option<u32> {
+        if !self.risk.battery {
+            return Some(0);
+        }
+        battery.checked_sub(levels).filter(|left| *left >= self.reserve || levels == 0)
+    }
+}
+
+/// What a choice does, from its action number: a move along an arc, or a change to a configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Along the arc with this number.
+    Move(usize),
+    /// To the configuration with this number.
+    Change(usize),
+}
+
+impl Action {
+    /// From the number that a process has for it.
+    pub fn from_number(number: u32) -> Self {
+        if number & 1 == 0 { Self::Move(number as usize >> 1) } else { Self::Change(number as usize >> 1) }
+    }
+
+    /// The number that a process has for it.
+    pub fn number(self) -> u32 {
+        match self {
+            Self::Move(arc) => (arc as u32) << 1,
+            Self::Change(configuration) => (configuration as u32) << 1 | 1,
+        }
+    }
+}
+
+impl<N: Number> Generator<N> for Process<N> {
+    type State = State;
+
+    fn initial(&self) -> State {
+        self.initial
+    }
+
+    fn rewards(&self) -> usize {
+        self.rewards.len()
+    }
+
+    fn successors(&self, state: &State, choices: &mut Choices<State, N>) -> Result<(), Error> {
+        let s = state.situation();
+        if s.place == self.goal || s.failed {
+            return Ok(());
+        }
+        for change in &self.changes[s.configuration] {
+            let Some(battery) = self.enough(s.battery, change.levels) else { continue };
+            if s.lost && self.lost[change.to] {
+                continue;
+            }
+            choices.to(Situation { configuration: change.to, battery, ..s }.into(), change.success.clone());
+            choices.to(Situation { battery, ..s }.into(), change.failure.clone());
+            let rewards = [change.time.clone(), change.energy.clone(), N::zero(), N::one(), N::zero()];
+            choices.end(Action::Change(change.to).number(), self.rewards_of(&rewards));
+        }
+        if s.lost && self.lost[s.configuration] {
+            return Ok(());
+        }
+        for step in &self.moves[s.place][s.configuration] {
+            let Some(battery) = self.enough(s.battery, step.levels) else { continue };
+            let arrived = Situation { place: step.to, battery, ..s };
+            for (lost, ends) in [s.lost, true].into_iter().zip(&step.outcomes) {
+                // Failed missions are over: where the battery and the collisions stood does not matter any more.
+                let failed = Situation { failed: true, battery, ..s };
+                choices.to(Situation { lost, ..arrived }.into(), ends[0].clone());
+                choices.to(Situation { lost, hit: true, ..arrived }.into(), ends[1].clone());
+                choices.to(Situation { lost, ..failed }.into(), ends[2].clone());
+            }
+            let rewards =
+                [step.time.clone(), step.energy.clone(), step.collisions.clone(), N::zero(), N::one()];
+            choices.end(Action::Move(step.arc as usize).number(), self.rewards_of(&rewards));
+        }
+        Ok(())
+    }
+}

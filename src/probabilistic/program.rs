@@ -1,0 +1,269 @@
+//! A co-adaptation mission to a model in the PRISM language, the same process as [`Process`](super::Process) builds.
+
+use std::collections::BTreeSet;
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, ToPrimitive, Zero};
+use probabilistic::Place;
+use probabilistic::prism::ast::{
+    BinaryOp, Command, Expr, ExprKind, Model, ModelKind, Module, Named, RewardItem, Rewards, Update, Variable,
+};
+use probabilistic::prism::identifier;
+
+use crate::probabilistic::coadaptation::{Coadaptation, Traversal};
+use crate::probabilistic::process::Risk;
+
+/// The mission as a model: `l` is the place, `c` the configuration, `b` the battery; `hit`, `failed` and `lost` are flags.
+pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
+    let writer = Writer { mission, risk };
+    Model {
+        kind: ModelKind::Mdp,
+        remark: writer.remark(),
+        constants: Vec::new(),
+        formulas: Vec::new(),
+        globals: Vec::new(),
+        modules: vec![Module {
+            name: "robot".to_owned(),
+            variables: writer.variables(),
+            commands: writer.commands(),
+            place: Place::default(),
+        }],
+        rewards: writer.rewards(),
+        labels: writer.labels(),
+    }
+}
+
+struct Writer<'a> {
+    mission: &'a Coadaptation,
+    risk: Risk,
+}
+
+fn equals(variable: &str, value: usize) -> Expr {
+    Expr::name(variable).op(BinaryOp::Equal, Expr::int(value as i64))
+}
+
+fn not(expression: Expr) -> Expr {
+    Expr::new(ExprKind::Not(Box::new(expression)))
+}
+
+fn all(parts: impl IntoIterator<Item = Expr>) -> Expr {
+    parts.into_iter().reduce(|all, part| all.op(BinaryOp::And, part)).unwrap_or(Expr::bool(true))
+}
+
+fn number(value: &BigRational) -> Expr {
+    Expr::new(ExprKind::Number(value.clone()))
+}
+
+type Assignments = Vec<(String, Expr, Place)>;
+
+fn assign(name: &str, value: Expr) -> (String, Expr, Place) {
+    (name.to_owned(), value, Place::default())
+}
+
+impl Writer<'_> {
+    fn remark(&self) -> String {
+        let list = |names: Vec<&str>| {
+            let numbered: Vec<_> =
+                names.iter().enumerate().map(|(n, name)| format!("{n} = {name}")).collect();
+            numbered.join(", ")
+        };
+        let places = list(self.mission.places.iter().map(String::as_str).collect());
+        let designs = list(self.mission.configurations.iter().map(|c| c.name.as_str()).collect());
+        format!("A co-adaptation mission.\nl, the place: {places}\nc, the configuration: {designs}")
+    }
+
+    fn battery(&self) -> Option<crate::probabilistic::Battery> {
+        self.mission.battery.filter(|_| self.risk.battery)
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        let range = |name: &str, greatest: usize, initial: usize| Variable {
+            name: name.to_owned(),
+            range: Some((Expr::int(0), Expr::int(greatest as i64))),
+            initial: Some(Expr::int(initial as i64)),
+            place: Place::default(),
+        };
+        let flag = |name: &str| Variable {
+            name: name.to_owned(),
+            range: None,
+            initial: Some(Expr::bool(false)),
+            place: Place::default(),
+        };
+        let mission = self.mission;
+        let mut variables = vec![
+            range("l", mission.places.len() - 1, mission.start),
+            range("c", mission.configurations.len().max(2) - 1, mission.initial),
+        ];
+        let flags = [("hit", self.risk.collisions), ("failed", self.risk.failures), ("lost", self.risk.loss)];
+        variables.extend(flags.into_iter().filter(|(_, wanted)| *wanted).map(|(name, _)| flag(name)));
+        if let Some(battery) = self.battery() {
+            variables.push(range("b", battery.initial as usize, battery.initial as usize));
+        }
+        variables
+    }
+
+    /// Not at the goal, and nothing has failed.
+    fn running(&self) -> Expr {
+        let away = Expr::name("l").op(BinaryOp::NotEqual, Expr::int(self.mission.goal as i64));
+        all(std::iter::once(away).chain(self.risk.failures.then(|| not(Expr::name("failed")))))
+    }
+
+    fn levels(&self, energy: &BigRational) -> i64 {
+        let unit = self.mission.battery.map_or(1, |battery| battery.unit);
+        (energy / BigRational::from(BigInt::from(unit))).ceil().to_i64().unwrap_or(i64::MAX)
+    }
+
+    /// That there is battery for something, and the battery after it.
+    fn spend(&self, energy: &BigRational) -> (Option<Expr>, Assignments) {
+        let Some(battery) = self.battery() else { return (None, Vec::new()) };
+        let levels = self.levels(energy);
+        if levels == 0 {
+            return (None, Vec::new());
+        }
+        let enough =
+            Expr::name("b").op(BinaryOp::GreaterEqual, Expr::int(levels + i64::from(battery.reserve)));
+        (Some(enough), vec![assign("b", Expr::name("b").op(BinaryOp::Minus, Expr::int(levels)))])
+    }
+
+    fn kept(&self, configuration: usize) -> Option<Expr> {
+        (self.risk.loss && self.mission.lost(configuration)).then(|| not(Expr::name("lost")))
+    }
+
+    fn set(&self, configuration: usize) -> String {
+        identifier(&format!("set_{}", self.mission.configurations[configuration].name))
+    }
+
+    fn go(&self, arc: usize) -> String {
+        let arc = &self.mission.arcs[arc];
+        identifier(&format!("go_{}_{}", self.mission.places[arc.from], self.mission.places[arc.to]))
+    }
+
+    fn commands(&self) -> Vec<Command> {
+        let mut commands = Vec::new();
+        let available = |design: &usize| self.mission.configurations[*design].available;
+        for new in (0..self.mission.configurations.len()).filter(available) {
+            for old in 0..self.mission.configurations.len() {
+                let Some(switch) = &self.mission.switches[old][new] else { continue };
+                let (enough, spent) = self.spend(&switch.energy);
+                let guard =
+                    all([self.running(), equals("c", old)].into_iter().chain(self.kept(new)).chain(enough));
+                let mut changed = spent.clone();
+                changed.push(assign("c", Expr::int(new as i64)));
+                let failure = BigRational::one() - &switch.success;
+                let updates = updates([(switch.success.clone(), changed), (failure, spent)]);
+                commands.push(command(self.set(new), guard, updates));
+            }
+        }
+        for (index, arc) in self.mission.arcs.iter().enumerate() {
+            for (design, traversal) in arc.by.iter().enumerate().filter(|(design, _)| available(design)) {
+                let Some(traversal) = traversal else { continue };
+                let (enough, spent) = self.spend(&traversal.energy);
+                let place = [self.running(), equals("l", arc.from), equals("c", design)];
+                let guard = all(place.into_iter().chain(self.kept(design)).chain(enough));
+                let updates = updates(self.ends(traversal, arc.to, &spent));
+                commands.push(command(self.go(index), guard, updates));
+            }
+        }
+        commands
+    }
+
+    /// How a move can end.
+    fn ends(&self, traversal: &Traversal, to: usize, spent: &Assignments) -> Vec<(BigRational, Assignments)> {
+        let one = BigRational::one();
+        let hit = if self.risk.collisions { traversal.hit.clone() } else { BigRational::zero() };
+        let success = if self.risk.failures { traversal.success.clone() } else { one.clone() };
+        let with = |more: Vec<(&str, Expr)>| {
+            let more = more.into_iter().map(|(name, value)| assign(name, value));
+            more.chain(spent.iter().cloned()).collect::<Assignments>()
+        };
+        let there = ("l", Expr::int(to as i64));
+        let ends = [
+            (&success * (&one - &hit), with(vec![there.clone()])),
+            (&success * &hit, with(vec![there, ("hit", Expr::bool(true))])),
+            (&one - &success, with(vec![("failed", Expr::bool(true))])),
+        ];
+        let Some(loss) = self.mission.loss.as_ref().filter(|_| self.risk.loss) else { return ends.to_vec() };
+        let mut all = Vec::new();
+        for (probability, assignments) in ends {
+            let mut lost = assignments.clone();
+            lost.push(assign("lost", Expr::bool(true)));
+            all.push((&probability * (&one - &loss.rate), assignments));
+            all.push((probability * &loss.rate, lost));
+        }
+        all
+    }
+
+    fn rewards(&self) -> Vec<Rewards> {
+        let mut time = Vec::new();
+        let mut energy = Vec::new();
+        let mut collisions = Vec::new();
+        let mut put = |action: &str, guard: Expr, values: [&BigRational; 3]| {
+            for (list, value) in [&mut time, &mut energy, &mut collisions].into_iter().zip(values) {
+                if !value.is_zero() {
+                    list.push(item(action, guard.clone(), number(value)));
+                }
+            }
+        };
+        let zero = BigRational::zero();
+        for new in 0..self.mission.configurations.len() {
+            for (old, switches) in self.mission.switches.iter().enumerate() {
+                if let Some(switch) = &switches[new] {
+                    put(&self.set(new), equals("c", old), [&switch.time, &switch.energy, &zero]);
+                }
+            }
+        }
+        for (index, arc) in self.mission.arcs.iter().enumerate() {
+            for (design, traversal) in arc.by.iter().enumerate() {
+                if let Some(traversal) = traversal {
+                    let success =
+                        if self.risk.failures { traversal.success.clone() } else { BigRational::one() };
+                    let hits = if self.risk.collisions { success * &traversal.hit } else { zero.clone() };
+                    put(&self.go(index), equals("c", design), [&traversal.time, &traversal.energy, &hits]);
+                }
+            }
+        }
+        let once = |actions: BTreeSet<String>| {
+            actions.iter().map(|action| item(action, Expr::bool(true), Expr::int(1))).collect::<Vec<_>>()
+        };
+        let sets = once((0..self.mission.configurations.len()).map(|design| self.set(design)).collect());
+        let moves = once((0..self.mission.arcs.len()).map(|arc| self.go(arc)).collect());
+        let all = [time, energy, collisions, sets, moves];
+        let named = super::REWARDS.iter().zip(all);
+        named
+            .map(|(name, items)| Rewards { name: (*name).to_owned(), items, place: Place::default() })
+            .collect()
+    }
+
+    fn labels(&self) -> Vec<Named> {
+        let goal = equals("l", self.mission.goal);
+        let label = |name: &str, expression: Expr| Named {
+            name: name.to_owned(),
+            expression,
+            place: Place::default(),
+        };
+        let arrived = all(std::iter::once(goal).chain(self.risk.failures.then(|| not(Expr::name("failed")))));
+        let safe =
+            all(std::iter::once(arrived.clone()).chain(self.risk.collisions.then(|| not(Expr::name("hit")))));
+        vec![label("goal", arrived), label("safe_goal", safe), label("stop", not(self.running()))]
+    }
+}
+
+fn item(action: &str, guard: Expr, reward: Expr) -> RewardItem {
+    RewardItem { action: Some(Some(action.to_owned())), guard, reward, place: Place::default() }
+}
+
+fn command(action: String, guard: Expr, updates: Vec<Update>) -> Command {
+    Command { action: Some(action), guard, updates, place: Place::default() }
+}
+
+/// The ends that are possible; one that is certain stands without its probability.
+fn updates(ends: impl IntoIterator<Item = (BigRational, Assignments)>) -> Vec<Update> {
+    let possible: Vec<_> = ends.into_iter().filter(|(probability, _)| !probability.is_zero()).collect();
+    let certain = possible.len() == 1;
+    let update = |(probability, assignments): (BigRational, Assignments)| Update {
+        probability: (!certain).then(|| number(&probability)),
+        assignments,
+    };
+    possible.into_iter().map(update).collect()
+}

@@ -1,0 +1,153 @@
+//! The published procedure: the five shortest routes, one configuration for the whole way, and a utility.
+//!
+//! As described by Cámara, Schmerl and Garlan (SEAMS 2020) and done by the public re-implementation: simple paths are
+//! ordered by length and five are kept; for each, model checking finds the configuration that is best by the priority
+//! property, and checks the other properties with it; the route with the best utility wins. Two oddities are kept: the
+//! flag `collided` is overwritten at each move that can collide, so only the last one counts, and an empty battery
+//! does not end a mission.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
+
+use crate::probabilistic::coadaptation::{Coadaptation, Traversal};
+use crate::probabilistic::process::Action;
+use probabilistic::Number;
+
+/// How many routes are kept.
+const ROUTES: usize = 5;
+/// The weight of the priority property, and of each other one.
+const WEIGHTS: [f64; 2] = [0.6, 0.2];
+/// Partial routes after which the search for routes gives up.
+const SEARCH: usize = 2_000_000;
+
+/// What the procedure decides, and what it believes about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Published {
+    /// The route, as numbers of arcs.
+    pub route: Vec<usize>,
+    /// The configuration for the whole way.
+    pub configuration: usize,
+    /// Its utility, from 0 to 1.
+    pub utility: f64,
+    /// The time that it expects, in the mission's unit.
+    pub time: f64,
+    /// The energy that it expects to use.
+    pub energy: f64,
+    /// The probability that the last risky move does not collide.
+    pub not_collided: f64,
+}
+
+impl Published {
+    /// What the robot then does: one reconfiguration if it is needed, and the route.
+    pub fn actions(&self, mission: &Coadaptation) -> Vec<Action> {
+        let change = (self.configuration != mission.initial).then_some(Action::Change(self.configuration));
+        change.into_iter().chain(self.route.iter().map(|arc| Action::Move(*arc))).collect()
+    }
+}
+
+/// The shortest simple routes in order of their length, which for each arc is the least time that any configuration
+/// takes, at most so many.
+pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>> {
+    let length = |arc: usize| {
+        let by = mission.arcs[arc].by.iter().flatten().map(|traversal| traversal.time.to_f64());
+        by.fold(f64::INFINITY, f64::min)
+    };
+    // Millionths of the time unit, so that the queue has an order.
+    let scaled = |arc: usize| (length(arc) * 1e6).round() as u64;
+    let rest = to_goal(mission, &scaled);
+    let mut queue =
+        BinaryHeap::from([Reverse((rest[mission.start].unwrap_or(u64::MAX), Vec::<usize>::new()))]);
+    let (mut found, mut steps) = (Vec::new(), 0);
+    while let Some(Reverse((estimate, route))) = queue.pop() {
+        steps += 1;
+        if estimate == u64::MAX || steps > SEARCH {
+            break;
+        }
+        let at = route.last().map_or(mission.start, |arc| mission.arcs[*arc].to);
+        if at == mission.goal {
+            found.push(route);
+            if found.len() == wanted {
+                break;
+            }
+            continue;
+        }
+        let so_far: u64 = route.iter().map(|arc| scaled(*arc)).sum();
+        let seen: BTreeSet<usize> =
+            route.iter().map(|arc| mission.arcs[*arc].from).chain(std::iter::once(at)).collect();
+        for (number, arc) in mission.arcs.iter().enumerate() {
+            if arc.from == at
+                && !seen.contains(&arc.to)
+                && let Some(rest) = rest[arc.to]
+            {
+                let mut longer = route.clone();
+                longer.push(number);
+                queue.push(Reverse((so_far + scaled(number) + rest, longer)));
+            }
+        }
+    }
+    found
+}
+
+/// The length of the shortest way from each place to the goal.
+fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
+    let mut best: Vec<Option<u64>> = vec![None; mission.places.len()];
+    let mut queue = BinaryHeap::from([Reverse((0_u64, mission.goal))]);
+    while let Some(Reverse((so_far, place))) = queue.pop() {
+        if best[place].is_some() {
+            continue;
+        }
+        best[place] = Some(so_far);
+        for (number, arc) in mission.arcs.iter().enumerate().filter(|(_, arc)| arc.to == place) {
+            if best[arc.from].is_none() {
+                queue.push(Reverse((so_far + length(number), arc.from)));
+            }
+        }
+    }
+    best
+}
+
+/// What the published model says of a route with one configuration; none if it cannot drive it.
+fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Option<[f64; 3]> {
+    let way: Option<Vec<&Traversal>> =
+        route.iter().map(|arc| mission.arcs[*arc].by[configuration].as_ref()).collect();
+    let way = way?;
+    let switch = mission.switches[mission.initial][configuration].as_ref();
+    let begin = switch.map_or([0.0; 2], |switch| [switch.time.to_f64(), switch.energy.to_f64()]);
+    let time = way.iter().fold(begin[0], |sum, traversal| sum + traversal.time.to_f64());
+    let energy = way.iter().fold(begin[1], |sum, traversal| sum + traversal.energy.to_f64());
+    let last_risky = way.iter().rev().map(|traversal| traversal.hit.to_f64()).find(|hit| *hit > 0.0);
+    Some([time, energy, 1.0 - last_risky.unwrap_or(0.0)])
+}
+
+/// Runs the procedure with the priority on time (0), energy (1) or safety (2); none if no route can be driven.
+pub fn published(mission: &Coadaptation, priority: usize) -> Option<Published> {
+    let available = |configuration: &usize| mission.configurations[*configuration].available;
+    let mut candidates = Vec::new();
+    for route in shortest_routes(mission, ROUTES) {
+        let drivable = (0..mission.configurations.len()).filter(available);
+        let believed = drivable.filter_map(|c| believed(mission, &route, c).map(|values| (c, values)));
+        // Less time and energy is better, a greater probability is.
+        let key = |values: &[f64; 3]| if priority == 2 { -values[2] } else { values[priority] };
+        let best = believed.min_by(|(_, a), (_, b)| key(a).total_cmp(&key(b)));
+        candidates.extend(best.map(|(configuration, values)| (route, configuration, values)));
+    }
+    let greatest =
+        |of: usize| candidates.iter().map(|(.., values)| values[of]).fold(f64::MIN_POSITIVE, f64::max);
+    let scale =
+        [greatest(0), mission.battery.map_or(greatest(1), |b| f64::from(b.initial) * f64::from(b.unit))];
+    let utility = |values: &[f64; 3]| {
+        let single = [1.0 - values[0] / scale[0], 1.0 - (values[1] / scale[1]).min(1.0), values[2]];
+        let weighted = single.iter().enumerate().map(|(of, u)| u * WEIGHTS[usize::from(of != priority)]);
+        weighted.sum::<f64>()
+    };
+    let best = candidates.iter().max_by(|(.., a), (.., b)| utility(a).total_cmp(&utility(b)))?;
+    let (route, configuration, values) = best;
+    Some(Published {
+        route: route.clone(),
+        configuration: *configuration,
+        utility: utility(values),
+        time: values[0],
+        energy: values[1],
+        not_collided: values[2],
+    })
+}

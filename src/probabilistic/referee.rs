@@ -1,0 +1,158 @@
+//! The referee: the one process in which everything is measured, with what is optimal in it.
+
+use fixedbitset::FixedBitSet;
+use num_rational::BigRational;
+use probabilistic::explore::Explored;
+use probabilistic::pareto::{Objective, Pareto};
+use probabilistic::policy::with_secondary;
+use probabilistic::solve::{NONE, Solution, solve};
+use probabilistic::{Direction, Error, Problem};
+
+use crate::probabilistic::coadaptation::Coadaptation;
+use crate::probabilistic::play::{Measures, play};
+use crate::probabilistic::process::{Action, Process, REWARDS, Risk, Situation, State};
+
+/// A policy and what it is best at.
+pub type NamedPolicy = (String, Vec<u32>);
+
+/// The process with what is solved in it.
+pub struct Referee<'a> {
+    pub mission: &'a Coadaptation,
+    pub risk: Risk,
+    pub penalty: f64,
+    pub explored: Explored<State, f64>,
+}
+
+impl Referee<'_> {
+    pub fn set(&self, holds: impl Fn(Situation) -> bool) -> FixedBitSet {
+        let mut set = FixedBitSet::with_capacity(self.explored.mdp.states());
+        for (number, state) in self.explored.states.iter().enumerate() {
+            set.set(number, holds(state.situation()));
+        }
+        set
+    }
+
+    pub fn goal(&self) -> FixedBitSet {
+        self.set(|s| s.place == self.mission.goal && !s.failed)
+    }
+
+    pub fn safe_goal(&self) -> FixedBitSet {
+        self.set(|s| s.place == self.mission.goal && !s.failed && !s.hit)
+    }
+
+    pub fn problem<'p>(
+        &'p self,
+        direction: Direction,
+        reward: Option<usize>,
+        terminal: &'p FixedBitSet,
+    ) -> Problem<'p, f64> {
+        Problem {
+            mdp: &self.explored.mdp,
+            direction,
+            rewards: reward.map(|reward| &self.explored.rewards[reward][..]),
+            terminal,
+            terminal_values: None,
+            blocked: None,
+            allowed: None,
+        }
+    }
+
+    /// The best policies by single objectives; the first one is best by penalised time.
+    pub fn policies(&self) -> Vec<NamedPolicy> {
+        let (goal, safe) = (self.goal(), self.safe_goal());
+        let mut policies = Vec::new();
+        let reachable = solve(self.problem(Direction::Max, None, &goal), None);
+        if let Some(reachable) = &reachable {
+            let solution = self.penalised(&goal, reachable);
+            policies.extend(solution.map(|s| ("best policy by penalised time".to_owned(), s.policy)));
+        }
+        let probabilities = [
+            ("best policy by P(goal), then time", &goal, reachable.clone()),
+            ("best policy by P(goal, no collision), then time", &safe, None),
+        ];
+        for (name, target, known) in probabilities {
+            let problem = self.problem(Direction::Max, None, target);
+            let solution = known.or_else(|| solve(problem, None));
+            let better = solution.and_then(|s| with_secondary(&problem, &s, &self.explored.rewards[0]));
+            policies.extend(better.map(|s| (name.to_owned(), s.policy)));
+        }
+        let problem = self.problem(Direction::Min, Some(1), &goal);
+        if let Some(solution) = solve(problem, None).filter(|solution| !solution.infinite.contains(0)) {
+            let better = with_secondary(&problem, &solution, &self.explored.rewards[0]).unwrap_or(solution);
+            policies.push(("best policy by energy, then time".to_owned(), better.policy));
+        }
+        policies
+    }
+
+    /// Least expected time, where hopeless states cost the penalty.
+    pub fn penalised(&self, goal: &FixedBitSet, reachable: &Solution<f64>) -> Option<Solution<f64>> {
+        let n = self.explored.mdp.states();
+        let mut terminal = goal.clone();
+        let mut worth = vec![0.0; n];
+        for (state, worth) in worth.iter_mut().enumerate() {
+            if reachable.values[state] <= 0.0 {
+                terminal.insert(state);
+                *worth = self.penalty;
+            }
+        }
+        let problem =
+            Problem { terminal_values: Some(&worth), ..self.problem(Direction::Min, Some(0), &terminal) };
+        solve(problem, None)
+    }
+
+    /// The front of time and probability of success without collision, and policies of its vertices.
+    pub fn front(&self) -> (Vec<[f64; 2]>, Vec<NamedPolicy>) {
+        let objectives = [
+            Objective { rewards: Some(self.explored.rewards[0].clone()), target: self.goal() },
+            Objective { rewards: None, target: self.safe_goal() },
+        ];
+        let vertices = Pareto::new(&self.explored.mdp, &objectives).and_then(|pareto| pareto.vertices(None));
+        let vertices = vertices.unwrap_or_default();
+        let front = vertices.iter().map(|vertex| [vertex.losses[0], 1.0 - vertex.losses[1]]).collect();
+        let name =
+            |number: usize| format!("vertex {} of the front of time and P(goal, no collision)", number + 1);
+        let inner = vertices.into_iter().enumerate().map(|(number, vertex)| (name(number), vertex.policy));
+        (front, inner.collect())
+    }
+
+    pub fn exact(&self) -> Process<BigRational> {
+        Process::new(self.mission, self.risk, &REWARDS)
+    }
+
+    pub fn reserve(&self) -> u32 {
+        self.mission.battery.filter(|_| self.risk.battery).map_or(0, |battery| battery.reserve)
+    }
+
+    /// What a policy does in a situation.
+    pub fn decision(&self, policy: &[u32], situation: Situation) -> Option<Action> {
+        let number = self.explored.states.get_index_of(&State::from(situation))?;
+        let choice = policy.get(number).filter(|choice| **choice != NONE)?;
+        Some(Action::from_number(self.explored.mdp.action(*choice as usize)))
+    }
+
+    pub fn play_policy(&self, policy: &[u32]) -> Result<Measures, Error> {
+        let mut decide = |state: State, _: u32| self.decision(policy, state.situation()).map(Action::number);
+        play(&self.exact(), false, self.penalty, self.reserve(), &|_| false, &mut decide)
+    }
+
+    pub fn play_plan(&self, plan: &[Action]) -> Result<Measures, Error> {
+        let mut decide = |_: State, step: u32| plan.get(step as usize).map(|action| action.number());
+        play(&self.exact(), true, self.penalty, self.reserve(), &|_| false, &mut decide)
+    }
+
+    /// Where transitions are certain but for the collision flag, which no transition depends on, the fastest plan is an
+    /// optimal policy.
+    pub fn no_price(&self) -> Option<&'static str> {
+        use num_traits::One;
+        let certain = |probability: &BigRational| probability.is_one();
+        let moves = self.mission.arcs.iter().flat_map(|arc| arc.by.iter().flatten());
+        let moves_certain =
+            !self.risk.failures || moves.into_iter().all(|traversal| certain(&traversal.success));
+        let switches = self.mission.switches.iter().flatten().flatten();
+        let all =
+            moves_certain && !self.risk.loss && switches.into_iter().all(|switch| certain(&switch.success));
+        all.then_some(
+            "nothing but the collision flag is uncertain, and neither the time nor any move depends on it",
+        )
+    }
+}

@@ -1,0 +1,46 @@
+//! A fixed route to the best configurations on it, by dynamic programming over its arcs.
+
+use num_rational::BigRational;
+
+use crate::probabilistic::coadaptation::{Coadaptation, Switch, Traversal};
+use crate::probabilistic::process::Action;
+
+/// The fastest way to drive a route, reconfiguring before any arc; none if it cannot be driven.
+pub fn best_on_route(mission: &Coadaptation, route: &[usize]) -> Option<Vec<Action>> {
+    best_by(mission, route, |traversal| traversal.time.clone(), |switch| switch.time.clone())
+        .map(|(_, plan)| plan)
+}
+
+/// As [`best_on_route`], by any cost of traversals and switches; with the cost.
+fn best_by(
+    mission: &Coadaptation,
+    route: &[usize],
+    traversal_cost: impl Fn(&Traversal) -> BigRational,
+    switch_cost: impl Fn(&Switch) -> BigRational,
+) -> Option<(BigRational, Vec<Action>)> {
+    let designs = mission.configurations.len();
+    let mut best: Vec<Option<(BigRational, Vec<Action>)>> = vec![None; designs];
+    best[mission.initial] = Some((BigRational::from_integer(0.into()), Vec::new()));
+    for arc in route {
+        let mut next = vec![None; designs];
+        for design in (0..designs).filter(|design| mission.configurations[*design].available) {
+            let Some(traversal) = &mission.arcs[*arc].by[design] else { continue };
+            for (old, known) in best.iter().enumerate() {
+                let Some((so_far, plan)) = known else { continue };
+                let mut cost = so_far + traversal_cost(traversal);
+                let mut plan = plan.clone();
+                if old != design {
+                    let Some(switch) = &mission.switches[old][design] else { continue };
+                    cost += switch_cost(switch);
+                    plan.push(Action::Change(design));
+                }
+                plan.push(Action::Move(*arc));
+                if next[design].as_ref().is_none_or(|(known, _)| cost < *known) {
+                    next[design] = Some((cost, plan));
+                }
+            }
+        }
+        best = next;
+    }
+    best.into_iter().flatten().min_by(|(a, _), (b, _)| a.cmp(b))
+}

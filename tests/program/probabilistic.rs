@@ -1,0 +1,368 @@
+//! The probabilistic approach beside the planner: known results, agreement of two engines, and the commands.
+
+#![allow(clippy::print_stdout)]
+
+use std::path::{Path, PathBuf};
+
+use metaplan::mission::Mission;
+use metaplan::probabilistic::{Coadaptation, MapOptions, Process, Risk, import_map, program};
+use num_rational::BigRational;
+use probabilistic::check::{Answer, Exactness, Options, Outcome, check};
+use probabilistic::explore::{Bounds, explore};
+use probabilistic::solve::solve;
+use probabilistic::{Direction, Number, Problem, property};
+use serde_json::{Value, json};
+
+use crate::common::{metaplan, metaplan_in, root};
+
+fn shared(path: &str) -> Option<PathBuf> {
+    let path = root().join("../shared").join(path);
+    if !path.exists() {
+        println!("skipped: {} is not there", path.display());
+    }
+    path.exists().then_some(path)
+}
+
+/// The mission that an imported map becomes, in a directory of its own.
+fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Mission) {
+    let files = import_map("map", map, options).expect("a map");
+    let directory = tempfile::tempdir().expect("a directory");
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("written");
+    write("camara.toml", &files.manifest);
+    write("camara.ttl", &files.knowledge);
+    write("domain.pddl", &files.domain);
+    write("problem.pddl", &files.problem);
+    let (mission, _) = Mission::read(&directory.path().join("camara.toml")).expect("a mission");
+    (directory, mission)
+}
+
+fn coadaptation(mission: &Mission) -> Coadaptation {
+    let (problem, _) = mission.filled().expect("filled");
+    Coadaptation::new(mission, &problem, mission.roles()).expect("a process")
+}
+
+fn places(start: &str, goal: &str) -> MapOptions {
+    MapOptions { start: start.to_owned(), goal: goal.to_owned(), battery: None, ..MapOptions::default() }
+}
+
+fn dark() -> Vec<(String, String)> {
+    let pairs = [("l18", "l19"), ("l3", "l4"), ("l11", "l12")];
+    pairs.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect()
+}
+
+/// The answer of the PRISM model of a process, as a fraction.
+fn answer(mission: &Coadaptation, risk: Risk, question: &str) -> Outcome {
+    let model = program(mission, risk);
+    let options = Options { exactness: Exactness::Always, ..Options::default() };
+    check(&model, &property::parse(question).expect("a property"), &options).expect("an answer").outcome
+}
+
+fn fraction(answer: &Answer) -> String {
+    let exact = answer.quantity().and_then(|quantity| quantity.exact.clone());
+    exact.map_or_else(|| format!("{answer:?}"), |exact| exact.to_string())
+}
+
+#[test]
+fn known_results_on_the_map_of_camara() {
+    let Some(path) = shared("real/map/map-p2cp3.json") else { return };
+    let map = std::fs::read_to_string(path).expect("readable");
+    let nothing = Risk::default();
+    let (_directory, with_dark) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
+    let (_directory, lit) = mission(&map, &places("l1", "l18"));
+    let cases = [
+        (&with_dark, nothing, "R{\"time\"}min=? [ F \"goal\" ]", "1204733/10000"),
+        (&with_dark, nothing, "R{\"energy\"}min=? [ F \"goal\" ]", "5587"),
+        (&lit, nothing, "R{\"time\"}min=? [ F \"goal\" ]", "15277/200"),
+        (
+            &lit,
+            Risk { collisions: true, failures: true, ..nothing },
+            "R{\"time\"}min=? [ F \"goal\" ]",
+            "15277/200",
+        ),
+    ];
+    for (mission, risk, question, expected) in cases {
+        let Outcome::Value(found) = answer(&coadaptation(mission), risk, question) else {
+            panic!("no value")
+        };
+        assert_eq!(fraction(&found), expected, "{question}");
+    }
+    let (_directory, mut without_kinect) = mission(&map, &places("l25", "l7"));
+    without_kinect.fail("c_kinect").expect("a component");
+    let question = "multi(R{\"time\"}min=? [ F \"goal\" ], Pmax=? [ F \"safe_goal\" ])";
+    let risk = Risk { collisions: true, ..nothing };
+    let Outcome::Front(front) = answer(&coadaptation(&without_kinect), risk, question) else {
+        panic!("no front")
+    };
+    let front: Vec<_> = front.iter().map(|pair| pair.each_ref().map(fraction)).collect();
+    let expected = [["525887/5000", "269230769/500000000"], ["86487/625", "1"]];
+    assert_eq!(front, expected.map(|pair| pair.map(str::to_owned)));
+}
+
+/// The least expected time to the goal, exactly; none if the goal is not reached for sure.
+fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
+    let process = Process::<BigRational>::new(mission, risk, &["time"]);
+    let explored = explore(&process, &Bounds::default()).expect("explored");
+    let mut goal = fixedbitset::FixedBitSet::with_capacity(explored.mdp.states());
+    for (number, state) in explored.states.iter().enumerate() {
+        goal.set(number, process.is_goal(*state));
+    }
+    let problem = Problem {
+        mdp: &explored.mdp,
+        direction: Direction::Min,
+        rewards: Some(&explored.rewards[0]),
+        terminal: &goal,
+        terminal_values: None,
+        blocked: None,
+        allowed: None,
+    };
+    let solution = solve(problem, None).expect("small enough");
+    (!solution.infinite.contains(0)).then(|| solution.values[0].clone())
+}
+
+/// The planner's optimum; none if there is proved to be no plan.
+fn planned(mission: &Mission) -> Option<f64> {
+    let (problem, _) = mission.filled().expect("filled");
+    let task = mission.ground(&problem, &[], &encodings::Limits::none()).expect("ground");
+    let solution = encodings::optimize(&task, &encodings::Config::default(), &mut |_| {});
+    match solution.status {
+        encodings::Status::Optimal => solution.plan.map(|plan| plan.cost.to_f64()),
+        encodings::Status::Unsolvable => None,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn agree(what: &str, mission: &Mission, risk: Risk) {
+    let (process, plan) = (least_time(&coadaptation(mission), risk), planned(mission));
+    let close = match (&process, plan) {
+        (Some(time), Some(cost)) => (Number::to_f64(time) - cost).abs() < 1e-9,
+        (None, None) => true,
+        _ => false,
+    };
+    assert!(close, "{what}: process {process:?}, planner {plan:?}");
+}
+
+fn pairs_of_the_map(count: usize) {
+    let Some(path) = shared("real/map/map-p2cp3.json") else { return };
+    let map = std::fs::read_to_string(path).expect("readable");
+    let (_directory, mission) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
+    let names = coadaptation(&mission).places;
+    let mut random = Random(7);
+    for _ in 0..count {
+        let (start, goal) = (random.below(names.len()), random.below(names.len()));
+        if start == goal {
+            continue;
+        }
+        let mut mission = mission.clone();
+        mission.set("robot_at", &names[start]).expect("a place");
+        mission.aim("robot_at", &names[goal]);
+        agree(&format!("{} to {}", names[start], names[goal]), &mission, Risk::default());
+    }
+}
+
+/// A small generator of numbers; the same ones each time.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % bound
+    }
+}
+
+/// A random map of the form that the importer reads; the last place may not be reachable.
+fn random_map(random: &mut Random) -> (String, usize) {
+    let n = 3 + random.below(6);
+    let mut neighbours = vec![Vec::new(); n];
+    let mut time = Vec::new();
+    for a in 0..n {
+        for b in a + 1..n {
+            if random.below(100) < 45 {
+                neighbours[a].push(format!("p{b}"));
+                neighbours[b].push(format!("p{a}"));
+                let mut entry = json!({ "from": format!("p{a}"), "to": format!("p{b}") });
+                for design in ["amcl-kinect", "amcl-lidar", "mrpt-kinect", "aruco"] {
+                    entry[design] = json!({ "mean": (1 + random.below(400)) as f64 / 10.0 });
+                }
+                time.push(entry);
+            }
+        }
+    }
+    let nodes: Vec<Value> = neighbours
+        .iter()
+        .enumerate()
+        .map(|(n, others)| {
+            let coords = json!({ "x": random.below(20), "y": random.below(20) });
+            json!({ "node-id": format!("p{n}"), "coords": coords, "connected-to": others })
+        })
+        .collect();
+    (json!({ "map": nodes, "time": time }).to_string(), n)
+}
+
+fn generated_missions(count: usize) {
+    let mut random = Random(11);
+    for number in 0..count {
+        let (map, n) = random_map(&mut random);
+        let binds = number % 2 == 1;
+        let options = MapOptions {
+            battery: binds.then(|| 500 + random.below(4000) as u32),
+            switch_seconds: random.below(8) as u32,
+            ..places("p0", &format!("p{}", n - 1))
+        };
+        let (directory, _) = mission(&map, &options);
+        let mut manifest = std::fs::read_to_string(directory.path().join("camara.toml")).expect("readable");
+        manifest = manifest.replace("battery_unit = 100", "battery_unit = 1");
+        std::fs::write(directory.path().join("camara.toml"), manifest).expect("written");
+        let mission = match Mission::read(&directory.path().join("camara.toml")) {
+            Ok((mission, _)) => mission,
+            Err(messages) => panic!("{messages:?}"),
+        };
+        let (problem, _) = mission.filled().expect("filled");
+        if Coadaptation::new(&mission, &problem, mission.roles()).is_err() {
+            continue; // no arc at all
+        }
+        agree(&format!("mission {number}"), &mission, Risk { battery: binds, ..Risk::default() });
+    }
+}
+
+#[test]
+fn process_and_planner_agree_on_a_few_missions() {
+    generated_missions(6);
+    pairs_of_the_map(3);
+}
+
+#[test]
+#[ignore = "minutes; two engines on 200 missions and 300 pairs"]
+fn process_and_planner_agree_on_many_missions() {
+    generated_missions(200);
+    pairs_of_the_map(303);
+}
+
+/// Compares an imported mission, and hands over the first answer.
+fn compared(map: &str, options: &MapOptions, more: &[&str]) -> Value {
+    let (directory, _) = mission(map, options);
+    let arguments = [&["compare", "camara.toml", "--format", "json"], more].concat();
+    let outcome = metaplan_in(directory.path(), &arguments, "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    outcome.json()["comparisons"][0].clone()
+}
+
+#[test]
+fn the_price_of_not_reckoning_with_a_loss() {
+    let Some(path) = shared("real/map/map-p2cp3.json") else { return };
+    let map = std::fs::read_to_string(path).expect("readable");
+    // Start, goal, rate; least expected time, and that of our plan with re-planning.
+    let cases =
+        [("l59", "l35", "0.2", 79.3925, 84.950_524_8), ("l25", "l7", "0.05", 102.467_925, 102.467_925)];
+    for (start, goal, rate, best, replanning) in cases {
+        let options = MapOptions {
+            configuration: "amcl-kinect".to_owned(),
+            collisions: false,
+            failures: false,
+            ..places(start, goal)
+        };
+        let answer = compared(&map, &options, &["--loss", &format!("c_kinect={rate}")]);
+        let time = |kind: &str| {
+            let candidates = answer["candidates"].as_array().expect("candidates");
+            let found = candidates.iter().find(|candidate| candidate["kind"] == kind).expect("a candidate");
+            found["time"].as_f64().expect("a time")
+        };
+        assert!((time("a") - best).abs() < 1e-6, "{start} {goal}: {}", time("a"));
+        assert!((time("c") - replanning).abs() < 1e-6, "{start} {goal}: {}", time("c"));
+        assert!(time("f") <= best + 1e-9, "{}", time("f"));
+        assert!(!answer["loss"]["steps"].as_array().expect("steps").is_empty());
+    }
+}
+
+#[test]
+fn our_own_mission_is_compared() {
+    let outcome =
+        metaplan(&["compare", "missions/camara_like.toml", "--battery-unit", "500", "--format", "json"]);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let answer = &outcome.json()["comparisons"][0];
+    let kinds: Vec<&str> = answer["candidates"]
+        .as_array()
+        .expect("candidates")
+        .iter()
+        .filter_map(|candidate| candidate["kind"].as_str())
+        .collect();
+    for kind in ["a", "b", "c", "d", "e", "f"] {
+        assert!(kinds.contains(&kind), "{kind} in {kinds:?}");
+    }
+    assert!((answer["price_of_determinism"].as_f64().expect("a number") - 197.94).abs() < 1e-6, "{answer:#}");
+}
+
+#[test]
+fn what_is_exported_is_the_process_itself() {
+    let mission = "missions/camara_like.toml";
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("model.prism");
+    let file = file.to_str().expect("UTF-8");
+    let outcome = metaplan(&["export", mission, "--to", "prism", "-o", file]);
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let (mission, _) = Mission::read(&root().join(mission)).expect("a mission");
+    let native = coadaptation(&mission);
+    let risk = Risk::all(&native);
+    let native = explore(&Process::<f64>::new(&native, risk, &[]), &Bounds::default()).expect("explored");
+    let checked = metaplan(&["check", file, "Pmax=? [ F \"safe_goal\" ]", "--format", "json"]);
+    let statistics = &checked.json()["statistics"];
+    let sizes = [native.mdp.states(), native.mdp.choice_count(), native.mdp.transition_count()];
+    let found = ["states", "choices", "transitions"].map(|key| statistics[key].as_u64().expect("number"));
+    assert_eq!(found, sizes.map(|size| size as u64));
+    let jani = metaplan(&["export", "missions/camara_like.toml", "--to", "jani"]);
+    assert_eq!(jani.json()["jani-version"], 1);
+}
+
+const MODEL: &str =
+    "mdp\nmodule m\n  s:[0..2] init 0;\n  [a] s=0 -> PROBABILITIES;\nendmodule\nlabel \"goal\" = s=1;\n";
+
+#[test]
+fn bad_models_and_properties_are_refused_with_their_place() {
+    let good = "0.5:(s'=1) + 0.5:(s'=2)";
+    // What the updates say, the property; status, and what is said.
+    let cases = [
+        (good, "Pmax=? [ F \"goal\" ]", 0, "0.5"),
+        ("0.5:(s'=1) + 0.4:(s'=2)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:3: error[Q301]"),
+        ("(s'=3)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:15: error[Q305]"),
+        ("(t'=1)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:15: error[Q201]"),
+        ("(s'=1", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:19: error[Q102]"),
+        (good, "Pmax=? [ F \"nowhere\" ]", 3, "property:1:12: error[Q202]"),
+        (good, "S=? [ \"goal\" ]", 3, "property:1:1: error[Q403]"),
+        (good, "R{\"time\"}min=? [ F \"goal\" ]", 3, "error[Q202]"),
+    ];
+    for (updates, property, status, said) in cases {
+        let model = MODEL.replace("PROBABILITIES", updates);
+        let outcome = metaplan_in(&root(), &["check", "-", property], &model);
+        let all = format!("{}{}", outcome.stdout, outcome.stderr);
+        // Standard input goes by the name that was given for it.
+        let all = all.replace("-:", "<stdin>:");
+        assert_eq!(outcome.status, status, "{updates} {property}: {outcome:#?}");
+        assert!(all.contains(said), "{said} in {all}");
+    }
+    let limited = metaplan_in(
+        &root(),
+        &["check", "-", "Pmax=? [ F \"goal\" ]", "--state-limit", "2"],
+        &MODEL.replace("PROBABILITIES", good),
+    );
+    assert_eq!(limited.status, 12, "{limited:#?}");
+    let continuous =
+        metaplan_in(&root(), &["check", "-", "Pmax=? [ F \"goal\" ]"], "ctmc\nmodule m endmodule\n");
+    assert_eq!(continuous.status, 3, "{continuous:#?}");
+    assert!(continuous.stderr.contains(":1:1: error[Q401]"), "{continuous:#?}");
+}
+
+#[test]
+fn a_policy_is_written_and_evaluated() {
+    let Some(folder) = shared("reference/prism_cases") else { return };
+    let model = folder.join("c12_det_plan_vs_policy.prism");
+    let directory = tempfile::tempdir().expect("a directory");
+    let policy = directory.path().join("policy.json");
+    let (model, policy): (&Path, &Path) = (&model, &policy);
+    let (model, policy) = (model.to_str().expect("UTF-8"), policy.to_str().expect("UTF-8"));
+    let question = "R{\"time\"}min=? [ F \"goal\" ]";
+    let open = metaplan(&["check", model, question, "--const", "FIXED=false", "--policy", policy]);
+    assert_eq!((open.status, open.stdout.as_str()), (0, "3\n"), "{open:#?}");
+    let again = metaplan(&["check", model, question, "--const", "FIXED=false", "--evaluate", policy]);
+    assert_eq!((again.status, again.stdout.as_str()), (0, "3\n"), "{again:#?}");
+    let fixed = metaplan(&["check", model, question, "--const", "FIXED=true", "--evaluate", policy]);
+    assert_eq!(fixed.status, 3, "the policy is about another model: {fixed:#?}");
+}
