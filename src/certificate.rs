@@ -13,7 +13,7 @@ use std::fs;
 use std::io::Read as _;
 use std::path::Path;
 
-use encodings::pddl::ast::{ActionBody, Domain, Problem};
+use encodings::pddl::ast::{ActionBody, Domain, Name, Problem};
 use encodings::pddl::{self, Source, print_domain, print_problem};
 use encodings::validate::{Options, PlanText, validate};
 use encodings::{
@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use crate::message::Message;
+use crate::mission::Mission;
 
 const FORMAT: &str = "metaplan-certificate/1";
 /// All files together are at most this large, in bytes.
@@ -40,6 +41,8 @@ const ARGUMENT: &str = "argument.json";
 struct Manifest {
     format: String,
     claim: Claim,
+    /// Predicates that say which design solves which function: the slots of the ground task come from them.
+    solves: Vec<String>,
     files: Vec<File>,
 }
 
@@ -89,19 +92,27 @@ impl Report {
     }
 }
 
-/// Writes the certificate of a solution into a directory that does not exist yet. `plan` is the plan as lines with start and
-/// duration.
+/// What a certificate is about.
+#[derive(Debug, Clone, Copy)]
+pub struct Contents<'c> {
+    /// The mission.
+    pub mission: &'c Mission,
+    /// The problem as it was planned, with its metric.
+    pub problem: &'c Problem,
+    /// What they ground to.
+    pub task: &'c Task,
+    /// What was found.
+    pub solution: &'c Solution,
+    /// The plan as lines with start and duration, for the mission's domain.
+    pub plan: &'c str,
+}
+
+/// Writes the certificate of a solution into a directory that does not exist yet.
 ///
 /// # Errors
 /// The solution has no certificate, or the directory cannot be written.
-pub fn write(
-    directory: &Path,
-    (domain, problem): (&Domain, &Problem),
-    task: &Task,
-    solution: &Solution,
-    plan: &str,
-    limits: &Limits,
-) -> Result<(), Message> {
+pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Result<(), Message> {
+    let Contents { mission, problem, task, solution, plan } = *contents;
     let name = directory.display().to_string();
     let Some(certificate) = certify(task, solution, limits) else {
         let reason = match solution.status {
@@ -114,7 +125,7 @@ pub fn write(
         return Err(Message::error("M120", format!("no certificate: {reason}")));
     };
     let mut files = vec![
-        (DOMAIN, print_domain(domain)),
+        (DOMAIN, print_domain(mission.domain())),
         (PROBLEM, print_problem(problem)),
         (TASK, certificate.task),
         (ARGUMENT, certificate.argument),
@@ -131,7 +142,8 @@ pub fn write(
         bytes: text.len() as u64,
         sha256: digest(text.as_bytes()),
     });
-    let manifest = Manifest { format: FORMAT.to_owned(), claim, files: listed.collect() };
+    let solves = mission.solves().iter().map(ToString::to_string).collect();
+    let manifest = Manifest { format: FORMAT.to_owned(), claim, solves, files: listed.collect() };
     let mut text = serde_json::to_string_pretty(&manifest)
         .map_err(|error| Message::error("M120", format!("no certificate: {error}")))?;
     text.push('\n');
@@ -158,20 +170,20 @@ fn digest(bytes: &[u8]) -> String {
 pub fn verify(directory: &Path) -> Report {
     let mut report = Report { claim: None, parts: Vec::new() };
     match read(directory) {
-        Ok((claim, contents)) => {
+        Ok((Manifest { claim, solves, .. }, contents)) => {
             report.claim = Some(claim.clone());
             let bytes: usize = contents.iter().map(|(_, text)| text.len()).sum();
             let files = format!("{} files, {bytes} bytes, as the manifest has them", contents.len());
             report.parts.push(Part { part: "files", result: Ok(files) });
-            report.parts.extend(parts(&claim, &contents));
+            report.parts.extend(parts(&claim, &solves, &contents));
         }
         Err(reason) => report.parts.push(Part { part: "files", result: Err(reason) }),
     }
     report
 }
 
-/// The manifest's claim and the contents of the files, each as the manifest says.
-fn read(directory: &Path) -> Result<(Claim, Vec<(String, String)>), String> {
+/// The manifest, and the contents of the files, each as the manifest says.
+fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>), String> {
     let manifest = read_file(directory, "manifest.json", 1 << 20)?;
     let manifest: Manifest =
         serde_json::from_str(&manifest).map_err(|error| format!("manifest.json: {error}"))?;
@@ -197,7 +209,7 @@ fn read(directory: &Path) -> Result<(Claim, Vec<(String, String)>), String> {
         return Err(format!("manifest.json: the files are larger than {SIZE_LIMIT} bytes"));
     }
     let mut contents = Vec::new();
-    for file in manifest.files {
+    for file in &manifest.files {
         let text = read_file(directory, &file.name, file.bytes)?;
         if text.len() as u64 != file.bytes {
             return Err(format!(
@@ -211,9 +223,9 @@ fn read(directory: &Path) -> Result<(Claim, Vec<(String, String)>), String> {
         if found != file.sha256 {
             return Err(format!("{}: SHA-256 is {found}, where {} is expected", file.name, file.sha256));
         }
-        contents.push((file.name, text));
+        contents.push((file.name.clone(), text));
     }
-    Ok((manifest.claim, contents))
+    Ok((manifest, contents))
 }
 
 /// A plain file of at most so many bytes.
@@ -235,7 +247,7 @@ fn read_file(directory: &Path, name: &str, most: u64) -> Result<String, String> 
     Ok(text)
 }
 
-fn parts(claim: &Claim, contents: &[(String, String)]) -> Vec<Part> {
+fn parts(claim: &Claim, solves: &[String], contents: &[(String, String)]) -> Vec<Part> {
     let text =
         |name: &str| contents.iter().find(|(own, _)| own == name).map_or("", |(_, text)| text.as_str());
     let (domain, problem) = match read_pddl(text(DOMAIN), text(PROBLEM)) {
@@ -256,7 +268,7 @@ fn parts(claim: &Claim, contents: &[(String, String)]) -> Vec<Part> {
             Some(value)
         }
     };
-    parts.push(Part { part: "task", result: same_task(&domain, &problem, text(TASK)) });
+    parts.push(Part { part: "task", result: same_task(&domain, &problem, solves, text(TASK)) });
     let checked = check_certificate(text(TASK), text(ARGUMENT), metric.as_ref());
     let result = checked.map_err(|fault| fault.to_string()).map(|Checked { labels, potentials, needs }| {
         format!("no plan is better: induction over {labels} labels, with {potentials} potentials and {needs} needs")
@@ -302,8 +314,10 @@ fn plan(
 }
 
 /// Grounds the files again.
-fn same_task(domain: &Domain, problem: &Problem, written: &str) -> Result<String, String> {
-    let task = ground(domain, problem, &GroundConfig::default())
+fn same_task(domain: &Domain, problem: &Problem, solves: &[String], written: &str) -> Result<String, String> {
+    let solves = solves.iter().map(|name| Name::new(name)).collect();
+    let config = GroundConfig { solves, ..GroundConfig::default() };
+    let task = ground(domain, problem, &config)
         .map_err(|errors| errors.first().map_or_else(String::new, ToString::to_string))?;
     if describes(written, &task) {
         Ok(format!("what the files ground to: {} operators", task.operator_count()))

@@ -164,6 +164,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mut point = encodings::lexicographic(&task, &config, &mut report);
     progress.finish_and_clear();
     objectives.confirm(&mission, &problem, &point)?;
+    if let Some(directory) = &arguments.certificate {
+        certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
+            .unwrap_or_else(|message| output::warnings(common, &[message]));
+    }
     // What `validate` executes has the designs, what the user's own domain has no place for them has not.
     if arguments.plan_format != Some(PlanFormat::Ipc) {
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
@@ -172,11 +176,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(reason) = &solution.statistics.failure {
         let text = format!("the SAT solver gave up: {reason}");
         output::warnings(common, &[Message::warning("M114", text)]);
-    }
-
-    if let Some(directory) = &arguments.certificate {
-        certify(directory, &mission, &problem, &objectives, &task, solution, &config.limits)
-            .unwrap_or_else(|message| output::warnings(common, &[message]));
     }
 
     let text = match (arguments.plan_format, common.format) {
@@ -220,7 +219,8 @@ fn certify(
     if let [metric] = &objectives.metrics[..] {
         problem.metric = Some(metric.clone());
     }
-    certificate::write(directory, (mission.domain(), &problem), task, solution, &plan, limits)
+    let certificate = certificate::Contents { mission, problem: &problem, task, solution, plan: &plan };
+    certificate::write(directory, &certificate, limits)
 }
 
 /// Has the independent validator execute the plan; what it refuses is not shown.

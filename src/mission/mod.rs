@@ -221,13 +221,17 @@ impl Mission {
         plan
     }
 
-    /// The domain, in explicit form if its file is plain.
+    /// The predicates that say which design solves which function.
+    pub fn solves(&self) -> Vec<Name> {
+        self.bindings.solves()
+    }
+
     /// The symbols of the co-adaptation process.
     pub fn roles(&self) -> &Roles {
         &self.roles
     }
 
-    /// The domain.
+    /// The domain, in explicit form if its file is plain.
     pub fn domain(&self) -> &Domain {
         &self.domain
     }
@@ -257,11 +261,8 @@ impl Mission {
         objectives: &[Metric],
         limits: &Limits,
     ) -> Result<Task, Vec<Message>> {
-        let config = GroundConfig {
-            solves: self.bindings.solves(),
-            objectives: objectives.to_vec(),
-            limits: limits.clone(),
-        };
+        let config =
+            GroundConfig { solves: self.solves(), objectives: objectives.to_vec(), limits: limits.clone() };
         encodings::ground(&self.domain, problem, &config)
             .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
     }

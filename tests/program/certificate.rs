@@ -26,6 +26,8 @@ fn missions_have_certificates() {
         &["plan", "missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"],
         &["plan", "missions/ugv.toml", "--minimize", "total-time"],
         &["plan", "missions/uuv.toml"],
+        &["plan", "missions/ugv_plain.toml"],
+        &["plan", "missions/uuv_plain.toml", "--plan-format", "plansys2"],
         &["plan", "missions/uuv.toml", "--set", "battery=15"],
     ] {
         let directory = tempfile::tempdir().expect("a directory");
