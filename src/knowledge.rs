@@ -9,6 +9,7 @@ use ontology::tomasys::View;
 use ontology::tomasys::change::{self, Status};
 use ontology::{Equality, ReadOptions};
 use rules::{Delta, Engine, Fact, Literal, Prefixes, Program, Symbols, Value};
+use serde::{Deserialize, Serialize};
 
 use crate::message::Message;
 
@@ -36,10 +37,12 @@ pub struct Knowledge {
     origin: Runtime,
     rule_count: usize,
     warnings: Vec<Message>,
+    sources: Sources,
 }
 
 /// A stated fact, with names and values in place of symbols.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Statement {
     /// The IRI of the class or property.
     pub predicate: String,
@@ -48,7 +51,8 @@ pub struct Statement {
 }
 
 /// An argument of a [`Statement`].
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Part {
     /// An individual.
     Name(String),
@@ -57,7 +61,8 @@ pub enum Part {
 }
 
 /// How statements differ from those of the documents.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Statements {
     /// Stated now, and not in the documents.
     pub added: Vec<Statement>,
@@ -146,12 +151,18 @@ impl Knowledge {
         let mistakes = ontology::tomasys::check(&ontology, &engine);
         warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
         let runtime = Runtime::new(engine, Mode::Retract);
-        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings })
+        let sources = sources.clone();
+        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources })
     }
 
     /// What is questionable about the documents.
     pub fn warnings(&self) -> &[Message] {
         &self.warnings
+    }
+
+    /// What it was read from.
+    pub fn sources(&self) -> &Sources {
+        &self.sources
     }
 
     /// How many rules there are: those of each document, and those of rule files; axioms do not count.
@@ -374,15 +385,19 @@ impl Knowledge {
     }
 }
 
-fn parse_rule_file(file: &str, symbols: &mut Symbols) -> Result<Program, Vec<Message>> {
+/// The text of a rule file, or of shipped rules by their name.
+pub(crate) fn rule_text(file: &str) -> Result<String, Message> {
     let text = match file {
-        COADAPTATION => rules::COADAPTATION_RULES.to_owned(),
-        TOMASYS => rules::TOMASYS_RULES.to_owned(),
-        "-" => std::io::read_to_string(std::io::stdin())
-            .map_err(|error| vec![Message::at("M101", "-", None, format!("cannot be read: {error}"))])?,
-        path => std::fs::read_to_string(path)
-            .map_err(|error| vec![Message::at("M101", path, None, format!("cannot be read: {error}"))])?,
+        COADAPTATION => Ok(rules::COADAPTATION_RULES.to_owned()),
+        TOMASYS => Ok(rules::TOMASYS_RULES.to_owned()),
+        "-" => std::io::read_to_string(std::io::stdin()),
+        path => std::fs::read_to_string(path),
     };
+    text.map_err(|error| Message::at("M101", file, None, format!("cannot be read: {error}")))
+}
+
+fn parse_rule_file(file: &str, symbols: &mut Symbols) -> Result<Program, Vec<Message>> {
+    let text = rule_text(file).map_err(|message| vec![message])?;
     rules::parse_rules(&text, file, symbols, &Prefixes::default())
         .map_err(|errors| errors.iter().map(Message::from_rules).collect())
 }

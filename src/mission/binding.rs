@@ -43,6 +43,8 @@ enum Query {
 #[derive(Debug, Clone, Default)]
 pub struct Bindings {
     own: BTreeMap<Name, Query>,
+    /// As the manifest has them.
+    written: BTreeMap<String, String>,
 }
 
 impl Bindings {
@@ -53,7 +55,12 @@ impl Bindings {
     pub fn with(own: &BTreeMap<String, String>) -> Result<Self, String> {
         let parse =
             |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
-        Ok(Self { own: own.iter().map(parse).collect::<Result<_, String>>()? })
+        Ok(Self { own: own.iter().map(parse).collect::<Result<_, String>>()?, written: own.clone() })
+    }
+
+    /// Those that are given, as they are written.
+    pub(crate) fn written(&self) -> &BTreeMap<String, String> {
+        &self.written
     }
 
     /// The predicates that say which design solves which function.

@@ -221,6 +221,16 @@ impl Mission {
         plan
     }
 
+    /// The bindings.
+    pub(crate) fn bindings(&self) -> &Bindings {
+        &self.bindings
+    }
+
+    /// The domain as its file has it.
+    pub(crate) fn domain_source(&self) -> &Source {
+        &self.domain_source
+    }
+
     /// The predicates that say which design solves which function.
     pub fn solves(&self) -> Vec<Name> {
         self.bindings.solves()

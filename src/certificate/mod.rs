@@ -5,8 +5,11 @@
 //! | `manifest.json` | the claim, and the size and SHA-256 of every other file |
 //! | `domain.pddl`, `problem.pddl` | the files as they were planned with: availability and values filled in |
 //! | `plan.txt` | the plan; missing if there is none |
+//! | `knowledge.nt`, `origin.json` | the knowledge base, rules, bindings, and what has changed since they were read; missing if there is no knowledge base |
 //! | `task.json` | the ground task |
 //! | `argument.json` | why no plan is cheaper: labels, potentials, needs (see `encodings::check_certificate`) |
+
+mod knowledge;
 
 use std::fmt::Write as _;
 use std::fs;
@@ -70,7 +73,7 @@ struct File {
 /// What came of one part of a verification.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// `files`, `plan`, `task` or `argument`.
+    /// `files`, `knowledge`, `plan`, `task` or `argument`.
     pub part: &'static str,
     /// What was checked; or why it fails, with the first thing that is wrong.
     pub result: Result<String, String>,
@@ -130,6 +133,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         (TASK, certificate.task),
         (ARGUMENT, certificate.argument),
     ];
+    files.extend(knowledge::files(mission)?.into_iter().flatten());
     let claim = match &solution.plan {
         Some(found) => {
             files.push((PLAN, plan.to_owned()));
@@ -194,6 +198,9 @@ fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>), String> {
     if manifest.claim != Claim::Unsolvable {
         expected.push(PLAN);
     }
+    if manifest.files.iter().any(|file| file.name == knowledge::ORIGIN) {
+        expected.extend([knowledge::DOCUMENT, knowledge::ORIGIN]);
+    }
     expected.sort_unstable();
     let mut names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
     names.sort_unstable();
@@ -252,9 +259,14 @@ fn parts(claim: &Claim, solves: &[String], contents: &[(String, String)]) -> Vec
         |name: &str| contents.iter().find(|(own, _)| own == name).map_or("", |(_, text)| text.as_str());
     let (domain, problem) = match read_pddl(text(DOMAIN), text(PROBLEM)) {
         Ok(read) => read,
-        Err(reason) => return vec![Part { part: "plan", result: Err(reason) }],
+        Err(reason) => return vec![Part { part: "files", result: Err(reason) }],
     };
     let mut parts = Vec::new();
+    if contents.iter().any(|(name, _)| name == knowledge::ORIGIN) {
+        let (document, origin) = (text(knowledge::DOCUMENT), text(knowledge::ORIGIN));
+        let result = knowledge::check(document, origin, &domain, &problem);
+        parts.push(Part { part: "knowledge", result });
+    }
     let metric = match claim {
         Claim::Unsolvable => None,
         Claim::Optimal { metric } => {
