@@ -24,18 +24,12 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Vec<Diagnostic>> {
     let actions = actions(model);
     let globals = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
     let mut variables: Vec<Value> = globals.map(|variable| writer.variable(variable)).collect();
-    let taken = |text: &str| {
-        let declared = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
-        let mut names =
-            declared.map(|v| v.name.as_str()).chain(model.constants.iter().map(|c| c.name.as_str()));
-        names.any(|known| known == text)
-    };
     for label in &model.labels {
-        let name = if taken(&label.name) { format!("label_{}", label.name) } else { label.name.clone() };
+        let name = label_name(model, &label.name);
         variables.push(json!({ "name": name, "type": "bool", "transient": true, "initial-value": false }));
     }
     for rewards in &model.rewards {
-        let name = reward_name(&rewards.name);
+        let name = reward_name(model, &rewards.name);
         variables.push(json!({ "name": name, "type": "real", "transient": true, "initial-value": 0 }));
     }
     // Every automaton writes what belongs to it; labels and rewards of states belong to the first one.
@@ -43,7 +37,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Vec<Diagnostic>> {
         .modules
         .iter()
         .enumerate()
-        .map(|(number, module)| writer.automaton(model, module, number == 0, &taken))
+        .map(|(number, module)| writer.automaton(model, module, number == 0))
         .collect();
     for rewards in &model.rewards {
         for item in rewards.items.iter().filter(|item| item.action == Some(None)) {
@@ -76,8 +70,26 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Vec<Diagnostic>> {
     }))
 }
 
-fn reward_name(name: &str) -> String {
-    if name.is_empty() { "reward".to_owned() } else { format!("reward_{name}") }
+/// Whether a variable or a constant has this name.
+fn is_taken(model: &Model, name: &str) -> bool {
+    let declared = model.modules.iter().flat_map(|module| &module.variables).chain(&model.globals);
+    let mut names = declared.map(|v| &v.name).chain(model.constants.iter().map(|constant| &constant.name));
+    names.any(|known| known == name)
+}
+
+/// Labels keep their names where they can.
+fn label_name(model: &Model, name: &str) -> String {
+    if is_taken(model, name) { format!("label_{name}") } else { name.to_owned() }
+}
+
+/// So do rewards.
+fn reward_name(model: &Model, name: &str) -> String {
+    let taken = is_taken(model, name) || model.labels.iter().any(|label| label.name == name);
+    match name {
+        "" => "reward".to_owned(),
+        _ if taken => format!("reward_{name}"),
+        _ => name.to_owned(),
+    }
 }
 
 fn type_name(kind: Type) -> &'static str {
@@ -114,24 +126,17 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn automaton(
-        &self,
-        model: &Model,
-        module: &Module,
-        is_first: bool,
-        taken: &dyn Fn(&str) -> bool,
-    ) -> Value {
+    fn automaton(&self, model: &Model, module: &Module, is_first: bool) -> Value {
         let mut transient = Vec::new();
         if is_first {
             for label in &model.labels {
-                let name =
-                    if taken(&label.name) { format!("label_{}", label.name) } else { label.name.clone() };
+                let name = label_name(model, &label.name);
                 transient.push(json!({ "ref": name, "value": self.expression(&label.expression) }));
             }
             for rewards in &model.rewards {
                 let of_states = rewards.items.iter().filter(|item| item.action.is_none());
                 if let Some(value) = self.sum(of_states) {
-                    transient.push(json!({ "ref": reward_name(&rewards.name), "value": value }));
+                    transient.push(json!({ "ref": reward_name(model, &rewards.name), "value": value }));
                 }
             }
         }
@@ -160,7 +165,7 @@ impl Writer<'_> {
             for Rewards { name, items, .. } in &model.rewards {
                 let own = items.iter().filter(|item| item.action == Some(command.action.clone()));
                 if let Some(value) = self.sum(own) {
-                    assignments.push(json!({ "ref": reward_name(name), "value": value }));
+                    assignments.push(json!({ "ref": reward_name(model, name), "value": value }));
                 }
             }
         }
