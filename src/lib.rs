@@ -13,3 +13,4 @@ pub mod mapek;
 pub mod message;
 pub mod mission;
 pub mod probabilistic;
+pub mod simulate;

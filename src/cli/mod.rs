@@ -11,6 +11,7 @@ mod output;
 mod plan;
 mod reason;
 mod run;
+mod simulate;
 mod validate;
 mod verify;
 
@@ -115,6 +116,8 @@ enum Command {
     Export(export::Arguments),
     /// The adaptation loop: events in, adaptations out, one JSON object a line.
     Run(run::Arguments),
+    /// The loop against a simulated robot, beside other ways of control.
+    Simulate(simulate::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
     Validate(validate::Arguments),
     /// Checks a certificate without trusting the planner.
@@ -297,6 +300,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Import(arguments) => import::run(arguments, &cli.common),
         Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Run(arguments) => run::run(arguments, &cli.common),
+        Command::Simulate(arguments) => simulate::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),
         Command::Verify(arguments) => verify::run(arguments, &cli.common),
     }

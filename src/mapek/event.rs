@@ -349,9 +349,9 @@ impl Event {
 }
 
 impl Observation {
-    /// The observation as one line; only what is an event is written.
-    pub fn to_line(&self) -> String {
-        let Some(Ok(event)) = self.events.first() else { return "{}".to_owned() };
+    /// The observation as an object of the format, if it is one event; an empty object otherwise.
+    pub fn to_json(&self) -> Value {
+        let [Ok(event)] = self.events.as_slice() else { return json!({}) };
         let mut object = event.to_json();
         if let Some(sequence) = self.sequence {
             object["seq"] = json!(sequence);
@@ -359,6 +359,6 @@ impl Observation {
         if let Some(time) = self.time {
             object["time"] = json!(time.as_secs_f64());
         }
-        object.to_string()
+        object
     }
 }

@@ -48,7 +48,7 @@ impl Loop {
         answers.push(Answer::GoalReached);
     }
 
-    fn request(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
+    pub(super) fn request(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
         self.knowledge.actions += 1;
         let action = self.knowledge.actions;
         self.reconfigure(action, &step, answers);

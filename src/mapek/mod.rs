@@ -21,6 +21,7 @@ mod event;
 mod execute;
 mod knowledge;
 mod monitor;
+mod parts;
 pub(crate) mod number;
 mod plan;
 mod record;
@@ -46,7 +47,9 @@ pub use step::PlannedStep;
 
 use monitor::Changes;
 use plan::Planner;
-use resume::{resume, resumed_goal};
+pub(crate) use monitor::value_of;
+pub(crate) use resume::resume;
+use resume::resumed_goal;
 
 /// How eager the loop is.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! Monitor: events to changes of what is believed.
 
-use encodings::pddl::ast::InitialElement;
+use encodings::pddl::ast::{InitialElement, Problem};
 use encodings::validate::{Advance, advance};
 use num_rational::BigRational;
 use ontology::vocab::local_name;
@@ -188,11 +188,7 @@ impl Loop {
 
     /// The value of a function of the problem, by name and arguments.
     pub(super) fn value(&self, name: &str) -> Option<BigRational> {
-        let words: Vec<&str> = name.split_whitespace().collect();
-        self.knowledge.mission.problem().init.iter().find_map(|element| match element {
-            InitialElement::Value(atom, value, _) if is_named(atom, &words) => Some(value.clone()),
-            _ => None,
-        })
+        value_of(self.knowledge.mission.problem(), name)
     }
 
     /// A fact or a value of the problem is reported.
@@ -230,6 +226,15 @@ impl Loop {
         self.checked.insert(key);
         Ok(())
     }
+}
+
+/// The value of a function that a problem states, by name and arguments.
+pub(crate) fn value_of(problem: &Problem, name: &str) -> Option<BigRational> {
+    let words: Vec<&str> = name.split_whitespace().collect();
+    problem.init.iter().find_map(|element| match element {
+        InitialElement::Value(atom, value, _) if is_named(atom, &words) => Some(value.clone()),
+        _ => None,
+    })
 }
 
 fn is_cancel(effect: &super::answer::Effect) -> bool {

@@ -1,6 +1,6 @@
 //! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
 
-use encodings::pddl::ast::{Condition, Declaration, Domain, InitialElement, Name, Problem};
+use encodings::pddl::ast::{Condition, Declaration, Domain, InitialElement, Name, Problem, Term};
 use encodings::pddl::{self, Severity, Source};
 
 use super::{Mission, binding};
@@ -43,6 +43,20 @@ impl Mission {
         declared
             .into_iter()
             .any(|d| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments)
+    }
+
+    /// Whether the problem states a fact, as `predicate arguments`.
+    pub(crate) fn holds(&self, fact: &str) -> bool {
+        let words: Vec<Name> = fact.split_whitespace().map(Name::new).collect();
+        self.problem.init.iter().any(|element| match element {
+            InitialElement::Fact(atom) => {
+                let arguments = atom.arguments.iter().map(|term| match term {
+                    Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
+                });
+                std::iter::once(&atom.predicate.name).chain(arguments).eq(&words)
+            }
+            _ => false,
+        })
     }
 
     /// Replaces the facts and values of the problem.

@@ -13,6 +13,7 @@ use crate::mapek::{Settings, number};
 use crate::message::Message;
 use crate::mission::binding::Bindings;
 use crate::mission::source;
+use crate::simulate::Simulation;
 
 /// A manifest; paths in it are relative to the manifest.
 #[derive(Debug, Clone, Deserialize)]
@@ -82,6 +83,9 @@ pub struct Scenario {
     /// Measured attributes, fluents and facts by name, as for `--set`; strings, numbers or truth values.
     #[serde(default)]
     pub set: BTreeMap<String, toml::Value>,
+    /// What a simulated robot meets.
+    #[serde(default)]
+    pub simulation: Option<Simulation>,
 }
 
 fn shipped_rules() -> Vec<String> {

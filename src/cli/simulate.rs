@@ -1,0 +1,261 @@
+//! `metaplan simulate`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use indicatif::ProgressBar;
+use metaplan::mapek::{Answer, Observation};
+use metaplan::message::Message;
+use metaplan::mission::Mission;
+use metaplan::simulate::{Run, SUAVE_COLUMNS, Sample, Simulation, Strategy, simulate};
+use serde_json::{Value, json};
+
+use crate::cli::{Common, Exit, Failure, Format, output};
+
+/// Arguments of `simulate`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission's manifest.
+    #[arg(value_name = "MISSION")]
+    mission: PathBuf,
+    /// A scenario of the manifest that says what a simulated robot meets.
+    #[arg(long, value_name = "NAME")]
+    scenario: String,
+    /// Who decides (repeatable; all without it).
+    #[arg(long, value_enum)]
+    strategy: Vec<Who>,
+    /// So many missions for each strategy, with seeds that count up.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    runs: u32,
+    /// The first seed.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Write what was observed and answered in the first mission of each strategy, one JSON object a line.
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Write one line for each mission, with the columns of SUAVE among others.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Who {
+    /// The adaptation loop.
+    Joint,
+    /// A new joint plan when an action has failed.
+    Failure,
+    /// For each function by itself the best design.
+    Greedy,
+    /// Any available design.
+    Random,
+    /// The first plan to its end.
+    None,
+}
+
+impl Who {
+    fn strategy(self) -> Strategy {
+        match self {
+            Self::Joint => Strategy::Joint,
+            Self::Failure => Strategy::Failure,
+            Self::Greedy => Strategy::Greedy,
+            Self::Random => Strategy::Random,
+            Self::None => Strategy::None,
+        }
+    }
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let (mut mission, manifest) = Mission::read(&arguments.mission)?;
+    let known = || {
+        let simulated = manifest.scenarios.iter().filter(|(_, scenario)| scenario.simulation.is_some());
+        simulated.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    let scenario = manifest.scenarios.get(&arguments.scenario);
+    let Some((scenario, settings)) = scenario.and_then(|scenario| Some((scenario, scenario.simulation.as_ref()?)))
+    else {
+        let text = format!("the mission has no scenario `{}` to simulate; it has: {}", arguments.scenario, known());
+        return Err(Failure::usage(Message::error("M108", text)));
+    };
+    mission.apply(scenario)?;
+    output::warnings(common, mission.warnings());
+    crate::cli::consistent(mission.knowledge())?;
+    let strategies: Vec<Strategy> = if arguments.strategy.is_empty() {
+        Strategy::ALL.to_vec()
+    } else {
+        arguments.strategy.iter().map(|who| who.strategy()).collect()
+    };
+    let mut log = String::new();
+    let runs = play(&mission, settings, &strategies, arguments, common, &mut log)?;
+    if let Some(file) = &arguments.log {
+        output::write_file(file, &log)?;
+    }
+    if let Some(file) = &arguments.csv {
+        output::write_file(file, &csv(&runs))?;
+    }
+    match common.format {
+        Format::Json => output::json_answer(&to_json(&mission.name, &arguments.scenario, &strategies, &runs)),
+        _ => output::answer(&text(&strategies, &runs)),
+    }
+    Ok(Exit::Done)
+}
+
+fn play(
+    mission: &Mission,
+    settings: &Simulation,
+    strategies: &[Strategy],
+    arguments: &Arguments,
+    common: &Common,
+    log: &mut String,
+) -> Result<Vec<Run>, Failure> {
+    let total = strategies.len() as u64 * u64::from(arguments.runs);
+    let progress = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new(total) };
+    let mut runs = Vec::new();
+    for &strategy in strategies {
+        for seed in (arguments.seed..).take(arguments.runs as usize) {
+            let is_first = seed == arguments.seed && arguments.log.is_some();
+            let mut note = |observation: &Observation, answers: &[Answer]| {
+                if is_first {
+                    write_log(log, strategy, observation, answers);
+                }
+            };
+            runs.push(simulate(mission, settings, strategy, seed, &mut note)?);
+            progress.inc(1);
+        }
+    }
+    progress.finish_and_clear();
+    Ok(runs)
+}
+
+fn write_log(log: &mut String, strategy: Strategy, observation: &Observation, answers: &[Answer]) {
+    let mut line = |mut object: Value| {
+        object["strategy"] = json!(strategy.name());
+        // Writing to a string does not fail.
+        let _ = writeln!(log, "{object}");
+    };
+    line(observation.to_json());
+    for answer in answers {
+        line(answer.to_json());
+    }
+}
+
+/// The runs of a strategy.
+fn of<'a>(runs: &'a [Run], strategy: Strategy) -> impl Iterator<Item = &'a Run> + Clone {
+    runs.iter().filter(move |run| run.strategy == strategy)
+}
+
+/// Missions in which a strategy did better than the loop, and in which it did worse.
+fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> {
+    let mut joint = of(runs, Strategy::Joint).peekable();
+    joint.peek()?;
+    let pairs = of(runs, strategy).zip(joint);
+    Some(pairs.fold((0, 0), |(better, worse), (run, joint)| {
+        (better + usize::from(run.is_better_than(joint)), worse + usize::from(joint.is_better_than(run)))
+    }))
+}
+
+fn sample(runs: &[Run], strategy: Strategy, figure: impl Fn(&Run) -> Option<f64>) -> Option<Sample> {
+    Sample::of(&of(runs, strategy).filter_map(figure).collect::<Vec<_>>())
+}
+
+fn accomplished_cost(run: &Run) -> Option<f64> {
+    run.accomplished.then_some(run.cost)
+}
+
+fn text(strategies: &[Strategy], runs: &[Run]) -> String {
+    let show = |sample: Option<Sample>| {
+        sample.map_or_else(
+            || "none".to_owned(),
+            |s| if s.count < 2 { format!("{:.2}", s.mean) } else { format!("{:.2} ± {:.2} (sd {:.2})", s.mean, s.half_width, s.deviation) },
+        )
+    };
+    let rows = strategies.iter().map(|&strategy| {
+        let mine = of(runs, strategy);
+        let (count, done) = (mine.clone().count(), mine.filter(|run| run.accomplished).count());
+        let beside = beside_joint(runs, strategy).filter(|_| strategy != Strategy::Joint);
+        vec![
+            strategy.name().to_owned(),
+            format!("{done} of {count}"),
+            show(sample(runs, strategy, accomplished_cost)),
+            show(sample(runs, strategy, Run::mean_reaction)),
+            show(sample(runs, strategy, |run| Some(run.failed as f64))),
+            show(sample(runs, strategy, |run| Some(run.reconfigurations as f64))),
+            show(sample(runs, strategy, |run| Some(run.distinct as f64))),
+            beside.map_or_else(String::new, |(better, worse)| format!("{better} / {worse}")),
+        ]
+    });
+    let header = [
+        "strategy",
+        "accomplished",
+        "cost, if accomplished",
+        "reaction",
+        "failed actions",
+        "reconfigurations",
+        "configurations",
+        "better / worse than joint",
+    ];
+    output::table(&header, rows)
+}
+
+fn csv(runs: &[Run]) -> String {
+    let mut text = String::from("strategy,seed,accomplished,cost,time,plans,failed,cancelled,reconfigurations,configurations,");
+    text += &SUAVE_COLUMNS.join(",");
+    text.push('\n');
+    for run in runs {
+        let _ = writeln!(
+            text,
+            "{},{},{},{:.3},{:.3},{},{},{},{},{},{}",
+            run.strategy.name(),
+            run.seed,
+            run.accomplished,
+            run.cost,
+            run.time,
+            run.plans,
+            run.failed,
+            run.cancelled,
+            run.reconfigurations,
+            run.distinct,
+            run.suave().join(",")
+        );
+    }
+    text
+}
+
+fn to_json(mission: &str, scenario: &str, strategies: &[Strategy], runs: &[Run]) -> Value {
+    let sample_json = |sample: Option<Sample>| {
+        sample.map(|s| json!({ "mean": s.mean, "deviation": s.deviation, "half_width_95": s.half_width }))
+    };
+    let summary: Vec<Value> = strategies
+        .iter()
+        .map(|&strategy| {
+            let beside = beside_joint(runs, strategy);
+            json!({
+                "strategy": strategy.name(),
+                "runs": of(runs, strategy).count(),
+                "accomplished": of(runs, strategy).filter(|run| run.accomplished).count(),
+                "cost": sample_json(sample(runs, strategy, accomplished_cost)),
+                "reaction": sample_json(sample(runs, strategy, Run::mean_reaction)),
+                "reconfigurations": sample_json(sample(runs, strategy, |run| Some(run.reconfigurations as f64))),
+                "configurations": sample_json(sample(runs, strategy, |run| Some(run.distinct as f64))),
+                "better_than_joint": beside.map(|(better, _)| better),
+                "worse_than_joint": beside.map(|(_, worse)| worse),
+            })
+        })
+        .collect();
+    let each: Vec<Value> = runs
+        .iter()
+        .map(|run| {
+            json!({
+                "strategy": run.strategy.name(), "seed": run.seed, "accomplished": run.accomplished, "lost": run.lost,
+                "cost": run.cost, "time": run.time, "actions": run.actions, "failed": run.failed,
+                "cancelled": run.cancelled, "plans": run.plans, "reconfigurations": run.reconfigurations,
+                "configurations": run.distinct, "reaction": run.mean_reaction(), "found": run.found,
+                "distance": run.distance,
+            })
+        })
+        .collect();
+    json!({
+        "format": "metaplan-simulate/1", "mission": mission, "scenario": scenario, "strategies": summary, "runs": each,
+    })
+}

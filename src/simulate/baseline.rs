@@ -1,0 +1,194 @@
+//! Ways of control to compare with: what is left out of the loop, one idea each.
+//!
+//! All know what the loop knows, request actions in the same way, and have the same planner for their tasks. They differ
+//! in when they plan and in who chooses designs:
+//!
+//! - *none* follows its first plan, and gives up when an action fails;
+//! - *failure* plans anew, jointly, when an action has failed, as PLANTA does \[1\];
+//! - *greedy* takes of the available designs of each function the one with which the action at hand costs least by itself, at
+//!   each request and when a design is lost, as MROS takes the one of greatest utility \[2\]; its task is planned
+//!   anew when an action has failed;
+//! - *random* takes any available design instead.
+//!
+//! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36, 2022.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use encodings::pddl::ast::Direction;
+use encodings::validate::{advance, metric_after};
+use num_rational::BigRational;
+
+use crate::mapek::{Answer, Event, Loop, Observation, PlannedStep};
+
+/// Who decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Strategy {
+    /// The adaptation loop.
+    Joint,
+    /// The first plan to its end.
+    None,
+    /// Any available design.
+    Random,
+    /// For each function by itself the best design.
+    Greedy,
+    /// A new joint plan when an action has failed.
+    Failure,
+}
+
+impl Strategy {
+    /// All of them, the loop first.
+    pub const ALL: [Self; 5] = [Self::Joint, Self::Failure, Self::Greedy, Self::Random, Self::None];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::None => "none",
+            Self::Random => "random",
+            Self::Greedy => "greedy",
+            Self::Failure => "failure",
+        }
+    }
+
+    fn chooses_designs(self) -> bool {
+        matches!(self, Self::Random | Self::Greedy)
+    }
+}
+
+/// A strategy at work. What it knows is kept by a loop that is never asked to decide.
+#[derive(Debug)]
+pub(super) struct Controller {
+    strategy: Strategy,
+    knowledge: Loop,
+    plan: VecDeque<PlannedStep>,
+    random: fastrand::Rng,
+    gave_up: bool,
+    /// How many plans were made.
+    pub(super) plans: usize,
+}
+
+impl Controller {
+    pub(super) fn new(strategy: Strategy, knowledge: Loop, seed: u64) -> Self {
+        let random = fastrand::Rng::with_seed(seed ^ 0x5eed);
+        Self { strategy, knowledge, plan: VecDeque::new(), random, gave_up: false, plans: 0 }
+    }
+
+    /// Whether it will never request anything any more.
+    pub(super) fn is_done(&self) -> bool {
+        self.gave_up
+    }
+
+    pub(super) fn start(&mut self) -> Vec<Answer> {
+        if self.strategy == Strategy::Joint {
+            let answers = self.knowledge.start();
+            self.count(&answers);
+            return answers;
+        }
+        let mut answers = Vec::new();
+        self.replan();
+        self.go_on(&mut answers);
+        answers
+    }
+
+    pub(super) fn handle(&mut self, event: Event, now: Duration) -> Vec<Answer> {
+        let is_failure = matches!(event, Event::Failed { .. });
+        let observation = Observation::from(event);
+        if self.strategy == Strategy::Joint {
+            let answers = self.knowledge.handle(&observation, now);
+            self.count(&answers);
+            return answers;
+        }
+        self.knowledge.observe(&observation, now);
+        let mut answers = Vec::new();
+        if is_failure && self.strategy == Strategy::None {
+            self.gave_up = true;
+        } else if is_failure {
+            self.replan();
+        }
+        if self.strategy.chooses_designs() {
+            self.replace_lost(&mut answers);
+        }
+        self.go_on(&mut answers);
+        answers
+    }
+
+    fn count(&mut self, answers: &[Answer]) {
+        let _ = self.knowledge.decision(answers);
+        self.plans += answers.iter().filter(|answer| matches!(answer, Answer::PlanRequested { .. })).count();
+    }
+
+    fn replan(&mut self) {
+        self.plans += 1;
+        self.plan = self.knowledge.plan_anew().unwrap_or_default().into();
+    }
+
+    /// Requests the next action if none is under way.
+    fn go_on(&mut self, answers: &mut Vec<Answer>) {
+        if self.gave_up || self.knowledge.knowledge().running().is_some() {
+            return;
+        }
+        if let Some(step) = self.plan.pop_front() {
+            let step = if self.strategy.chooses_designs() { self.choose(&step, |_| true) } else { step };
+            self.knowledge.request_now(step, answers);
+        } else if self.strategy != Strategy::None && !self.knowledge.is_goal() {
+            // There was no plan; there may be one now.
+            self.replan();
+            if let Some(step) = self.plan.pop_front() {
+                self.plan.push_front(step);
+                self.go_on(answers);
+            }
+        }
+    }
+
+    /// The same action with designs as the strategy chooses them for some functions.
+    fn choose(&mut self, step: &PlannedStep, concerns: impl Fn(&str) -> bool) -> PlannedStep {
+        let mut chosen = step.clone();
+        for (function, _) in &step.configuration {
+            if !concerns(function) {
+                continue;
+            }
+            let designs = self.knowledge.designs_for(function);
+            let design = match self.strategy {
+                Strategy::Random if !designs.is_empty() => Some(designs[self.random.usize(..designs.len())].clone()),
+                Strategy::Random => None,
+                _ => self.cheapest(&chosen, function, &designs),
+            };
+            if let Some(design) = design {
+                chosen = chosen.with_design(function, &design);
+            }
+        }
+        chosen
+    }
+
+    /// The design with which the action costs least by itself, whether or not it can be done; of equals the first.
+    fn cheapest(&self, step: &PlannedStep, function: &str, designs: &[String]) -> Option<String> {
+        let mission = self.knowledge.knowledge().mission();
+        let mut problem = mission.problem().clone();
+        mission.fill(&mut problem);
+        let maximize = problem.metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize);
+        let cost = |design: &String| -> Option<BigRational> {
+            let step = step.with_design(function, design).to_plan_step();
+            let advance = advance(mission.domain(), &problem, &step, true).ok()?;
+            let mut after = problem.clone();
+            advance.apply(&mut after.init);
+            let cost = metric_after(mission.domain(), &after, &advance.duration)?;
+            Some(if maximize { -cost } else { cost })
+        };
+        let costs = designs.iter().filter_map(|design| Some((cost(design)?, design)));
+        costs.min_by(|left, right| left.0.cmp(&right.0)).map(|(_, design)| design.clone())
+    }
+
+    /// Chooses anew where the action under way has lost a design.
+    fn replace_lost(&mut self, answers: &mut Vec<Answer>) {
+        let known = self.knowledge.knowledge();
+        let Some((_, step)) = known.running() else { return };
+        let step = step.clone();
+        let available = known.available().clone();
+        let is_lost = |function: &str| step.design(function).is_some_and(|design| !available.contains(design));
+        if step.configuration.iter().any(|(function, _)| is_lost(function)) {
+            let chosen = self.choose(&step, is_lost);
+            self.knowledge.reconfigure_now(chosen, answers);
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What a simulated robot meets: the section `simulation` of a scenario.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+/// How a scenario is simulated. Times are in the domain's time unit.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Simulation {
+    /// The time from one report to the next.
+    pub step: f64,
+    /// The mission is given up after this time.
+    pub time_budget: f64,
+    /// How long an action that cannot go on waits before it fails.
+    pub patience: f64,
+    /// Actions take up to this share longer or shorter than expected.
+    #[serde(default)]
+    pub noise: f64,
+    /// The function of the problem that ends the mission when it comes to nothing.
+    #[serde(default)]
+    pub lifeline: Option<String>,
+    /// What happens once.
+    #[serde(default)]
+    pub events: Vec<Disturbance>,
+    /// Attributes that swing.
+    #[serde(default)]
+    pub signals: Vec<Signal>,
+    /// Components that fail at random.
+    #[serde(default)]
+    pub failures: Vec<Failure>,
+    /// How the figures of SUAVE are found.
+    #[serde(default)]
+    pub suave: Option<Suave>,
+}
+
+/// Something that happens once: at a time, or when a fact holds for the first time.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Disturbance {
+    /// When.
+    #[serde(default)]
+    pub at: Option<f64>,
+    /// The fact, as `predicate arguments`.
+    #[serde(default)]
+    pub when: Option<String>,
+    /// So much later than the fact, or later by a random part of it.
+    #[serde(default)]
+    pub within: f64,
+    /// Components that fail.
+    #[serde(default)]
+    pub fail: Vec<String>,
+    /// Components that recover.
+    #[serde(default)]
+    pub recover: Vec<String>,
+    /// Names to values, as for `--set`.
+    #[serde(default)]
+    pub set: BTreeMap<String, String>,
+}
+
+/// An attribute that swings: `mean + amplitude * sin(2 * pi * (time / period + phase))`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Signal {
+    /// The attribute.
+    pub attribute: String,
+    /// In the attribute's unit.
+    pub mean: f64,
+    /// In the attribute's unit.
+    pub amplitude: f64,
+    /// In the domain's time unit.
+    pub period: f64,
+    /// From 0 to 1; random without it.
+    #[serde(default)]
+    pub phase: Option<f64>,
+}
+
+/// A component that fails at random.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Failure {
+    /// The component.
+    pub component: String,
+    /// The mean time to a failure.
+    pub mean_time: f64,
+    /// The time from a failure to the recovery; never without it.
+    #[serde(default)]
+    pub recovery: Option<f64>,
+}
+
+/// How the figures that SUAVE reports are found in this mission.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Suave {
+    /// The fact that the pipeline is found.
+    pub found: String,
+    /// The action that inspects it.
+    pub inspect: String,
+    /// The function that says how long it is.
+    pub length: String,
+}
+
+impl Simulation {
+    /// What is wrong with the numbers, if something is.
+    pub fn mistake(&self) -> Option<String> {
+        let positive = [("step", self.step), ("time_budget", self.time_budget), ("patience", self.patience)];
+        let wrong = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0));
+        let noise = !(0.0..1.0).contains(&self.noise);
+        let many = self.time_budget / self.step > 1e6;
+        wrong
+            .map(|(name, value)| format!("`{name}` is {value}, but should be positive"))
+            .or_else(|| noise.then(|| format!("`noise` is {}, but should be at least 0 and below 1", self.noise)))
+            .or_else(|| many.then(|| "`time_budget` is more than a million times `step`".to_owned()))
+    }
+}

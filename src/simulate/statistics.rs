@@ -1,0 +1,70 @@
+//! Mean, deviation and confidence interval of a sample.
+//!
+//! The interval is Student's, two-sided, at 95 percent \[1\].
+//!
+//! - \[1\] Student: The probable error of a mean, Biometrika 6, 1908.
+
+/// A sample in three numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// How many values.
+    pub count: usize,
+    /// Their mean.
+    pub mean: f64,
+    /// Their standard deviation, from one degree of freedom less than values; 0 for fewer than two.
+    pub deviation: f64,
+    /// Half the width of the 95 percent confidence interval of the mean; 0 for fewer than two values.
+    pub half_width: f64,
+}
+
+/// The 97.5 percent quantiles of Student's distribution for 1 to 30 degrees of freedom.
+const QUANTILES: [f64; 30] = [
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131,
+    2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048, 2.045, 2.042,
+];
+
+impl Sample {
+    /// The sample of some values; none without any.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let count = values.len();
+        if count == 0 {
+            return None;
+        }
+        let mean = values.iter().sum::<f64>() / count as f64;
+        if count == 1 {
+            return Some(Self { count, mean, deviation: 0.0, half_width: 0.0 });
+        }
+        let freedom = count - 1;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let deviation = (squares / freedom as f64).sqrt();
+        // For more than 30 degrees of freedom, Cornish and Fisher's expansion to its second term.
+        let normal = 1.959_964_f64;
+        let quantile = QUANTILES.get(freedom - 1).copied().unwrap_or_else(|| {
+            normal + (normal.powi(3) + normal) / (4.0 * freedom as f64)
+        });
+        Some(Self { count, mean, deviation, half_width: quantile * deviation / (count as f64).sqrt() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Sample;
+
+    fn check(values: &[f64], mean: f64, deviation: f64, half_width: f64) {
+        let sample = Sample::of(values).expect("values");
+        let close = |left: f64, right: f64| (left - right).abs() < 1e-3;
+        assert!(close(sample.mean, mean) && close(sample.deviation, deviation), "{sample:?}");
+        assert!(close(sample.half_width, half_width), "{sample:?}");
+    }
+
+    #[test]
+    fn samples_by_hand() {
+        check(&[5.0], 5.0, 0.0, 0.0);
+        check(&[1.0, 3.0], 2.0, 1.414, 12.706);
+        check(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0], 5.0, 2.138, 1.788);
+        assert_eq!(Sample::of(&[]), None);
+        // 41 values, 40 degrees of freedom: 2.021.
+        let many: Vec<f64> = (0..41).map(f64::from).collect();
+        check(&many, 20.0, 11.979, 3.781);
+    }
+}

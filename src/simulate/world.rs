@@ -1,0 +1,329 @@
+//! A simulated robot: what is true, as it changes with time, disturbances and the action under way.
+//!
+//! What an action needs, takes and does is what the mission's own domain says, with a seeded share more or less time. An
+//! action whose designs are not available, or whose conditions do not hold for what is left of it, stands still, and
+//! fails when its patience is over. Everything random is drawn from the seed alone, so that all ways of control meet the
+//! same world.
+
+use encodings::pddl::ast::Problem;
+use encodings::validate::{advance, metric_after};
+use num_rational::BigRational;
+use ontology::tomasys::change::Status;
+
+use super::settings::{Disturbance, Simulation};
+use crate::mapek::{Command, Effect, Event, PlannedStep, number};
+use crate::message::Message;
+use crate::mission::Mission;
+
+/// Times and shares are rounded to this part of a unit.
+const GRAIN: f64 = 1e6;
+
+/// The action under way.
+#[derive(Debug, Clone)]
+struct Job {
+    action: u64,
+    step: PlannedStep,
+    /// From 0 to 1.
+    progress: f64,
+    /// How long it has stood still.
+    waited: f64,
+}
+
+/// A failure or recovery that is to come.
+#[derive(Debug, Clone)]
+struct Upset {
+    time: f64,
+    component: String,
+    status: Status,
+}
+
+/// The true state of robot and surroundings.
+#[derive(Debug, Clone)]
+pub struct World {
+    truth: Mission,
+    settings: Simulation,
+    seed: u64,
+    /// Since the start of the mission, in the domain's time unit.
+    pub time: f64,
+    job: Option<Job>,
+    phases: Vec<f64>,
+    upsets: Vec<Upset>,
+    /// When each disturbance takes place, once that is known; infinite once it has.
+    times: Vec<Option<f64>>,
+    /// Whether the robot has come to its end.
+    pub lost: bool,
+    /// How much of the action that inspects is done, at most so far.
+    pub inspected: f64,
+    /// When the pipeline was found.
+    pub found: Option<f64>,
+}
+
+fn exact(value: f64) -> BigRational {
+    let scaled = (value * GRAIN).round();
+    BigRational::new((scaled as i64).into(), (GRAIN as i64).into())
+}
+
+fn rounded(value: f64) -> f64 {
+    (value * GRAIN).round() / GRAIN
+}
+
+impl World {
+    /// A robot at the beginning of its mission.
+    pub fn new(truth: Mission, settings: Simulation, seed: u64) -> Self {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let phases = settings.signals.iter().map(|signal| signal.phase.unwrap_or_else(|| random.f64())).collect();
+        let mut upsets = Vec::new();
+        for failure in &settings.failures {
+            let mut time = 0.0;
+            loop {
+                time += -(1.0 - random.f64()).ln() * failure.mean_time;
+                if time > settings.time_budget {
+                    break;
+                }
+                let component = failure.component.clone();
+                upsets.push(Upset { time: rounded(time), component: component.clone(), status: Status::Failed });
+                let Some(recovery) = failure.recovery else { break };
+                time += recovery;
+                upsets.push(Upset { time: rounded(time), component, status: Status::Recovered });
+            }
+        }
+        upsets.sort_by(|left, right| left.time.total_cmp(&right.time));
+        let times = settings
+            .events
+            .iter()
+            .map(|event| event.at.map(|at| rounded(at + random.f64() * event.within)))
+            .collect();
+        Self {
+            truth,
+            settings,
+            seed,
+            time: 0.0,
+            job: None,
+            phases,
+            upsets,
+            times,
+            lost: false,
+            inspected: 0.0,
+            found: None,
+        }
+    }
+
+    fn filled(&self) -> Problem {
+        let mut problem = self.truth.problem().clone();
+        self.truth.fill(&mut problem);
+        problem
+    }
+
+    /// Does as the controller says; what that leads to at once.
+    pub fn obey(&mut self, effect: &Effect) -> Vec<Event> {
+        match &effect.command {
+            Command::Request { step } => {
+                self.job = Some(Job { action: effect.action, step: step.clone(), progress: 0.0, waited: 0.0 });
+                vec![Event::Started { action: effect.action }]
+            }
+            Command::Reconfigure { function, to, .. } => {
+                if let Some(job) = self.job.as_mut().filter(|job| job.action == effect.action) {
+                    job.step = job.step.with_design(function, to);
+                }
+                vec![Event::Acknowledged { effect: effect.number }]
+            }
+            Command::Cancel { .. } => match self.job.take_if(|job| job.action == effect.action) {
+                Some(_) => vec![Event::Cancelled { action: effect.action }],
+                None => Vec::new(),
+            },
+        }
+    }
+
+    /// Whether the action under way can go on; there need not be one.
+    pub fn goes_on(&self) -> bool {
+        self.job.as_ref().is_none_or(|job| self.left(job).is_some())
+    }
+
+    /// How long what is left of an action takes, if it can go on.
+    fn left(&self, job: &Job) -> Option<f64> {
+        let domain = crate::mapek::resume(self.truth.domain(), &job.step, &exact(job.progress));
+        let advance = advance(&domain, &self.filled(), &job.step.to_plan_step(), false).ok()?;
+        Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
+    }
+
+    /// How much longer than expected an action takes here, whatever its designs.
+    fn slowness(&self, step: &PlannedStep) -> f64 {
+        let mut text = step.action.clone();
+        for word in step.context().into_iter().flatten() {
+            text.push(' ');
+            text += word;
+        }
+        let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ u64::from(crc32fast::hash(text.as_bytes()));
+        1.0 + self.settings.noise * (2.0 * fastrand::Rng::with_seed(seed).f64() - 1.0)
+    }
+
+    /// Lets time pass, at most one step, and reports.
+    ///
+    /// # Errors
+    /// A disturbance or a signal that does not fit the mission.
+    pub fn pass(&mut self) -> Result<Vec<Event>, Message> {
+        let mut events = Vec::new();
+        let left = self.job.as_ref().and_then(|job| self.left(job));
+        let step = left.map_or(self.settings.step, |left| left.min(self.settings.step));
+        self.time = rounded(self.time + step);
+        self.work(step, left, &mut events);
+        self.disturb(&mut events)?;
+        self.swing(&mut events)?;
+        events.push(Event::Tick);
+        Ok(events)
+    }
+
+    fn work(&mut self, step: f64, left: Option<f64>, events: &mut Vec<Event>) {
+        let Some(mut job) = self.job.take() else { return };
+        let Some(left) = left else {
+            job.waited += step;
+            if job.waited >= self.settings.patience {
+                let reason = "it cannot go on".to_owned();
+                events.push(Event::Failed { action: job.action, reason });
+            } else {
+                self.job = Some(job);
+            }
+            return;
+        };
+        job.waited = 0.0;
+        let whole = step >= left;
+        let share = if whole { 1.0 - job.progress } else { (1.0 - job.progress) * step / left };
+        job.progress = rounded(job.progress + share);
+        self.use_up(&job.step, share, whole, events);
+        if self.settings.suave.as_ref().is_some_and(|suave| suave.inspect == job.step.action) {
+            self.inspected = self.inspected.max(job.progress);
+        }
+        if whole {
+            events.push(Event::Succeeded { action: job.action });
+        } else {
+            events.insert(0, Event::Progress { action: job.action, fraction: exact(job.progress) });
+            self.job = Some(job);
+        }
+        self.look();
+    }
+
+    /// What a share of an action changes, and at its end all else that it changes.
+    fn use_up(&mut self, step: &PlannedStep, share: f64, whole: bool, events: &mut Vec<Event>) {
+        let Ok(mut advance) = advance(self.truth.domain(), &self.filled(), &step.to_plan_step(), true) else {
+            return;
+        };
+        let share = exact(share);
+        for change in advance.values.iter_mut().filter(|change| !change.assigned) {
+            if let Some(before) = &change.before {
+                change.after = number::rounded(&(before + (&change.after - before) * &share));
+            }
+        }
+        if !whole {
+            advance.values.retain(|change| !change.assigned);
+            (advance.added, advance.deleted) = (Vec::new(), Vec::new());
+        }
+        let mut init = self.truth.problem().init.clone();
+        advance.apply(&mut init);
+        self.truth.set_init(init);
+        for change in &advance.values {
+            let name = change.text.trim_matches(['(', ')']).to_owned();
+            if self.settings.lifeline.as_ref() == Some(&name) && change.after <= BigRational::default() {
+                self.lost = true;
+            }
+            if !whole {
+                events.push(Event::Fact { name, value: number::decimal(&change.after) });
+            }
+        }
+    }
+
+    /// Notes when something is found, and when what waits for a fact takes place.
+    fn look(&mut self) {
+        if let Some(suave) = &self.settings.suave
+            && self.found.is_none()
+            && self.truth.holds(&suave.found)
+        {
+            self.found = Some(self.time);
+        }
+        for (index, event) in self.settings.events.iter().enumerate() {
+            if let Some(fact) = event.when.as_ref().filter(|_| self.times[index].is_none())
+                && self.truth.holds(fact)
+            {
+                let seed = self.seed.wrapping_add(index as u64 + 1);
+                let delay = fastrand::Rng::with_seed(seed).f64() * event.within;
+                self.times[index] = Some(rounded(self.time + delay));
+            }
+        }
+    }
+
+    fn disturb(&mut self, events: &mut Vec<Event>) -> Result<(), Message> {
+        let due: Vec<usize> =
+            (0..self.times.len()).filter(|&index| self.times[index].is_some_and(|time| time <= self.time)).collect();
+        for index in due {
+            self.times[index] = Some(f64::INFINITY);
+            let Disturbance { fail, recover, set, .. } = self.settings.events[index].clone();
+            for (components, status) in [(fail, Status::Failed), (recover, Status::Recovered)] {
+                for component in components {
+                    self.report(component, status, events)?;
+                }
+            }
+            for (name, value) in set {
+                self.truth.set(&name, &value)?;
+                events.push(Event::Fact { name, value });
+            }
+        }
+        while self.upsets.first().is_some_and(|upset| upset.time <= self.time) {
+            let upset = self.upsets.remove(0);
+            self.report(upset.component, upset.status, events)?;
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, component: String, status: Status, events: &mut Vec<Event>) -> Result<(), Message> {
+        if let Some(knowledge) = self.truth.knowledge_mut() {
+            knowledge.report(&component, status)?;
+        }
+        events.push(Event::Component { component, status });
+        Ok(())
+    }
+
+    /// What the signals are at the beginning.
+    ///
+    /// # Errors
+    /// As [`World::pass`].
+    pub fn first_look(&mut self) -> Result<Vec<Event>, Message> {
+        let mut events = Vec::new();
+        self.look();
+        self.disturb(&mut events)?;
+        self.swing(&mut events)?;
+        Ok(events)
+    }
+
+    fn swing(&mut self, events: &mut Vec<Event>) -> Result<(), Message> {
+        for (signal, phase) in self.settings.signals.iter().zip(&self.phases) {
+            let turn = std::f64::consts::TAU * (self.time / signal.period + phase);
+            let value = signal.mean + signal.amplitude * turn.sin();
+            let value = exact((value * 100.0).round() / 100.0);
+            if let Some(knowledge) = self.truth.knowledge_mut() {
+                knowledge.try_measure(&signal.attribute, &value)?;
+            }
+            events.push(Event::Measured { attribute: signal.attribute.clone(), value });
+        }
+        Ok(())
+    }
+
+    /// Whether the goal holds.
+    pub fn reached(&self) -> bool {
+        let problem = self.filled();
+        let empty = encodings::validate::PlanText::default();
+        encodings::validate::validate(self.truth.domain(), &problem, &empty, &encodings::validate::Options::default())
+            .valid
+    }
+
+    /// The mission's metric so far; the time without one.
+    pub fn cost(&self) -> f64 {
+        let metric = metric_after(self.truth.domain(), &self.filled(), &exact(self.time));
+        metric.map_or(self.time, |metric| number::to_f64(&metric))
+    }
+
+    /// How much was inspected, in the unit of the length; none where the mission does not inspect.
+    pub fn distance(&self) -> Option<f64> {
+        let suave = self.settings.suave.as_ref()?;
+        let length = crate::mapek::value_of(self.truth.problem(), &suave.length)?;
+        Some(number::to_f64(&length) * self.inspected)
+    }
+}
