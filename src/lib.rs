@@ -7,6 +7,7 @@
 pub use {encodings, ontology, rules};
 
 pub mod certificate;
+pub mod explain;
 pub mod journal;
 pub mod knowledge;
 pub mod mapek;

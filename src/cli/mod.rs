@@ -3,6 +3,7 @@
 mod check;
 mod compare;
 mod convert;
+mod explain;
 mod export;
 mod import;
 mod memory;
@@ -112,6 +113,8 @@ enum Command {
     Compare(compare::Arguments),
     /// A mission from the files of another tool.
     Import(import::Arguments),
+    /// Why a design is available or not, why it is chosen or not, and what would change the answer.
+    Explain(explain::Arguments),
     /// A mission for other planners, with what the knowledge base has contributed.
     Export(export::Arguments),
     /// The adaptation loop: events in, adaptations out, one JSON object a line.
@@ -298,6 +301,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Check(arguments) => check::run(arguments, &cli.common),
         Command::Compare(arguments) => compare::run(arguments, &cli.common),
         Command::Import(arguments) => import::run(arguments, &cli.common),
+        Command::Explain(arguments) => explain::run(arguments, &cli.common),
         Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Run(arguments) => run::run(arguments, &cli.common),
         Command::Simulate(arguments) => simulate::run(arguments, &cli.common),

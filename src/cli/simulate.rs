@@ -73,9 +73,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         simulated.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
     };
     let scenario = manifest.scenarios.get(&arguments.scenario);
-    let Some((scenario, settings)) = scenario.and_then(|scenario| Some((scenario, scenario.simulation.as_ref()?)))
+    let Some((scenario, settings)) =
+        scenario.and_then(|scenario| Some((scenario, scenario.simulation.as_ref()?)))
     else {
-        let text = format!("the mission has no scenario `{}` to simulate; it has: {}", arguments.scenario, known());
+        let text =
+            format!("the mission has no scenario `{}` to simulate; it has: {}", arguments.scenario, known());
         return Err(Failure::usage(Message::error("M108", text)));
     };
     mission.apply(scenario)?;
@@ -141,7 +143,7 @@ fn write_log(log: &mut String, strategy: Strategy, observation: &Observation, an
 }
 
 /// The runs of a strategy.
-fn of<'a>(runs: &'a [Run], strategy: Strategy) -> impl Iterator<Item = &'a Run> + Clone {
+fn of(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> + Clone {
     runs.iter().filter(move |run| run.strategy == strategy)
 }
 
@@ -167,7 +169,13 @@ fn text(strategies: &[Strategy], runs: &[Run]) -> String {
     let show = |sample: Option<Sample>| {
         sample.map_or_else(
             || "none".to_owned(),
-            |s| if s.count < 2 { format!("{:.2}", s.mean) } else { format!("{:.2} ± {:.2} (sd {:.2})", s.mean, s.half_width, s.deviation) },
+            |s| {
+                if s.count < 2 {
+                    format!("{:.2}", s.mean)
+                } else {
+                    format!("{:.2} ± {:.2} (sd {:.2})", s.mean, s.half_width, s.deviation)
+                }
+            },
         )
     };
     let rows = strategies.iter().map(|&strategy| {
@@ -199,7 +207,9 @@ fn text(strategies: &[Strategy], runs: &[Run]) -> String {
 }
 
 fn csv(runs: &[Run]) -> String {
-    let mut text = String::from("strategy,seed,accomplished,cost,time,plans,failed,cancelled,reconfigurations,configurations,");
+    let mut text = String::from(
+        "strategy,seed,accomplished,cost,time,plans,failed,cancelled,reconfigurations,configurations,",
+    );
     text += &SUAVE_COLUMNS.join(",");
     text.push('\n');
     for run in runs {

@@ -21,8 +21,8 @@ mod event;
 mod execute;
 mod knowledge;
 mod monitor;
-mod parts;
 pub(crate) mod number;
+mod parts;
 mod plan;
 mod record;
 mod resume;
@@ -45,9 +45,10 @@ pub use knowledge::Knowledge;
 pub use record::{Decision, Snapshot};
 pub use step::PlannedStep;
 
+pub(crate) use analyze::ruled_out;
 use monitor::Changes;
-use plan::Planner;
 pub(crate) use monitor::value_of;
+use plan::Planner;
 pub(crate) use resume::resume;
 use resume::resumed_goal;
 
@@ -73,7 +74,7 @@ impl Default for Settings {
 }
 
 /// So many names and values may be interned before the knowledge is made anew without what is not used any more.
-const GROWTH: usize = 100_000;
+const GROWTH: usize = 1024;
 
 /// The adaptation loop of one robot.
 #[derive(Debug, Clone)]

@@ -55,7 +55,7 @@ impl Planner {
         }
         let none =
             |proved, because: String| Outcome { steps: None, cost: BigRational::default(), proved, because };
-        let task = match mission.ground_with(domain, problem, &limits) {
+        let task = match mission.ground_with(domain, problem, &[], &limits) {
             Ok(task) => task,
             Err(messages) => {
                 let texts: Vec<&str> = messages.iter().map(|message| message.message.as_str()).collect();
@@ -67,7 +67,7 @@ impl Planner {
         match (solution.status, solution.plan) {
             (status, Some(plan)) => Outcome {
                 cost: number::of_plan(plan.cost),
-                steps: Some(plan.steps.iter().map(PlannedStep::from).collect()),
+                steps: Some(plan.steps.iter().map(|step| PlannedStep::new(mission, step)).collect()),
                 proved: status == Status::Optimal,
                 because: String::new(),
             },

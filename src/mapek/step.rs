@@ -6,6 +6,7 @@ use num_rational::BigRational;
 use serde_json::{Map, Value, json};
 
 use super::number;
+use crate::mission::Mission;
 
 /// An action with its configuration.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +15,8 @@ pub struct PlannedStep {
     pub action: String,
     /// All arguments in the order of the schema's parameters, designs among them.
     pub arguments: Vec<String>,
+    /// How many of them stand in the domain's file; the knowledge base has added the others to a plain domain.
+    pub written: usize,
     /// The function and the design chosen for it, in the order of the parameters.
     pub configuration: Vec<(String, String)>,
     /// How long it takes, in the domain's time unit.
@@ -22,19 +25,19 @@ pub struct PlannedStep {
     pub cost: BigRational,
 }
 
-impl From<&encodings::Step> for PlannedStep {
-    fn from(step: &encodings::Step) -> Self {
+impl PlannedStep {
+    /// A step of a plan for a mission.
+    pub(crate) fn new(mission: &Mission, step: &encodings::Step) -> Self {
         Self {
             action: step.action.clone(),
             arguments: step.arguments.clone(),
+            written: mission.written_arguments(&step.action).unwrap_or(step.arguments.len()),
             configuration: step.configuration.clone(),
             duration: number::of_plan(step.duration),
             cost: number::of_plan(step.cost),
         }
     }
-}
 
-impl PlannedStep {
     /// `move wp1 wp2 (f_localization = fd_amcl_kinect)`: without functions and designs among the arguments.
     pub fn summary(&self) -> String {
         let configured = |word: &str| self.configuration.iter().any(|(f, d)| f == word || d == word);
@@ -90,7 +93,7 @@ impl PlannedStep {
             self.configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect();
         json!({
             "action": self.action,
-            "arguments": self.arguments,
+            "arguments": self.arguments.get(..self.written).unwrap_or(&self.arguments),
             "configuration": configuration,
             "duration": number::to_json(&self.duration),
             "cost": number::to_json(&self.cost),
@@ -102,6 +105,7 @@ impl PlannedStep {
         json!([
             self.action,
             self.arguments,
+            self.written,
             self.configuration,
             self.duration.to_string(),
             self.cost.to_string()
@@ -111,13 +115,15 @@ impl PlannedStep {
     /// The inverse of [`PlannedStep::to_record`].
     pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
-        let [action, arguments, configuration, duration, cost] = record.as_array()?.as_slice() else {
+        let [action, arguments, written, configuration, duration, cost] = record.as_array()?.as_slice()
+        else {
             return None;
         };
         let pair = |value: &Value| Some((text(value.get(0)?)?, text(value.get(1)?)?));
         Some(Self {
             action: text(action)?,
             arguments: arguments.as_array()?.iter().map(text).collect::<Option<_>>()?,
+            written: written.as_u64()? as usize,
             configuration: configuration.as_array()?.iter().map(pair).collect::<Option<_>>()?,
             duration: duration.as_str()?.parse().ok()?,
             cost: cost.as_str()?.parse().ok()?,

@@ -1,7 +1,9 @@
 //! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
 
-use encodings::pddl::ast::{Condition, Declaration, Domain, InitialElement, Name, Problem, Term};
+use encodings::pddl::ast::{Condition, Declaration, Domain, InitialElement, Metric, Name, Problem, Term};
 use encodings::pddl::{self, Severity, Source};
+use encodings::{GroundConfig, Limits, Task};
+use num_rational::BigRational;
 
 use super::{Mission, binding};
 use crate::knowledge::Knowledge;
@@ -59,6 +61,37 @@ impl Mission {
         })
     }
 
+    /// The functions without parameters that have a value in the problem, and it.
+    pub(crate) fn values(&self) -> Vec<(String, BigRational)> {
+        let values = self.problem.init.iter().filter_map(|element| match element {
+            InitialElement::Value(atom, value, _) if atom.arguments.is_empty() => {
+                Some((atom.predicate.name.to_string(), value.clone()))
+            }
+            _ => None,
+        });
+        values.collect()
+    }
+
+    /// Says anew which designs of a filled problem are available: those that `allowed` answers with yes, asked with the
+    /// name of each design of the knowledge base and whether it is available.
+    pub(crate) fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) {
+        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
+        let Some(predicate) = declared.into_iter().find(|name| self.bindings.is_availability(name)) else {
+            return;
+        };
+        let is_own = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate);
+        problem.init.retain(|element| !is_own(element));
+        let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.view().function_designs());
+        for design in designs.filter(|design| allowed(&design.individual.name, design.available)) {
+            problem.init.push(InitialElement::Fact(binding::atom(predicate, &[&design.individual.name])));
+        }
+    }
+
+    /// How many arguments an action has in the domain's file, if the knowledge base has added some.
+    pub(crate) fn written_arguments(&self, action: &str) -> Option<usize> {
+        self.adaptation.as_ref().and_then(|adaptation| adaptation.parameters(action))
+    }
+
     /// Replaces the facts and values of the problem.
     pub(crate) fn set_init(&mut self, init: Vec<InitialElement>) {
         self.problem.init = init;
@@ -97,12 +130,13 @@ impl Mission {
         &self,
         domain: &Domain,
         problem: &Problem,
-        limits: &encodings::Limits,
-    ) -> Result<encodings::Task, Vec<Message>> {
-        let config = encodings::GroundConfig {
-            solves: self.bindings.solves(),
+        objectives: &[Metric],
+        limits: &Limits,
+    ) -> Result<Task, Vec<Message>> {
+        let config = GroundConfig {
+            solves: self.solves(),
+            objectives: objectives.to_vec(),
             limits: limits.clone(),
-            ..encodings::GroundConfig::default()
         };
         encodings::ground(domain, problem, &config)
             .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))

@@ -13,7 +13,7 @@ use std::path::Path;
 
 use encodings::pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use encodings::pddl::{self, Severity, Source};
-use encodings::{GroundConfig, Limits, Plan, Task};
+use encodings::{Limits, Plan, Task};
 
 use crate::knowledge::Knowledge;
 use crate::mapek::Settings;
@@ -271,10 +271,7 @@ impl Mission {
         objectives: &[Metric],
         limits: &Limits,
     ) -> Result<Task, Vec<Message>> {
-        let config =
-            GroundConfig { solves: self.solves(), objectives: objectives.to_vec(), limits: limits.clone() };
-        encodings::ground(&self.domain, problem, &config)
-            .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
+        self.ground_with(&self.domain, problem, objectives, limits)
     }
 }
 

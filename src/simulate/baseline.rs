@@ -12,7 +12,7 @@
 //!
 //! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36, 2022.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 use encodings::pddl::ast::Direction;
@@ -64,6 +64,8 @@ pub(super) struct Controller {
     plan: VecDeque<PlannedStep>,
     random: fastrand::Rng,
     gave_up: bool,
+    /// The designs that were available when a plan was last looked for.
+    planned_with: BTreeSet<String>,
     /// How many plans were made.
     pub(super) plans: usize,
 }
@@ -71,7 +73,15 @@ pub(super) struct Controller {
 impl Controller {
     pub(super) fn new(strategy: Strategy, knowledge: Loop, seed: u64) -> Self {
         let random = fastrand::Rng::with_seed(seed ^ 0x5eed);
-        Self { strategy, knowledge, plan: VecDeque::new(), random, gave_up: false, plans: 0 }
+        Self {
+            strategy,
+            knowledge,
+            plan: VecDeque::new(),
+            random,
+            gave_up: false,
+            planned_with: BTreeSet::new(),
+            plans: 0,
+        }
     }
 
     /// Whether it will never request anything any more.
@@ -120,6 +130,7 @@ impl Controller {
 
     fn replan(&mut self) {
         self.plans += 1;
+        self.planned_with.clone_from(self.knowledge.knowledge().available());
         self.plan = self.knowledge.plan_anew().unwrap_or_default().into();
     }
 
@@ -131,8 +142,11 @@ impl Controller {
         if let Some(step) = self.plan.pop_front() {
             let step = if self.strategy.chooses_designs() { self.choose(&step, |_| true) } else { step };
             self.knowledge.request_now(step, answers);
-        } else if self.strategy != Strategy::None && !self.knowledge.is_goal() {
-            // There was no plan; there may be one now.
+        } else if self.strategy != Strategy::None
+            && self.planned_with != *self.knowledge.knowledge().available()
+            && !self.knowledge.is_goal()
+        {
+            // There was no plan; with other designs there may be one.
             self.replan();
             if let Some(step) = self.plan.pop_front() {
                 self.plan.push_front(step);
@@ -150,7 +164,9 @@ impl Controller {
             }
             let designs = self.knowledge.designs_for(function);
             let design = match self.strategy {
-                Strategy::Random if !designs.is_empty() => Some(designs[self.random.usize(..designs.len())].clone()),
+                Strategy::Random if !designs.is_empty() => {
+                    Some(designs[self.random.usize(..designs.len())].clone())
+                }
                 Strategy::Random => None,
                 _ => self.cheapest(&chosen, function, &designs),
             };
@@ -185,7 +201,8 @@ impl Controller {
         let Some((_, step)) = known.running() else { return };
         let step = step.clone();
         let available = known.available().clone();
-        let is_lost = |function: &str| step.design(function).is_some_and(|design| !available.contains(design));
+        let is_lost =
+            |function: &str| step.design(function).is_some_and(|design| !available.contains(design));
         if step.configuration.iter().any(|(function, _)| is_lost(function)) {
             let chosen = self.choose(&step, is_lost);
             self.knowledge.reconfigure_now(chosen, answers);

@@ -85,13 +85,13 @@ impl Stage {
         loop {
             while let Some(event) = queue.pop_front() {
                 self.count(&event);
-                let observation =
-                    Observation { time: Some(self.now()), ..Observation::from(event.clone()) };
+                let observation = Observation { time: Some(self.now()), ..Observation::from(event.clone()) };
                 let answers = self.controller.handle(event, self.now());
                 log(&observation, &answers);
                 self.take(&answers, &mut queue);
             }
-            let over = self.world.time >= settings.time_budget || self.controller.is_done() || self.world.lost;
+            let over =
+                self.world.time >= settings.time_budget || self.controller.is_done() || self.world.lost;
             if self.world.reached() || over {
                 return Ok(());
             }

@@ -109,7 +109,9 @@ impl Simulation {
         let many = self.time_budget / self.step > 1e6;
         wrong
             .map(|(name, value)| format!("`{name}` is {value}, but should be positive"))
-            .or_else(|| noise.then(|| format!("`noise` is {}, but should be at least 0 and below 1", self.noise)))
+            .or_else(|| {
+                noise.then(|| format!("`noise` is {}, but should be at least 0 and below 1", self.noise))
+            })
             .or_else(|| many.then(|| "`time_budget` is more than a million times `step`".to_owned()))
     }
 }

@@ -37,10 +37,12 @@ impl Sample {
         let freedom = count - 1;
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
         let deviation = (squares / freedom as f64).sqrt();
-        // For more than 30 degrees of freedom, Cornish and Fisher's expansion to its second term.
-        let normal = 1.959_964_f64;
+        // For more than 30 degrees of freedom, Cornish and Fisher's expansion to its third term.
+        let (z, n) = (1.959_964_f64, freedom as f64);
         let quantile = QUANTILES.get(freedom - 1).copied().unwrap_or_else(|| {
-            normal + (normal.powi(3) + normal) / (4.0 * freedom as f64)
+            let second = (z.powi(3) + z) / (4.0 * n);
+            let third = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * n * n);
+            z + second + third
         });
         Some(Self { count, mean, deviation, half_width: quantile * deviation / (count as f64).sqrt() })
     }

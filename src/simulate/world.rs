@@ -71,7 +71,8 @@ impl World {
     /// A robot at the beginning of its mission.
     pub fn new(truth: Mission, settings: Simulation, seed: u64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed);
-        let phases = settings.signals.iter().map(|signal| signal.phase.unwrap_or_else(|| random.f64())).collect();
+        let phases =
+            settings.signals.iter().map(|signal| signal.phase.unwrap_or_else(|| random.f64())).collect();
         let mut upsets = Vec::new();
         for failure in &settings.failures {
             let mut time = 0.0;
@@ -81,7 +82,11 @@ impl World {
                     break;
                 }
                 let component = failure.component.clone();
-                upsets.push(Upset { time: rounded(time), component: component.clone(), status: Status::Failed });
+                upsets.push(Upset {
+                    time: rounded(time),
+                    component: component.clone(),
+                    status: Status::Failed,
+                });
                 let Some(recovery) = failure.recovery else { break };
                 time += recovery;
                 upsets.push(Upset { time: rounded(time), component, status: Status::Recovered });
@@ -118,7 +123,8 @@ impl World {
     pub fn obey(&mut self, effect: &Effect) -> Vec<Event> {
         match &effect.command {
             Command::Request { step } => {
-                self.job = Some(Job { action: effect.action, step: step.clone(), progress: 0.0, waited: 0.0 });
+                self.job =
+                    Some(Job { action: effect.action, step: step.clone(), progress: 0.0, waited: 0.0 });
                 vec![Event::Started { action: effect.action }]
             }
             Command::Reconfigure { function, to, .. } => {
@@ -153,7 +159,8 @@ impl World {
             text.push(' ');
             text += word;
         }
-        let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ u64::from(crc32fast::hash(text.as_bytes()));
+        let seed =
+            self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ u64::from(crc32fast::hash(text.as_bytes()));
         1.0 + self.settings.noise * (2.0 * fastrand::Rng::with_seed(seed).f64() - 1.0)
     }
 
@@ -251,8 +258,9 @@ impl World {
     }
 
     fn disturb(&mut self, events: &mut Vec<Event>) -> Result<(), Message> {
-        let due: Vec<usize> =
-            (0..self.times.len()).filter(|&index| self.times[index].is_some_and(|time| time <= self.time)).collect();
+        let due: Vec<usize> = (0..self.times.len())
+            .filter(|&index| self.times[index].is_some_and(|time| time <= self.time))
+            .collect();
         for index in due {
             self.times[index] = Some(f64::INFINITY);
             let Disturbance { fail, recover, set, .. } = self.settings.events[index].clone();
@@ -310,8 +318,13 @@ impl World {
     pub fn reached(&self) -> bool {
         let problem = self.filled();
         let empty = encodings::validate::PlanText::default();
-        encodings::validate::validate(self.truth.domain(), &problem, &empty, &encodings::validate::Options::default())
-            .valid
+        encodings::validate::validate(
+            self.truth.domain(),
+            &problem,
+            &empty,
+            &encodings::validate::Options::default(),
+        )
+        .valid
     }
 
     /// The mission's metric so far; the time without one.

@@ -2,6 +2,7 @@
 
 mod common;
 mod experiments;
+mod fleet;
 mod fuzz;
 mod journal;
 mod kill;

@@ -11,10 +11,20 @@ use crate::fuzz::{Fuzz, WORLDS, step};
 const SOAK_SECONDS: u64 = 3600;
 
 /// Resident memory in kilobytes; none where the system does not say.
-fn resident() -> Option<usize> {
+pub fn resident() -> Option<usize> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
     line.split_whitespace().nth(1)?.parse().ok()
+}
+
+/// Processor time that this process has taken, which does not depend on what else the machine does; none where the system does
+/// not say.
+pub fn processor_time() -> Option<Duration> {
+    let status = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // User and system time, in hundredths of a second, stand behind the name in parentheses.
+    let fields: Vec<&str> = status.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
+    Some(Duration::from_millis(ticks * 10))
 }
 
 #[test]

@@ -3,11 +3,14 @@
 mod certificate;
 mod cli;
 mod common;
+mod explain;
 mod export;
 mod probabilistic;
 mod real;
 mod reason;
 mod reference;
+mod run;
+mod simulate;
 mod ugv;
 mod uuv;
 mod validate;

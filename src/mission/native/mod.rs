@@ -140,6 +140,11 @@ impl CoAdaptation {
         errors
     }
 
+    /// How many parameters an action has in the plain domain.
+    pub(super) fn parameters(&self, action: &str) -> Option<usize> {
+        self.actions.get(&Name::new(action)).map(|needs| needs.parameters)
+    }
+
     /// The arguments of an action as its schema in the plain domain has them.
     pub(super) fn written(&self, step: &mut Step) {
         if let Some(needs) = self.actions.get(&Name::new(&step.action)) {

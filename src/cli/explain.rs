@@ -1,0 +1,192 @@
+//! `metaplan explain`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use encodings::Limits;
+use metaplan::explain::{Answer, Change, DesignExplanation, Target, best, design, smallest_changes};
+use num_rational::BigRational;
+use serde_json::{Value, json};
+
+use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+
+/// Arguments of `explain`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission's manifest.
+    #[arg(value_name = "MISSION")]
+    mission: PathBuf,
+    /// A function design; without one, what would change the plan.
+    #[arg(value_name = "DESIGN")]
+    query: Option<String>,
+    #[command(flatten)]
+    situation: Situation,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let mission = arguments.situation.mission(std::slice::from_ref(&arguments.mission))?;
+    output::warnings(common, mission.warnings());
+    let limits = Limits::none();
+    let answer = best(&mission, &limits)?;
+    let name = mission.name.as_str();
+    if let Some(query) = &arguments.query {
+        let found = design(&mission, query, &limits).map_err(|messages| {
+            let exit = if messages.iter().any(|m| m.code == "M112") { Exit::Usage } else { Exit::BadInput };
+            Failure { exit, messages }
+        })?;
+        match common.format {
+            Format::Json => output::json_answer(&design_json(name, &answer, &found)),
+            _ => output::answer(&design_text(&answer, &found)),
+        }
+    } else {
+        let changes = smallest_changes(&mission, &limits)?;
+        match common.format {
+            Format::Json => output::json_answer(&json!({
+                "format": "metaplan-explain/1", "mission": name, "best": answer_json(&answer),
+                "changes": changes.iter().map(change_json).collect::<Vec<_>>(),
+            })),
+            _ => output::answer(&changes_text(&answer, &changes)),
+        }
+    }
+    Ok(Exit::Done)
+}
+
+fn number(value: &BigRational) -> String {
+    rules::Decimal::from_rational(value).to_string()
+}
+
+/// The steps of a plan, each on a line.
+fn plan_text(answer: &Answer) -> String {
+    answer.steps.iter().fold(String::new(), |text, step| text + "    " + &step.summary() + "\n")
+}
+
+/// A metric, and how it differs from that of the best plan.
+fn cost_text(answer: &Answer, best: &Answer) -> String {
+    match (&answer.cost, &best.cost) {
+        (None, _) => "there is no plan".to_owned(),
+        (Some(cost), Some(base)) if cost == base => format!("the best plan costs {}, no more", number(cost)),
+        (Some(cost), Some(base)) if cost > base => {
+            format!("the best plan costs {}, {} more", number(cost), number(&(cost - base)))
+        }
+        (Some(cost), Some(base)) => {
+            format!("the best plan costs {}, {} less", number(cost), number(&(base - cost)))
+        }
+        (Some(cost), None) => format!("there is a plan, and the best costs {}", number(cost)),
+    }
+}
+
+fn target_text(change: &Change) -> String {
+    let now = change.from.as_ref().map(|from| format!(" (now {})", number(from))).unwrap_or_default();
+    let name = &change.name;
+    match &change.to {
+        Target::AtLeast(bound) => format!("{name} at least {}{now}", number(bound)),
+        Target::AtMost(bound) => format!("{name} at most {}{now}", number(bound)),
+        Target::Above(bound) => format!("{name} above {}{now}", number(bound)),
+        Target::Below(bound) => format!("{name} below {}{now}", number(bound)),
+        Target::Recovered => format!("{name} works again"),
+        Target::Failed => format!("{name} fails"),
+    }
+}
+
+fn design_text(best: &Answer, found: &DesignExplanation) -> String {
+    let mut text = String::new();
+    let functions = found.functions.join(", ");
+    let state = if found.available { "is available" } else { "is not available" };
+    // Writing to a string does not fail.
+    let _ = writeln!(text, "{} ({functions}) {state}", found.design);
+    for line in &found.because {
+        let _ = writeln!(text, "    {line}");
+    }
+    let used: Vec<String> = found.used.iter().map(ToString::to_string).collect();
+    match (&best.cost, used.is_empty()) {
+        (None, _) => text += "there is no plan\n",
+        (Some(cost), true) => {
+            let _ = writeln!(text, "the best plan costs {} and does not use it", number(cost));
+        }
+        (Some(cost), false) => {
+            let _ = writeln!(
+                text,
+                "the best plan costs {} and uses it in steps {}",
+                number(cost),
+                used.join(", ")
+            );
+        }
+    }
+    text += &plan_text(best);
+    let condition = if found.available { "" } else { "if it were available, and " };
+    let _ = writeln!(text, "{condition}as the only design of {functions}: {}", cost_text(&found.alone, best));
+    text += &plan_text(&found.alone);
+    if !found.used.is_empty() {
+        let _ = writeln!(text, "without it: {}", cost_text(&found.without, best));
+        text += &plan_text(&found.without);
+    }
+    if !found.changes.is_empty() {
+        let what =
+            if found.available { "it is not available any more if" } else { "what rules it out goes if" };
+        let _ = writeln!(text, "{what}");
+        for change in &found.changes {
+            let _ = writeln!(text, "    {}: {}", target_text(change), cost_text(&change.then, best));
+        }
+    }
+    text
+}
+
+fn changes_text(best: &Answer, changes: &[Change]) -> String {
+    let mut text = match &best.cost {
+        None => "there is no plan\n".to_owned(),
+        Some(cost) => format!("the best plan costs {}\n{}", number(cost), plan_text(best)),
+    };
+    if changes.is_empty() {
+        return text + "no change of one measurement leads to another plan\n";
+    }
+    text += "the smallest changes that lead to another plan\n";
+    for change in changes {
+        let _ = writeln!(text, "{}: {}", target_text(change), cost_text(&change.then, best));
+        text += &plan_text(&change.then);
+    }
+    text
+}
+
+fn answer_json(answer: &Answer) -> Value {
+    json!({
+        "cost": answer.cost.as_ref().map(output::decimal_number),
+        "proved": answer.proved,
+        "steps": answer.steps.iter().map(metaplan::mapek::PlannedStep::to_json).collect::<Vec<_>>(),
+    })
+}
+
+fn change_json(change: &Change) -> Value {
+    let (relation, bound) = match &change.to {
+        Target::AtLeast(bound) => ("at_least", Some(bound)),
+        Target::AtMost(bound) => ("at_most", Some(bound)),
+        Target::Above(bound) => ("above", Some(bound)),
+        Target::Below(bound) => ("below", Some(bound)),
+        Target::Recovered => ("recovered", None),
+        Target::Failed => ("failed", None),
+    };
+    json!({
+        "name": change.name,
+        "from": change.from.as_ref().map(output::decimal_number),
+        "relation": relation,
+        "bound": bound.map(output::decimal_number),
+        "then": answer_json(&change.then),
+    })
+}
+
+fn design_json(mission: &str, best: &Answer, found: &DesignExplanation) -> Value {
+    json!({
+        "format": "metaplan-explain/1",
+        "mission": mission,
+        "best": answer_json(best),
+        "design": found.design,
+        "functions": found.functions,
+        "available": found.available,
+        "because": found.because,
+        "used": found.used,
+        "alone": answer_json(&found.alone),
+        "without": answer_json(&found.without),
+        "changes": found.changes.iter().map(change_json).collect::<Vec<_>>(),
+    })
+}
