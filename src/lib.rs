@@ -1,8 +1,8 @@
 //! Metaplan adapts a robot's task plan and its software architecture together.
 //!
 //! This facade joins the three libraries: [`ontology`] (what the robot is), [`rules`] (what follows) and [`encodings`] (what to
-//! do about it); and `metaplan-probabilistic`, model checking of decision
-//! processes, which [`probabilistic`] brings to a mission. [`mission`] is the only place that sees OWL and PDDL at once. Order lives here, not logic.
+//! do about it); and `metaplan-probabilistic`, model checking of decision processes, which [`probabilistic`] brings to a mission.
+//! [`mission`] is the only place that sees OWL and PDDL at once. Order lives here, not logic.
 
 pub use {encodings, ontology, rules};
 

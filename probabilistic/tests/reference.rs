@@ -145,7 +145,7 @@ fn storm_on_models_of_the_map() {
             return;
         }
         // Large models are not solved exactly, and once is enough.
-        let large = case["storm"]["states"].as_u64().is_some_and(|states| states > 20_000);
+        let large = case["storm"]["states"].as_u64().is_some_and(|states| states > 5_000);
         let ways = if large { &[Exactness::Never][..] } else { &[Exactness::Auto, Exactness::Never] };
         for exactness in ways.iter().copied() {
             let report = run(&model, text("property"), "", exactness);

@@ -114,7 +114,7 @@ impl<N: Number> Solution<N> {
 }
 
 /// How much exact arithmetic may cost, in bits touched, before it is given up.
-const EXACT_WORK: u64 = 40_000_000_000;
+const EXACT_WORK: u64 = 3_000_000_000;
 
 /// What the components share while a problem is solved.
 pub(crate) struct Run<'a, N> {
