@@ -35,7 +35,9 @@ mod transitions;
 #[cfg(test)]
 mod tests;
 
-pub use certificate::{Certificate, Checked, Fault, certify, check as check_certificate, describes};
+pub use certificate::{
+    Certificate, Checked, Fault, certify, check as check_certificate, describes, verification_conditions,
+};
 pub use encode::Semantics;
 pub use error::{Error, File, Place};
 pub use ground::{Config as GroundConfig, ground};

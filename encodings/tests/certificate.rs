@@ -7,7 +7,7 @@ mod random;
 use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{
     Certificate, Config, GroundConfig, Limits, Status, Task, certify, check_certificate, describes, ground,
-    optimize,
+    optimize, verification_conditions,
 };
 use missions::Mission;
 use num_rational::BigRational;
@@ -110,6 +110,33 @@ fn withstands(seed: u64, mutants: usize) {
 #[test]
 fn changed_arguments_prove_nothing_that_is_false() {
     (200..230).for_each(|seed| withstands(seed, 40));
+}
+
+/// What the SMT solver answers to the verification conditions of a claim.
+fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>) -> Vec<String> {
+    let conditions = verification_conditions(&certificate.task, &certificate.argument, claim);
+    let conditions = conditions.expect("documents").expect("no derived variables");
+    let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("argument.smt2");
+    std::fs::write(&file, conditions).expect("a file");
+    let output = std::process::Command::new(solver).arg(&file).output().expect("the solver runs");
+    String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
+}
+
+/// Needs an SMT solver that reads SMT-LIB 2, named by `METAPLAN_SMT`, such as Z3 (`python3 -m venv z3; z3/bin/pip install z3-solver`,
+/// then `METAPLAN_SMT=z3/bin/z3`).
+#[test]
+#[ignore = "needs an SMT solver"]
+fn an_smt_solver_accepts_the_truth_and_nothing_else() {
+    let Ok(solver) = std::env::var("METAPLAN_SMT") else { panic!("METAPLAN_SMT names no solver") };
+    for seed in 0..100 {
+        let (_, certificate, cost) = certified(seed);
+        let found = answers(&solver, &certificate, cost.as_ref());
+        assert!(found.len() >= 2 && found.iter().all(|answer| answer == "unsat"), "seed {seed}: {found:?}");
+        for claim in cost.iter().flat_map(false_claims) {
+            let found = answers(&solver, &certificate, claim.as_ref());
+            assert!(found.iter().any(|answer| answer == "sat"), "seed {seed}, {claim:?}: {found:?}");
+        }
+    }
 }
 
 #[test]

@@ -21,6 +21,7 @@ use encodings::pddl::{self, Source, print_domain, print_problem};
 use encodings::validate::{Options, PlanText, validate};
 use encodings::{
     Checked, GroundConfig, Limits, Solution, Status, Task, certify, check_certificate, describes, ground,
+    verification_conditions,
 };
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
@@ -184,6 +185,27 @@ pub fn verify(directory: &Path) -> Report {
         Err(reason) => report.parts.push(Part { part: "files", result: Err(reason) }),
     }
     report
+}
+
+/// The argument of a certificate as verification conditions in SMT-LIB 2; it is not checked here.
+///
+/// # Errors
+/// The certificate cannot be read, or its task has derived variables, for which there are no such conditions.
+pub fn conditions(directory: &Path) -> Result<String, Message> {
+    let wrong = |reason: String| Message::at("M121", &directory.display().to_string(), None, reason);
+    let (Manifest { claim, .. }, contents) = read(directory).map_err(wrong)?;
+    let text =
+        |name: &str| contents.iter().find(|(own, _)| own == name).map_or("", |(_, text)| text.as_str());
+    let metric = match &claim {
+        Claim::Unsolvable => None,
+        Claim::Optimal { metric } => {
+            let (domain, problem) = read_pddl(text(DOMAIN), text(PROBLEM)).map_err(wrong)?;
+            Some(plan(&domain, &problem, text(PLAN), metric).map_err(wrong)?.1)
+        }
+    };
+    verification_conditions(text(TASK), text(ARGUMENT), metric.as_ref())
+        .map_err(|fault| wrong(fault.to_string()))?
+        .ok_or_else(|| wrong("a task with derived predicates has no verification conditions".to_owned()))
 }
 
 /// The manifest, and the contents of the files, each as the manifest says.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::certificate::{Claim, Report, verify};
+use metaplan::certificate::{Claim, Report, conditions, verify};
 use serde_json::json;
 
 use crate::cli::{Common, Exit, Failure, Format, output};
@@ -14,11 +14,16 @@ use crate::cli::{Common, Exit, Failure, Format, output};
 pub struct Arguments {
     /// What `metaplan plan --certificate` has written.
     directory: PathBuf,
+    /// Write the argument as verification conditions in SMT-LIB 2, too: an SMT solver has to answer `unsat` to each.
+    #[arg(long, value_name = "FILE")]
+    smt: Option<PathBuf>,
 }
 
 /// Runs the command.
-#[allow(clippy::unnecessary_wraps)]
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    if let Some(file) = &arguments.smt {
+        output::write_file(file, &conditions(&arguments.directory)?)?;
+    }
     let report = verify(&arguments.directory);
     match common.format {
         Format::Json => output::json_answer(&json!({

@@ -72,6 +72,17 @@ fn a_verification_has_its_fields() {
     assert_eq!(answer["verified"], true);
 }
 
+#[test]
+fn the_argument_is_written_for_other_checkers() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
+    let file = directory.path().join("argument.smt2").display().to_string();
+    assert_eq!(metaplan(&["verify", &target, "--smt", &file]).status, 0);
+    let text = std::fs::read_to_string(file).expect("a file");
+    // One question for the initial state, one for goal states, and one for each of the 22 operators.
+    assert_eq!(text.matches("(check-sat)").count(), 24, "{text}");
+}
+
 /// Changes a file of a certificate, and has the manifest say what the file is now.
 fn change(certificate: &str, name: &str, edit: &dyn Fn(String) -> String) {
     use sha2::{Digest as _, Sha256};
@@ -179,4 +190,105 @@ fn certificates_that_are_none_are_rejected() {
         },
         "plan.txt: is no plain file",
     );
+}
+
+/// Numbers for changes, the same in every run (`SplitMix64`).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) % limit as u64) as usize
+    }
+}
+
+/// Changes a text somewhere: a line goes, comes twice or changes places, or a number or a word becomes another one of the text.
+fn mutate(text: &str, random: &mut Random) -> String {
+    let mut lines: Vec<&str> = text.split_inclusive('\n').collect();
+    let line = random.below(lines.len());
+    match random.below(6) {
+        0 => drop(lines.remove(line)),
+        1 => lines.insert(line, lines[line]),
+        2 => {
+            let other = random.below(lines.len());
+            lines.swap(line, other);
+        }
+        _ => {
+            let is_part = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+            let words: Vec<(usize, &str)> = text
+                .match_indices(is_part)
+                .filter(|(at, _)| !text[..*at].ends_with(is_part))
+                .map(|(at, _)| (at, text[at..].split(|c| !is_part(c)).next().unwrap_or_default()))
+                .collect();
+            let (at, word) = words[random.below(words.len())];
+            let digits = word.bytes().all(|byte| byte.is_ascii_digit());
+            let other = words[random.below(words.len())].1.to_owned();
+            let numbers = ["0", "1", "7", "-1", "9999"];
+            let other = if digits { numbers[random.below(numbers.len())].to_owned() } else { other };
+            return format!("{}{other}{}", &text[..at], &text[at + word.len()..]);
+        }
+    }
+    lines.concat()
+}
+
+/// Changes a file of a certificate at random, mostly with a manifest that goes with it. What is accepted must be true:
+/// planning for the files of the certificate must come to the same.
+fn withstands(arguments: &[&str], seeds: std::ops::Range<u64>) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let target = certificate(directory.path(), arguments);
+    let mut names: Vec<String> = std::fs::read_dir(&target)
+        .expect("files")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    let read = |name: &str| std::fs::read_to_string(Path::new(&target).join(name)).expect("a file");
+    let originals: Vec<(String, String)> = names.iter().map(|name| (name.clone(), read(name))).collect();
+    for seed in seeds {
+        let mut random = Random(seed);
+        let (name, text) = &originals[random.below(originals.len())];
+        let mutant = mutate(text, &mut random);
+        if name == "manifest.json" || random.below(8) == 0 {
+            std::fs::write(Path::new(&target).join(name), &mutant).expect("a file");
+        } else {
+            change(&target, name, &|_| mutant.clone());
+        }
+        let outcome = verify(&target);
+        assert!([0, 30].contains(&outcome.status), "{arguments:?}, seed {seed}, {name}: {outcome:#?}");
+        if outcome.status == 0 {
+            let files = ["domain.pddl", "problem.pddl"].map(|name| format!("{target}/{name}"));
+            let answer = metaplan(&["plan", &files[0], &files[1], "--format", "json", "--quiet"]).json();
+            let claim: Value = serde_json::from_str(&read("manifest.json")).expect("a manifest");
+            let metric = claim["claim"]["optimal"]["metric"].as_str().map(str::to_owned);
+            let found = (answer["status"] == "optimal").then(|| answer["cost"].to_string());
+            assert_eq!(metric, found, "{arguments:?}, seed {seed}, {name}: {outcome:#?}");
+        }
+        for (name, text) in &originals {
+            std::fs::write(Path::new(&target).join(name), text).expect("a file");
+        }
+    }
+}
+
+const MISSIONS: [&[&str]; 4] = [
+    &["plan", "missions/ugv.toml"],
+    &["plan", "missions/uuv.toml", "--set", "battery=15"],
+    &["plan", "missions/ugv_plain.toml", "--fail", "c_kinect"],
+    &["plan", "missions/uuv.toml", "--minimize", "total-time"],
+];
+
+#[test]
+fn what_is_accepted_after_a_random_change_is_true() {
+    for mission in MISSIONS {
+        withstands(mission, 0..20);
+    }
+}
+
+#[test]
+#[ignore = "minutes"]
+fn what_is_accepted_after_many_random_changes_is_true() {
+    for mission in MISSIONS {
+        withstands(mission, 1_000..1_300);
+    }
 }

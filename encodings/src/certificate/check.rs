@@ -69,19 +69,7 @@ pub enum Fault {
 /// # Errors
 /// The first thing that is wrong.
 pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<Checked, Fault> {
-    let model: Model = read("the task", task)?;
-    let argument: Argument = read("the argument", argument)?;
-    let form = |document, reason| Fault::Form { document, reason };
-    for (document, found, expected) in
-        [("the task", &model.format, TASK_FORMAT), ("the argument", &argument.format, ARGUMENT_FORMAT)]
-    {
-        if found != expected {
-            return Err(form(document, format!("format `{found}`, where `{expected}` is expected")));
-        }
-    }
-    shape::task(&model).map_err(|reason| form("the task", reason))?;
-    shape::argument(&model, &argument).map_err(|reason| form("the argument", reason))?;
-    let cost = claim.map(|claim| cost(&model, claim)).transpose()?;
+    let (model, argument, cost) = parse(task, argument, claim)?;
     let mut potentials = Vec::new();
     for (potential, position) in argument.potentials.iter().zip(0..) {
         let table = Table::new(&model, &potential.pattern, &potential.values);
@@ -122,6 +110,28 @@ pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<
         potentials: argument.potentials.len(),
         needs: argument.needs.len(),
     })
+}
+
+/// The documents, with what they refer to in place, and the sum of operator costs that is claimed.
+pub(super) fn parse(
+    task: &str,
+    argument: &str,
+    claim: Option<&BigRational>,
+) -> Result<(Model, Argument, Option<i128>), Fault> {
+    let model: Model = read("the task", task)?;
+    let argument: Argument = read("the argument", argument)?;
+    let form = |document, reason| Fault::Form { document, reason };
+    for (document, found, expected) in
+        [("the task", &model.format, TASK_FORMAT), ("the argument", &argument.format, ARGUMENT_FORMAT)]
+    {
+        if found != expected {
+            return Err(form(document, format!("format `{found}`, where `{expected}` is expected")));
+        }
+    }
+    shape::task(&model).map_err(|reason| form("the task", reason))?;
+    shape::argument(&model, &argument).map_err(|reason| form("the argument", reason))?;
+    let cost = claim.map(|claim| cost(&model, claim)).transpose()?;
+    Ok((model, argument, cost))
 }
 
 fn read<T: DeserializeOwned>(document: &'static str, text: &str) -> Result<T, Fault> {

@@ -7,6 +7,8 @@
 //! successor of a label is covered or cut off again, then no plan of any length is cheaper than the claim: by
 //! induction over its steps. A claim without a cost is that there is no plan.
 //!
+//! `smt` writes the same as verification conditions for an SMT solver.
+//!
 //! `write` makes the argument from a search that has ended. `check` shares nothing with grounding, bounds and search but the
 //! form in `model`.
 //!
@@ -18,8 +20,10 @@ mod check;
 mod model;
 mod semantics;
 mod shape;
+mod smt;
 mod table;
 mod write;
 
 pub use check::{Checked, Fault, check};
+pub use smt::verification_conditions;
 pub use write::{Certificate, certify, describes};
