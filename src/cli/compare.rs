@@ -136,12 +136,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => Vec::new(),
     };
     let mut comparisons = Vec::new();
+    let progress = bar(arguments, common);
     for (pair, mission, coadaptation) in missions(arguments, &mission, coadaptation, &roles)? {
         comparisons.push((pair, one(arguments, &mission, &coadaptation, &roles)?));
-        if let Some(bar) = bar(arguments, common) {
-            bar.set_position(comparisons.len() as u64);
-        }
+        progress.set_position(comparisons.len() as u64);
     }
+    progress.finish_and_clear();
     let mut rows: Vec<Row> =
         comparisons.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison)).collect();
     rows.append(&mut added);
@@ -161,9 +161,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn bar(arguments: &Arguments, common: &Common) -> Option<ProgressBar> {
-    let pairs = arguments.pairs.filter(|_| !common.quiet && std::io::stderr().is_terminal())?;
-    Some(ProgressBar::with_draw_target(Some(pairs as u64), ProgressDrawTarget::stderr()))
+fn bar(arguments: &Arguments, common: &Common) -> ProgressBar {
+    let shown = !common.quiet && std::io::stderr().is_terminal();
+    let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    ProgressBar::with_draw_target(arguments.pairs.map(|pairs| pairs as u64), target)
 }
 
 type Pair = (String, String);

@@ -133,11 +133,8 @@ impl Mission {
         objectives: &[Metric],
         limits: &Limits,
     ) -> Result<Task, Vec<Message>> {
-        let config = GroundConfig {
-            solves: self.solves(),
-            objectives: objectives.to_vec(),
-            limits: limits.clone(),
-        };
+        let config =
+            GroundConfig { solves: self.solves(), objectives: objectives.to_vec(), limits: limits.clone() };
         encodings::ground(domain, problem, &config)
             .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
     }
