@@ -18,6 +18,7 @@ mod ground;
 mod quantity;
 mod task;
 
+mod alternatives;
 mod bounds;
 mod certificate;
 mod encode;
@@ -35,6 +36,7 @@ mod transitions;
 #[cfg(test)]
 mod tests;
 
+pub use alternatives::{Alternatives, Forced, alternatives};
 pub use certificate::{
     Certificate, Checked, Fault, certify, check as check_certificate, describes, verification_conditions,
 };

@@ -1,7 +1,7 @@
 //! Formulas against an oracle: for every number of steps, a formula has a plan at the oracle's cost, and none one below.
 
 #[path = "../tests/missions/mod.rs"]
-mod missions;
+pub(crate) mod missions;
 #[path = "../tests/random/mod.rs"]
 mod random;
 

@@ -1,5 +1,6 @@
 //! Arguments to calls of the library, answers to standard output, everything else to standard error.
 
+mod alternatives;
 mod check;
 mod compare;
 mod convert;
@@ -10,6 +11,7 @@ mod memory;
 mod objectives;
 mod output;
 mod plan;
+mod plan_json;
 mod reason;
 mod run;
 mod simulate;

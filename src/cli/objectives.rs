@@ -8,7 +8,8 @@ use metaplan::message::Message;
 use metaplan::mission::Mission;
 use serde_json::{Value, json};
 
-use crate::cli::plan::{Stages, confirm, json as plan_json, status_word, text as plan_text};
+use crate::cli::plan::{Stages, confirm, status_word, text as plan_text};
+use crate::cli::plan_json::json as plan_json;
 use crate::cli::{Failure, output};
 
 /// The objectives that the user asks for, in order; none for the problem's metric.

@@ -9,18 +9,19 @@ use clap::{Args, ValueEnum};
 use encodings::pddl::ast::{Name, Problem};
 use encodings::validate::{Options, PlanStep, PlanText, validate};
 use encodings::{
-    Backend, BackendError, Config, Exact, Improvement, Limits, Plan, Proof, Semantics, Solution, Status,
-    Step, Task, Unbounded,
+    Alternatives, Backend, BackendError, Config, Exact, Front, Improvement, Limits, Plan, Point, Proof,
+    Semantics, Solution, Status, Step, Task, Unbounded,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::certificate;
 use metaplan::message::Message;
-use metaplan::mission::Mission;
+use metaplan::mission::{Blocking, Mission};
 use num_rational::BigRational;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::cli::objectives::Objectives;
-use crate::cli::{Common, Exit, Failure, Format, Situation, memory, output};
+use crate::cli::plan_json::json as plan_json;
+use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, memory, output};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -57,6 +58,9 @@ pub struct Arguments {
     /// `metaplan verify` checks it.
     #[arg(long, value_name = "DIR", conflicts_with = "pareto")]
     certificate: Option<PathBuf>,
+    /// Up to so many further plans that are as good as the best one, and which choices all such plans share.
+    #[arg(long, value_name = "N", conflicts_with_all = ["minimize", "pareto", "plan_format"])]
+    alternatives: Option<usize>,
     /// Only the plan, in a format that other tools read.
     #[arg(long, value_enum)]
     plan_format: Option<PlanFormat>,
@@ -103,13 +107,12 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// Milliseconds spent before the optimizer runs.
 #[derive(Default)]
 pub(super) struct Stages {
-    read: Duration,
-    ground: Duration,
+    pub(super) read: Duration,
+    pub(super) ground: Duration,
 }
 
-/// Runs the command.
-pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let started = Instant::now();
+/// The limits that the user has set, and Ctrl-C.
+fn limits(arguments: &Arguments) -> Result<Limits, Failure> {
     let mut limits = Limits::none();
     if let Some(time) = arguments.time_limit {
         limits = limits.with_time(time);
@@ -117,11 +120,18 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(megabytes) = arguments.memory_limit {
         memory::watch(megabytes, limits.interrupt())?;
     }
-    let usage = |error: &BackendError| Failure::usage(Message::error("M113", error.to_string()));
-    arguments.solver.check().map_err(|error| usage(&error))?;
     let interrupt = limits.interrupt();
     // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual.
     let _ = ctrlc::set_handler(move || interrupt.store(true, Ordering::Relaxed));
+    Ok(limits)
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let started = Instant::now();
+    let limits = limits(arguments)?;
+    let usage = |error: &BackendError| Failure::usage(Message::error("M113", error.to_string()));
+    arguments.solver.check().map_err(|error| usage(&error))?;
 
     let mission = arguments.situation.mission(&arguments.inputs)?;
     let (problem, warnings) = mission.filled()?;
@@ -145,21 +155,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         ));
     };
     if arguments.pareto.is_some() {
-        let mut front = encodings::pareto(&task, &config, &mut report);
+        let front = encodings::pareto(&task, &config, &mut report);
         progress.finish_and_clear();
-        for point in &mut front.points {
-            objectives.confirm(&mission, &problem, point)?;
-            point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
-        }
-        let text = match common.format {
-            Format::Json => output::pretty(&objectives.front_json(&mission.name, &front, &stages)),
-            _ => objectives.front_text(&mission.name, &front),
-        };
-        match &arguments.output {
-            Some(file) => output::write_file(file, &text)?,
-            None => output::answer(&text),
-        }
-        return Ok(exit(front.status));
+        return show_front(front, &mission, &problem, &objectives, &stages, (arguments, common));
     }
     let mut point = encodings::lexicographic(&task, &config, &mut report);
     progress.finish_and_clear();
@@ -168,40 +166,73 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
             .unwrap_or_else(|message| output::warnings(common, &[message]));
     }
+    if let Some(reason) = &point.solution.statistics.failure {
+        let text = format!("the SAT solver gave up: {reason}");
+        output::warnings(common, &[Message::warning("M114", text)]);
+    }
+    let others = match arguments.alternatives {
+        Some(most) => alternatives::find(&mission, &problem, &task, &point.solution, most, &config)?,
+        None => None,
+    };
+    let blocking = match point.solution.status {
+        Status::Unsolvable => mission.blocking(&problem, &config),
+        _ => None,
+    };
     // What `validate` executes has the designs, what the user's own domain has no place for them has not.
     if arguments.plan_format != Some(PlanFormat::Ipc) {
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
-    let solution = &point.solution;
-    if let Some(reason) = &solution.statistics.failure {
-        let text = format!("the SAT solver gave up: {reason}");
-        output::warnings(common, &[Message::warning("M114", text)]);
-    }
-
-    let text = match (arguments.plan_format, common.format) {
-        (Some(PlanFormat::Json), _) | (None, Format::Json) => {
-            let mut answer = json(&mission.name, solution, &stages);
-            objectives.attach(&mut answer, &point);
-            output::pretty(&answer)
-        }
-        (None, _) => text(&mission.name, solution, common.verbose, &stages) + &objectives.values_text(&point),
-        (Some(format), _) => {
-            let Some(plan) = &solution.plan else {
-                // There is nothing to write, and readers of plans would stumble over anything else.
-                output::note(&verdict(solution));
-                return Ok(exit(solution.status));
-            };
-            plan_text(plan, format)
-        }
-    };
-    match &arguments.output {
-        Some(file) => {
+    let beside = Beside { others, blocking };
+    let status = point.solution.status;
+    match (show(&point, &beside, &mission.name, &objectives, &stages, (arguments, common)), &arguments.output)
+    {
+        (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
-            output::note(&verdict(solution));
+            output::note(&verdict(&point.solution));
         }
-        None => output::answer(&text),
+        (Some(text), None) => output::answer(&text),
+        // There is nothing to write, and readers of plans would stumble over anything else.
+        (None, _) => output::note(&verdict(&point.solution)),
     }
-    Ok(exit(solution.status))
+    Ok(exit(status))
+}
+
+/// What is known besides the plan.
+struct Beside {
+    others: Option<Alternatives>,
+    blocking: Option<Blocking>,
+}
+
+/// The answer in the form that the user asks for; none if that is a plan, and there is none.
+fn show(
+    point: &Point,
+    beside: &Beside,
+    name: &str,
+    objectives: &Objectives,
+    stages: &Stages,
+    (arguments, common): (&Arguments, &Common),
+) -> Option<String> {
+    let solution = &point.solution;
+    match (arguments.plan_format, common.format) {
+        (Some(PlanFormat::Json), _) | (None, Format::Json) => {
+            let mut answer = plan_json(name, solution, stages);
+            objectives.attach(&mut answer, point);
+            if let Some(others) = &beside.others {
+                alternatives::attach(&mut answer, others);
+            }
+            if let Some(Blocking::Designs(designs)) = &beside.blocking {
+                answer["blocking"] = json!(designs);
+            }
+            Some(output::pretty(&answer))
+        }
+        (None, _) => {
+            let plan = text(name, solution, common.verbose, stages);
+            let others = beside.others.as_ref().map(|others| alternatives::text(others, solution));
+            let blocking = beside.blocking.as_ref().map(blocking_text);
+            Some(plan + &objectives.values_text(point) + &others.or(blocking).unwrap_or_default())
+        }
+        (Some(format), _) => solution.plan.as_ref().map(|plan| plan_text(plan, format)),
+    }
 }
 
 /// Writes why nothing is better than the solution.
@@ -221,6 +252,30 @@ fn certify(
     }
     let certificate = certificate::Contents { mission, problem: &problem, task, solution, plan: &plan };
     certificate::write(directory, &certificate, limits)
+}
+
+/// Shows a Pareto front whose every plan the validator has executed.
+fn show_front(
+    mut front: Front,
+    mission: &Mission,
+    problem: &Problem,
+    objectives: &Objectives,
+    stages: &Stages,
+    (arguments, common): (&Arguments, &Common),
+) -> Result<Exit, Failure> {
+    for point in &mut front.points {
+        objectives.confirm(mission, problem, point)?;
+        point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
+    }
+    let text = match common.format {
+        Format::Json => output::pretty(&objectives.front_json(&mission.name, &front, stages)),
+        _ => objectives.front_text(&mission.name, &front),
+    };
+    match &arguments.output {
+        Some(file) => output::write_file(file, &text)?,
+        None => output::answer(&text),
+    }
+    Ok(exit(front.status))
 }
 
 /// Has the independent validator execute the plan; what it refuses is not shown.
@@ -329,6 +384,20 @@ fn verdict(solution: &Solution) -> String {
     }
 }
 
+/// Why there is no plan, as far as designs are the reason.
+fn blocking_text(blocking: &Blocking) -> String {
+    match blocking {
+        Blocking::Designs(designs) => format!(
+            "it is for designs that are not available: there is no plan without {}; with any one of them, and all \
+             others, there would be\n",
+            designs.join(", ")
+        ),
+        Blocking::Other => {
+            "it is not for designs: with all of them available there would be none either\n".to_owned()
+        }
+    }
+}
+
 fn steps(count: usize) -> String {
     if count == 1 { "1 step".to_owned() } else { format!("{count} steps") }
 }
@@ -384,7 +453,7 @@ fn route(step: &Step) -> Vec<&str> {
     step.arguments.iter().filter(|argument| !configured(argument)).map(String::as_str).collect()
 }
 
-fn milliseconds(duration: Duration) -> f64 {
+pub(super) fn milliseconds(duration: Duration) -> f64 {
     (duration.as_secs_f64() * 1e6).round() / 1e3
 }
 
@@ -407,62 +476,6 @@ fn statistics_text(solution: &Solution, stages: &Stages) -> String {
         milliseconds(statistics.encode),
         milliseconds(statistics.solve),
     )
-}
-
-pub(super) fn json(name: &str, solution: &Solution, stages: &Stages) -> Value {
-    let step = |step: &Step| {
-        let configuration: serde_json::Map<String, Value> =
-            step.configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect();
-        json!({
-            "action": step.action,
-            "arguments": step.arguments,
-            "configuration": configuration,
-            "start": output::number(step.start),
-            "duration": output::number(step.duration),
-            "cost": output::number(step.cost),
-            "reconfigured": step.reconfigured,
-        })
-    };
-    let statistics = &solution.statistics;
-    let families: serde_json::Map<String, Value> =
-        statistics.families.iter().map(|(family, count)| ((*family).to_owned(), json!(count))).collect();
-    let proof = match &solution.proof {
-        None => Value::Null,
-        Some(Proof::Sat { step_bound }) => json!({ "by": "sat", "step_bound": step_bound }),
-        Some(Proof::Bound) => json!({ "by": "bound" }),
-        Some(Proof::Search) => json!({ "by": "search" }),
-        Some(Proof::Relaxation(reason)) => json!({ "by": "relaxation", "reason": reason }),
-    };
-    let unbounded = solution.unbounded.map(|unbounded| match unbounded {
-        Unbounded::Proved => "proved",
-        Unbounded::Suspected => "suspected",
-    });
-    json!({
-        "format": "metaplan-plan/1",
-        "mission": name,
-        "status": status_word(solution.status),
-        "cost": solution.plan.as_ref().map(|plan| output::number(plan.cost)),
-        "lower_bound": solution.lower_bound.map(output::number),
-        "horizon": solution.horizon,
-        "proof": proof,
-        "unbounded": unbounded,
-        "steps": solution.plan.as_ref().map(|plan| plan.steps.iter().map(step).collect::<Vec<_>>()).unwrap_or_default(),
-        "statistics": {
-            "operators": statistics.operators,
-            "variables": statistics.variables,
-            "clauses": statistics.clauses,
-            "families": families,
-            "conflicts": statistics.conflicts,
-            "solver_calls": statistics.calls,
-            "milliseconds": {
-                "read": milliseconds(stages.read),
-                "ground": milliseconds(stages.ground),
-                "search": milliseconds(statistics.search),
-                "encode": milliseconds(statistics.encode),
-                "solve": milliseconds(statistics.solve),
-            },
-        },
-    })
 }
 
 /// The plan in the formats of the planning competitions and of `PlanSys2`.

@@ -4,6 +4,7 @@
 //! and the values of quality attributes from the knowledge base, by the bindings of the manifest.
 
 mod binding;
+mod blocking;
 mod live;
 mod manifest;
 mod native;
@@ -21,6 +22,7 @@ use crate::message::Message;
 use crate::probabilistic::Roles;
 
 pub use binding::Bindings;
+pub use blocking::Blocking;
 pub use manifest::{Manifest, Scenario};
 pub use native::CoAdaptation;
 

@@ -322,3 +322,25 @@ fn memory_is_limited() {
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "0"]), 2, &["0 is not in"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "4000"]), 0, &["optimal, proved"]);
 }
+
+#[test]
+fn alternatives_are_listed_with_what_is_forced() {
+    let only = metaplan(&["plan", "missions/ugv.toml", "--alternatives", "3"]);
+    check(&only, 0, &["the only one that is as good, proved", "step 1: in every plan that is as good: move"]);
+    let problem = PROBLEM.replace("(way b c)", "(way b c) (way a d) (way d c)").replace("a b c", "a b c d");
+    let answer = plan(DOMAIN, &problem, &["--alternatives", "5"]);
+    check(
+        &answer,
+        0,
+        &[
+            "alternative 1",
+            "go a d",
+            "no others that are as good, proved",
+            "step 1: in every plan that is as good: nothing",
+        ],
+    );
+    let answer = plan(DOMAIN, &problem, &["--alternatives", "0", "--format", "json"]).json();
+    assert_eq!(answer["alternatives"]["plans"].as_array().map(Vec::len), Some(0), "{answer:#}");
+    assert_eq!(answer["alternatives"]["complete"].as_bool(), Some(false), "{answer:#}");
+    assert_eq!(answer["alternatives"]["forced"][0]["action"].as_bool(), Some(false), "{answer:#}");
+}

@@ -204,6 +204,12 @@ fn without_any_sensor_there_is_no_plan() {
     ]);
     assert_eq!(outcome.status, 10, "{outcome:#?}");
     assert!(outcome.stdout.starts_with("no plan exists, proved"), "{outcome:#?}");
+    assert!(
+        outcome.stdout.contains("there is no plan without fd_amcl_kinect, fd_amcl_lidar, fd_aruco,"),
+        "{outcome:#?}"
+    );
+    let empty = metaplan(&["plan", "missions/ugv.toml", "--set", "battery=3"]);
+    assert!(empty.status == 10 && empty.stdout.contains("it is not for designs"), "{empty:#?}");
 }
 
 #[test]

@@ -83,3 +83,11 @@ fn brute_force_finds_one_optimum_each() {
         assert_ne!(found.get(1), Some(&cost), "battery {battery}: the optimum is not unique");
     }
 }
+
+#[test]
+fn only_the_designs_that_block_are_named() {
+    // Without thruster 3 only the low speed is left, which would do.
+    let arguments = ["plan", "missions/uuv.toml", "--fail", "c_sonar", "--fail", "c_thruster_3"];
+    let answer = metaplan(&[&arguments[..], &["--format", "json"]].concat());
+    assert_eq!((answer.status, answer.json()["blocking"].clone()), (10, serde_json::json!(["fd_follow"])));
+}

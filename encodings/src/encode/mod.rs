@@ -62,9 +62,22 @@ pub(crate) struct CostLimit<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// Encodes plans of at most `allowed.len()` steps, with the operators allowed at each step. None if a limit was
-    /// reached meanwhile.
+    /// Encodes plans of at most `allowed.len()` steps, with the operators allowed at each step; of plans that differ by
+    /// exchanging what is equal only some. None if a limit was reached meanwhile.
     pub(crate) fn new(
+        task: &'a Task,
+        allowed: &[Vec<bool>],
+        cost: Option<CostLimit<'_>>,
+        semantics: Semantics,
+        limits: &Limits,
+    ) -> Option<Self> {
+        let mut encoding = Self::with_equals(task, allowed, cost, semantics, limits)?;
+        encoding.break_symmetries();
+        Some(encoding)
+    }
+
+    /// The same with all plans.
+    pub(crate) fn with_equals(
         task: &'a Task,
         allowed: &[Vec<bool>],
         cost: Option<CostLimit<'_>>,
@@ -101,7 +114,6 @@ impl<'a> Encoding<'a> {
             encoding.selection(step);
         }
         encoding.domain(horizon);
-        encoding.break_symmetries();
         let numbers = encoding.numeric(limits)?;
         for (step, numbers) in numbers.iter().enumerate() {
             encoding.axioms(step, numbers);
@@ -145,6 +157,29 @@ impl<'a> Encoding<'a> {
             cost.at_most(&mut self.formula, limit);
             self.cost = Some(cost);
         }
+    }
+
+    /// The variable of an operator of a plan at its step, or that of the design of one of its slots.
+    pub(crate) fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u16>)) -> Lit {
+        let step = &plan[at];
+        match slot {
+            None => self.operator(at, step.operator).unwrap_or(!Formula::truth()),
+            Some(slot) => {
+                let slots = &self.task.operators[step.operator.index()].slots;
+                let (slot, design) = selection::global(slots, slot, step.choice[slot as usize]);
+                self.designs[at][slot][design]
+            }
+        }
+    }
+
+    /// The clause that excludes exactly one plan.
+    pub(crate) fn other_than(&self, plan: &[GroundStep]) -> Vec<Lit> {
+        let longer = self.busy.get(plan.len()).copied();
+        let choices = plan.iter().enumerate().flat_map(|(at, step)| {
+            let slots = (0..step.choice.len() as u16).map(Some);
+            std::iter::once(None).chain(slots).map(move |slot| !self.choice(plan, (at, slot)))
+        });
+        choices.chain(longer).collect()
     }
 
     /// The plan of the assignment that the solver found.

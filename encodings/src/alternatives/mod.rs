@@ -1,0 +1,154 @@
+//! Further cheapest plans, and which choices all of them share.
+//!
+//! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved again and again, each
+//! plan excluded that was found before. What every cheapest plan has in common is its backbone [1]: asked for a plan that
+//! differs from the first one in at least one of the choices left, the solver names one, which rules out where the two
+//! differ, or proves that there is none. Equal designs and objects are not taken for one another here.
+//!
+//! [1] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
+
+#[cfg(test)]
+mod tests;
+
+use crate::bounds::Bounds;
+use crate::encode::{CostLimit, Encoding, Semantics};
+use crate::optimize::Config;
+use crate::plan::{GroundPlan, GroundStep, Plan, decode, replay};
+use crate::sat::{Answer, Lit};
+use crate::solution::{Solution, Status};
+use crate::task::{Argument, Task};
+
+/// What is known of the other cheapest plans.
+#[derive(Debug, Clone)]
+pub struct Alternatives {
+    /// Plans that cost as much as the first one; not the first one itself.
+    pub plans: Vec<Plan>,
+    /// Whether it is proved that there are no others.
+    pub complete: bool,
+    /// For each step of the first plan which of its choices every cheapest plan makes at that step; none if a limit was
+    /// reached, or if cheapest plans may be longer than any that was looked for.
+    pub forced: Option<Vec<Forced>>,
+}
+
+/// Choices at a step that are the same in every cheapest plan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Forced {
+    /// Whether the action is, with its arguments apart from designs.
+    pub action: bool,
+    /// The functions whose design is.
+    pub functions: Vec<String>,
+}
+
+/// Looks for so many more cheapest plans than that of an optimal solution. None if the solution is not optimal, or its formula
+/// could not be built within the limits.
+pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
+    let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
+    let bounds = Bounds::new(task, &config.limits);
+    let window = bounds.window(task, Some(first.cost), config.horizon);
+    let complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
+    let allowed = if complete || config.horizon.is_some() {
+        window.allowed
+    } else {
+        bounds.window(task, Some(first.cost), Some(first.steps.len())).allowed
+    };
+    let cost = CostLimit { limit: first.cost, bounds: &bounds };
+    let encoding = Encoding::with_equals(task, &allowed, Some(cost), Semantics::Sequential, &config.limits)?;
+    let mut run = Run { task, encoding, config };
+    let mut found = vec![first.steps.clone()];
+    let mut exhausted = false;
+    let mut blocked = Vec::new();
+    while found.len() <= most && !exhausted {
+        blocked.extend(found.last().map(|plan| run.encoding.other_than(plan)));
+        match run.solve(&blocked) {
+            (Answer::Satisfiable, Some(plan)) => found.push(plan),
+            (Answer::Unsatisfiable, _) => exhausted = true,
+            _ => break,
+        }
+    }
+    let forced = if complete { run.forced(&first.steps, &found) } else { None };
+    let plan = |steps: Vec<GroundStep>| decode(task, &GroundPlan { steps, cost: first.cost });
+    let plans = found.into_iter().skip(1).map(plan).collect();
+    Some(Alternatives { plans, complete: complete && exhausted, forced })
+}
+
+struct Run<'a> {
+    task: &'a Task,
+    encoding: Encoding<'a>,
+    config: &'a Config,
+}
+
+/// A choice of the first plan: an operator at a step, or the design of one of its slots (by position).
+type Choice = (usize, Option<u16>);
+
+impl Run<'_> {
+    /// A plan of the formula under further clauses.
+    fn solve(&mut self, further: &[Vec<Lit>]) -> (Answer, Option<Vec<GroundStep>>) {
+        let mut solver = self.config.backend.start(&self.config.limits, u64::MAX);
+        for (_, clause) in self.encoding.formula.clauses() {
+            solver.add_clause(clause);
+        }
+        for clause in further {
+            solver.add_clause(clause);
+        }
+        let answer = solver.solve();
+        if answer != Answer::Satisfiable {
+            return (answer, None);
+        }
+        let steps = self.encoding.decode(solver.as_ref());
+        let is_plan = replay(self.task, &steps).is_some();
+        debug_assert!(is_plan, "the encoding admits a sequence that is no plan");
+        (answer, is_plan.then_some(steps))
+    }
+
+    /// Which choices of the first plan all cheapest plans make; some of them are known.
+    fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Forced>> {
+        let mut choices: Vec<Choice> = Vec::new();
+        for (at, step) in first.iter().enumerate() {
+            choices.push((at, None));
+            choices.extend((0..step.choice.len() as u16).map(|slot| (at, Some(slot))));
+        }
+        for plan in known {
+            choices.retain(|choice| self.shares(first, plan, *choice));
+        }
+        while !choices.is_empty() {
+            let other = choices.iter().map(|choice| !self.encoding.choice(first, *choice)).collect();
+            match self.solve(&[other]) {
+                (Answer::Satisfiable, Some(plan)) => {
+                    choices.retain(|choice| self.shares(first, &plan, *choice));
+                }
+                (Answer::Unsatisfiable, _) => break,
+                _ => return None,
+            }
+        }
+        Some(first.iter().enumerate().map(|(at, step)| self.names(at, step, &choices)).collect())
+    }
+
+    fn shares(&self, first: &[GroundStep], plan: &[GroundStep], (at, slot): Choice) -> bool {
+        let Some(other) = plan.get(at) else { return false };
+        match slot {
+            None => other.operator == first[at].operator,
+            Some(slot) => {
+                let own = self.design(&first[at], slot as usize);
+                (0..other.choice.len()).any(|position| self.design(other, position) == own)
+            }
+        }
+    }
+
+    /// Slot and design in the task's numbering.
+    fn design(&self, step: &GroundStep, position: usize) -> (usize, u16) {
+        let usage = &self.task.operators[step.operator.index()].slots[position];
+        (usage.slot.index(), usage.designs[step.choice[position] as usize])
+    }
+
+    fn names(&self, at: usize, step: &GroundStep, forced: &[Choice]) -> Forced {
+        let action = forced.contains(&(at, None));
+        let operator = &self.task.operators[step.operator.index()];
+        let is_forced = |argument: &Argument| match argument {
+            Argument::Object(_) => action,
+            Argument::Slot(slot) => forced.contains(&(at, Some(*slot))),
+        };
+        let functions = operator.configuration.iter().filter(|(_, argument)| is_forced(argument));
+        let name = |function: crate::lifted::ObjectId| self.task.object_names[function.index()].clone();
+        Forced { action, functions: functions.map(|(function, _)| name(*function)).collect() }
+    }
+}

@@ -1,0 +1,62 @@
+//! `metaplan plan --alternatives`: further plans that are as good, and what all of them share.
+
+use std::fmt::Write as _;
+
+use encodings::pddl::ast::Problem;
+use encodings::{Alternatives, Config, Forced, Solution, Task};
+use metaplan::mission::Mission;
+use serde_json::{Value, json};
+
+use crate::cli::Failure;
+use crate::cli::plan::{confirm, steps_text};
+use crate::cli::plan_json::step_json;
+
+/// Looks for further plans; each is executed by the validator as the first one is.
+pub(super) fn find(
+    mission: &Mission,
+    problem: &Problem,
+    task: &Task,
+    solution: &Solution,
+    most: usize,
+    config: &Config,
+) -> Result<Option<Alternatives>, Failure> {
+    let Some(mut found) = encodings::alternatives(task, solution, most, config) else { return Ok(None) };
+    for plan in &found.plans {
+        confirm(mission, problem, plan)?;
+    }
+    found.plans = found.plans.into_iter().map(|plan| mission.written(plan)).collect();
+    Ok(Some(found))
+}
+
+/// Adds them to a plan in JSON.
+pub(super) fn attach(answer: &mut Value, found: &Alternatives) {
+    let plans = found.plans.iter().map(|plan| plan.steps.iter().map(step_json).collect::<Vec<_>>());
+    let forced = |forced: &Forced| json!({ "action": forced.action, "functions": forced.functions });
+    let forced = found.forced.as_ref().map(|steps| steps.iter().map(forced).collect::<Vec<_>>());
+    if let Some(object) = answer.as_object_mut() {
+        let alternatives =
+            json!({ "plans": plans.collect::<Vec<_>>(), "complete": found.complete, "forced": forced });
+        object.insert("alternatives".into(), alternatives);
+    }
+}
+
+/// The further plans as tables, and for each step of the first one which of its choices are forced.
+pub(super) fn text(found: &Alternatives, first: &Solution) -> String {
+    let mut text = String::new();
+    for (plan, number) in found.plans.iter().zip(1..) {
+        let _ = write!(text, "\nalternative {number}\n{}", steps_text(plan));
+    }
+    text += match (found.plans.is_empty(), found.complete) {
+        (true, true) => "\nthe plan is the only one that is as good, proved\n",
+        (false, true) => "\nthere are no others that are as good, proved\n",
+        (_, false) => "\nthere may be others that are as good\n",
+    };
+    let (Some(forced), Some(plan)) = (&found.forced, &first.plan) else { return text };
+    for ((step, forced), number) in plan.steps.iter().zip(forced).zip(1..) {
+        let own = if forced.action { vec![step.action.as_str()] } else { Vec::new() };
+        let all: Vec<_> = own.into_iter().chain(forced.functions.iter().map(String::as_str)).collect();
+        let all = if all.is_empty() { "nothing".to_owned() } else { all.join(", ") };
+        let _ = writeln!(text, "step {number}: in every plan that is as good: {all}");
+    }
+    text
+}

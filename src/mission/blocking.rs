@@ -1,0 +1,73 @@
+//! Why a mission has no plan, as far as it is for designs that are not available: a smallest part of them that suffices.
+//!
+//! The facts that designs are available are taken for assumptions. The designs that are not, all together, leave no plan; one
+//! after the other is made available, and stays so if there is still no plan without it. What is left is minimal: with any
+//! one of them there would be a plan. This is the deletion-based search for a minimal unsatisfiable core [1], with the
+//! planner, whose proofs hold for plans of every length, in the place of a SAT solver.
+//!
+//! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
+
+use encodings::pddl::ast::{InitialElement, Name, Problem};
+use encodings::{Config, Status, optimize};
+
+use crate::mission::Mission;
+use crate::mission::binding::atom;
+
+/// What keeps an unsolvable mission from having a plan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Blocking {
+    /// That these designs are not available, by local name, sorted: as long as none of them is, there is no plan, however many
+    /// others are; and with any one of them there would be one, were all others available, too.
+    Designs(Vec<String>),
+    /// Something else: there would be no plan if every design was available.
+    Other,
+}
+
+impl Mission {
+    /// Why there is no plan for a problem that [`Mission::filled`] has made and that is proved to have none. None if the mission has
+    /// no knowledge base, or if a limit was reached before the reason was known.
+    pub fn blocking(&self, problem: &Problem, config: &Config) -> Option<Blocking> {
+        let config = &Config { horizon: None, ..config.clone() };
+        let designs = self.knowledge.as_ref()?.view().function_designs();
+        let missing: Vec<String> = designs
+            .into_iter()
+            .filter(|design| !design.available)
+            .map(|design| design.individual.name)
+            .collect();
+        let mut blocking = missing.clone();
+        if self.solvable_with(problem, &missing, config)? {
+            for design in &missing {
+                let rest: Vec<String> = blocking.iter().filter(|name| *name != design).cloned().collect();
+                let available: Vec<String> =
+                    missing.iter().filter(|name| !rest.contains(name)).cloned().collect();
+                if !self.solvable_with(problem, &available, config)? {
+                    blocking = rest;
+                }
+            }
+            blocking.sort();
+            return Some(Blocking::Designs(blocking));
+        }
+        Some(Blocking::Other)
+    }
+
+    /// Whether there is a plan with some further designs available; none if a limit was reached.
+    fn solvable_with(&self, problem: &Problem, available: &[String], config: &Config) -> Option<bool> {
+        let mut problem = problem.clone();
+        // Any plan will do.
+        problem.metric = None;
+        let predicates = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
+        let predicates: Vec<&Name> =
+            predicates.filter(|predicate| self.bindings.is_availability(predicate)).collect();
+        for design in available {
+            for predicate in &predicates {
+                problem.init.push(InitialElement::Fact(atom(predicate, &[design])));
+            }
+        }
+        let task = self.ground(&problem, &[], &config.limits).ok()?;
+        match optimize(&task, config, &mut |_| {}).status {
+            Status::Optimal | Status::Feasible => Some(true),
+            Status::Unsolvable => Some(false),
+            Status::UnsolvableWithinHorizon | Status::Unknown => None,
+        }
+    }
+}
