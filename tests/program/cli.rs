@@ -108,8 +108,19 @@ fn what_the_planner_does_not_handle_is_refused_with_its_place() {
         0,
         &["cost 2", "optimal, proved"],
     );
-    let timed = PROBLEM.replace("(at a)", "(at a) (at 5 (way b c))");
-    check(&plan(DOMAIN, &timed, &[]), 0, &["optimal, proved"]);
+    let durative = "(define (domain d) (:types place) (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (load))
+      (:durative-action go :parameters (?a ?b - place) :duration (= ?duration (load))
+        :condition (and (at start (at ?a)) (at start (way ?a ?b)))
+        :effect (and (at start (not (at ?a))) (at end (at ?b)) (at end (increase (load) 1)))))";
+    let loaded = PROBLEM.replace("(at a)", "(at a) (= (load) 1)");
+    check(&plan(durative, &loaded, &[]), 3, &["domain.pddl:2:", "E301", "depends on the state"]);
+}
+
+#[test]
+fn what_happens_by_itself_is_waited_for() {
+    let timed = PROBLEM.replace("(way b c)", "(at 5 (way b c))");
+    let outcome = plan(DOMAIN, &timed, &["--plan-format", "ipc"]);
+    assert_eq!(outcome.stdout, "0.000: (go a b)  [0.000]\n5.000: (go b c)  [0.000]\n");
 }
 
 #[test]
