@@ -126,6 +126,13 @@ impl<N: Number> Quantity<N> {
         self.fold_constant_tables();
     }
 
+    /// What tables over no other slots than these contribute.
+    pub(crate) fn part(&self, slots: &[u16], choice: &[u16], sizes: &[usize]) -> N {
+        let own = self.tables.iter().filter(|table| table.slots.iter().all(|slot| slots.contains(slot)));
+        own.map(|table| table.values[table.index(choice, sizes)].clone())
+            .fold(N::zero(), |sum, value| sum + value)
+    }
+
     /// The value when the slot at position `i` has its `choice[i]`-th admitted design; `sizes` counts those designs.
     pub(crate) fn at(&self, choice: &[u16], sizes: &[usize]) -> N {
         let chosen = self.tables.iter().map(|table| table.values[table.index(choice, sizes)].clone());

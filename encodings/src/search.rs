@@ -24,8 +24,6 @@ use crate::task::{Fact, OperatorId, State, Task};
 const STATE_LIMIT: usize = 400_000;
 /// States with larger numbers are left out.
 const NUMBER_LIMIT: u64 = 1 << 60;
-/// Operators with more combinations of designs than this are left to the SAT solver.
-const CHOICE_LIMIT: usize = 20_000;
 
 /// What the search found.
 #[derive(Debug)]
@@ -98,10 +96,7 @@ impl<'a> Search<'a> {
         let monotone = is_monotone(task);
         let mut choices = Vec::with_capacity(task.operators.len());
         for operator in &task.operators {
-            if operator.sizes().iter().product::<usize>() > CHOICE_LIMIT {
-                return None;
-            }
-            choices.push(undominated(operator, monotone, false));
+            choices.push(undominated(operator, monotone, false)?);
         }
         let mut search = Search {
             task,

@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::quantity::Quantity;
 use crate::task::{Operator, OperatorId, State, Task};
 
 /// Operators by that fact of their condition whose variable has the most values.
@@ -39,31 +40,126 @@ impl OperatorIndex {
     }
 }
 
+/// As many combinations of designs are compared at most.
+const CHOICE_LIMIT: usize = 100_000;
+
+/// Designs for some slots of an operator, with what they add to its cost and to the numbers in its conditions and effects.
+struct Partial {
+    choice: Vec<u16>,
+    cost: i64,
+    profile: Vec<i64>,
+}
+
 /// The combinations of an operator's designs that no other one dominates, with their costs: none is cheaper or
-/// leaves more of the numeric variables. Of equal ones the first stands for all, unless `all` are asked for.
-pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u16>, i64)> {
+/// leaves more of the numeric variables. Of equal ones the first stands for all, unless `all` are asked for. None if there
+/// are too many.
+///
+/// Slots that no table and no exclusion joins contribute by themselves, so what is dominated among the combinations of some of
+/// them is dominated in all combinations that extend it: k functions of m designs cost no m^k comparisons.
+pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Option<Vec<(Vec<u16>, i64)>> {
     let sizes = operator.sizes();
-    let profile = |choice: &[u16]| -> Vec<i64> {
-        let effects = operator.numeric_effects.iter().map(|effect| effect.value.quantity.at(choice, &sizes));
-        let conditions =
-            operator.condition.comparisons.iter().map(|linear| linear.quantity.at(choice, &sizes));
-        effects.chain(conditions).collect()
-    };
-    let mut front: Vec<(Vec<u16>, i64, Vec<i64>)> = Vec::new();
-    let no_worse =
-        |a: &[i64], b: &[i64]| if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b };
-    for choice in operator.choices() {
-        let (cost, profile) = (operator.cost.at(&choice, &sizes), profile(&choice));
-        let equal = |other: i64, numbers: &[i64]| all && other == cost && *numbers == profile;
-        if front.iter().any(|(_, other, numbers)| {
-            *other <= cost && no_worse(numbers, &profile) && !equal(*other, numbers)
-        }) {
-            continue;
-        }
-        front.retain(|(_, other, numbers)| {
-            !(cost <= *other && no_worse(&profile, numbers)) || equal(*other, numbers)
+    let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
+    let conditions = operator.condition.comparisons.iter().map(|linear| &linear.quantity);
+    let quantities: Vec<&Quantity<i64>> = effects.chain(conditions).collect();
+    let profile = quantities.iter().map(|quantity| quantity.constant).collect();
+    let mut front = vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant, profile }];
+    for slots in independent(operator, &quantities) {
+        let mut own = Vec::new();
+        each_combination(&slots, &sizes, &mut |choice| {
+            let excluded = operator.forbidden.iter().any(|rule| {
+                let joins = rule.slots.iter().all(|slot| slots.contains(slot));
+                joins
+                    && rule
+                        .combinations
+                        .iter()
+                        .any(|bad| rule.slots.iter().zip(bad).all(|(s, d)| choice[*s as usize] == *d))
+            });
+            let sum = |quantity: &Quantity<i64>| quantity.part(&slots, choice, &sizes);
+            if !excluded {
+                own.push(Partial {
+                    choice: choice.to_vec(),
+                    cost: sum(&operator.cost),
+                    profile: quantities.iter().map(|quantity| sum(quantity)).collect(),
+                });
+            }
+            own.len() <= CHOICE_LIMIT
         });
-        front.push((choice, cost, profile));
+        let own = best(own, monotone, all);
+        if own.len().saturating_mul(front.len()) > CHOICE_LIMIT {
+            return None;
+        }
+        let slots = &slots;
+        let pairs = front.iter().flat_map(|known| own.iter().map(move |own| known.with(own, slots)));
+        front = best(pairs.collect(), monotone, all);
     }
-    front.into_iter().map(|(choice, cost, _)| (choice, cost)).collect()
+    Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect())
+}
+
+impl Partial {
+    fn with(&self, other: &Self, slots: &[u16]) -> Self {
+        let mut choice = self.choice.clone();
+        for slot in slots {
+            choice[*slot as usize] = other.choice[*slot as usize];
+        }
+        let profile = self.profile.iter().zip(&other.profile).map(|(a, b)| a + b).collect();
+        Self { choice, cost: self.cost + other.cost, profile }
+    }
+}
+
+/// Those that none dominates, in lexicographic order of the designs.
+fn best(mut all_of_them: Vec<Partial>, monotone: bool, all: bool) -> Vec<Partial> {
+    // What dominates comes before what it dominates.
+    all_of_them.sort_by(|a, b| {
+        a.cost.cmp(&b.cost).then_with(|| b.profile.cmp(&a.profile)).then_with(|| a.choice.cmp(&b.choice))
+    });
+    let mut front: Vec<Partial> = Vec::new();
+    for new in all_of_them {
+        let dominates = |old: &Partial| {
+            let no_worse = if monotone {
+                old.profile.iter().zip(&new.profile).all(|(old, new)| old >= new)
+            } else {
+                old.profile == new.profile
+            };
+            no_worse && !(all && old.cost == new.cost && old.profile == new.profile)
+        };
+        if !front.iter().any(dominates) {
+            front.push(new);
+        }
+    }
+    front.sort_by(|a, b| a.choice.cmp(&b.choice));
+    front
+}
+
+/// The slots of an operator in groups that no table and no exclusion joins.
+fn independent(operator: &Operator, quantities: &[&Quantity<i64>]) -> Vec<Vec<u16>> {
+    let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
+    let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));
+    let mut groups: Vec<Vec<u16>> = (0..operator.slots.len() as u16).map(|slot| vec![slot]).collect();
+    for slots in joined {
+        let (mut together, apart): (Vec<_>, Vec<_>) =
+            groups.into_iter().partition(|group| group.iter().any(|slot| slots.contains(slot)));
+        together = if together.is_empty() { together } else { vec![together.concat()] };
+        groups = apart.into_iter().chain(together).collect();
+    }
+    for group in &mut groups {
+        group.sort_unstable();
+    }
+    groups.sort();
+    groups
+}
+
+/// Calls `visit` with every combination of designs for some slots until it returns false; the other slots stay at 0.
+fn each_combination(slots: &[u16], sizes: &[usize], visit: &mut dyn FnMut(&[u16]) -> bool) {
+    if slots.iter().any(|slot| sizes[*slot as usize] == 0) {
+        return;
+    }
+    let mut choice = vec![0; sizes.len()];
+    while visit(&choice) {
+        let grows = |slot: &&u16| choice[**slot as usize] as usize + 1 < sizes[**slot as usize];
+        let Some(position) = slots.iter().rposition(|slot| grows(&slot)) else { return };
+        choice[slots[position] as usize] += 1;
+        for slot in &slots[position + 1..] {
+            choice[*slot as usize] = 0;
+        }
+    }
 }

@@ -101,7 +101,7 @@ impl Ties<'_> {
             let current = suffix[0].clone();
             let mut replaced = None;
             'candidates: for operator in self.index.applicable(self.task, &at.state) {
-                for (choice, cost) in self.choices(operator) {
+                for (choice, cost) in self.choices(operator)? {
                     if (operator, &choice) >= (current.operator, &current.choice) {
                         break 'candidates;
                     }
@@ -125,11 +125,13 @@ impl Ties<'_> {
         Some(chosen)
     }
 
-    fn choices(&mut self, operator: OperatorId) -> Choices {
-        let (task, monotone) = (self.task, self.monotone);
-        self.choices[operator.index()]
-            .get_or_insert_with(|| undominated(&task.operators[operator.index()], monotone, true))
-            .clone()
+    /// None if there are too many.
+    fn choices(&mut self, operator: OperatorId) -> Option<Choices> {
+        let known = &mut self.choices[operator.index()];
+        if known.is_none() {
+            *known = Some(undominated(&self.task.operators[operator.index()], self.monotone, true)?);
+        }
+        known.clone()
     }
 
     /// The label after a step; none if it leads beyond the limits.
@@ -184,7 +186,7 @@ impl Ties<'_> {
             }
             let state = labels[id].state.clone();
             for operator in self.index.applicable(self.task, &state) {
-                for (choice, cost) in self.choices(operator) {
+                for (choice, cost) in self.choices(operator)? {
                     let step = GroundStep { operator, choice };
                     let Some(next) = self.successor(&labels[id], &step, cost, Some(id)) else { continue };
                     if next.changes > most {
