@@ -163,3 +163,98 @@ fn each_combination(slots: &[u16], sizes: &[usize], visit: &mut dyn FnMut(&[u16]
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::quantity::{Linear, NumericId, Table};
+    use crate::task::{Condition, Forbidden, NumericEffect, SlotId, SlotUse};
+
+    const SIZES: [usize; 4] = [2, 3, 2, 2];
+
+    /// A quantity with a table over each list of slots, filled with small numbers.
+    fn quantity(tables: &[Vec<u16>], numbers: &mut impl Iterator<Item = i64>) -> Quantity<i64> {
+        let mut quantity = Quantity::constant(numbers.next().unwrap_or(0));
+        for slots in tables {
+            let size = slots.iter().map(|slot| SIZES[*slot as usize]).product();
+            let values = (0..size).map(|_| numbers.next().unwrap_or(0)).collect();
+            quantity.add_table(Table { slots: slots.iter().copied().collect(), values });
+        }
+        quantity
+    }
+
+    fn operator(costs: &[Vec<u16>], uses: &[Vec<u16>], excluded: &[(u16, u16)], numbers: &[i64]) -> Operator {
+        let mut numbers = numbers.iter().copied().cycle();
+        let cost = quantity(costs, &mut numbers);
+        let variable = NumericId(0);
+        let value = Linear { coefficients: vec![(variable, 1)], quantity: quantity(uses, &mut numbers) };
+        let slot = |(size, slot): (&usize, u32)| SlotUse {
+            slot: SlotId(slot),
+            designs: (0..*size as u16).collect(),
+        };
+        // Slots 0 and 1 exclude each other's designs.
+        let combinations = excluded.iter().map(|(a, b)| [*a, *b].into()).collect();
+        Operator {
+            schema: 0,
+            arguments: Vec::new(),
+            configuration: Vec::new(),
+            slots: SIZES.iter().zip(0..).map(slot).collect(),
+            forbidden: [Forbidden { slots: [0, 1].into(), combinations }].into(),
+            condition: Condition { comparisons: vec![value.clone()], ..Condition::default() },
+            effects: Vec::new(),
+            conditional: Vec::new(),
+            numeric_effects: vec![NumericEffect { variable, value }],
+            cost,
+            others: Vec::new(),
+            duration: Quantity::constant(0),
+            wait: None,
+        }
+    }
+
+    /// By definition: every combination against every other one.
+    fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u16>, i64)> {
+        let sizes = operator.sizes();
+        let value = |choice: &Vec<u16>| {
+            (operator.cost.at(choice, &sizes), operator.numeric_effects[0].value.quantity.at(choice, &sizes))
+        };
+        let choices: Vec<Vec<u16>> = operator.choices().collect();
+        let beaten = |choice: &Vec<u16>| {
+            let (cost, left) = value(choice);
+            choices.iter().any(|other| {
+                let (own, more) = value(other);
+                let no_worse = own <= cost && if monotone { more >= left } else { more == left };
+                let equal = own == cost && more == left;
+                no_worse && if equal { !all && other < choice } else { true }
+            })
+        };
+        let best = choices.iter().filter(|choice| !beaten(choice));
+        best.map(|choice| (choice.clone(), value(choice).0)).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn independent_slots_lose_nothing(
+            costs in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![1, 2]], 0..=5),
+            uses in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![0, 3]], 0..=5),
+            excluded in proptest::collection::vec((0_u16..2, 0_u16..3), 0..4),
+            numbers in proptest::collection::vec(-4_i64..5, 1..40),
+            monotone: bool,
+        ) {
+            let operator = operator(&costs, &uses, &excluded, &numbers);
+            prop_assert_eq!(undominated(&operator, monotone, true), Some(expected(&operator, monotone, true)));
+            // Of equal ones one stands for all.
+            let values = |choices: Vec<(Vec<u16>, i64)>| {
+                let sizes = operator.sizes();
+                let left = |choice: &[u16]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);
+                let mut values: Vec<_> = choices.iter().map(|(choice, cost)| (*cost, left(choice))).collect();
+                values.sort_unstable();
+                values
+            };
+            let found = undominated(&operator, monotone, false).unwrap_or_default();
+            prop_assert!(found.iter().all(|(choice, _)| operator.admits(choice)));
+            prop_assert_eq!(values(found), values(expected(&operator, monotone, false)));
+        }
+    }
+}
