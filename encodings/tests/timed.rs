@@ -120,6 +120,25 @@ fn literal(random: &mut Random) -> String {
     if random.below(3) == 0 { format!("(not {atom})") } else { atom.to_owned() }
 }
 
+#[test]
+fn a_wait_is_no_step_of_a_plan() {
+    // Without a metric plans are measured by their length: two actions and a wait are shorter than three actions.
+    let domain =
+        "(define (domain d) (:requirements :timed-initial-literals) (:predicates (at-b) (at-c) (at-d) (gate))
+      (:action to-b :parameters () :precondition (and) :effect (at-b))
+      (:action through :parameters () :precondition (and (at-b) (gate)) :effect (at-c))
+      (:action round :parameters () :precondition (at-b) :effect (at-d))
+      (:action back :parameters () :precondition (at-d) :effect (at-c)))";
+    let problem = "(define (problem p) (:domain d) (:init (at 5 (gate))) (:goal (at-c)))";
+    let (domain, problem) = parse(domain, problem);
+    for quick_search in [true, false] {
+        let found = plan(&domain, &problem, quick_search).expect("a plan");
+        let starts: Vec<_> = found.steps.iter().map(|step| step.start.to_string()).collect();
+        assert_eq!((found.cost.to_string().as_str(), found.steps.len()), ("2", 2), "{starts:?}");
+        assert_eq!(starts.last().map(String::as_str), Some("5"));
+    }
+}
+
 /// Conditions or effects, each at one of some times.
 fn timed(random: &mut Random, times: &[&str], most: u64) -> String {
     let mut text = String::from("(and");

@@ -33,7 +33,8 @@ pub(crate) fn attach_costs(lifted: &Lifted, task: &mut GroundTask<'_>) -> Result
     if lifted.metrics.is_empty() {
         let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
         for operator in &mut task.operators {
-            let unit = Quantity::constant(Rational::from_integer(1));
+            // A wait is no action of the plan.
+            let unit = Quantity::constant(Rational::from_integer(i128::from(operator.wait.is_none())));
             operator.costs = vec![if temporal { operator.duration.clone() } else { unit }];
         }
         task.objectives = vec![GroundObjective::default()];
