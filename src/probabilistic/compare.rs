@@ -140,7 +140,7 @@ pub fn compare(
     costs.states = explored.mdp.states();
     costs.transitions = explored.mdp.transition_count();
     let mut memo = Memo { planner, plans: BTreeMap::new(), costs };
-    let first = memo.plan(&process_start(mission, config.risk))?;
+    let first = memo.plan(&Situation::start(mission, config.risk))?;
     let fastest = first.as_ref().map(|plan| time_of(mission, plan));
     let penalty = config.penalty.unwrap_or_else(|| 10.0 * fastest.unwrap_or(1000.0).max(1.0));
     let referee = Referee { mission, risk: config.risk, penalty, explored };
@@ -211,17 +211,6 @@ impl From<Vec<Message>> for Failure {
     }
 }
 
-fn process_start(mission: &Coadaptation, risk: Risk) -> Situation {
-    Situation {
-        place: mission.start,
-        configuration: mission.initial,
-        hit: false,
-        failed: false,
-        lost: false,
-        battery: mission.battery.filter(|_| risk.battery).map_or(0, |battery| battery.initial),
-    }
-}
-
 /// The time of a plan on which nothing goes wrong.
 pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
     use probabilistic::Number;
@@ -285,7 +274,7 @@ impl Memo<'_, '_> {
             }
             match self.plan(&situation) {
                 Ok(Some(plan)) => {
-                    if situation != process_start(mission, referee.risk) {
+                    if situation != Situation::start(mission, referee.risk) {
                         unexpected.borrow_mut().insert(situation);
                     }
                     follow(mission, situation, &plan, referee.risk, &mut expected);

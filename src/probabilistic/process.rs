@@ -53,6 +53,20 @@ pub struct Situation {
     pub battery: u32,
 }
 
+impl Situation {
+    /// Where a mission begins.
+    pub(super) fn start(mission: &Coadaptation, risk: Risk) -> Self {
+        Self {
+            place: mission.start,
+            configuration: mission.initial,
+            hit: false,
+            failed: false,
+            lost: false,
+            battery: mission.battery.filter(|_| risk.battery).map_or(0, |battery| battery.initial),
+        }
+    }
+}
+
 impl State {
     /// What it says.
     pub fn situation(self) -> Situation {
@@ -165,17 +179,9 @@ impl<N: Number> Process<N> {
         };
         let changes =
             (0..designs).map(|old| (0..designs).filter_map(|new| change(old, new)).collect()).collect();
-        let initial = Situation {
-            place: mission.start,
-            configuration: mission.initial,
-            hit: false,
-            failed: false,
-            lost: false,
-            battery: mission.battery.filter(|_| risk.battery).map_or(0, |battery| battery.initial),
-        };
         Self {
             goal: mission.goal,
-            initial: initial.into(),
+            initial: Situation::start(mission, risk).into(),
             reserve: mission.battery.filter(|_| risk.battery).map_or(0, |battery| battery.reserve),
             moves,
             changes,
