@@ -7,7 +7,7 @@ use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::{self, Status};
-use ontology::{Equality, ReadOptions};
+use ontology::{Equality, Ontology, ReadOptions};
 use rules::{Delta, Engine, Fact, Literal, Prefixes, Program, Symbols, Value};
 use serde::{Deserialize, Serialize};
 
@@ -99,6 +99,59 @@ impl Statement {
     }
 }
 
+/// What documents and rule files say, before anything is concluded.
+pub(crate) struct Stated {
+    pub(crate) symbols: Symbols,
+    pub(crate) program: Program,
+    pub(crate) facts: Vec<Fact>,
+    ontology: Ontology,
+    /// As [`Knowledge::rule_count`] has it.
+    pub(crate) rule_count: usize,
+    warnings: Vec<Message>,
+}
+
+impl Stated {
+    /// Reads documents and rules.
+    ///
+    /// # Errors
+    /// All that is wrong with them.
+    pub(crate) fn read(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+        let read = ontology::read_files(&sources.documents, &sources.options);
+        let mut errors = Vec::new();
+        let mut symbols = Symbols::new();
+        let mut own = Vec::new();
+        for file in &sources.rules {
+            match parse_rule_file(file, &mut symbols) {
+                Ok(program) => own.extend(program.rules),
+                Err(more) => errors.extend(more),
+            }
+        }
+        let ontology = match read {
+            Ok(ontology) if errors.is_empty() => ontology,
+            Ok(_) => return Err(errors),
+            Err(more) => {
+                errors.extend(more.iter().map(Message::from_ontology));
+                return Err(errors);
+            }
+        };
+        let lowered = ontology::lower_with(&ontology, equality, &mut symbols);
+        let warnings =
+            ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
+        let rule_count = ontology.rules.len() + own.len();
+        let mut program = lowered.program;
+        program.rules.extend(own);
+        Ok(Self { symbols, program, facts: lowered.facts, ontology, rule_count, warnings })
+    }
+
+    /// Changes what is stated.
+    pub(crate) fn change(&mut self, statements: &Statements) {
+        let symbols = &mut self.symbols;
+        let removed: BTreeSet<Fact> = statements.removed.iter().map(|own| own.intern(symbols)).collect();
+        self.facts.retain(|fact| !removed.contains(fact));
+        self.facts.extend(statements.added.iter().map(|own| own.intern(symbols)));
+    }
+}
+
 /// Something that the knowledge contradicts.
 #[derive(Debug, Clone)]
 pub struct Contradiction {
@@ -122,37 +175,28 @@ impl Knowledge {
     /// # Errors
     /// All that is wrong with the sources.
     pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
-        let read = ontology::read_files(&sources.documents, &sources.options);
-        let mut errors = Vec::new();
-        let mut symbols = Symbols::new();
-        let mut own = Vec::new();
-        for file in &sources.rules {
-            match parse_rule_file(file, &mut symbols) {
-                Ok(program) => own.extend(program.rules),
-                Err(more) => errors.extend(more),
-            }
-        }
-        let ontology = match read {
-            Ok(ontology) if errors.is_empty() => ontology,
-            Ok(_) => return Err(errors),
-            Err(more) => {
-                errors.extend(more.iter().map(Message::from_ontology));
-                return Err(errors);
-            }
-        };
-        let lowered = ontology::lower_with(&ontology, equality, &mut symbols);
-        let mut warnings: Vec<Message> =
-            ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
-        let rule_count = ontology.rules.len() + own.len();
-        let mut program = lowered.program;
-        program.rules.extend(own);
-        let engine = Engine::new(symbols, program, lowered.facts)
+        let Stated { symbols, program, facts, ontology, rule_count, mut warnings } =
+            Stated::read(sources, equality)?;
+        let engine = Engine::new(symbols, program, facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let mistakes = ontology::tomasys::check(&ontology, &engine);
         warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
         let runtime = Runtime::new(engine, Mode::Retract);
         let sources = sources.clone();
         Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources })
+    }
+
+    /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
+    ///
+    /// # Errors
+    /// The facts refer to other symbols.
+    pub(crate) fn closed(symbols: Symbols, facts: Vec<Fact>, equality: bool) -> Result<Self, Vec<Message>> {
+        let program = Program { rules: Vec::new(), equality };
+        let engine = Engine::new(symbols, program, facts)
+            .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
+        let runtime = Runtime::new(engine, Mode::Retract);
+        let sources = Sources::default();
+        Ok(Self { origin: runtime.clone(), runtime, rule_count: 0, warnings: Vec::new(), sources })
     }
 
     /// What is questionable about the documents.

@@ -17,6 +17,7 @@ mod network;
 pub mod owl_rl;
 mod plan;
 mod record;
+pub mod replay;
 mod revision;
 mod rule;
 mod safety;

@@ -1,13 +1,16 @@
-//! Where a mission's problem comes from: its knowledge base and what has changed since, to be reasoned with again.
+//! Where a mission's problem comes from: its knowledge base, what has changed since, and why what follows from them does.
 
 use std::collections::BTreeMap;
 
 use encodings::pddl::ast::{Domain, Problem};
 use encodings::pddl::{Source, print_domain, print_problem};
-use ontology::{OutputSyntax, ReadOptions};
+use ontology::{Equality, OutputSyntax, ReadOptions};
+use rules::Engine;
+use rules::replay::{Replayed, replay};
 use serde::{Deserialize, Serialize};
 
-use crate::knowledge::{Knowledge, Sources, Statements, rule_text};
+use super::derivations::{self, DERIVATIONS};
+use crate::knowledge::{Knowledge, Sources, Stated, Statements, rule_text};
 use crate::message::Message;
 use crate::mission::{Bindings, Mission};
 
@@ -31,7 +34,7 @@ struct Origin {
 }
 
 /// The files of a mission with a knowledge base.
-pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String); 2]>, Message> {
+pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String); 3]>, Message> {
     let Some(knowledge) = mission.knowledge() else { return Ok(None) };
     let sources = knowledge.sources();
     let first = |messages: Vec<Message>| {
@@ -48,19 +51,44 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
         rules: rules.collect::<Result<_, Message>>()?,
         changes: knowledge.statements(),
     };
-    let origin = serde_json::to_string(&origin)
-        .map_err(|error| Message::error("M120", format!("no certificate: {error}")))?;
-    Ok(Some([(DOCUMENT, document), (ORIGIN, origin)]))
+    let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
+    // Rules are told apart by where they stand, so that it has to be this document that is reasoned with.
+    let Stated { symbols, program, facts, .. } = stated(&document, &origin).map_err(|error| wrong(&error))?;
+    let engine = Engine::new(symbols, program, facts)
+        .map_err(|errors| first(errors.iter().map(Message::from_rules).collect()))?;
+    let derivations = derivations::write(&engine).map_err(|error| wrong(&error))?;
+    let origin = serde_json::to_string(&origin).map_err(|error| wrong(&error))?;
+    Ok(Some([(DOCUMENT, document), (ORIGIN, origin), (DERIVATIONS, derivations)]))
 }
 
-/// Reasons again, and fills the problem with what follows. It must be the problem that was planned, but for its metric.
+/// What a certificate says about knowledge: the documents, what has changed since, and what follows.
+pub(super) struct Written<'w> {
+    pub(super) document: &'w str,
+    pub(super) origin: &'w str,
+    pub(super) derivations: &'w str,
+}
+
+/// Replays the derivations, and fills the problem with what they say. It must be the problem that was planned, but for its
+/// metric.
 pub(super) fn check(
-    document: &str,
-    origin: &str,
+    written: &Written<'_>,
     domain: &Domain,
     problem: &Problem,
-) -> Result<String, String> {
-    let origin: Origin = serde_json::from_str(origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
+) -> [Result<String, String>; 2] {
+    let (knowledge, said, origin) = match replayed(written) {
+        Ok(replayed) => replayed,
+        Err(reason) => return [Err(reason), Err("the derivations do not say what follows".to_owned())],
+    };
+    [Ok(said), filled(knowledge, &origin, domain, problem)]
+}
+
+fn said_first(messages: &[Message]) -> String {
+    let error = messages.iter().find(|message| message.is_error()).or(messages.first());
+    error.map_or_else(String::new, |found| found.message.clone())
+}
+
+/// What the documents say, with what has changed since.
+fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     let directory = tempfile::tempdir().map_err(|error| format!("no temporary directory: {error}"))?;
     let write = |name: &str, text: &str| {
         let file = directory.path().join(name);
@@ -68,20 +96,52 @@ pub(super) fn check(
         Ok::<_, String>(file)
     };
     let documents = vec![write(DOCUMENT, document)?];
-    let mut rules = Vec::new();
-    for ((_, text), number) in origin.rules.iter().zip(1..) {
-        rules.push(write(&format!("rules-{number}.swrl"), text)?.display().to_string());
-    }
+    let rules = origin.rules.iter().zip(1..);
+    let rules = rules
+        .map(|((_, text), number)| Ok(write(&format!("rules-{number}.swrl"), text)?.display().to_string()));
+    let rules = rules.collect::<Result<Vec<_>, String>>()?;
     let sources = Sources { documents, rules, options: ReadOptions::default() };
-    let mission = mission(&sources, &origin).map_err(|messages| {
-        messages
-            .iter()
-            .find(|message| message.is_error())
-            .map_or_else(String::new, |found| found.message.clone())
-    })?;
-    let (mut filled, _) = mission
-        .filled()
-        .map_err(|messages| messages.first().map_or_else(String::new, |message| message.message.clone()))?;
+    let mut stated = Stated::read(&sources, Equality::Owl).map_err(|messages| said_first(&messages))?;
+    for rule in &mut stated.program.rules {
+        let file = sources.rules.iter().position(|file| **file == *rule.identity.source);
+        if let Some(position) = file {
+            rule.identity.source = origin.rules[position].0.as_str().into();
+        }
+    }
+    stated.change(&origin.changes);
+    Ok(stated)
+}
+
+/// What follows, by its derivations alone.
+fn replayed(written: &Written<'_>) -> Result<(Knowledge, String, Origin), String> {
+    let origin: Origin =
+        serde_json::from_str(written.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
+    let mut stated = stated(written.document, &origin)?;
+    let derivation = derivations::read(written.derivations, &mut stated.symbols)?;
+    let Replayed { facts, derived, matches } =
+        replay(&stated.program, &mut stated.symbols, &stated.facts, &derivation)
+            .map_err(|fault| format!("{DERIVATIONS}: {fault}"))?;
+    let said = format!(
+        "{facts} facts hold, {derived} of them by rules, and nothing else follows: {} rules and axioms, {matches} matches",
+        stated.program.rules.len()
+    );
+    let facts = derivation.steps.into_iter().map(|step| step.fact).collect();
+    let knowledge = Knowledge::closed(stated.symbols, facts, stated.program.equality);
+    Ok((knowledge.map_err(|messages| said_first(&messages))?, said, origin))
+}
+
+fn filled(
+    knowledge: Knowledge,
+    origin: &Origin,
+    domain: &Domain,
+    problem: &Problem,
+) -> Result<String, String> {
+    let bindings = Bindings::with(&origin.bindings)?;
+    let source = |name: &str, text: &str| Ok(Source::new(name, text));
+    let (own_domain, own_problem) = (source("domain", &origin.domain), source("problem", &origin.problem));
+    let mission = Mission::new("", Some(Ok(knowledge)), bindings, own_domain, own_problem);
+    let mission = mission.map_err(|messages| said_first(&messages))?;
+    let (mut filled, _) = mission.filled().map_err(|messages| said_first(&messages))?;
     filled.metric.clone_from(&problem.metric);
     if print_domain(mission.domain()) != print_domain(domain) {
         return Err("the mission's domain is another one".to_owned());
@@ -95,15 +155,5 @@ pub(super) fn check(
     if found != expected {
         return Err("the knowledge says more or less than the problem".to_owned());
     }
-    let rules = mission.knowledge().map_or(0, Knowledge::rule_count);
-    Ok(format!("the problem is what follows: {} triples, {rules} rules", document.lines().count()))
-}
-
-fn mission(sources: &Sources, origin: &Origin) -> Result<Mission, Vec<Message>> {
-    let mut knowledge = Knowledge::read(sources)?;
-    knowledge.restore(&origin.changes).map_err(|message| vec![message])?;
-    let bindings = Bindings::with(&origin.bindings).map_err(|text| vec![Message::error("M105", text)])?;
-    let source = |name: &str, text: &str| Ok(Source::new(name, text));
-    let (domain, problem) = (source("domain", &origin.domain), source("problem", &origin.problem));
-    Mission::new("", Some(Ok(knowledge)), bindings, domain, problem)
+    Ok("the problem is what follows".to_owned())
 }

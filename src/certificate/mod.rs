@@ -6,9 +6,11 @@
 //! | `domain.pddl`, `problem.pddl` | the files as they were planned with: availability and values filled in |
 //! | `plan.txt` | the plan; missing if there is none |
 //! | `knowledge.nt`, `origin.json` | the knowledge base, rules, bindings, and what has changed since they were read; missing if there is no knowledge base |
+//! | `derivations.json` | everything that follows from them, with the rule, its bindings and what it rests on; missing likewise |
 //! | `task.json` | the ground task |
 //! | `argument.json` | why no plan is cheaper: labels, potentials, needs (see `encodings::check_certificate`) |
 
+mod derivations;
 mod knowledge;
 
 use std::fmt::Write as _;
@@ -74,7 +76,7 @@ struct File {
 /// What came of one part of a verification.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// `files`, `knowledge`, `plan`, `task` or `argument`.
+    /// `files`, `derivations`, `knowledge`, `plan`, `task` or `argument`.
     pub part: &'static str,
     /// What was checked; or why it fails, with the first thing that is wrong.
     pub result: Result<String, String>,
@@ -221,7 +223,7 @@ fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>), String> {
         expected.push(PLAN);
     }
     if manifest.files.iter().any(|file| file.name == knowledge::ORIGIN) {
-        expected.extend([knowledge::DOCUMENT, knowledge::ORIGIN]);
+        expected.extend([knowledge::DOCUMENT, knowledge::ORIGIN, derivations::DERIVATIONS]);
     }
     expected.sort_unstable();
     let mut names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
@@ -285,9 +287,14 @@ fn parts(claim: &Claim, solves: &[String], contents: &[(String, String)]) -> Vec
     };
     let mut parts = Vec::new();
     if contents.iter().any(|(name, _)| name == knowledge::ORIGIN) {
-        let (document, origin) = (text(knowledge::DOCUMENT), text(knowledge::ORIGIN));
-        let result = knowledge::check(document, origin, &domain, &problem);
-        parts.push(Part { part: "knowledge", result });
+        let written = knowledge::Written {
+            document: text(knowledge::DOCUMENT),
+            origin: text(knowledge::ORIGIN),
+            derivations: text(derivations::DERIVATIONS),
+        };
+        let [derivations, filled] = knowledge::check(&written, &domain, &problem);
+        parts.push(Part { part: "derivations", result: derivations });
+        parts.push(Part { part: "knowledge", result: filled });
     }
     let metric = match claim {
         Claim::Unsolvable => None,

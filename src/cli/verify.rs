@@ -45,8 +45,8 @@ fn text(report: &Report) -> String {
     let mut text = String::new();
     for part in &report.parts {
         let _ = match &part.result {
-            Ok(said) => writeln!(text, "{:9} verified: {said}", part.part),
-            Err(reason) => writeln!(text, "{:9} failed: {reason}", part.part),
+            Ok(said) => writeln!(text, "{:11} verified: {said}", part.part),
+            Err(reason) => writeln!(text, "{:11} failed: {reason}", part.part),
         };
     }
     let claim = match &report.claim {

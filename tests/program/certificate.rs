@@ -68,7 +68,7 @@ fn a_verification_has_its_fields() {
     assert_eq!(answer["format"], "metaplan-verification/1");
     assert_eq!(answer["claim"], json!({ "optimal": { "metric": "408" } }));
     let parts: Vec<_> = answer["parts"].as_array().expect("parts").iter().map(|part| &part["part"]).collect();
-    assert_eq!(parts, ["files", "knowledge", "plan", "task", "argument"]);
+    assert_eq!(parts, ["files", "derivations", "knowledge", "plan", "task", "argument"]);
     assert_eq!(answer["verified"], true);
 }
 
@@ -104,32 +104,48 @@ fn change(certificate: &str, name: &str, edit: &dyn Fn(String) -> String) {
 #[test]
 fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
     type Edit = fn(String) -> String;
-    let cases: [(&str, Edit, &str); 9] = [
+    let cases: [(&str, Edit, &str); 11] = [
         (
             "knowledge.nt",
             |text| text.replace("fd_aruco>", "fd_marker>"),
-            "knowledge failed: the knowledge says",
+            "derivations failed: derivations.json: step",
+        ),
+        (
+            "derivations.json",
+            |text| {
+                let mut document: Value = serde_json::from_str(&text).expect("JSON");
+                let steps = document["steps"].as_array_mut().expect("steps");
+                let derived = steps.iter().rposition(|step| step["rule"].is_number()).expect("a conclusion");
+                steps.remove(derived);
+                document.to_string()
+            },
+            "and is missing\nknowledge   failed",
+        ),
+        (
+            "derivations.json",
+            |text| text.replacen("\"rule\":0", "\"rule\":1", 1),
+            "derivations failed: derivations.json: step",
         ),
         (
             "origin.json",
             |text| text.replacen("\"added\":[]", "\"added\":[7]", 1),
-            "knowledge failed: origin.json",
+            "derivations failed: origin.json",
         ),
         (
             "problem.pddl",
             |text| text.replace("(fd_available fd_aruco)", ""),
-            "knowledge failed: the knowledge says",
+            "knowledge   failed: the knowledge says",
         ),
         (
             "plan.txt",
             |plan| plan.lines().skip(1).fold(String::new(), |text, line| text + line + "\n"),
-            "plan      failed",
+            "plan        failed",
         ),
-        ("problem.pddl", |text| text.replace("(fd_available fd_amcl_kinect)", ""), "plan      failed"),
-        ("task.json", |text| text.replacen("\"constant\":", "\"constant\":1", 1), "task      failed"),
-        ("argument.json", |text| text.replacen("\"values\":[", "\"values\":[9999,", 1), "argument  failed"),
-        ("argument.json", |_| "[".repeat(100_000), "argument  failed"),
-        ("domain.pddl", |text| text.replace(":effect", ":efect"), "files     failed"),
+        ("problem.pddl", |text| text.replace("(fd_available fd_amcl_kinect)", ""), "plan        failed"),
+        ("task.json", |text| text.replacen("\"constant\":", "\"constant\":1", 1), "task        failed"),
+        ("argument.json", |text| text.replacen("\"values\":[", "\"values\":[9999,", 1), "argument    failed"),
+        ("argument.json", |_| "[".repeat(100_000), "argument    failed"),
+        ("domain.pddl", |text| text.replace(":effect", ":efect"), "files       failed"),
     ];
     for (file, edit, expected) in cases {
         let directory = tempfile::tempdir().expect("a directory");

@@ -3,9 +3,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use metaplan_rules::replay::{Fault, replay};
 use metaplan_rules::{
-    Aggregate, Atom, BuiltIn, Cause, Delta, Derivation, Engine, Fact, Literal, Program, Reason, Rule,
-    RuleIdentity, Symbol, Symbols, Term, Variable, owl_rl,
+    Aggregate, Atom, BuiltIn, Cause, Delta, Derivation, DerivationStep, Engine, Fact, Literal, Program,
+    Reason, Rule, RuleIdentity, Symbol, Symbols, Term, Variable, owl_rl,
 };
 
 use crate::oracle::{
@@ -347,7 +348,38 @@ fn check_state(engine: &Engine, world: &World, stated: &BTreeSet<Fact>) -> BTree
         }
     }
     assert_eq!(counts, violations(engine.program(), &mut symbols, &expected));
+    check_replay(engine, stated, &facts);
     facts
+}
+
+/// What the engine says that holds, with why, is accepted without it; something that is missing or made up is not.
+fn check_replay(engine: &Engine, stated: &BTreeSet<Fact>, facts: &BTreeSet<Fact>) {
+    let rules = engine.program().rules.iter().filter(|rule| !rule.head.is_empty()).cloned().collect();
+    let program = Program { rules, ..engine.program().clone() };
+    let stated: Vec<Fact> = stated.iter().cloned().collect();
+    let mut symbols = engine.symbols().clone();
+    let mut everything = engine.everything();
+    let replayed = replay(&program, &mut symbols, &stated, &everything);
+    if engine.violations().iter().any(|violation| violation.cause == Cause::Clash) {
+        assert!(matches!(replayed, Err(Fault::Inconsistent(_))), "{replayed:?}");
+        return;
+    }
+    replayed.expect("what holds");
+    let said: BTreeSet<&Fact> = everything.steps.iter().map(|step| &step.fact).collect();
+    let hidden = |fact: &&Fact| !facts.contains(fact);
+    assert!(facts.iter().all(|fact| said.contains(fact)));
+    assert!(said.iter().copied().filter(hidden).all(|fact| is_reflexive(&symbols, fact)));
+    // A pair of names may follow from the others.
+    if !program.equality
+        && let Some(last) = everything.steps.pop()
+    {
+        assert!(replay(&program, &mut symbols, &stated, &everything).is_err(), "without {last:?}");
+        let made_up = Fact::new(last.fact.predicate, last.fact.arguments.iter().rev().copied());
+        if !facts.contains(&made_up) {
+            everything.steps.extend([last.clone(), DerivationStep { fact: made_up, ..last }]);
+            assert!(replay(&program, &mut symbols, &stated, &everything).is_err(), "{everything:?}");
+        }
+    }
 }
 
 /// Runs a script of changes and compares with the oracle after every step.

@@ -1,0 +1,293 @@
+//! Derivations of everything that holds, checked without the engine: by looking at each step by itself, and by plain joins.
+//!
+//! What holds is the perfect model of a stratified program [1]. It is the only set of facts that is *founded* (each fact is
+//! stated, or concluded by a rule from facts that come before it, while what the rule negates is not in the set) and
+//! *closed* (it has what is stated, and whatever a rule concludes from it), because stratified programs have no other stable
+//! model [2]. So [`replay`] checks three things: that the rules are stratified, that every step is founded, and that
+//! nothing is missing. The last matters as much as the others: a fact that is left out may be what another rule negates.
+//!
+//! With equality, facts are compared by the first name of each class of names that are one. A step may use the
+//! equalities before it only.
+//!
+//! Nothing of the engine's store, plans, strata or records is used: only rules as data, and the meaning of single built-ins
+//! and aggregates.
+//!
+//! [1] Przymusinski, "On the declarative semantics of deductive databases and logic programs", 1988.
+//! [2] Gelfond, Lifschitz, "The stable model semantics for logic programming", ICLP 1988.
+
+mod facts;
+mod levels;
+mod matches;
+mod names;
+mod write;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::explain::{Derivation, DerivationStep, Reason};
+use crate::fact::Fact;
+use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
+use crate::symbol::{Symbol, Symbols};
+use facts::Facts;
+use matches::{Matcher, Values};
+use names::Names;
+
+/// The relation of equal names.
+const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
+/// The relation of different individuals.
+const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
+
+/// What [`replay`] has gone through.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Replayed {
+    /// Facts that hold.
+    pub facts: usize,
+    /// Those of them that a rule concludes.
+    pub derived: usize,
+    /// Matches of rules that were looked at to see that nothing is missing.
+    pub matches: usize,
+}
+
+/// Why derivations are not accepted: the first thing that is wrong. Facts are given as text.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// A rule negates, or aggregates over, what depends on its own conclusion.
+    #[error("the rules are not stratified at rule {0}")]
+    Unstratified(RuleIdentity),
+    /// A step does not follow from those before it.
+    #[error("step {step}, {fact}: {reason}")]
+    Step {
+        /// Its position, counted from 0.
+        step: usize,
+        /// What it concludes.
+        fact: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Something is stated, and no step says so.
+    #[error("{0} is stated, and missing")]
+    MissingStatement(String),
+    /// A rule concludes something that no step says.
+    #[error("{fact} follows by rule {rule}, and is missing")]
+    MissingConclusion {
+        /// What follows.
+        fact: String,
+        /// By which rule.
+        rule: RuleIdentity,
+    },
+    /// Names that may be one are compared by a rule, not by what is known to differ.
+    #[error("a rule asks whether names differ that may be one")]
+    Difference,
+    /// The facts contradict each other.
+    #[error("the knowledge is inconsistent: {0}")]
+    Inconsistent(String),
+}
+
+/// Checks that the steps of a derivation, each after what it rests on, are exactly what holds by a program and stated facts.
+/// Values that rules compute are interned in `symbols`.
+///
+/// # Errors
+/// The first thing that is wrong: a step that does not follow, something that is missing, or a contradiction.
+pub fn replay(
+    program: &Program,
+    symbols: &mut Symbols,
+    stated: &[Fact],
+    derivation: &Derivation,
+) -> Result<Replayed, Fault> {
+    let (same, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
+    let program = &without_guards(program);
+    levels::check(program, same, different)?;
+    let mut names = Names::default();
+    for step in &derivation.steps {
+        if program.equality && step.fact.predicate == same && step.fact.arguments.len() == 2 {
+            names.join(step.fact.arguments[0], step.fact.arguments[1]);
+        }
+    }
+    let facts = Facts::new(derivation.steps.iter().map(|step| names.normal(&step.fact)));
+    let matcher =
+        Matcher { symbols, facts: &facts, names: &names, equality: program.equality, names_differ: false };
+    let mut replayer = Replayer { program, same, different, matcher };
+    replayer.consistent(derivation)?;
+    replayer.founded(stated, derivation)?;
+    let matches = replayer.closed(stated)?;
+    if replayer.matcher.names_differ {
+        return Err(Fault::Difference);
+    }
+    let is_derived = |step: &&DerivationStep| matches!(step.reason, Reason::Rule { .. });
+    Ok(Replayed {
+        facts: derivation.steps.len(),
+        derived: derivation.steps.iter().filter(is_derived).count(),
+        matches,
+    })
+}
+
+struct Replayer<'r> {
+    program: &'r Program,
+    same: Symbol,
+    different: Symbol,
+    matcher: Matcher<'r>,
+}
+
+impl Replayer<'_> {
+    fn show(&self, fact: &Fact) -> String {
+        fact.display(self.matcher.symbols).to_string()
+    }
+
+    /// No ill-typed literals, and no literal that is something else.
+    fn consistent(&self, derivation: &Derivation) -> Result<(), Fault> {
+        let symbols = &*self.matcher.symbols;
+        let literal = |symbol: Symbol| symbols.value(symbol).as_literal();
+        let wrong = derivation.steps.iter().map(|step| &step.fact).find(|fact| {
+            let [first, rest @ ..] = fact.arguments.as_slice() else { return false };
+            let clash = self.is_pair(fact)
+                && rest[0] != *first
+                && (literal(*first).is_some() || literal(rest[0]).is_some());
+            clash || fact.arguments.iter().any(|own| literal(*own).is_some_and(crate::Literal::is_ill_typed))
+        });
+        wrong.map_or(Ok(()), |fact| Err(Fault::Inconsistent(self.show(fact))))
+    }
+
+    fn is_pair(&self, fact: &Fact) -> bool {
+        self.program.equality && fact.predicate == self.same && fact.arguments.len() == 2
+    }
+
+    fn founded(&mut self, stated: &[Fact], derivation: &Derivation) -> Result<(), Fault> {
+        let stated: FxHashSet<&Fact> = stated.iter().collect();
+        let mut rules: FxHashMap<&RuleIdentity, Vec<&Rule>> = FxHashMap::default();
+        for rule in &self.program.rules {
+            rules.entry(&rule.identity).or_default().push(rule);
+        }
+        // What is known before a step: the names that are one, and, where that matters, all facts.
+        let mut names = Names::default();
+        let mut known: FxHashSet<Fact> = FxHashSet::default();
+        for (position, step) in derivation.steps.iter().enumerate() {
+            let checked = match &step.reason {
+                Reason::Asserted => {
+                    stated.contains(&step.fact).then_some(()).ok_or("is not stated".to_owned())
+                }
+                Reason::Equality { .. } => {
+                    let is_one = self.is_pair(&step.fact)
+                        && names.find(step.fact.arguments[0]) == names.find(step.fact.arguments[1]);
+                    let follows =
+                        self.program.equality && (is_one || known.contains(&names.normal(&step.fact)));
+                    follows.then_some(()).ok_or("does not follow by equality".to_owned())
+                }
+                Reason::Rule { identity, bindings, supports, .. } => {
+                    let candidates = rules.get(identity).map_or(&[][..], Vec::as_slice);
+                    let mut result = Err(format!("there is no rule {identity}"));
+                    for rule in candidates {
+                        result = self.follows(rule, bindings, supports, (position, derivation), &names);
+                        if result.is_ok() {
+                            break;
+                        }
+                    }
+                    result
+                }
+            };
+            checked.map_err(|reason| Fault::Step { step: position, fact: self.show(&step.fact), reason })?;
+            if self.program.equality {
+                if self.is_pair(&step.fact) && names.join(step.fact.arguments[0], step.fact.arguments[1]) {
+                    known = known.iter().map(|fact| names.normal(fact)).collect();
+                }
+                known.insert(names.normal(&step.fact));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a rule concludes a step from earlier ones.
+    fn follows(
+        &mut self,
+        rule: &Rule,
+        bindings: &[(String, Symbol)],
+        supports: &[usize],
+        (position, derivation): (usize, &Derivation),
+        names: &Names,
+    ) -> Result<(), String> {
+        let mut values: Values = vec![None; rule.variable_count()];
+        for (name, value) in bindings {
+            let mut variables = 0..rule.variable_count() as u16;
+            let number = variables.find(|number| rule.variable_name(Variable(*number)) == *name);
+            let number = number.ok_or_else(|| format!("rule {} has no variable {name}", rule.identity))?;
+            values[usize::from(number)] = Some(*value);
+        }
+        let mut supports = supports.iter();
+        for atom in &rule.body {
+            let holds = if let Atom::Relation { predicate, arguments } = atom {
+                let instance =
+                    instance(*predicate, arguments, &values).ok_or("a variable without a value")?;
+                let support = supports.next().copied().filter(|support| *support < position);
+                let support = support.ok_or("a support that does not come before")?;
+                names.normal(&derivation.steps[support].fact) == names.normal(&instance)
+            } else {
+                self.matcher.holds(atom, rule, &values, names)
+            };
+            if !holds {
+                return Err(format!("rule {} does not apply", rule.identity));
+            }
+        }
+        let fact = names.normal(&derivation.steps[position].fact);
+        let mut heads = rule.head.iter().filter_map(|head| self.concluded(head, &values));
+        if supports.next().is_none() && heads.any(|head| names.normal(&head) == fact) {
+            Ok(())
+        } else {
+            Err(format!("rule {} concludes something else", rule.identity))
+        }
+    }
+
+    fn concluded(&self, head: &Atom, values: &Values) -> Option<Fact> {
+        match head {
+            Atom::Relation { predicate, arguments } => instance(*predicate, arguments, values),
+            Atom::Same(left, right) => instance(self.same, &[*left, *right], values),
+            Atom::Different(left, right) => instance(self.different, &[*left, *right], values),
+            Atom::Not { .. } | Atom::BuiltIn { .. } | Atom::Aggregate { .. } => None,
+        }
+    }
+
+    /// Whatever is stated or concluded is there; returns how many matches were looked at.
+    fn closed(&mut self, stated: &[Fact]) -> Result<usize, Fault> {
+        if let Some(fact) =
+            stated.iter().find(|fact| !self.matcher.facts.contains(&self.matcher.names.normal(fact)))
+        {
+            return Err(Fault::MissingStatement(self.show(fact)));
+        }
+        let mut count = 0;
+        for rule in &self.program.rules {
+            let all = self.matcher.all(rule);
+            count += all.len();
+            for values in all {
+                if rule.head.is_empty() {
+                    return Err(Fault::Inconsistent(rule.identity.to_string()));
+                }
+                for fact in rule.head.iter().filter_map(|head| self.concluded(head, &values)) {
+                    let normal = self.matcher.names.normal(&fact);
+                    // A name is itself without a step that says so.
+                    let is_trivial = self.is_pair(&normal) && normal.arguments[0] == normal.arguments[1];
+                    if !is_trivial && !self.matcher.facts.contains(&normal) {
+                        let fact = self.show(&fact);
+                        return Err(Fault::MissingConclusion { fact, rule: rule.identity.clone() });
+                    }
+                }
+            }
+        }
+        Ok(count)
+    }
+}
+
+/// The program with rules that make two names one wherever their body holds, also where they are one already: a condition that
+/// they differ changes nothing.
+fn without_guards(program: &Program) -> Program {
+    let mut program = program.clone();
+    for rule in program.rules.iter_mut().filter(|_| program.equality) {
+        if let [Atom::Same(left, right)] = rule.head[..] {
+            rule.body.retain(|atom| *atom != Atom::Different(left, right));
+        }
+    }
+    program
+}
+
+/// A relation under values of all its variables.
+fn instance(predicate: Symbol, terms: &[Term], values: &Values) -> Option<Fact> {
+    let arguments: Option<Vec<Symbol>> = terms.iter().map(|term| matches::value(*term, values)).collect();
+    Some(Fact::new(predicate, arguments?))
+}
