@@ -11,6 +11,7 @@ pub mod explain;
 pub mod journal;
 pub mod knowledge;
 pub mod mapek;
+pub mod measure;
 pub mod message;
 pub mod mission;
 pub mod probabilistic;

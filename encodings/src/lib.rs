@@ -38,7 +38,8 @@ mod tests;
 
 pub use alternatives::{Alternatives, Forced, alternatives};
 pub use certificate::{
-    Certificate, Checked, Fault, certify, check as check_certificate, describes, verification_conditions,
+    Certificate, Checked, Fault, Inputs as RefutationInputs, Outputs as RefutationOutputs, StepBound,
+    certify, check as check_certificate, check_refutation, describes, refute, verification_conditions,
 };
 pub use encode::Semantics;
 pub use error::{Error, File, Place};

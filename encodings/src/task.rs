@@ -315,6 +315,12 @@ impl Operator {
 }
 
 impl Task {
+    /// Where the problem has no metric: whether plans are measured by their time, and not by the number of their steps.
+    pub fn is_timed(&self) -> bool {
+        let step = |operator: &Operator| if operator.wait.is_some() { 0 } else { self.objective.scale };
+        self.operators.iter().any(|operator| operator.cost != Quantity::constant(step(operator)))
+    }
+
     /// Whether a state satisfies the goal.
     pub(crate) fn is_goal(&self, state: &State) -> bool {
         self.goal.holds_propositionally(&state.values)

@@ -22,7 +22,7 @@ pub(super) fn find(
 ) -> Result<Option<Alternatives>, Failure> {
     let Some(mut found) = encodings::alternatives(task, solution, most, config) else { return Ok(None) };
     for plan in &found.plans {
-        confirm(mission, problem, plan)?;
+        confirm(mission, problem, task, plan)?;
     }
     found.plans = found.plans.into_iter().map(|plan| mission.written(plan)).collect();
     Ok(Some(found))

@@ -12,6 +12,7 @@ mod objectives;
 mod output;
 mod plan;
 mod plan_json;
+mod plan_text;
 mod reason;
 mod run;
 mod simulate;

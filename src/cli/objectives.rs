@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use encodings::pddl::ast::{Metric, Problem};
-use encodings::{Front, Point, Status};
+use encodings::{Front, Point, Status, Task};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use serde_json::{Value, json};
@@ -51,16 +51,22 @@ impl Objectives {
     }
 
     /// Has the validator execute the plan, and check its value by every objective.
-    pub(super) fn confirm(&self, mission: &Mission, problem: &Problem, point: &Point) -> Result<(), Failure> {
+    pub(super) fn confirm(
+        &self,
+        mission: &Mission,
+        problem: &Problem,
+        task: &Task,
+        point: &Point,
+    ) -> Result<(), Failure> {
         let Some(plan) = &point.solution.plan else { return Ok(()) };
         if self.metrics.is_empty() {
-            return confirm(mission, problem, plan);
+            return confirm(mission, problem, task, plan);
         }
         for (metric, value) in self.metrics.iter().zip(&point.values) {
             let problem = Problem { metric: Some(metric.clone()), ..problem.clone() };
             let mut plan = plan.clone();
             plan.cost = *value;
-            confirm(mission, &problem, &plan)?;
+            confirm(mission, &problem, task, &plan)?;
         }
         Ok(())
     }

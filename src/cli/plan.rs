@@ -14,6 +14,7 @@ use encodings::{
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::certificate;
+use metaplan::measure::measure;
 use metaplan::message::Message;
 use metaplan::mission::{Blocking, Mission};
 use num_rational::BigRational;
@@ -21,6 +22,7 @@ use serde_json::json;
 
 use crate::cli::objectives::Objectives;
 use crate::cli::plan_json::json as plan_json;
+use crate::cli::plan_text::plan_text;
 use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, memory, output};
 
 /// Arguments of `plan`.
@@ -70,7 +72,7 @@ pub struct Arguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum PlanFormat {
+pub(super) enum PlanFormat {
     /// Lines `(action arguments)`, or `start: (action arguments) [duration]`.
     Ipc,
     /// What the POPF plugin of `PlanSys2` parses.
@@ -157,11 +159,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if arguments.pareto.is_some() {
         let front = encodings::pareto(&task, &config, &mut report);
         progress.finish_and_clear();
-        return show_front(front, &mission, &problem, &objectives, &stages, (arguments, common));
+        return show_front(front, (&mission, &problem, &task), &objectives, &stages, (arguments, common));
     }
     let mut point = encodings::lexicographic(&task, &config, &mut report);
     progress.finish_and_clear();
-    objectives.confirm(&mission, &problem, &point)?;
+    objectives.confirm(&mission, &problem, &task, &point)?;
     if let Some(directory) = &arguments.certificate {
         certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
             .unwrap_or_else(|message| output::warnings(common, &[message]));
@@ -257,14 +259,13 @@ fn certify(
 /// Shows a Pareto front whose every plan the validator has executed.
 fn show_front(
     mut front: Front,
-    mission: &Mission,
-    problem: &Problem,
+    (mission, problem, task): (&Mission, &Problem, &Task),
     objectives: &Objectives,
     stages: &Stages,
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
     for point in &mut front.points {
-        objectives.confirm(mission, problem, point)?;
+        objectives.confirm(mission, problem, task, point)?;
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let text = match common.format {
@@ -278,8 +279,8 @@ fn show_front(
     Ok(exit(front.status))
 }
 
-/// Has the independent validator execute the plan; what it refuses is not shown.
-pub(super) fn confirm(mission: &Mission, problem: &Problem, plan: &Plan) -> Result<(), Failure> {
+/// Has the independent validator execute the plan; what it refuses, or measures otherwise, is not shown.
+pub(super) fn confirm(mission: &Mission, problem: &Problem, task: &Task, plan: &Plan) -> Result<(), Failure> {
     let rational = |exact: Exact| BigRational::new(exact.numerator.into(), exact.denominator.into());
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
@@ -290,12 +291,12 @@ pub(super) fn confirm(mission: &Mission, problem: &Problem, plan: &Plan) -> Resu
     });
     let verdict =
         validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &Options::default());
-    let reason = match (&verdict.violation, verdict.metric) {
+    let reason = match (&verdict.violation, measure(problem, &verdict, plan.steps.len(), task.is_timed())) {
         (Some(violation), _) => {
             format!("the validator refuses the plan that was found: {}", violation.message)
         }
-        (None, Some(metric)) if metric != rational(plan.cost) => {
-            format!("the plan that was found costs {metric}, and not {} as claimed", plan.cost)
+        (None, Some(value)) if value != rational(plan.cost) => {
+            format!("the plan that was found costs {value}, and not {} as claimed", plan.cost)
         }
         (None, _) => return Ok(()),
     };
@@ -476,22 +477,4 @@ fn statistics_text(solution: &Solution, stages: &Stages) -> String {
         milliseconds(statistics.encode),
         milliseconds(statistics.solve),
     )
-}
-
-/// The plan in the formats of the planning competitions and of `PlanSys2`.
-fn plan_text(plan: &Plan, format: PlanFormat) -> String {
-    let timed = |step: &Step| step.duration.numerator != 0 || step.start.numerator != 0;
-    let temporal = plan.steps.iter().any(timed) || format == PlanFormat::Plansys2;
-    let mut text = if format == PlanFormat::Plansys2 { "Solution Found\n".to_owned() } else { String::new() };
-    for step in &plan.steps {
-        let call: Vec<&str> =
-            std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
-        if temporal {
-            let (start, duration) = (step.start.to_f64(), step.duration.to_f64());
-            let _ = writeln!(text, "{start:.3}: ({})  [{duration:.3}]", call.join(" "));
-        } else {
-            let _ = writeln!(text, "({})", call.join(" "));
-        }
-    }
-    text
 }

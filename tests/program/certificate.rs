@@ -68,7 +68,8 @@ fn a_verification_has_its_fields() {
     assert_eq!(answer["format"], "metaplan-verification/1");
     assert_eq!(answer["claim"], json!({ "optimal": { "metric": "408" } }));
     let parts: Vec<_> = answer["parts"].as_array().expect("parts").iter().map(|part| &part["part"]).collect();
-    assert_eq!(parts, ["files", "derivations", "knowledge", "plan", "task", "argument"]);
+    let expected = "files derivations knowledge task plan argument formula proof steps";
+    assert_eq!(parts, expected.split(' ').collect::<Vec<_>>());
     assert_eq!(answer["verified"], true);
 }
 
@@ -104,7 +105,7 @@ fn change(certificate: &str, name: &str, edit: &dyn Fn(String) -> String) {
 #[test]
 fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
     type Edit = fn(String) -> String;
-    let cases: [(&str, Edit, &str); 11] = [
+    let cases: [(&str, Edit, &str); 16] = [
         (
             "knowledge.nt",
             |text| text.replace("fd_aruco>", "fd_marker>"),
@@ -146,10 +147,18 @@ fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
         ("argument.json", |text| text.replacen("\"values\":[", "\"values\":[9999,", 1), "argument    failed"),
         ("argument.json", |_| "[".repeat(100_000), "argument    failed"),
         ("domain.pddl", |text| text.replace(":effect", ":efect"), "files       failed"),
+        ("formula.cnf", |text| text.replacen(" 2 ", " -2 ", 1), "formula     failed: line"),
+        ("legend.txt", |text| text.replacen("wp1", "wp2", 1), "formula     failed: line"),
+        ("proof.drat", |_| String::new(), "proof       failed: the proof ends before the empty clause"),
+        ("proof.drat", |_| "2 0\n".to_owned(), "proof       failed: line 1 of the proof does not follow"),
+        ("proof.drat", |_| "a".repeat(10_000_000), "proof       failed: line 1 of the proof is no clause"),
     ];
     for (file, edit, expected) in cases {
         let directory = tempfile::tempdir().expect("a directory");
-        let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
+        // The formula of the mission as it is is refuted by unit propagation alone.
+        let changed = ["plan", "missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"];
+        let arguments = if file == "proof.drat" { &changed[..] } else { &changed[..2] };
+        let target = certificate(directory.path(), arguments);
         change(&target, file, &edit);
         let outcome = verify(&target);
         assert_eq!(outcome.status, 30, "{file}: {outcome:#?}");
@@ -187,6 +196,26 @@ fn certificates_that_are_none_are_rejected() {
         &|directory| std::fs::write(directory.join("task.json"), "").expect("a file"),
         "task.json: has 0 bytes",
     );
+    check(
+        &|directory| std::fs::write(directory.join("proof.drat"), "0\n").expect("a file"),
+        "proof.drat: has 2 bytes",
+    );
+    check(
+        &|directory| std::fs::remove_file(directory.join("legend.txt")).expect("a file"),
+        "legend.txt: cannot be read",
+    );
+    // A file of many gigabytes that takes no room, as an unpacked archive may have it.
+    check(
+        &|directory| {
+            let file = std::fs::File::create(directory.join("proof.drat")).expect("a file");
+            file.set_len(1 << 40).expect("a length");
+        },
+        "proof.drat: has 1099511627776 bytes, more than",
+    );
+    check(
+        &manifest(|text| text.replace("\"formula.cnf\"", "\"/dev/zero\"")),
+        "manifest.json: lists /dev/zero",
+    );
     check(&manifest(|text| text[..text.len() / 2].to_owned()), "manifest.json: EOF");
     check(
         &manifest(|text| text.replace("\"plan.txt\"", "\"../../plan.txt\"")),
@@ -206,6 +235,32 @@ fn certificates_that_are_none_are_rejected() {
         },
         "plan.txt: is no plain file",
     );
+}
+
+/// Needs `rate`, a checker of DRAT proofs by others, named by `METAPLAN_RATE`: `cargo install rate --version 0.3.0 --root rate`,
+/// then `METAPLAN_RATE=rate/bin/rate`.
+#[test]
+#[ignore = "needs a proof checker"]
+fn an_outside_checker_accepts_the_proofs() {
+    let Ok(checker) = std::env::var("METAPLAN_RATE") else { panic!("METAPLAN_RATE names no checker") };
+    let accepts = |certificate: &str| {
+        let files = ["formula.cnf", "proof.drat"].map(|name| format!("{certificate}/{name}"));
+        let output = std::process::Command::new(&checker).args(&files).output().expect("the checker runs");
+        String::from_utf8_lossy(&output.stdout).contains("s VERIFIED")
+    };
+    for mission in MISSIONS {
+        let directory = tempfile::tempdir().expect("a directory");
+        let target = certificate(directory.path(), mission);
+        assert!(accepts(&target), "{mission:?}");
+        // Without the claim, the formula has a model, and the proof is none.
+        let formula = Path::new(&target).join("formula.cnf");
+        let text = std::fs::read_to_string(&formula).expect("a formula");
+        let half: Vec<&str> = text.lines().take(text.lines().count() / 2).collect();
+        let head = half[0].rsplit_once(' ').expect("a header").0;
+        let half = format!("{head} {}\n{}\n", half.len() - 1, half[1..].join("\n"));
+        std::fs::write(&formula, half).expect("a file");
+        assert!(!accepts(&target), "{mission:?}");
+    }
 }
 
 /// Numbers for changes, the same in every run (`SplitMix64`).
@@ -287,11 +342,12 @@ fn withstands(arguments: &[&str], seeds: std::ops::Range<u64>) {
     }
 }
 
-const MISSIONS: [&[&str]; 4] = [
+const MISSIONS: [&[&str]; 5] = [
     &["plan", "missions/ugv.toml"],
     &["plan", "missions/uuv.toml", "--set", "battery=15"],
     &["plan", "missions/ugv_plain.toml", "--fail", "c_kinect"],
     &["plan", "missions/uuv.toml", "--minimize", "total-time"],
+    &["plan", "missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"],
 ];
 
 #[test]

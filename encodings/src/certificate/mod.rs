@@ -7,7 +7,8 @@
 //! successor of a label is covered or cut off again, then no plan of any length is cheaper than the claim: by
 //! induction over its steps. A claim without a cost is that there is no plan.
 //!
-//! `smt` writes the same as verification conditions for an SMT solver.
+//! `clausal` has a second argument for small tasks: a formula, its refutation, and a bound on the number of steps.
+//! `smt` writes the first one as verification conditions for an SMT solver.
 //!
 //! `write` makes the argument from a search that has ended. `check` shares nothing with grounding, bounds and search but the
 //! form in `model`.
@@ -17,6 +18,7 @@
 
 mod argument;
 mod check;
+mod clausal;
 mod model;
 mod semantics;
 mod shape;
@@ -25,5 +27,6 @@ mod table;
 mod write;
 
 pub use check::{Checked, Fault, check};
+pub use clausal::{Inputs, Outputs, StepBound, check_refutation, refute};
 pub use smt::verification_conditions;
 pub use write::{Certificate, certify, describes};

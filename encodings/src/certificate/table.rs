@@ -25,17 +25,35 @@ impl<'t> Table<'t> {
     }
 
     pub(super) fn at(&self, state: &State) -> Option<i128> {
-        let values: Vec<u32> = self.pattern.iter().map(|variable| state.values[*variable as usize]).collect();
-        self.value(&values)
+        self.at_row(self.row_of(state))
     }
 
     fn value(&self, values: &[u32]) -> Option<i128> {
-        let row = self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize);
+        self.at_row(self.row(values))
+    }
+
+    /// The position of a combination of values.
+    pub(super) fn row(&self, values: &[u32]) -> usize {
+        self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize)
+    }
+
+    /// The position of a state's values.
+    pub(super) fn row_of(&self, state: &State) -> usize {
+        let values: Vec<u32> = self.pattern.iter().map(|variable| state.values[*variable as usize]).collect();
+        self.row(&values)
+    }
+
+    /// How many combinations of values there are.
+    pub(super) fn rows(&self) -> usize {
+        self.values.len()
+    }
+
+    pub(super) fn at_row(&self, row: usize) -> Option<i128> {
         self.values[row].map(i128::from)
     }
 
     /// Every combination that agrees with some facts.
-    fn matching(&self, facts: &[Fact]) -> Vec<Vec<u32>> {
+    pub(super) fn matching(&self, facts: &[Fact]) -> Vec<Vec<u32>> {
         let mut all = vec![Vec::new()];
         for (variable, size) in self.pattern.iter().zip(&self.sizes) {
             let fixed = facts.iter().find(|fact| fact.0 == *variable).map(|fact| fact.1);
@@ -53,14 +71,14 @@ impl<'t> Table<'t> {
         self.pattern.iter().zip(values).map(|(variable, value)| effect(*variable).unwrap_or(*value)).collect()
     }
 
-    fn touches(&self, operator: &Operator) -> bool {
+    pub(super) fn touches(&self, operator: &Operator) -> bool {
         let conditional = operator.conditional.iter().flat_map(|conditional| &conditional.effects);
         let mut facts = operator.condition.facts.iter().chain(&operator.effects).chain(conditional);
         facts.any(|fact| self.pattern.contains(&fact.0))
     }
 
     /// Where an operator may lead from some values: what a conditional effect asks for beyond the pattern may hold or not.
-    fn targets(&self, operator: &Operator, values: &[u32]) -> Vec<Vec<u32>> {
+    pub(super) fn targets(&self, operator: &Operator, values: &[u32]) -> Vec<Vec<u32>> {
         let truth = |((variable, value), positive): &Literal| {
             let position = self.pattern.iter().position(|own| own == variable)?;
             Some((values[position] == *value) == *positive)

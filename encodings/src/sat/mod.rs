@@ -14,6 +14,7 @@ use std::str::FromStr;
 
 use crate::limits::Limits;
 use program::Program;
+pub(crate) use varisat::refute_with_proof;
 
 /// A literal: a variable, counted from 0, or its negation.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

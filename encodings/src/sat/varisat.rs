@@ -25,16 +25,42 @@ pub(super) struct Varisat {
 impl Varisat {
     /// A solver that gives up at a limit, or after learning `budget` clauses.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
+        Self::with_proof(limits, budget, Box::new(io::sink()))
+    }
+
+    /// As [`Varisat::new`], with the DRAT proof written somewhere.
+    pub(super) fn with_proof(limits: &Limits, budget: u64, proof: Box<dyn io::Write>) -> Self {
         let conflicts = Rc::new(Cell::new(0));
         let sink = CountingSink {
             limits: limits.clone(),
             budget,
             conflicts: Rc::clone(&conflicts),
             at_line_start: true,
+            proof,
         };
         let mut solver = varisat::Solver::new();
         solver.write_proof(sink, varisat::ProofFormat::Drat);
         Self { solver, conflicts, assignment: Vec::new(), buffer: Vec::new() }
+    }
+}
+
+/// Refutes clauses over variables numbered from 1, or finds that they have a model; the proof is in DRAT.
+pub(crate) fn refute_with_proof<'c>(
+    clauses: impl Iterator<Item = &'c [i32]>,
+    proof: Box<dyn io::Write>,
+    limits: &Limits,
+    budget: u64,
+) -> Answer {
+    let mut solver = Varisat::with_proof(limits, budget, proof);
+    for clause in clauses {
+        let literals: Vec<varisat::Lit> =
+            clause.iter().map(|literal| varisat::Lit::from_dimacs(*literal as isize)).collect();
+        solver.solver.add_clause(&literals);
+    }
+    let answer = solver.solve();
+    match solver.solver.close_proof() {
+        Ok(()) => answer,
+        Err(_) => Answer::Interrupted,
     }
 }
 
@@ -73,12 +99,13 @@ impl Solver for Varisat {
     }
 }
 
-/// Swallows a DRAT proof, counts the clauses that it adds, and fails when a limit or the budget is reached.
+/// Passes a DRAT proof on, counts the clauses that it adds, and fails when a limit or the budget is reached.
 struct CountingSink {
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
     at_line_start: bool,
+    proof: Box<dyn io::Write>,
 }
 
 impl io::Write for CountingSink {
@@ -92,10 +119,11 @@ impl io::Write for CountingSink {
             self.at_line_start = *byte == b'\n';
         }
         self.conflicts.set(self.conflicts.get() + added);
+        self.proof.write_all(bytes)?;
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        Ok(())
+        self.proof.flush()
     }
 }

@@ -1,9 +1,9 @@
 //! Derivations of everything that holds, checked without the engine: by looking at each step by itself, and by plain joins.
 //!
-//! What holds is the perfect model of a stratified program [1]. It is the only set of facts that is *founded* (each fact is
+//! What holds is the perfect model of a stratified program \[1\]. It is the only set of facts that is *founded* (each fact is
 //! stated, or concluded by a rule from facts that come before it, while what the rule negates is not in the set) and
 //! *closed* (it has what is stated, and whatever a rule concludes from it), because stratified programs have no other stable
-//! model [2]. So [`replay`] checks three things: that the rules are stratified, that every step is founded, and that
+//! model \[2\]. So [`replay`] checks three things: that the rules are stratified, that every step is founded, and that
 //! nothing is missing. The last matters as much as the others: a fact that is left out may be what another rule negates.
 //!
 //! With equality, facts are compared by the first name of each class of names that are one. A step may use the
@@ -12,8 +12,8 @@
 //! Nothing of the engine's store, plans, strata or records is used: only rules as data, and the meaning of single built-ins
 //! and aggregates.
 //!
-//! [1] Przymusinski, "On the declarative semantics of deductive databases and logic programs", 1988.
-//! [2] Gelfond, Lifschitz, "The stable model semantics for logic programming", ICLP 1988.
+//! \[1\] Przymusinski, "On the declarative semantics of deductive databases and logic programs", 1988.
+//! \[2\] Gelfond, Lifschitz, "The stable model semantics for logic programming", ICLP 1988.
 
 mod facts;
 mod levels;

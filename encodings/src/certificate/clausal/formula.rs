@@ -1,0 +1,312 @@
+//! A task to the formula "there is a plan of at most T steps that costs less than the claim".
+//!
+//! After each step, every variable has exactly one value; at each step stands exactly one operator, or none for good. An operator
+//! requires its conditions, makes its effects true, and fills its slots with designs that suit; a value that was not there
+//! before was made by an operator. Sums are in [`super::sums`].
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, Write};
+
+use crate::certificate::clausal::sums::Sums;
+use crate::certificate::model::{Argument, Fact, Literal, Model, Operator};
+
+/// A variable of the formula, or its negation.
+pub(super) type Var = i32;
+
+/// Clauses, and what their variables mean.
+pub(super) struct Formula {
+    /// Each ends with 0.
+    literals: Vec<Var>,
+    names: Vec<String>,
+    limit: usize,
+}
+
+impl Formula {
+    /// The formula of a task; an error says what it does not cover.
+    pub(super) fn new(model: &Model, cost: i128, steps: usize, limit: usize) -> Result<Self, String> {
+        if !model.axioms.is_empty() {
+            return Err("derived predicates are not covered".into());
+        }
+        if model.operators.iter().any(|operator| !operator.conditional.is_empty()) {
+            return Err("conditional effects are not covered".into());
+        }
+        if cost < 1 {
+            return Err("no plan costs less than nothing".into());
+        }
+        let mut formula = Self { literals: Vec::new(), names: Vec::new(), limit };
+        let truth = formula.variable(|| "true".to_owned());
+        formula.clause(&[truth]);
+        let mut timeline = Timeline::new(model, &mut formula);
+        let mut sums = Sums::new(model, &mut formula, cost, steps)?;
+        for step in 0..steps {
+            timeline.advance(model, &mut formula, step);
+            sums.advance(model, &mut formula, &timeline, step)?;
+            formula.within_limit()?;
+        }
+        timeline.goal(model, &mut formula);
+        sums.goal(model, &mut formula)?;
+        formula.within_limit()?;
+        Ok(formula)
+    }
+
+    fn within_limit(&self) -> Result<(), String> {
+        if self.literals.len() > self.limit {
+            return Err(format!("the formula has more than {} literals", self.limit));
+        }
+        Ok(())
+    }
+
+    /// A new variable.
+    pub(super) fn variable(&mut self, name: impl FnOnce() -> String) -> Var {
+        self.names.push(name());
+        self.names.len() as Var
+    }
+
+    /// The variable that is true.
+    #[allow(clippy::unused_self, reason = "part of the formula")]
+    pub(super) fn truth(&self) -> Var {
+        1
+    }
+
+    pub(super) fn clause(&mut self, clause: &[Var]) {
+        self.literals.extend(clause);
+        self.literals.push(0);
+    }
+
+    /// At most one of some variables: with "one of the first so many" where there are many.
+    pub(super) fn at_most_one(&mut self, variables: &[Var], name: &str) {
+        if variables.len() <= 5 {
+            for (position, first) in variables.iter().enumerate() {
+                for second in &variables[position + 1..] {
+                    self.clause(&[-first, -second]);
+                }
+            }
+            return;
+        }
+        let mut before: Option<Var> = None;
+        for (position, variable) in variables.iter().enumerate() {
+            let some = self.variable(|| format!("one of the first {} of {name}", position + 1));
+            self.clause(&[-variable, some]);
+            if let Some(before) = before {
+                self.clause(&[-before, some]);
+                self.clause(&[-before, -variable]);
+            }
+            before = Some(some);
+        }
+    }
+
+    pub(super) fn variables(&self) -> usize {
+        self.names.len()
+    }
+
+    pub(super) fn clauses(&self) -> impl Iterator<Item = &[Var]> {
+        let all = self.literals.split(|literal| *literal == 0);
+        // The last clause ends with 0, too.
+        all.take(self.literals.iter().filter(|literal| **literal == 0).count())
+    }
+
+    pub(super) fn write_dimacs(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        for line in self.dimacs() {
+            writeln!(output, "{line}")?;
+        }
+        output.flush()
+    }
+
+    pub(super) fn write_legend(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        for line in self.legend() {
+            writeln!(output, "{line}")?;
+        }
+        output.flush()
+    }
+
+    fn dimacs(&self) -> impl Iterator<Item = String> {
+        let head = format!("p cnf {} {}", self.variables(), self.clauses().count());
+        let line = |clause: &[Var]| {
+            let literals = clause.iter().chain([&0]).map(ToString::to_string);
+            literals.collect::<Vec<_>>().join(" ")
+        };
+        std::iter::once(head).chain(self.clauses().map(line))
+    }
+
+    fn legend(&self) -> impl Iterator<Item = String> {
+        (1..).zip(&self.names).map(|(number, name): (usize, _)| format!("{number} {name}"))
+    }
+
+    /// Whether a written formula and its legend are these: every clause, by the names of its variables.
+    pub(super) fn compare(&self, formula: &mut dyn BufRead, legend: &mut dyn BufRead) -> Result<(), String> {
+        compare("legend", legend, self.legend())?;
+        compare("formula", formula, self.dimacs())
+    }
+}
+
+fn compare(
+    what: &str,
+    written: &mut dyn BufRead,
+    expected: impl Iterator<Item = String>,
+) -> Result<(), String> {
+    let mut line = Vec::new();
+    let unreadable = |error: std::io::Error| format!("the {what} cannot be read: {error}");
+    for (number, expected) in (1..).zip(expected) {
+        line.clear();
+        // A line that is longer than expected is wrong, however long it is.
+        let most = expected.len() as u64 + 1;
+        std::io::Read::take(&mut *written, most).read_until(b'\n', &mut line).map_err(unreadable)?;
+        if line.strip_suffix(b"\n") != Some(expected.as_bytes()) {
+            return Err(format!("line {number} of the {what} is another one, `{expected}` is expected"));
+        }
+    }
+    if written.fill_buf().map_err(unreadable)?.is_empty() {
+        Ok(())
+    } else {
+        Err(format!("the {what} has more lines"))
+    }
+}
+
+/// States and what leads from one to the next.
+pub(super) struct Timeline {
+    /// For each variable and value, after the latest step.
+    values: Vec<Vec<Var>>,
+    /// At the latest step.
+    pub(super) operators: Vec<Var>,
+    pub(super) idle: Var,
+    /// For each slot and design.
+    pub(super) chosen: Vec<Vec<Var>>,
+}
+
+impl Timeline {
+    fn new(model: &Model, formula: &mut Formula) -> Self {
+        let values = Self::state(model, formula, 0);
+        for (variable, value) in model.values.iter().enumerate() {
+            formula.clause(&[values[variable][*value as usize]]);
+        }
+        Self { values, operators: Vec::new(), idle: 0, chosen: Vec::new() }
+    }
+
+    fn state(model: &Model, formula: &mut Formula, time: usize) -> Vec<Vec<Var>> {
+        let all = model.variables.iter().enumerate().map(|(variable, values)| {
+            let name = |value: &String| format!("{value} (variable {variable}) after step {time}");
+            let own: Vec<Var> = values.iter().map(|value| formula.variable(|| name(value))).collect();
+            formula.clause(&own);
+            formula.at_most_one(&own, &format!("the values of variable {variable} after step {time}"));
+            own
+        });
+        all.collect()
+    }
+
+    fn fact(values: &[Vec<Var>], (variable, value): Fact) -> Var {
+        values[variable as usize][value as usize]
+    }
+
+    fn advance(&mut self, model: &Model, formula: &mut Formula, step: usize) {
+        let number = step + 1;
+        let name = |operator: &Operator| format!("{} at step {number}", show(model, operator));
+        let operators: Vec<Var> =
+            model.operators.iter().map(|operator| formula.variable(|| name(operator))).collect();
+        let idle = formula.variable(|| format!("nothing from step {number} on"));
+        if self.idle != 0 {
+            formula.clause(&[-self.idle, idle]);
+        }
+        let one = [&operators[..], &[idle]].concat();
+        formula.clause(&one);
+        formula.at_most_one(&one, &format!("the operators at step {number}"));
+        self.operators = operators;
+        self.idle = idle;
+        self.choose(model, formula, number);
+        let next = Self::state(model, formula, number);
+        let mut makers: BTreeMap<Fact, Vec<Var>> = BTreeMap::new();
+        for (operator, own) in model.operators.iter().zip(&self.operators) {
+            for fact in &operator.condition.facts {
+                formula.clause(&[-own, Self::fact(&self.values, *fact)]);
+            }
+            for clause in &operator.condition.clauses {
+                let literals = clause.iter().map(|literal| Self::literal(&self.values, literal));
+                formula.clause(&std::iter::once(-own).chain(literals).collect::<Vec<_>>());
+            }
+            // Later effects prevail.
+            let last: BTreeMap<u32, u32> = operator.effects.iter().copied().collect();
+            for fact in last {
+                formula.clause(&[-own, Self::fact(&next, fact)]);
+                makers.entry(fact).or_default().push(*own);
+            }
+        }
+        for (variable, values) in (0..).zip(&next) {
+            for (value, after) in (0..).zip(values) {
+                let before = Self::fact(&self.values, (variable, value));
+                let made = makers.get(&(variable, value)).into_iter().flatten().copied();
+                formula.clause(&[-after, before].into_iter().chain(made).collect::<Vec<_>>());
+            }
+        }
+        self.values = next;
+    }
+
+    fn literal(values: &[Vec<Var>], (fact, positive): &Literal) -> Var {
+        let own = Self::fact(values, *fact);
+        if *positive { own } else { -own }
+    }
+
+    /// Every operator fills its slots with designs that suit, and with no combination that is excluded.
+    fn choose(&mut self, model: &Model, formula: &mut Formula, number: usize) {
+        self.chosen = Vec::new();
+        for (slot, designs) in model.slots.iter().enumerate() {
+            let name = |design: &u32| format!("{} in slot {slot} at step {number}", object(model, *design));
+            let own: Vec<Var> = designs.iter().map(|design| formula.variable(|| name(design))).collect();
+            formula.at_most_one(&own, &format!("the designs of slot {slot} at step {number}"));
+            self.chosen.push(own);
+        }
+        let mut kinds: BTreeMap<(u32, u32), Vec<Var>> = BTreeMap::new();
+        for (operator, own) in model.operators.iter().zip(&self.operators) {
+            kinds.entry((operator.uses, operator.exclusions)).or_default().push(*own);
+        }
+        for ((uses, exclusions), operators) in kinds {
+            let kind =
+                formula.variable(|| format!("slots {uses} without {exclusions} are filled at step {number}"));
+            for operator in operators {
+                formula.clause(&[-operator, kind]);
+            }
+            let uses = &model.uses[uses as usize];
+            for (slot, designs) in uses {
+                let suited = designs.iter().map(|design| self.chosen[*slot as usize][*design as usize]);
+                formula.clause(&std::iter::once(-kind).chain(suited).collect::<Vec<_>>());
+            }
+            for exclusion in &model.exclusions[exclusions as usize] {
+                for combination in &exclusion.combinations {
+                    let pairs = exclusion.slots.iter().zip(combination);
+                    let chosen = pairs.map(|(slot, design)| -self.design(uses, *slot, *design));
+                    formula.clause(&std::iter::once(-kind).chain(chosen).collect::<Vec<_>>());
+                }
+            }
+        }
+    }
+
+    /// A design by its position among those that suit a slot of an operator.
+    pub(super) fn design(&self, uses: &[(u32, Vec<u16>)], slot: u16, design: u16) -> Var {
+        let (slot, suited) = &uses[slot as usize];
+        self.chosen[*slot as usize][suited[design as usize] as usize]
+    }
+
+    fn goal(&self, model: &Model, formula: &mut Formula) {
+        for fact in &model.goal.facts {
+            formula.clause(&[Self::fact(&self.values, *fact)]);
+        }
+        for clause in &model.goal.clauses {
+            let literals: Vec<Var> =
+                clause.iter().map(|literal| Self::literal(&self.values, literal)).collect();
+            formula.clause(&literals);
+        }
+    }
+}
+
+/// An operator as it is called in PDDL; slots are `?` and a number.
+fn show(model: &Model, operator: &Operator) -> String {
+    let argument = |argument: &Argument| match argument {
+        Argument::Object(own) => format!(" {}", object(model, *own)),
+        Argument::Slot(slot) => format!(" ?{slot}"),
+    };
+    let arguments: String = operator.arguments.iter().map(argument).collect();
+    let schema = model.schemas.get(operator.schema as usize).map_or("wait", String::as_str);
+    format!("({schema}{arguments})")
+}
+
+fn object(model: &Model, number: u32) -> &str {
+    model.objects.get(number as usize).map_or("?", String::as_str)
+}

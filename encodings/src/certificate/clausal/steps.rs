@@ -1,0 +1,99 @@
+//! A bound on the number of steps of a cheaper plan, by arithmetic on a potential.
+//!
+//! Whatever a plan does, its first T + 1 steps lead to some values of the potential's variables, and cost at least what the
+//! cheapest T + 1 operators cost that lead there; the rest costs at least the potential, or at least nothing. If the sum is never
+//! below the claim, a cheaper plan has at most T steps.
+
+use crate::certificate::argument::Argument;
+use crate::certificate::clausal::StepBound;
+use crate::certificate::model::Model;
+use crate::certificate::table::Table;
+
+/// No formula has more steps.
+const STEP_LIMIT: usize = 64;
+
+/// The least bound that a potential gives.
+pub(super) fn bound(model: &Model, argument: &Argument, cost: i128, by: StepBound) -> Result<usize, String> {
+    let bounds = argument.potentials.iter().filter_map(|potential| {
+        let table = Table::new(model, &potential.pattern, &potential.values);
+        let mut layers = Layers::new(model, &table);
+        (0..=STEP_LIMIT).find(|_| {
+            layers.advance();
+            let least = if by == StepBound::Spent { layers.spent() } else { layers.least() };
+            least.is_none_or(|least| least >= cost)
+        })
+    });
+    bounds.min().ok_or_else(|| format!("a cheaper plan may have more than {STEP_LIMIT} steps"))
+}
+
+/// Whether no plan of more steps is cheaper, by the potential whose position is returned.
+pub(super) fn check(model: &Model, argument: &Argument, cost: i128, steps: usize) -> Result<usize, String> {
+    if steps > STEP_LIMIT {
+        return Err(format!("more than {STEP_LIMIT} steps"));
+    }
+    let serves = |(position, potential): (usize, &crate::certificate::argument::Potential)| {
+        let table = Table::new(model, &potential.pattern, &potential.values);
+        let mut layers = Layers::new(model, &table);
+        (0..=steps).for_each(|_| layers.advance());
+        layers.least().is_none_or(|least| least >= cost).then_some(position)
+    };
+    let found = argument.potentials.iter().enumerate().find_map(serves);
+    found.ok_or_else(|| format!("a cheaper plan may have more than {steps} steps"))
+}
+
+/// What it costs at least to come to each combination of values in a number of steps.
+struct Layers<'l> {
+    table: &'l Table<'l>,
+    /// From, to, least cost.
+    edges: Vec<(usize, usize, i128)>,
+    costs: Vec<Option<i128>>,
+}
+
+impl<'l> Layers<'l> {
+    fn new(model: &Model, table: &'l Table<'l>) -> Self {
+        let mut edges = Vec::new();
+        let mut idle: Option<i128> = None;
+        for operator in &model.operators {
+            let cost = model.least(&operator.cost);
+            if !table.touches(operator) {
+                idle = Some(idle.map_or(cost, |known| known.min(cost)));
+                continue;
+            }
+            for values in table.matching(&operator.condition.facts) {
+                let targets = table.targets(operator, &values);
+                let row = table.row(&values);
+                edges.extend(targets.iter().map(|target| (row, table.row(target), cost)));
+            }
+        }
+        let rows = table.rows();
+        edges.extend((0..rows).filter_map(|row| Some((row, row, idle?))));
+        edges.sort_unstable();
+        // Sorted by cost last: the first of each pair is the cheapest.
+        edges.dedup_by_key(|edge| (edge.0, edge.1));
+        let mut costs = vec![None; rows];
+        costs[table.row_of(&model.initial())] = Some(0);
+        Self { table, edges, costs }
+    }
+
+    fn advance(&mut self) {
+        let mut next: Vec<Option<i128>> = vec![None; self.costs.len()];
+        for (from, to, cost) in &self.edges {
+            if let Some(before) = self.costs[*from] {
+                let after = before + cost;
+                next[*to] = Some(next[*to].map_or(after, |known| known.min(after)));
+            }
+        }
+        self.costs = next;
+    }
+
+    /// The least that was spent.
+    fn spent(&self) -> Option<i128> {
+        self.costs.iter().flatten().min().copied()
+    }
+
+    /// The least that a plan costs that is still under way.
+    fn least(&self) -> Option<i128> {
+        let rows = self.costs.iter().enumerate();
+        rows.filter_map(|(row, cost)| Some((*cost)? + self.table.at_row(row)?)).min()
+    }
+}

@@ -1,0 +1,53 @@
+//! A plan in the formats of other programs.
+
+use std::fmt::Write as _;
+
+use encodings::{Exact, Plan, Step};
+
+use crate::cli::plan::PlanFormat;
+
+/// The plan in the formats of the planning competitions and of `PlanSys2`.
+pub(super) fn plan_text(plan: &Plan, format: PlanFormat) -> String {
+    let timed = |step: &Step| step.duration.numerator != 0 || step.start.numerator != 0;
+    let temporal = plan.steps.iter().any(timed) || format == PlanFormat::Plansys2;
+    let mut text = if format == PlanFormat::Plansys2 { "Solution Found\n".to_owned() } else { String::new() };
+    for step in &plan.steps {
+        let call: Vec<&str> =
+            std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
+        if temporal {
+            let (start, duration) = (decimal(step.start), decimal(step.duration));
+            let _ = writeln!(text, "{start}: ({})  [{duration}]", call.join(" "));
+        } else {
+            let _ = writeln!(text, "({})", call.join(" "));
+        }
+    }
+    text
+}
+
+/// A time with three decimals, or as many more as it has: an action must not start before what it waits for.
+fn decimal(time: Exact) -> String {
+    let text = time.to_string();
+    match text.split_once('.') {
+        _ if text.contains('/') => format!("{:.9}", time.to_f64()),
+        Some((_, decimals)) => text.clone() + &"0".repeat(3_usize.saturating_sub(decimals.len())),
+        None => text + ".000",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_not_rounded() {
+        for (numerator, denominator, expected) in [
+            (5, 1, "5.000"),
+            (5, 2, "2.500"),
+            (1, 8, "0.125"),
+            (100_001, 10_000, "10.0001"),
+            (1, 3, "0.333333333"),
+        ] {
+            assert_eq!(decimal(Exact { numerator, denominator }), expected);
+        }
+    }
+}
