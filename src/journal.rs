@@ -9,13 +9,17 @@
 //! A crash may leave the last line incomplete. It is cut off and reported. A damaged line with sound ones behind it is
 //! no trace of a crash, and the journal is refused.
 //!
+//! One process at a time has the journal: it holds a lock on the file `lock`, which the operating system releases when the
+//! process ends, however it ends.
+//!
 //! - \[1\] C. Mohan et al.: ARIES, a transaction recovery method, ACM TODS 17, 1992.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, Write as _};
+use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use fs4::{FileExt, TryLockError};
 use serde_json::{Value, json};
 
 use crate::mapek::{Answer, Decision, Loop, Observation, Snapshot};
@@ -70,6 +74,8 @@ pub struct Journal {
     policy: Policy,
     segment: u64,
     file: File,
+    /// Locked for as long as it is open.
+    _lock: File,
     /// Observations since the snapshot.
     observations: u64,
 }
@@ -79,10 +85,12 @@ impl Journal {
     /// then as it was when the journal was last written, or has just begun.
     ///
     /// # Errors
-    /// The directory cannot be used, or the journal is damaged or belongs to another mission.
+    /// The directory cannot be used, or another process uses it; or the journal is damaged or belongs to another
+    /// mission.
     pub fn open(directory: &Path, policy: Policy, control: &mut Loop) -> Result<(Self, Recovery), Message> {
         let failed = |error: &io::Error| broken(directory, &error.to_string());
         std::fs::create_dir_all(directory).map_err(|error| failed(&error))?;
+        let lock = lock(directory)?;
         let digest = control.digest();
         let segment = latest_snapshot(directory).map_err(|error| failed(&error))?;
         let mut recovery = Recovery::default();
@@ -101,9 +109,10 @@ impl Journal {
         let file =
             OpenOptions::new().create(true).append(true).open(&name).map_err(|error| failed(&error))?;
         file.set_len(cut.keep).map_err(|error| failed(&error))?;
-        let mut journal = Self { directory: directory.to_owned(), policy, segment, file, observations: 0 };
+        let directory = directory.to_owned();
+        let mut journal = Self { directory, policy, segment, file, _lock: lock, observations: 0 };
         journal.replay(&records, &digest, control, &mut recovery)?;
-        journal.file.sync_data().map_err(|error| failed(&error))?;
+        journal.file.sync_data().map_err(|error| broken(&journal.directory, &error.to_string()))?;
         Ok((journal, recovery))
     }
 
@@ -240,6 +249,47 @@ impl Journal {
             }
         }
         Ok(())
+    }
+}
+
+/// So often a lock is tried again: a process that was killed may not be gone yet.
+const PATIENCE: u32 = 10;
+/// The time from one try to the next.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// Takes the journal for this process, and leaves its number there for the message that others get.
+fn lock(directory: &Path) -> Result<File, Message> {
+    let name = directory.join("lock");
+    let failed = |error: &io::Error| broken(&name, &error.to_string());
+    let mut options = OpenOptions::new();
+    let file = options.create(true).truncate(false).read(true).write(true).open(&name);
+    let mut file = file.map_err(|error| failed(&error))?;
+    let mut answer = FileExt::try_lock(&file);
+    for _ in 0..PATIENCE {
+        if !matches!(answer, Err(TryLockError::WouldBlock)) {
+            break;
+        }
+        std::thread::sleep(PAUSE);
+        answer = FileExt::try_lock(&file);
+    }
+    match answer {
+        Ok(()) => {
+            let note = file.set_len(0).and_then(|()| file.rewind());
+            note.and_then(|()| write!(file, "{}", std::process::id())).map_err(|error| failed(&error))?;
+            Ok(file)
+        }
+        Err(TryLockError::WouldBlock) => {
+            let mut owner = String::new();
+            // Where a locked file cannot be read the message does without.
+            let _ = file.read_to_string(&mut owner);
+            let owner = owner.parse::<u32>().map_or_else(|_| String::new(), |id| format!(" (number {id})"));
+            let text = format!(
+                "another process{owner} uses the journal in {}; end it first, or take another directory",
+                directory.display()
+            );
+            Err(Message::error("M322", text))
+        }
+        Err(TryLockError::Error(error)) => Err(failed(&error)),
     }
 }
 

@@ -3,14 +3,13 @@
 //! The paper plans when the available designs have changed or an objective is in error. Here a plan that is still valid and
 //! that uses none of the lost designs is kept, because it is still the best: of fewer choices none is better. Where a
 //! design of the action under way is lost, that action and the rest of the plan are configured anew together, see
-//! [`super::resume`]; if that is impossible, the action is cancelled first.
+//! [`super::resume`]; if that is impossible or bad, the action is suspended or cancelled, see [`super::interrupt`].
 
 use encodings::validate::{Options, Verdict, Violation, advance, validate};
-use num_rational::BigRational;
 
 use super::Loop;
 use super::analyze::Findings;
-use super::answer::{Answer, Command};
+use super::answer::Answer;
 use super::knowledge::Running;
 use super::monitor::Changes;
 use super::number;
@@ -36,7 +35,9 @@ impl Loop {
             if running.cancelling {
                 return;
             }
-            if let Some(reason) = self.trouble(&running, &changes) {
+            // A suspended action is in trouble as long as nothing changes for the better.
+            let is_news = is_change || !running.suspended;
+            if let Some(reason) = self.trouble(&running, &changes).filter(|_| is_news) {
                 self.replan(vec![reason], true, answers);
                 return;
             }
@@ -91,7 +92,7 @@ impl Loop {
         }
     }
 
-    fn is_available(&self, design: &str) -> bool {
+    pub(super) fn is_available(&self, design: &str) -> bool {
         self.knowledge.mission.knowledge().is_none() || self.knowledge.available.contains(design)
     }
 
@@ -125,7 +126,7 @@ impl Loop {
     }
 
     /// Why what is left of the action under way cannot be done.
-    fn obstacle(&self, running: &Running) -> Option<String> {
+    pub(super) fn obstacle(&self, running: &Running) -> Option<String> {
         let (domain, problem) = self.left();
         let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;
         Some(violation.message.clone())
@@ -156,8 +157,11 @@ impl Loop {
         let (domain, problem) = self.left();
         let domain = domain.into_owned();
         let outcome = self.planner.plan(&self.knowledge.mission, &domain, &problem);
+        if must && self.interrupt(&reason, &outcome, answers) {
+            return;
+        }
         let Some(steps) = &outcome.steps else {
-            self.without_plan(&reason, must, outcome, answers);
+            self.without_plan(must, outcome, answers);
             return;
         };
         self.knowledge.stuck = false;
@@ -180,23 +184,13 @@ impl Loop {
 
     /// Why a plan that need not be adopted is not.
     fn not_worth_it(&self, outcome: &Outcome) -> Option<String> {
-        let mission = &self.knowledge.mission;
-        let maximize = mission
-            .problem()
-            .metric
-            .as_ref()
-            .is_some_and(|metric| metric.direction == encodings::pddl::ast::Direction::Maximize);
         let kept = self.verdict().metric?;
-        let benefit = if maximize { &outcome.cost - &kept } else { &kept - &outcome.cost };
-        let zero = BigRational::from_integer(0.into());
-        let enough = benefit > zero && benefit >= self.settings.minimum_benefit;
-        (!enough).then(|| {
-            format!(
-                "the benefit of another plan is {}, the minimum is {}",
-                number::decimal(&benefit),
-                number::decimal(&self.settings.minimum_benefit)
-            )
-        })
+        if self.benefit(&kept, &outcome.cost).is_some() {
+            return None;
+        }
+        let benefit = self.gain(&kept, &outcome.cost);
+        let (benefit, minimum) = (number::decimal(&benefit), number::decimal(&self.settings.minimum_benefit));
+        Some(format!("the benefit of another plan is {benefit}, the minimum is {minimum}"))
     }
 
     /// Takes a plan over; the action under way gets its designs.
@@ -211,24 +205,14 @@ impl Loop {
                 running.step = first;
             }
             self.reconfigure(running.action, &running.step.clone(), answers);
+            self.resume_suspended(&mut running, answers);
             self.knowledge.running = Some(running);
         }
         self.knowledge.plan = Some(steps);
     }
 
-    /// There is no plan that goes on with the action under way, or none at all.
-    fn without_plan(&mut self, reason: &str, must: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
-        let impossible = self.knowledge.running.clone().filter(|running| {
-            let lost = running.step.configuration.iter().any(|(_, design)| !self.is_available(design));
-            lost || self.obstacle(running).is_some()
-        });
-        if let Some(running) = impossible {
-            self.knowledge.plan = None;
-            let because = format!("{reason}; no other design serves");
-            self.effect(running.action, Command::Cancel { because }, answers);
-            self.knowledge.running = Some(Running { cancelling: true, ..running });
-            return;
-        }
+    /// There is no plan, and the action under way goes on.
+    fn without_plan(&mut self, must: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because });
         if must {

@@ -98,6 +98,7 @@ pub struct Effect {
 
 /// What the managed system is to do.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Command {
     /// A function gets another design.
     Reconfigure {
@@ -118,6 +119,21 @@ pub enum Command {
         /// Why, in a sentence.
         because: String,
     },
+    /// An action stands still and keeps what it has done.
+    Suspend {
+        /// Why, in a sentence.
+        because: String,
+    },
+    /// A suspended action goes on.
+    Resume,
+}
+
+impl Command {
+    /// Whether it says if an action goes on. A report of that action may have been on its way before the command, so that
+    /// it does not show that the command has arrived.
+    pub(super) fn is_about_going_on(&self) -> bool {
+        matches!(self, Self::Cancel { .. } | Self::Suspend { .. } | Self::Resume)
+    }
 }
 
 impl Answer {
@@ -183,6 +199,8 @@ impl Effect {
                 object
             }
             Command::Cancel { because } => json!({ "answer": "cancel_action", "because": because }),
+            Command::Suspend { because } => json!({ "answer": "suspend_action", "because": because }),
+            Command::Resume => json!({ "answer": "resume_action" }),
         };
         object["action"] = json!(self.action);
         object["effect"] = json!(self.number);

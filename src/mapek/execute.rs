@@ -54,7 +54,8 @@ impl Loop {
         self.reconfigure(action, &step, answers);
         self.effect(action, Command::Request { step: step.clone() }, answers);
         let progress = num_rational::BigRational::from_integer(0.into());
-        self.knowledge.running = Some(Running { action, step, progress, cancelling: false });
+        self.knowledge.running =
+            Some(Running { action, step, progress, cancelling: false, suspended: false });
     }
 
     /// Gives functions the designs of a step, and the knowledge base its objectives.

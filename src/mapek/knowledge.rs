@@ -64,6 +64,8 @@ pub(super) struct Running {
     pub(super) progress: BigRational,
     /// Whether it was asked to end.
     pub(super) cancelling: bool,
+    /// Whether it was asked to stand still.
+    pub(super) suspended: bool,
 }
 
 impl Knowledge {
@@ -113,6 +115,11 @@ impl Knowledge {
     /// Whether the action that is under way was asked to end.
     pub fn cancelling(&self) -> bool {
         self.running.as_ref().is_some_and(|running| running.cancelling)
+    }
+
+    /// Whether the action that is under way was asked to stand still.
+    pub fn suspended(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| running.suspended)
     }
 
     /// What is still to be requested, if there is a plan.

@@ -19,6 +19,7 @@ mod answer;
 mod drive;
 mod event;
 mod execute;
+mod interrupt;
 mod knowledge;
 mod monitor;
 pub(crate) mod number;

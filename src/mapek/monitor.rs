@@ -118,7 +118,9 @@ impl Loop {
         let Some(running) = running else {
             return Err(Fault::new("M305", format!("no action {action} is under way")));
         };
-        self.knowledge.outstanding.retain(|_, effect| effect.action > action || is_cancel(effect));
+        self.knowledge
+            .outstanding
+            .retain(|_, effect| effect.action > action || effect.command.is_about_going_on());
         Ok(running)
     }
 
@@ -142,8 +144,9 @@ impl Loop {
             self.knowledge.mission.set_init(init);
         }
         self.knowledge.failures = None;
-        if running.cancelling {
-            changes.must.push(format!("action {action} was to be cancelled, but has succeeded"));
+        if running.cancelling || running.suspended {
+            let what = if running.cancelling { "cancelled" } else { "suspended" };
+            changes.must.push(format!("action {action} was to be {what}, but has succeeded"));
         }
         Ok(())
     }
@@ -235,10 +238,6 @@ pub(crate) fn value_of(problem: &Problem, name: &str) -> Option<BigRational> {
         InitialElement::Value(atom, value, _) if is_named(atom, &words) => Some(value.clone()),
         _ => None,
     })
-}
-
-fn is_cancel(effect: &super::answer::Effect) -> bool {
-    matches!(effect.command, super::answer::Command::Cancel { .. })
 }
 
 fn is_named(atom: &encodings::pddl::ast::Atom, words: &[&str]) -> bool {

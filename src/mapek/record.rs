@@ -65,7 +65,8 @@ impl Loop {
                 running.action,
                 running.step.to_record(),
                 running.progress.to_string(),
-                running.cancelling
+                running.cancelling,
+                running.suspended
             ])
         });
         Snapshot(json!({
@@ -178,6 +179,7 @@ fn running_from_record(record: &Value) -> Option<Running> {
         step: PlannedStep::from_record(record.get(1)?)?,
         progress: record.get(2)?.as_str()?.parse().ok()?,
         cancelling: record.get(3)?.as_bool()?,
+        suspended: record.get(4)?.as_bool()?,
     })
 }
 
@@ -186,6 +188,8 @@ fn effect_to_record(effect: &Effect) -> Value {
         Command::Reconfigure { function, from, to } => json!(["reconfigure", function, from, to]),
         Command::Request { step } => json!(["request", step.to_record()]),
         Command::Cancel { because } => json!(["cancel", because]),
+        Command::Suspend { because } => json!(["suspend", because]),
+        Command::Resume => json!(["resume"]),
     };
     json!([effect.number, effect.action, command])
 }
@@ -201,6 +205,8 @@ fn effect_from_record(record: &Value) -> Option<Effect> {
         },
         "request" => Command::Request { step: PlannedStep::from_record(command.get(1)?)? },
         "cancel" => Command::Cancel { because: text(command.get(1)?)? },
+        "suspend" => Command::Suspend { because: text(command.get(1)?)? },
+        "resume" => Command::Resume,
         _ => return None,
     };
     let (number, action) = (record.get(0)?.as_u64()?, record.get(1)?.as_u64()?);

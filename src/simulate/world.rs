@@ -27,6 +27,8 @@ struct Job {
     progress: f64,
     /// How long it has stood still.
     waited: f64,
+    /// Whether it was asked to.
+    suspended: bool,
 }
 
 /// A failure or recovery that is to come.
@@ -123,8 +125,8 @@ impl World {
     pub fn obey(&mut self, effect: &Effect) -> Vec<Event> {
         match &effect.command {
             Command::Request { step } => {
-                self.job =
-                    Some(Job { action: effect.action, step: step.clone(), progress: 0.0, waited: 0.0 });
+                let (action, step) = (effect.action, step.clone());
+                self.job = Some(Job { action, step, progress: 0.0, waited: 0.0, suspended: false });
                 vec![Event::Started { action: effect.action }]
             }
             Command::Reconfigure { function, to, .. } => {
@@ -137,6 +139,12 @@ impl World {
                 Some(_) => vec![Event::Cancelled { action: effect.action }],
                 None => Vec::new(),
             },
+            Command::Suspend { .. } | Command::Resume => {
+                if let Some(job) = self.job.as_mut().filter(|job| job.action == effect.action) {
+                    job.suspended = effect.command != Command::Resume;
+                }
+                vec![Event::Acknowledged { effect: effect.number }]
+            }
         }
     }
 
@@ -147,6 +155,9 @@ impl World {
 
     /// How long what is left of an action takes, if it can go on.
     fn left(&self, job: &Job) -> Option<f64> {
+        if job.suspended {
+            return None;
+        }
         let domain = crate::mapek::resume(self.truth.domain(), &job.step, &exact(job.progress));
         let advance = advance(&domain, &self.filled(), &job.step.to_plan_step(), false).ok()?;
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))

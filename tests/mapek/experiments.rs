@@ -28,6 +28,9 @@ fn words(answer: &Answer) -> Option<String> {
             }
             Command::Request { step } => format!("request {}: {}", effect.action, step.summary()),
             Command::Cancel { .. } => format!("cancel {}", effect.action),
+            Command::Suspend { .. } => format!("suspend {}", effect.action),
+            Command::Resume => format!("resume {}", effect.action),
+            other => panic!("unexpected: {other:?}"),
         },
         Answer::GoalReached => "goal".to_owned(),
         Answer::Error { code, .. } => format!("error {code}"),
@@ -323,4 +326,87 @@ fn the_goal_changes_and_actions_fail() {
     );
     let answers = feed(&mut ugv, r#"{"event":"fact_changed","name":"robot_at","value":"wp5"}"#);
     assert!(answers.iter().any(|answer| answer.effect().is_some()), "{answers:?}");
+}
+
+#[test]
+fn an_action_is_suspended_where_nothing_else_can_be_done() {
+    let mut uuv = control("uuv");
+    uuv.start();
+    let thruster = |number: u32, status: &str| {
+        format!(r#"{{"event":"component_status","component":"c_thruster_{number}","status":"{status}"}}"#)
+    };
+    let stands = "-fd_speed_high, -fd_speed_low, -fd_speed_medium, o_f_maintain_motion [IN_ERROR_COMPONENT]";
+    check(
+        &mut uuv,
+        &[
+            (r#"{"event":"action_progress","action":1,"fraction":0.75}"#, &[]),
+            // No speed is left: to cancel the search would lose three quarters of it, and gain nothing.
+            (&thruster(1, "FALSE"), &[stands, "suspend 1", "no plan: unsolvable"]),
+            (r#"{"event":"tick"}"#, &[]),
+            (r#"{"event":"component_status","component":"c_sonar","status":"OK"}"#, &[]),
+            (&thruster(3, "FALSE"), &[]),
+            (r#"{"event":"fact_changed","name":"battery","value":90}"#, &["no plan: unsolvable"]),
+            // Low speed is back, and serves.
+            (
+                &thruster(1, "RECOVERED"),
+                &[
+                    "+fd_speed_low",
+                    "plan 38: search_pipeline pl1 (f_generate_search_path = fd_search_high, f_maintain_motion = fd_speed_low); \
+                     follow_pipeline pl1 (f_follow_pipeline = fd_follow, f_maintain_motion = fd_speed_low)",
+                    "reconfigure f_maintain_motion: fd_speed_high to fd_speed_low",
+                    "o_f_maintain_motion []",
+                    "resume 1",
+                ],
+            ),
+            (
+                r#"{"event":"action_succeeded","action":1}"#,
+                &[
+                    "reconfigure f_follow_pipeline: none to fd_follow",
+                    "request 2: follow_pipeline pl1 (f_follow_pipeline = fd_follow, f_maintain_motion = fd_speed_low)",
+                ],
+            ),
+            // A robot that cannot suspend says that the action has ended.
+            (
+                &thruster(1, "FALSE"),
+                &[
+                    "-fd_speed_low, o_f_maintain_motion [IN_ERROR_COMPONENT]",
+                    "suspend 2",
+                    "no plan: unsolvable",
+                ],
+            ),
+            (r#"{"event":"action_cancelled","action":2}"#, &["no plan: unsolvable"]),
+        ],
+    );
+}
+
+#[test]
+fn an_action_is_cancelled_where_another_way_is_better_than_another_design() {
+    let mut ugv = ugv_at_wp2();
+    for line in [KINECT_FAILS, r#"{"event":"action_cancelled","action":2}"#] {
+        feed(&mut ugv, line);
+    }
+    check(
+        &mut ugv,
+        &[
+            // The robot is on its way to wp3, which turns out to be long, when the Kinect is back and the lidar fails.
+            (r#"{"event":"fact_changed","name":"travel_time wp2 wp3","value":30}"#, &[]),
+            (
+                r#"{"status":[{"message":"Component status","values":[{"key":"c_lidar","value":"FALSE"},{"key":"c_kinect","value":"RECOVERED"}]}]}"#,
+                &[
+                    "+fd_amcl_kinect, -fd_amcl_lidar, +fd_mrpt_kinect, -fd_mrpt_lidar, o_f_localization [IN_ERROR_COMPONENT]",
+                    "cancel 3",
+                ],
+            ),
+            (
+                r#"{"event":"action_cancelled","action":3}"#,
+                &[
+                    "plan 306: move_with_obstacles wp2 wp5 (f_localization = fd_amcl_kinect); move wp5 wp8 (f_localization = \
+                     fd_amcl_kinect); move wp8 wp9 (f_localization = fd_amcl_kinect)",
+                    "reconfigure f_localization: fd_amcl_lidar to fd_amcl_kinect",
+                    "o_f_localization []",
+                    "request 4: move_with_obstacles wp2 wp5 (f_localization = fd_amcl_kinect)",
+                ],
+            ),
+        ],
+    );
 }

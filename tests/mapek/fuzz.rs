@@ -67,6 +67,8 @@ const INVALID: [&str; 14] = [
 pub struct Fuzz {
     pub world: &'static World,
     pub random: fastrand::Rng,
+    /// After so many events the knowledge is compared with knowledge from scratch.
+    pub compare_every: usize,
     /// A loop to which nothing has happened.
     pristine: Loop,
 }
@@ -77,7 +79,8 @@ fn pick<'a, T>(random: &mut fastrand::Rng, all: &'a [T]) -> &'a T {
 
 impl Fuzz {
     pub fn new(world: &'static World, seed: u64) -> Self {
-        Self { world, random: fastrand::Rng::with_seed(seed), pristine: control(world.mission) }
+        let random = fastrand::Rng::with_seed(seed);
+        Self { world, random, compare_every: 10, pristine: control(world.mission) }
     }
 
     /// A loop that has begun.
@@ -150,7 +153,7 @@ pub fn step(control: &mut Loop, fuzz: &mut Fuzz, number: usize) -> Vec<Answer> {
         assert_eq!(without_counters(control), before, "{}", context());
     }
     invariants(control, &context);
-    if number.is_multiple_of(50) {
+    if number.is_multiple_of(fuzz.compare_every) {
         incremental_is_from_scratch(control, &context);
     }
     if number.is_multiple_of(200) {
@@ -179,6 +182,7 @@ fn invariants(control: &Loop, context: &dyn Fn() -> String) {
     assert!(known.outstanding().count() < 32, "{}", context());
     let cancelling = known.cancelling();
     let Some(plan) = known.plan() else { return };
+    assert!(!known.suspended(), "a plan beside a suspended action: {}", context());
     assert!(!cancelling, "a plan beside an action to be cancelled: {}", context());
     let running = known.running().map(|(_, step)| step);
     let steps: Vec<&PlannedStep> = running.into_iter().chain(plan).collect();

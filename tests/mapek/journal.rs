@@ -37,6 +37,40 @@ pub fn script() -> Vec<String> {
         r#""event":"action_cancelled","action":5"#,
         r#""event":"action_succeeded","action":6"#,
     ];
+    numbered(&events)
+}
+
+/// What a robot reports in the UUV mission whose thrusters fail, so that its action is suspended, and whose battery drops.
+pub fn uuv_script() -> Vec<String> {
+    let events = [
+        r#""event":"action_started","action":1"#,
+        r#""event":"action_progress","action":1,"fraction":0.25"#,
+        r#""event":"measured","attribute":"water_visibility","value":2.5"#,
+        r#""event":"acknowledged","effect":4"#,
+        r#""event":"component_status","component":"c_thruster_1","status":"FALSE""#,
+        r#""event":"acknowledged","effect":5"#,
+        r#""event":"tick""#,
+        r#""event":"component_status","component":"c_thruster_3","status":"ERROR""#,
+        r#""event":"component_status","component":"c_thruster_1","status":"RECOVERED""#,
+        r#""event":"acknowledged","effect":7"#,
+        r#""event":"action_progress","action":1,"fraction":0.5"#,
+        r#""event":"fact_changed","name":"battery","value":9"#,
+        r#""event":"fact_changed","name":"battery","value":30"#,
+        r#""event":"component_status","component":"c_thruster_3","status":"OK""#,
+        r#""event":"action_cancelled","action":1"#,
+        r#""event":"action_started","action":2"#,
+        r#""event":"action_succeeded","action":2"#,
+        r#""event":"action_succeeded","action":3"#,
+        r#""event":"nonsense""#,
+        r#""event":"action_failed","action":4,"reason":"lost""#,
+        r#""event":"action_succeeded","action":5"#,
+        r#""event":"action_succeeded","action":6"#,
+    ];
+    numbered(&events)
+}
+
+/// Lines with numbers and times.
+fn numbered(events: &[&str]) -> Vec<String> {
     let line =
         |(index, event): (usize, &&str)| format!(r#"{{{event},"seq":{},"time":{}.25}}"#, index + 1, index);
     events.iter().enumerate().map(line).collect()

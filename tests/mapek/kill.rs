@@ -1,4 +1,4 @@
-//! The program killed again and again: what it does in the end is what it does undisturbed.
+//! The program killed again and again: what it does and knows in the end is what it does and knows undisturbed.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -7,9 +7,25 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
+use metaplan::journal::Journal;
 use serde_json::Value;
 
-use crate::journal::script;
+use crate::common::control;
+use crate::journal::{POLICY, script, uuv_script};
+
+/// A mission, and what its robot reports.
+struct Story {
+    mission: &'static str,
+    script: Vec<String>,
+}
+
+impl Story {
+    /// What a robot has acknowledged that has sent so many lines.
+    fn acknowledged(&self, sent: usize) -> Vec<u64> {
+        let effect = |line: &String| serde_json::from_str::<Value>(line).ok()?.get("effect")?.as_u64();
+        self.script[..sent].iter().filter_map(effect).collect()
+    }
+}
 
 /// A running program, and what it writes.
 struct Program {
@@ -19,9 +35,10 @@ struct Program {
 }
 
 impl Program {
-    fn start(journal: &Path) -> Self {
+    fn start(mission: &str, journal: &Path) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
-            .args(["run", "missions/ugv.toml", "--snapshot-every", "7", "--fsync", "never", "--journal"])
+            .args(["run", &format!("missions/{mission}.toml"), "--snapshot-every", "7", "--fsync", "never"])
+            .arg("--journal")
             .arg(journal)
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .stdin(Stdio::piped())
@@ -45,11 +62,15 @@ impl Program {
     }
 }
 
-/// What has left the program.
-#[derive(Debug, Default)]
+/// What has left the program, and what it knew at the end.
+#[derive(Debug, Default, PartialEq)]
 struct Robot {
     effects: BTreeMap<u64, Value>,
+    /// The numbers of effects as they came for the first time.
+    order: Vec<u64>,
+    /// The numbers of effects that were acknowledged, in this order.
     acknowledged: Vec<u64>,
+    state: Value,
 }
 
 impl Robot {
@@ -59,37 +80,65 @@ impl Robot {
         object.remove("line");
         let repeated = object.remove("repeated").is_some();
         assert!(!self.acknowledged.contains(&number), "effect {number} was acknowledged: {line}");
-        let before = self.effects.insert(number, line.clone());
-        assert!(before.is_none() || repeated, "effect {number} comes twice without a word");
-        assert!(before.is_none_or(|before| before == line), "effect {number} has changed");
+        match self.effects.insert(number, line.clone()) {
+            Some(before) => {
+                assert!(repeated, "effect {number} comes twice without a word");
+                assert_eq!(before, line, "effect {number} has changed");
+            }
+            None => self.order.push(number),
+        }
+    }
+
+    /// Talks to the program until it ends; then what it knew is read from its journal.
+    fn finish(&mut self, mut program: Program, story: &Story, journal: &Path) {
+        self.talk(&mut program, story, usize::MAX);
+        drop(program.stdin);
+        assert!(program.child.wait().expect("it ends").success());
+        for line in program.lines {
+            self.take(line);
+        }
+        let mut control = control(story.mission);
+        let (_, recovery) = Journal::open(journal, POLICY, &mut control).expect("the journal opens");
+        assert_eq!(recovery.cut, 0);
+        self.state = control.snapshot().0;
+    }
+
+    /// Sends the lines that were not handled, waiting for each but the last of `patience` to be handled.
+    fn talk(&mut self, program: &mut Program, story: &Story, patience: usize) {
+        let ready = program.lines.recv().expect("a first line");
+        assert_eq!(ready["answer"], "ready", "{ready}");
+        let known = ready["seq"].as_u64().unwrap_or(0) as usize;
+        self.acknowledged = story.acknowledged(known);
+        for (index, line) in story.script.iter().enumerate().skip(known).take(patience.saturating_add(1)) {
+            if writeln!(program.stdin, "{line}").is_err() || index - known == patience {
+                return;
+            }
+            for answer in &program.lines {
+                let is_last = answer["answer"] == "handled";
+                self.take(answer);
+                if is_last {
+                    break;
+                }
+            }
+            self.acknowledged = story.acknowledged(index + 1);
+        }
     }
 }
 
-/// Runs the script, killing the program `kills` times at most.
-fn run(random: &mut fastrand::Rng, kills: &mut usize) -> Robot {
+/// Runs a story to its end, killing the program `kills` times at most; returns how often it was killed.
+fn run(story: &Story, random: &mut fastrand::Rng, kills: usize) -> (Robot, usize) {
     let directory = tempfile::tempdir().expect("a directory");
-    let script = script();
     let mut robot = Robot::default();
-    loop {
-        let mut program = Program::start(directory.path());
-        let victim = *kills > 0;
-        let patience = if victim { random.usize(0..6) } else { usize::MAX };
+    let mut killed = 0;
+    // Now and then few deaths are enough for one run.
+    while killed < kills && (killed == 0 || random.u32(..10) > 0) {
+        let mut program = Program::start(story.mission, directory.path());
         // Sometimes it dies before it has said a word.
-        if victim && random.u32(..8) == 0 {
+        if random.u32(..8) == 0 {
             std::thread::sleep(Duration::from_micros(random.u64(..20_000)));
         } else {
-            talk(&mut program, &script, patience, &mut robot);
-            if victim {
-                std::thread::sleep(Duration::from_micros(random.u64(..8_000)));
-            }
-        }
-        if !victim {
-            drop(program.stdin);
-            assert!(program.child.wait().expect("it ends").success());
-            for line in program.lines {
-                robot.take(line);
-            }
-            return robot;
+            robot.talk(&mut program, story, random.usize(0..6));
+            std::thread::sleep(Duration::from_micros(random.u64(..8_000)));
         }
         // SIGKILL; what was written before is still read.
         program.child.kill().expect("it is killed");
@@ -97,62 +146,29 @@ fn run(random: &mut fastrand::Rng, kills: &mut usize) -> Robot {
         for line in program.lines {
             robot.take(line);
         }
-        *kills -= 1;
-        if random.u32(..10) == 0 {
-            // Now and then one run is enough.
-            let mut none = 0;
-            std::mem::swap(kills, &mut none);
-            let last = finish(directory.path(), &script, robot);
-            std::mem::swap(kills, &mut none);
-            return last;
-        }
+        killed += 1;
     }
-}
-
-fn finish(directory: &Path, script: &[String], mut robot: Robot) -> Robot {
-    let mut program = Program::start(directory);
-    talk(&mut program, script, usize::MAX, &mut robot);
-    drop(program.stdin);
-    assert!(program.child.wait().expect("it ends").success());
-    for line in program.lines {
-        robot.take(line);
-    }
-    robot
-}
-
-/// Sends the lines that were not handled, waiting for each but the last of `patience` to be handled.
-fn talk(program: &mut Program, script: &[String], patience: usize, robot: &mut Robot) {
-    let ready = program.lines.recv().expect("a first line");
-    assert_eq!(ready["answer"], "ready", "{ready}");
-    let known = ready["seq"].as_u64().unwrap_or(0) as usize;
-    for (index, line) in script.iter().enumerate().skip(known).take(patience.saturating_add(1)) {
-        if writeln!(program.stdin, "{line}").is_err() {
-            return;
-        }
-        if index - known == patience {
-            return;
-        }
-        for answer in &program.lines {
-            let is_last = answer["answer"] == "handled";
-            robot.take(answer);
-            if is_last {
-                break;
-            }
-        }
-        let event: Value = serde_json::from_str(line).expect("an event");
-        robot.acknowledged.extend(event["effect"].as_u64());
-    }
+    let program = Program::start(story.mission, directory.path());
+    robot.finish(program, story, directory.path());
+    (robot, killed)
 }
 
 fn check(seed: u64, count: usize) {
-    let mut none = 0;
+    let ugv = Story { mission: "ugv", script: script() };
+    let uuv = Story { mission: "uuv", script: uuv_script() };
     let mut random = fastrand::Rng::with_seed(seed);
-    let undisturbed = run(&mut random, &mut none);
-    assert!(undisturbed.effects.len() > 10, "{undisturbed:#?}");
-    let mut kills = count;
-    while kills > 0 {
-        let robot = run(&mut random, &mut kills);
-        assert_eq!(robot.effects, undisturbed.effects);
+    let undisturbed = [&ugv, &uuv].map(|story| (story, run(story, &mut random, 0).0));
+    for (_, robot) in &undisturbed {
+        assert!(robot.effects.len() > 10 && robot.order.is_sorted(), "{robot:#?}");
+        assert_eq!(robot.state["reached"], true);
+    }
+    let (mut killed, mut runs) = (0, 0);
+    while killed < count {
+        let (story, expected) = &undisturbed[runs % 2];
+        let (robot, kills) = run(story, &mut random, count - killed);
+        assert_eq!(robot, *expected);
+        killed += kills;
+        runs += 1;
     }
 }
 
@@ -165,4 +181,32 @@ fn killed_at_random_points() {
 #[ignore = "takes a minute or two"]
 fn killed_at_five_hundred_random_points() {
     check(12, 500);
+}
+
+#[test]
+fn a_journal_has_one_process_at_a_time() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut first = Program::start("ugv", directory.path());
+    assert_eq!(first.lines.recv().expect("a line")["answer"], "ready");
+    let second = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_metaplan"));
+        command.args(["run", "missions/ugv.toml", "--journal"]).arg(directory.path());
+        let outcome = command.current_dir(env!("CARGO_MANIFEST_DIR")).stdin(Stdio::null()).output();
+        let outcome = outcome.expect("the program starts");
+        (outcome.status.code(), String::from_utf8_lossy(&outcome.stderr).into_owned())
+    };
+    let before = std::fs::read(directory.path().join("journal-000000")).expect("a journal");
+    let (status, message) = second();
+    assert_eq!(status, Some(3), "{message}");
+    let owner = format!("another process (number {}) uses the journal", first.child.id());
+    assert!(message.contains("M322") && message.contains(&owner), "{message}");
+    assert_eq!(std::fs::read(directory.path().join("journal-000000")).expect("a journal"), before);
+    // The refused process has not disturbed the first.
+    writeln!(first.stdin, r#"{{"event":"tick"}}"#).expect("it listens");
+    assert!(first.lines.iter().take(6).any(|answer| answer["answer"] == "handled"));
+    // A process that was killed has nothing any more.
+    first.child.kill().expect("it is killed");
+    first.child.wait().expect("it ends");
+    let (status, message) = second();
+    assert_eq!(status, Some(0), "{message}");
 }

@@ -2,6 +2,7 @@
 
 mod common;
 mod experiments;
+mod failures;
 mod fleet;
 mod fuzz;
 mod journal;
