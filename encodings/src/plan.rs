@@ -4,7 +4,7 @@ use crate::lifted::ObjectId;
 use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 
 /// One step of a plan over operators.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct GroundStep {
     pub(crate) operator: OperatorId,
     /// An index into `SlotUse::designs` for each slot of the operator.

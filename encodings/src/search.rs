@@ -44,24 +44,50 @@ struct Node {
     dominated: bool,
 }
 
-struct Search<'a> {
-    task: &'a Task,
-    bounds: &'a Bounds,
+/// What a search needs to know of a task, whatever state it begins in.
+pub(crate) struct Prepared {
     /// For each operator its combinations of designs that no other one dominates, with their costs.
     choices: Vec<Vec<(Vec<u16>, i64)>>,
     index: OperatorIndex,
+    /// Whether more of any numeric variable never hurts.
+    monotone: bool,
+}
+
+impl Prepared {
+    /// None if some operator has too many combinations of designs.
+    pub(crate) fn new(task: &Task) -> Option<Self> {
+        let monotone = is_monotone(task);
+        let choices = task.operators.iter().map(|operator| undominated(operator, monotone, false));
+        Some(Self { choices: choices.collect::<Option<_>>()?, index: OperatorIndex::new(task), monotone })
+    }
+}
+
+struct Search<'a> {
+    task: &'a Task,
+    bounds: &'a Bounds,
+    prepared: &'a Prepared,
     nodes: Vec<Node>,
     seen: FxHashMap<Box<[u32]>, Vec<u32>>,
     open: BinaryHeap<Reverse<(i64, u32, u32)>>,
-    /// Whether more of any numeric variable never hurts.
-    monotone: bool,
     /// Whether states were left out because their numbers do not fit.
     incomplete: bool,
 }
 
 /// Searches a task whose operators all cost at least 0.
 pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
-    Search::new(task, bounds).map_or(Found::Unknown, |mut search| search.run(limits))
+    let prepared = Prepared::new(task);
+    prepared.map_or(Found::Unknown, |prepared| search_from(task, bounds, &prepared, &task.initial, limits))
+}
+
+/// Searches it from a state of its own.
+pub(crate) fn search_from(
+    task: &Task,
+    bounds: &Bounds,
+    prepared: &Prepared,
+    initial: &State,
+    limits: &Limits,
+) -> Found {
+    Search::new(task, bounds, prepared, initial).run(limits)
 }
 
 /// A state's basic values and numbers, and what was paid on the way to it.
@@ -75,7 +101,8 @@ pub(crate) fn closed_labels(
     limits: &Limits,
     cost: Option<i64>,
 ) -> Option<Vec<ClosedLabel>> {
-    let mut search = Search::new(task, bounds)?;
+    let prepared = Prepared::new(task)?;
+    let mut search = Search::new(task, bounds, &prepared, &task.initial);
     match (search.run(limits), cost) {
         (Found::Optimal(plan), Some(cost)) if plan.cost >= cost => {}
         (Found::None, None) => {}
@@ -91,26 +118,18 @@ pub(crate) fn closed_labels(
 }
 
 impl<'a> Search<'a> {
-    /// None if some operator has too many combinations of designs.
-    fn new(task: &'a Task, bounds: &'a Bounds) -> Option<Self> {
-        let monotone = is_monotone(task);
-        let mut choices = Vec::with_capacity(task.operators.len());
-        for operator in &task.operators {
-            choices.push(undominated(operator, monotone, false)?);
-        }
+    fn new(task: &'a Task, bounds: &'a Bounds, prepared: &'a Prepared, initial: &State) -> Self {
         let mut search = Search {
             task,
             bounds,
-            choices,
-            index: OperatorIndex::new(task),
+            prepared,
             nodes: Vec::new(),
             seen: FxHashMap::default(),
             open: BinaryHeap::new(),
-            monotone,
             incomplete: false,
         };
-        search.push(task.initial.clone(), 0, 0, None);
-        Some(search)
+        search.push(initial.clone(), 0, 0, None);
+        search
     }
 
     fn run(&mut self, limits: &Limits) -> Found {
@@ -137,11 +156,11 @@ impl<'a> Search<'a> {
     fn expand(&mut self, id: u32, steps: u32) {
         let state = self.nodes[id as usize].state.clone();
         let cost = self.nodes[id as usize].cost;
-        for operator_id in self.index.applicable(self.task, &state) {
+        let prepared = self.prepared;
+        for operator_id in prepared.index.applicable(self.task, &state) {
             let operator = &self.task.operators[operator_id.index()];
             let sizes = operator.sizes();
-            for index in 0..self.choices[operator_id.index()].len() {
-                let (choice, step) = &self.choices[operator_id.index()][index];
+            for (index, (choice, step)) in prepared.choices[operator_id.index()].iter().enumerate() {
                 if operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
                     let next = self.task.successor(operator, &state, choice);
                     self.push(next, cost + step, steps + 1, Some((id, operator_id, index as u32)));
@@ -162,7 +181,7 @@ impl<'a> Search<'a> {
                 entry.insert(vec![id]);
             }
             Entry::Occupied(mut entry) => {
-                let (nodes, monotone) = (&mut self.nodes, self.monotone);
+                let (nodes, monotone) = (&mut self.nodes, self.prepared.monotone);
                 let at_least = |a: &[i64], b: &[i64]| {
                     if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b }
                 };
@@ -191,7 +210,7 @@ impl<'a> Search<'a> {
         let mut steps = Vec::new();
         let mut at = goal;
         while let Some((parent, operator, choice)) = self.nodes[at as usize].parent {
-            let choice = self.choices[operator.index()][choice as usize].0.clone();
+            let choice = self.prepared.choices[operator.index()][choice as usize].0.clone();
             steps.push(GroundStep { operator, choice });
             at = parent;
         }

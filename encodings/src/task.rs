@@ -193,6 +193,10 @@ pub struct Task {
     pub(crate) variables: Vec<Variable>,
     /// How many variables are basic.
     pub(crate) basic: usize,
+    /// The numeric variables as PDDL writes them.
+    pub(crate) number_names: Vec<String>,
+    /// Numbers are this many times the values of the files.
+    pub(crate) number_scale: i64,
     /// The rules of the derived variables, in the order of their evaluation.
     pub(crate) axioms: Vec<Layer>,
     pub(crate) slots: Vec<Slot>,

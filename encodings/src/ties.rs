@@ -11,7 +11,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::bounds::{Bounds, Projection};
 use crate::lifted::ObjectId;
@@ -32,16 +32,28 @@ struct Label {
     designs: Vec<Option<ObjectId>>,
     cost: i64,
     steps: usize,
-    /// Functions that have changed their design, summed over the steps.
-    changes: usize,
+    changes: Changes,
     parent: Option<(usize, GroundStep)>,
 }
+
+/// What is kept small, the more important first: steps that are not of the plan to stay close to, and functions that have changed
+/// their design, each summed over the steps.
+pub(crate) type Changes = (usize, usize);
 
 /// Combinations of designs with their costs.
 type Choices = Vec<(Vec<u16>, i64)>;
 
 /// Labels by where they have come to.
 type Seen = FxHashMap<(Box<[u32]>, Vec<Option<ObjectId>>), Vec<usize>>;
+
+/// What is before the plan.
+pub(crate) struct Beginning<'a> {
+    pub(crate) state: &'a State,
+    /// The design that functions ran with last.
+    pub(crate) designs: &'a [(ObjectId, ObjectId)],
+    /// Of plans that are as good, one with more of these steps is chosen.
+    pub(crate) close_to: &'a FxHashSet<GroundStep>,
+}
 
 struct Ties<'a> {
     task: &'a Task,
@@ -52,6 +64,7 @@ struct Ties<'a> {
     choices: Vec<Option<Choices>>,
     monotone: bool,
     functions: Vec<ObjectId>,
+    close_to: &'a FxHashSet<GroundStep>,
     cost: i64,
     steps: usize,
     made: usize,
@@ -59,10 +72,30 @@ struct Ties<'a> {
 
 /// The chosen one among the plans that cost as much as a cheapest plan with fewest steps.
 pub(crate) fn choose(task: &Task, bounds: &Bounds, limits: &Limits, plan: GroundPlan) -> GroundPlan {
+    let close_to = FxHashSet::default();
+    let beginning = Beginning { state: &task.initial, designs: &[], close_to: &close_to };
+    choose_from(task, bounds, limits, plan, &beginning).0
+}
+
+/// The same for plans that begin in another state, or after steps that are settled; with its changes, if plans were few
+/// enough to tell.
+pub(crate) fn choose_from(
+    task: &Task,
+    bounds: &Bounds,
+    limits: &Limits,
+    plan: GroundPlan,
+    beginning: &Beginning<'_>,
+) -> (GroundPlan, Option<Changes>) {
     let mut functions: Vec<ObjectId> =
         task.operators.iter().flat_map(|o| o.configuration.iter().map(|(function, _)| *function)).collect();
     functions.sort_unstable();
     functions.dedup();
+    let mut designs = vec![None; functions.len()];
+    for (function, design) in beginning.designs {
+        if let Ok(position) = functions.binary_search(function) {
+            designs[position] = Some(*design);
+        }
+    }
     let mut ties = Ties {
         task,
         bounds,
@@ -75,23 +108,20 @@ pub(crate) fn choose(task: &Task, bounds: &Bounds, limits: &Limits, plan: Ground
         steps: plan.steps.len(),
         made: 0,
         functions,
+        close_to: beginning.close_to,
     };
-    let steps = ties.first(&plan.steps).unwrap_or(plan.steps);
-    GroundPlan { steps, cost: plan.cost }
+    let state = beginning.state.clone();
+    let start = Label { state, designs, cost: 0, steps: 0, changes: (0, 0), parent: None };
+    match ties.first(start, &plan.steps) {
+        Some((steps, changes)) => (GroundPlan { steps, cost: plan.cost }, Some(changes)),
+        None => (plan, None),
+    }
 }
 
 impl Ties<'_> {
-    /// The first plan in order; none if there are too many to tell.
-    fn first(&mut self, known: &[GroundStep]) -> Option<Vec<GroundStep>> {
-        let start = Label {
-            state: self.task.initial.clone(),
-            designs: vec![None; self.functions.len()],
-            cost: 0,
-            steps: 0,
-            changes: 0,
-            parent: None,
-        };
-        let (mut suffix, changes) = self.fewest_changes(&start, usize::MAX)?;
+    /// The first plan in order, and its changes; none if there are too many to tell.
+    fn first(&mut self, start: Label, known: &[GroundStep]) -> Option<(Vec<GroundStep>, Changes)> {
+        let (mut suffix, changes) = self.fewest_changes(&start, (usize::MAX, usize::MAX))?;
         if suffix.len() != known.len() {
             return None;
         }
@@ -122,14 +152,22 @@ impl Ties<'_> {
             at = self.successor(&at, &step, cost, None)?;
             chosen.push(step);
         }
-        Some(chosen)
+        Some((chosen, changes))
     }
 
     /// None if there are too many.
     fn choices(&mut self, operator: OperatorId) -> Option<Choices> {
         let known = &mut self.choices[operator.index()];
         if known.is_none() {
-            *known = Some(undominated(&self.task.operators[operator.index()], self.monotone, true)?);
+            let schema = &self.task.operators[operator.index()];
+            let mut choices = undominated(schema, self.monotone, true)?;
+            for step in self.close_to.iter().filter(|step| step.operator == operator) {
+                if choices.iter().all(|(choice, _)| *choice != step.choice) {
+                    choices.push((step.choice.clone(), schema.cost_of(&step.choice)));
+                }
+            }
+            choices.sort();
+            *known = Some(choices);
         }
         known.clone()
     }
@@ -152,8 +190,10 @@ impl Ties<'_> {
             parent: parent.map(|parent| (parent, step.clone())),
             state,
         };
+        let is_other = !self.close_to.is_empty() && !self.close_to.contains(step);
+        next.changes.0 += usize::from(is_other);
         for (function, design) in self.configuration(operator, &step.choice) {
-            next.changes += usize::from(next.designs[function].is_some_and(|known| known != design));
+            next.changes.1 += usize::from(next.designs[function].is_some_and(|known| known != design));
             next.designs[function] = Some(design);
         }
         let within = next.cost + self.bounds.estimate(&next.state)? <= self.cost;
@@ -176,7 +216,7 @@ impl Ties<'_> {
     }
 
     /// A way from a label to the goal with fewest changes in all, at most so many.
-    fn fewest_changes(&mut self, from: &Label, most: usize) -> Option<(Vec<GroundStep>, usize)> {
+    fn fewest_changes(&mut self, from: &Label, most: Changes) -> Option<(Vec<GroundStep>, Changes)> {
         let mut labels = vec![Label { parent: None, ..from.clone() }];
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
         let mut seen = Seen::default();

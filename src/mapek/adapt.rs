@@ -13,7 +13,7 @@ use super::answer::Answer;
 use super::knowledge::Running;
 use super::monitor::Changes;
 use super::number;
-use super::plan::Outcome;
+use super::plan::{Ask, Outcome};
 use super::step::{PlannedStep, plan_text};
 
 /// How often one step may fail in a row before something has to change.
@@ -70,7 +70,7 @@ impl Loop {
         match &self.knowledge.failures {
             Some((step, count)) if *count >= FAILURES && !changes.must.is_empty() => {
                 let because = format!("`{}` has failed {count} times in a row", step.summary());
-                answers.push(Answer::PlanNone { status: "failed", because });
+                answers.push(Answer::PlanNone { status: "failed", because, blocking: Vec::new() });
                 self.knowledge.failures = None;
                 self.knowledge.plan = None;
                 self.knowledge.stuck = true;
@@ -154,9 +154,7 @@ impl Loop {
         let reason = because.first().cloned().unwrap_or_default();
         answers.push(Answer::PlanRequested { because });
         self.knowledge.hopes.clear();
-        let (domain, problem) = self.left();
-        let domain = domain.into_owned();
-        let outcome = self.planner.plan(&self.knowledge.mission, &domain, &problem);
+        let outcome = self.plan(true);
         if must && self.interrupt(&reason, &outcome, answers) {
             return;
         }
@@ -172,6 +170,26 @@ impl Loop {
         } else {
             self.adopt(outcome, answers);
         }
+    }
+
+    /// The best plan, with what is left of the action under way as its first step or as though there was none.
+    pub(super) fn plan(&mut self, goes_on: bool) -> Outcome {
+        let problem = self.filled();
+        let running = self.knowledge.running.as_ref().filter(|_| goes_on);
+        let steps = running.is_some() || self.knowledge.running.is_none();
+        let close_to: Option<Vec<PlannedStep>> = self
+            .knowledge
+            .plan
+            .as_ref()
+            .filter(|_| self.settings.stay_close && steps)
+            .map(|plan| plan.iter().cloned().collect());
+        let ask = Ask {
+            mission: &self.knowledge.mission,
+            problem: &problem,
+            running,
+            close_to: close_to.as_deref(),
+        };
+        self.planner.plan(&ask)
     }
 
     /// Whether these are the action under way and the plan at hand.
@@ -214,7 +232,7 @@ impl Loop {
     /// There is no plan, and the action under way goes on.
     fn without_plan(&mut self, must: bool, outcome: Outcome, answers: &mut Vec<Answer>) {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
-        answers.push(Answer::PlanNone { status, because: outcome.because });
+        answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });
         if must {
             self.knowledge.plan = None;
             self.knowledge.stuck = true;

@@ -42,6 +42,9 @@ pub enum Answer {
         status: &'static str,
         /// Why, in a sentence.
         because: String,
+        /// Designs that are not available, by which alone there is none, if it is known: with any one of them there would be a
+        /// plan, were all others available, too.
+        blocking: Vec<String>,
     },
     /// Something is to be done.
     Effect(Effect),
@@ -153,8 +156,8 @@ impl Answer {
                 "steps": steps.iter().map(PlannedStep::to_json).collect::<Vec<_>>(),
             }),
             Self::PlanKept { because } => json!({ "answer": "plan_kept", "because": because }),
-            Self::PlanNone { status, because } => {
-                json!({ "answer": "plan_none", "status": status, "because": because })
+            Self::PlanNone { status, because, blocking } => {
+                json!({ "answer": "plan_none", "status": status, "because": because, "blocking": blocking })
             }
             Self::Effect(effect) => effect.to_json(),
             Self::GoalReached => json!({ "answer": "goal_reached" }),

@@ -33,7 +33,7 @@ impl Loop {
                     self.replan(vec![because], true, answers);
                 }
                 Some(because) => {
-                    answers.push(Answer::PlanNone { status: "unknown", because });
+                    answers.push(Answer::PlanNone { status: "unknown", because, blocking: Vec::new() });
                     self.knowledge.plan = None;
                     self.knowledge.stuck = true;
                 }

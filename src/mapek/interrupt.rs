@@ -25,9 +25,7 @@ impl Loop {
         if is_possible && (going_on.steps.is_some() || !going_on.proved) {
             return false;
         }
-        let problem = self.filled();
-        let mission = &self.knowledge.mission;
-        let without = self.planner.plan(mission, mission.domain(), &problem);
+        let without = self.plan(false);
         match (&going_on.steps, &without.steps) {
             (Some(_), Some(_)) => match self.benefit(&going_on.cost, &without.cost) {
                 Some(benefit) => {
@@ -51,7 +49,11 @@ impl Loop {
             (None, None) => {
                 self.suspend(running, reason, answers);
                 let status = if without.proved { "unsolvable" } else { "unknown" };
-                answers.push(Answer::PlanNone { status, because: without.because });
+                answers.push(Answer::PlanNone {
+                    status,
+                    because: without.because,
+                    blocking: without.blocking,
+                });
                 true
             }
         }

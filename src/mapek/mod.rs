@@ -21,6 +21,7 @@ mod event;
 mod execute;
 mod interrupt;
 mod knowledge;
+mod live;
 mod monitor;
 pub(crate) mod number;
 mod parts;
@@ -62,6 +63,9 @@ pub struct Settings {
     pub settle: Duration,
     /// How long one plan may take; the best so far is used then.
     pub time_limit: Option<Duration>,
+    /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand. The choice then
+    /// depends on what has happened, and no longer on the situation alone.
+    pub stay_close: bool,
 }
 
 impl Default for Settings {
@@ -70,6 +74,7 @@ impl Default for Settings {
             minimum_benefit: BigRational::from_integer(0.into()),
             settle: Duration::ZERO,
             time_limit: None,
+            stay_close: false,
         }
     }
 }

@@ -22,9 +22,7 @@ impl Loop {
 
     /// The best plan for the situation as it is believed.
     pub(crate) fn plan_anew(&mut self) -> Option<Vec<PlannedStep>> {
-        let (domain, problem) = self.left();
-        let domain = domain.into_owned();
-        let outcome = self.planner.plan(&self.knowledge.mission, &domain, &problem);
+        let outcome = self.plan(true);
         self.planner.made.clear();
         outcome.steps
     }

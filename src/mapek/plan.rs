@@ -3,15 +3,19 @@
 //! Plans that the journal has recorded are taken from there and not made again: a plan that was cut short by a time
 //! limit would not come out twice.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use encodings::pddl::ast::{Domain, Problem};
+use encodings::pddl::ast::Problem;
 use encodings::{Config, Limits, Status, optimize};
 use num_rational::BigRational;
 use serde_json::{Value, json};
 
+use super::knowledge::Running;
+use super::live::Live;
 use super::number;
+use super::resume::{resume, resumed_goal};
 use super::step::PlannedStep;
 use crate::mission::Mission;
 
@@ -26,6 +30,20 @@ pub(crate) struct Outcome {
     pub proved: bool,
     /// Why there is no plan.
     pub because: String,
+    /// Designs that are not available, by which alone there is none, if that is known; see [`encodings::Replanner::blocking`].
+    pub blocking: Vec<String>,
+}
+
+/// What is to be planned for.
+#[derive(Debug)]
+pub(crate) struct Ask<'a> {
+    pub mission: &'a Mission,
+    /// The problem as it is believed, with what the knowledge base contributes.
+    pub problem: &'a Problem,
+    /// The action that comes first, if one is under way.
+    pub running: Option<&'a Running>,
+    /// Steps to stay close to among plans that are as good.
+    pub close_to: Option<&'a [PlannedStep]>,
 }
 
 /// Makes plans.
@@ -37,43 +55,59 @@ pub(crate) struct Planner {
     pub recorded: VecDeque<Outcome>,
     /// Plans made since the last look.
     pub made: Vec<Outcome>,
+    /// What is kept from one plan to the next.
+    pub live: Live,
 }
 
 impl Planner {
-    /// The best plan for a filled problem of a mission, with this domain.
-    pub fn plan(&mut self, mission: &Mission, domain: &Domain, problem: &Problem) -> Outcome {
+    /// The best plan for a situation.
+    pub fn plan(&mut self, ask: &Ask<'_>) -> Outcome {
         let recorded = self.recorded.pop_front();
-        let outcome = recorded.unwrap_or_else(|| self.solve(mission, domain, problem));
+        let outcome = recorded.unwrap_or_else(|| self.solve(ask));
         self.made.push(outcome.clone());
         outcome
     }
 
-    fn solve(&self, mission: &Mission, domain: &Domain, problem: &Problem) -> Outcome {
-        let mut limits = Limits::none();
-        if let Some(time) = self.time_limit {
-            limits = limits.with_time(time);
+    fn solve(&mut self, ask: &Ask<'_>) -> Outcome {
+        let limits = self.time_limit.map_or_else(Limits::none, |time| Limits::none().with_time(time));
+        self.live.plan(ask, &limits).unwrap_or_else(|| from_scratch(ask, limits))
+    }
+}
+
+/// The best plan of a task that is ground for it alone.
+pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits) -> Outcome {
+    let none = |proved, because: String| Outcome {
+        steps: None,
+        cost: BigRational::default(),
+        proved,
+        because,
+        blocking: Vec::new(),
+    };
+    let (mut domain, mut problem) = (Cow::Borrowed(ask.mission.domain()), Cow::Borrowed(ask.problem));
+    if let Some(running) = ask.running {
+        domain = Cow::Owned(resume(&domain, &running.step, &running.progress));
+        let goal = resumed_goal(&problem.goal);
+        problem.to_mut().goal = goal;
+    }
+    let task = match ask.mission.ground_with(&domain, &problem, &[], &limits) {
+        Ok(task) => task,
+        Err(messages) => {
+            let texts: Vec<&str> = messages.iter().map(|message| message.message.as_str()).collect();
+            return none(false, texts.join("; "));
         }
-        let none =
-            |proved, because: String| Outcome { steps: None, cost: BigRational::default(), proved, because };
-        let task = match mission.ground_with(domain, problem, &[], &limits) {
-            Ok(task) => task,
-            Err(messages) => {
-                let texts: Vec<&str> = messages.iter().map(|message| message.message.as_str()).collect();
-                return none(false, texts.join("; "));
-            }
-        };
-        let config = Config { limits, ..Config::default() };
-        let solution = optimize(&task, &config, &mut |_| {});
-        match (solution.status, solution.plan) {
-            (status, Some(plan)) => Outcome {
-                cost: number::of_plan(plan.cost),
-                steps: Some(plan.steps.iter().map(|step| PlannedStep::new(mission, step)).collect()),
-                proved: status == Status::Optimal,
-                because: String::new(),
-            },
-            (Status::Unsolvable, None) => none(true, "no plan reaches the goal".to_owned()),
-            _ => none(false, "the time limit came before any plan".to_owned()),
-        }
+    };
+    let config = Config { limits, ..Config::default() };
+    let solution = optimize(&task, &config, &mut |_| {});
+    match (solution.status, solution.plan) {
+        (status, Some(plan)) => Outcome {
+            cost: number::of_plan(plan.cost),
+            steps: Some(plan.steps.iter().map(|step| PlannedStep::new(ask.mission, step)).collect()),
+            proved: status == Status::Optimal,
+            because: String::new(),
+            blocking: Vec::new(),
+        },
+        (Status::Unsolvable, None) => none(true, "no plan reaches the goal".to_owned()),
+        _ => none(false, "the time limit came before any plan".to_owned()),
     }
 }
 
@@ -82,12 +116,14 @@ impl Outcome {
     pub fn to_record(&self) -> Value {
         let steps: Option<Vec<Value>> =
             self.steps.as_ref().map(|steps| steps.iter().map(PlannedStep::to_record).collect());
-        json!([steps, self.cost.to_string(), self.proved, self.because])
+        json!([steps, self.cost.to_string(), self.proved, self.because, self.blocking])
     }
 
     /// The inverse of [`Outcome::to_record`].
     pub fn from_record(record: &Value) -> Option<Self> {
-        let [steps, cost, proved, because] = record.as_array()?.as_slice() else { return None };
+        let [steps, cost, proved, because, blocking] = record.as_array()?.as_slice() else { return None };
+        let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
+        let texts = |value: &Value| value.as_array()?.iter().map(text).collect::<Option<Vec<_>>>();
         let steps = match steps {
             Value::Null => None,
             steps => Some(steps.as_array()?.iter().map(PlannedStep::from_record).collect::<Option<_>>()?),
@@ -97,6 +133,7 @@ impl Outcome {
             cost: cost.as_str()?.parse().ok()?,
             proved: proved.as_bool()?,
             because: because.as_str()?.to_owned(),
+            blocking: texts(blocking)?,
         })
     }
 }

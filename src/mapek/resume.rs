@@ -16,7 +16,7 @@ use num_rational::BigRational;
 use super::step::PlannedStep;
 
 /// Holds once the action under way has ended; no file has such a predicate.
-const GATE: &str = "metaplan_resumed";
+pub(super) const GATE: &str = "metaplan_resumed";
 
 /// The domain for what is left when so much of `running` is done, from 0 to 1.
 pub(crate) fn resume(domain: &Domain, running: &PlannedStep, done: &BigRational) -> Domain {

@@ -2,8 +2,9 @@
 
 use encodings::pddl::ast::{Condition, Declaration, Domain, InitialElement, Metric, Name, Problem, Term};
 use encodings::pddl::{self, Severity, Source};
-use encodings::{GroundConfig, Limits, Task};
+use encodings::{GroundConfig, Limits, Replanner, Task};
 use num_rational::BigRational;
+use ontology::tomasys::FunctionDesign;
 
 use super::{Mission, binding};
 use crate::knowledge::Knowledge;
@@ -120,6 +121,26 @@ impl Mission {
         // Only the goal has places in this text; all else was checked before.
         let wrong: Vec<_> = wrong.filter(|diagnostic| diagnostic.file == "goal").collect();
         if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source])) }
+    }
+
+    /// A planner for filled problems that are like this one; none if the mission is not suited.
+    pub(crate) fn replanner(&self, problem: &Problem, limits: &Limits) -> Option<Replanner> {
+        let predicates = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
+        let available: Vec<Name> = if self.knowledge.is_some() {
+            predicates.filter(|name| self.bindings.is_availability(name)).cloned().collect()
+        } else {
+            Vec::new()
+        };
+        let config = GroundConfig { solves: self.solves(), objectives: Vec::new(), limits: limits.clone() };
+        Replanner::new(&self.domain, problem, &available, &config)
+    }
+
+    /// The designs that solve a function, by local name, whether or not they are available.
+    pub(crate) fn designs_of(&self, function: &str) -> Vec<String> {
+        let Some(knowledge) = &self.knowledge else { return Vec::new() };
+        let solves = |design: &FunctionDesign| design.solves.iter().any(|solved| solved.name == function);
+        let designs = knowledge.view().function_designs().into_iter().filter(solves);
+        designs.map(|design| design.individual.name).collect()
     }
 
     /// Grounds a filled problem with a variant of the domain.

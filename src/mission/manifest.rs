@@ -68,6 +68,8 @@ struct AdaptationSection {
     minimum_benefit: Option<toml::Value>,
     settle: Option<toml::Value>,
     time_limit: Option<toml::Value>,
+    #[serde(default)]
+    stay_close: bool,
 }
 
 /// A situation: what has failed, and what has changed.
@@ -152,8 +154,8 @@ impl Manifest {
     /// # Errors
     /// A value that is no number, or negative.
     pub fn settings(&self) -> Result<Settings, Message> {
-        let mut settings = Settings::default();
         let section = &self.adaptation;
+        let mut settings = Settings { stay_close: section.stay_close, ..Settings::default() };
         if let Some(value) = &section.minimum_benefit {
             settings.minimum_benefit = self.number("minimum_benefit", value)?;
         }

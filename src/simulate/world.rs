@@ -5,6 +5,8 @@
 //! fails when its patience is over. Everything random is drawn from the seed alone, so that all ways of control meet the
 //! same world.
 
+use std::cell::OnceCell;
+
 use encodings::pddl::ast::Problem;
 use encodings::validate::{advance, metric_after};
 use num_rational::BigRational;
@@ -43,6 +45,8 @@ struct Upset {
 #[derive(Debug, Clone)]
 pub struct World {
     truth: Mission,
+    /// Its problem with what the knowledge base contributes, once that is asked for.
+    filled: OnceCell<Problem>,
     settings: Simulation,
     seed: u64,
     /// Since the start of the mission, in the domain's time unit.
@@ -102,6 +106,7 @@ impl World {
             .collect();
         Self {
             truth,
+            filled: OnceCell::new(),
             settings,
             seed,
             time: 0.0,
@@ -115,10 +120,18 @@ impl World {
         }
     }
 
-    fn filled(&self) -> Problem {
-        let mut problem = self.truth.problem().clone();
-        self.truth.fill(&mut problem);
-        problem
+    fn filled(&self) -> &Problem {
+        self.filled.get_or_init(|| {
+            let mut problem = self.truth.problem().clone();
+            self.truth.fill(&mut problem);
+            problem
+        })
+    }
+
+    /// The truth, to change it.
+    fn change(&mut self) -> &mut Mission {
+        self.filled.take();
+        &mut self.truth
     }
 
     /// Does as the controller says; what that leads to at once.
@@ -159,7 +172,7 @@ impl World {
             return None;
         }
         let domain = crate::mapek::resume(self.truth.domain(), &job.step, &exact(job.progress));
-        let advance = advance(&domain, &self.filled(), &job.step.to_plan_step(), false).ok()?;
+        let advance = advance(&domain, self.filled(), &job.step.to_plan_step(), false).ok()?;
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
     }
 
@@ -222,7 +235,7 @@ impl World {
 
     /// What a share of an action changes, and at its end all else that it changes.
     fn use_up(&mut self, step: &PlannedStep, share: f64, whole: bool, events: &mut Vec<Event>) {
-        let Ok(mut advance) = advance(self.truth.domain(), &self.filled(), &step.to_plan_step(), true) else {
+        let Ok(mut advance) = advance(self.truth.domain(), self.filled(), &step.to_plan_step(), true) else {
             return;
         };
         let share = exact(share);
@@ -237,7 +250,7 @@ impl World {
         }
         let mut init = self.truth.problem().init.clone();
         advance.apply(&mut init);
-        self.truth.set_init(init);
+        self.change().set_init(init);
         for change in &advance.values {
             let name = change.text.trim_matches(['(', ')']).to_owned();
             if self.settings.lifeline.as_ref() == Some(&name) && change.after <= BigRational::default() {
@@ -281,7 +294,7 @@ impl World {
                 }
             }
             for (name, value) in set {
-                self.truth.set(&name, &value)?;
+                self.change().set(&name, &value)?;
                 events.push(Event::Fact { name, value });
             }
         }
@@ -293,7 +306,7 @@ impl World {
     }
 
     fn report(&mut self, component: String, status: Status, events: &mut Vec<Event>) -> Result<(), Message> {
-        if let Some(knowledge) = self.truth.knowledge_mut() {
+        if let Some(knowledge) = self.change().knowledge_mut() {
             knowledge.report(&component, status)?;
         }
         events.push(Event::Component { component, status });
@@ -313,6 +326,7 @@ impl World {
     }
 
     fn swing(&mut self, events: &mut Vec<Event>) -> Result<(), Message> {
+        self.filled.take();
         for (signal, phase) in self.settings.signals.iter().zip(&self.phases) {
             let turn = std::f64::consts::TAU * (self.time / signal.period + phase);
             let value = signal.mean + signal.amplitude * turn.sin();
@@ -331,7 +345,7 @@ impl World {
         let empty = encodings::validate::PlanText::default();
         encodings::validate::validate(
             self.truth.domain(),
-            &problem,
+            problem,
             &empty,
             &encodings::validate::Options::default(),
         )
@@ -340,7 +354,7 @@ impl World {
 
     /// The mission's metric so far; the time without one.
     pub fn cost(&self) -> f64 {
-        let metric = metric_after(self.truth.domain(), &self.filled(), &exact(self.time));
+        let metric = metric_after(self.truth.domain(), self.filled(), &exact(self.time));
         metric.map_or(self.time, |metric| number::to_f64(&metric))
     }
 

@@ -223,6 +223,7 @@ fn a_better_design_returns() {
             minimum_benefit: num_rational::BigRational::from_integer(benefit.into()),
             settle: std::time::Duration::from_secs(settle),
             time_limit: None,
+            stay_close: false,
         };
         ugv = Loop::new(mission, settings).expect("a loop");
         ugv.start();

@@ -11,14 +11,17 @@ use metaplan::simulate::{Disturbance, Failure, Run, Simulation, Strategy, simula
 /// A mission with components that can fail.
 struct Robot {
     mission: &'static str,
-    components: &'static [&'static str],
+    /// Components that fail together.
+    failing: &'static [&'static [&'static str]],
+    /// How many of these the mission can do without for good; they come first.
+    spare: usize,
     /// What its simulation has beside failures: step, patience.
     pace: (f64, f64),
     lifeline: Option<&'static str>,
     /// When components fail, at the earliest, and within which time from then.
     times: [(f64, f64); 2],
     /// After how long they recover at the earliest, and within which time from then.
-    recoveries: [Option<(f64, f64)>; 3],
+    recoveries: [(f64, f64); 2],
     /// The mean time to a failure, and the time to its recovery, where components fail again and again.
     random: (f64, f64),
 }
@@ -26,37 +29,55 @@ struct Robot {
 const ROBOTS: [Robot; 2] = [
     Robot {
         mission: "uuv",
-        components: &["c_thruster_1", "c_thruster_3", "c_camera", "c_sonar", "c_charging_port"],
+        failing: &[
+            &["c_thruster_3"],
+            &["c_thruster_3", "c_charging_port"],
+            &["c_thruster_1"],
+            &["c_camera"],
+            &["c_sonar"],
+            &["c_thruster_1", "c_thruster_3"],
+            &["c_thruster_3", "c_camera"],
+            &["c_thruster_3", "c_sonar"],
+        ],
+        spare: 2,
         pace: (0.5, 2.0),
         lifeline: Some("battery"),
         times: [(1.0, 6.0), (12.0, 8.0)],
-        recoveries: [None, Some((0.5, 3.0)), Some((10.0, 10.0))],
+        recoveries: [(0.5, 3.0), (10.0, 10.0)],
         random: (15.0, 3.0),
     },
     Robot {
         mission: "ugv",
-        components: &["c_kinect", "c_lidar", "c_camera", "c_flashlight"],
+        failing: &[
+            &["c_kinect"],
+            &["c_lidar"],
+            &["c_camera"],
+            &["c_kinect", "c_camera"],
+            &["c_kinect", "c_flashlight"],
+            &["c_lidar", "c_camera"],
+            &["c_kinect", "c_lidar"],
+        ],
+        spare: 7,
         pace: (0.1, 0.5),
         lifeline: None,
         times: [(0.1, 1.0), (1.5, 2.0)],
-        recoveries: [None, Some((0.1, 1.0)), Some((2.0, 3.0))],
+        recoveries: [(0.1, 1.0), (2.0, 3.0)],
         random: (4.0, 0.8),
     },
 ];
 
 /// All that may happen to a robot, with names.
 fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
-    let count = robot.components.len();
-    let singles = (0..count).map(|one| vec![robot.components[one]]);
-    let pairs = (0..count).flat_map(|one| (one + 1..count).map(move |two| (one, two)));
-    let pairs = pairs.map(|(one, two)| vec![robot.components[one], robot.components[two]]);
     let mut all = Vec::new();
-    for failing in singles.chain(pairs) {
-        let name = failing.join("+");
+    for (failing, number) in robot.failing.iter().zip(0..) {
+        let name = failing.join(" and ");
         for (time, when) in robot.times.iter().zip(["early", "late"]) {
-            for (recovery, length) in robot.recoveries.iter().zip(["for good", "briefly", "long"]) {
-                let events = once(&failing, *time, *recovery);
-                all.push((format!("{name} {when} {length}"), simulation(robot, events, Vec::new())));
+            let back = robot.recoveries.iter().zip(["briefly", "long"]);
+            let back = back.map(|(recovery, length)| (Some(*recovery), length));
+            let ever = (number < robot.spare).then_some((None, "for good"));
+            for (recovery, length) in back.chain(ever) {
+                let events = once(failing, *time, recovery);
+                all.push((format!("{name}, {when}, {length}"), simulation(robot, events, Vec::new())));
             }
         }
         let again = |component: &&str| Failure {
@@ -65,7 +86,7 @@ fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
             recovery: Some(robot.random.1),
         };
         let failures = failing.iter().map(again).collect();
-        all.push((format!("{name} again and again"), simulation(robot, Vec::new(), failures)));
+        all.push((format!("{name}, again and again"), simulation(robot, Vec::new(), failures)));
     }
     all
 }

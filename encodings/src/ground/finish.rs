@@ -10,6 +10,7 @@ use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
 use crate::error::Error;
+use crate::ground::Generality;
 use crate::ground::derived::components;
 use crate::ground::evaluate::AtomId;
 use crate::ground::instantiate::{GroundOperator, GroundSlots, GroundTask};
@@ -17,7 +18,7 @@ use crate::ground::integers::{Denominator, Integers};
 use crate::ground::metric::initial_value;
 use crate::ground::mutex;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
-use crate::ground::prune::{atom_name, read_atoms};
+use crate::ground::prune::{atom_name, numeric_name, read_atoms};
 use crate::lifted::{Lifted, ObjectId, Rational};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
@@ -33,9 +34,10 @@ pub(crate) fn finish(
     lifted: &Lifted,
     mut task: GroundTask<'_>,
     unreachable: Option<String>,
+    generality: &Generality,
 ) -> Result<Task, Error> {
     let atoms = Atoms::new(lifted, &task);
-    let mut numbers = Numbers::new(&task)?;
+    let mut numbers = Numbers::new(lifted, &task, generality)?;
     let (mut objectives, mut costs) = objectives(&task)?;
     let mut durations = Denominator::new("durations");
     for operator in &task.operators {
@@ -82,6 +84,8 @@ pub(crate) fn finish(
         schema_names: lifted.schemas.iter().map(|schema| schema.name.to_string()).collect(),
         basic: atoms.basic,
         variables: atoms.variables,
+        number_names: std::mem::take(&mut numbers.names),
+        number_scale: numbers.integers.scale,
         axioms,
         initial: State { values: atoms.initial, numbers: std::mem::take(&mut numbers.initial) },
         slots: slots.all,
@@ -273,12 +277,13 @@ impl Atoms {
 /// The numeric variables that conditions depend on, with the factor that makes all their values integers.
 struct Numbers {
     initial: Vec<i64>,
+    names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
     integers: Integers,
 }
 
 impl Numbers {
-    fn new(task: &GroundTask<'_>) -> Result<Self, Error> {
+    fn new(lifted: &Lifted, task: &GroundTask<'_>, generality: &Generality) -> Result<Self, Error> {
         let mut used = FxHashSet::default();
         let mut denominator = Denominator::new("numeric fluents");
         let mut note = |linear: &Linear<Rational>| {
@@ -300,10 +305,14 @@ impl Numbers {
         for number in &initial {
             denominator.number(number);
         }
+        if let Some(precision) = generality.numbers {
+            denominator.number(&Rational::new(1, i128::from(precision)));
+        }
+        let names = used.iter().map(|variable| numeric_name(lifted, task, *variable)).collect();
         let integers = denominator.integers()?;
         let initial = initial.iter().map(|number| integers.number(number)).collect::<Result<_, _>>()?;
         let ids = used.into_iter().zip((0..).map(NumericId)).collect();
-        Ok(Self { initial, ids, integers })
+        Ok(Self { initial, names, ids, integers })
     }
 
     fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<i64>, Error> {

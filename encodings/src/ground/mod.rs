@@ -58,6 +58,24 @@ impl Default for Config {
 /// # Errors
 /// Every construct that the planner does not handle, with its place.
 pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Vec<Error>> {
+    ground_for(domain, problem, config, &Generality::default())
+}
+
+/// What a ground task is to be good for beside the problem that it is made of.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Generality {
+    /// If given, numbers of the initial state may be others, too, that are integers when multiplied by this: nothing is
+    /// concluded from those of the problem.
+    pub(crate) numbers: Option<i64>,
+}
+
+/// Grounds a problem so that other initial states can take the place of its own.
+pub(crate) fn ground_for(
+    domain: &Domain,
+    problem: &Problem,
+    config: &Config,
+    generality: &Generality,
+) -> Result<Task, Vec<Error>> {
     let lifted = normalize(domain, problem, &config.objectives)?;
     let designs: Vec<_> =
         lifted.schemas.iter().map(|schema| design_parameters(&lifted, schema, &config.solves)).collect();
@@ -73,6 +91,6 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Tas
     if config.limits.reached() {
         return Err(vec![Error::Interrupted]);
     }
-    let unreachable = prune::prune(&lifted, &mut ground);
-    finish::finish(&lifted, ground, unreachable).map_err(|error| vec![error])
+    let unreachable = prune::prune(&lifted, &mut ground, generality);
+    finish::finish(&lifted, ground, unreachable, generality).map_err(|error| vec![error])
 }

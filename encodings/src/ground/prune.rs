@@ -6,16 +6,18 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::configuration::conjuncts;
+use crate::ground::Generality;
 use crate::ground::derived::simplify;
 use crate::ground::evaluate::{AtomId, World};
 use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::intervals::{goal_can_hold, prune_by_numbers};
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Rational};
+use crate::pddl::ast::Name;
 use crate::quantity::{NumericId, Quantity};
 
 /// Prunes the task in place; returns a reason if the goal cannot be reached even if nothing is ever deleted.
-pub(crate) fn prune(lifted: &Lifted, task: &mut GroundTask<'_>) -> Option<String> {
+pub(crate) fn prune(lifted: &Lifted, task: &mut GroundTask<'_>, generality: &Generality) -> Option<String> {
     let initially: Vec<bool> = task
         .world
         .atoms
@@ -23,7 +25,7 @@ pub(crate) fn prune(lifted: &Lifted, task: &mut GroundTask<'_>) -> Option<String
         .map(|(predicate, arguments)| task.world.holds_initially(*predicate, arguments))
         .collect();
     let mut reached = forward(task, &initially);
-    while prune_by_numbers(task) {
+    while generality.numbers.is_none() && prune_by_numbers(task) {
         simplify(task);
         reached = forward(task, &initially);
     }
@@ -34,7 +36,7 @@ pub(crate) fn prune(lifted: &Lifted, task: &mut GroundTask<'_>) -> Option<String
     if let Some(atom) = goal_atoms.into_iter().find(|atom| !reached[atom.index()]) {
         return Some(never_true(&atom_name(lifted, task, atom)));
     }
-    if !goal_can_hold(task) {
+    if generality.numbers.is_none() && !goal_can_hold(task) {
         return Some(
             "the numbers that the goal asks for are out of reach, even if nothing is ever deleted".into(),
         );
@@ -67,12 +69,25 @@ pub(crate) fn atom_name(lifted: &Lifted, task: &GroundTask<'_>, atom: AtomId) ->
     found.map_or_else(String::new, |((predicate, arguments), ())| name(lifted, *predicate, arguments))
 }
 
+/// `(function arguments)` as PDDL writes it.
+pub(crate) fn numeric_name(lifted: &Lifted, task: &GroundTask<'_>, variable: NumericId) -> String {
+    let found = task.world.numerics.get_index(variable.index());
+    found.map_or_else(String::new, |((function, arguments), ())| {
+        let symbol = lifted.functions.get(function.index());
+        symbol.map_or_else(String::new, |symbol| applied(lifted, &symbol.name, arguments))
+    })
+}
+
 fn name(lifted: &Lifted, predicate: PredicateId, arguments: &[ObjectId]) -> String {
     let Some(symbol) = lifted.predicates.get(predicate.index()) else {
         let number = arguments.first().map_or(0, |number| number.0);
         return format!("condition {number}");
     };
-    let mut text = format!("({}", symbol.name);
+    applied(lifted, &symbol.name, arguments)
+}
+
+fn applied(lifted: &Lifted, symbol: &Name, arguments: &[ObjectId]) -> String {
+    let mut text = format!("({symbol}");
     for object in arguments {
         text.push(' ');
         text.push_str(lifted.objects[object.index()].as_str());

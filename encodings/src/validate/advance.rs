@@ -29,6 +29,8 @@ pub struct Advance {
     pub values: Vec<ValueChange>,
     /// How long it takes, in the domain's time unit.
     pub duration: BigRational,
+    /// The value of the problem's metric if the plan ended with it; none without a metric, or where it is undefined.
+    pub metric: Option<BigRational>,
 }
 
 /// A function whose value a step changes.
@@ -56,10 +58,23 @@ pub fn advance(
     step: &PlanStep,
     forced: bool,
 ) -> Result<Advance, Box<Violation>> {
+    advance_in(&World::new(domain, problem), step, forced)
+}
+
+/// Executes each of some steps from the initial state of a problem, as [`advance`] does for one of them that is not forced.
+pub fn advance_each(
+    domain: &Domain,
+    problem: &Problem,
+    steps: &[PlanStep],
+) -> Vec<Result<Advance, Box<Violation>>> {
     let world = World::new(domain, problem);
-    let step = step::resolve(&world, 1, step);
+    steps.iter().map(|step| advance_in(&world, step, false)).collect()
+}
+
+fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advance, Box<Violation>> {
+    let step = step::resolve(world, 1, step);
     let options = Options::default();
-    let mut execution = Execution::new(&world, &options);
+    let mut execution = Execution::new(world, &options);
     let before = execution.state.clone();
     let start = BigRational::default();
     let running =
@@ -80,13 +95,14 @@ pub fn advance(
     let after = &execution.state;
     let values = assigned.into_iter().filter_map(|(target, assigned)| {
         let after = after.values.get(&target)?.clone();
-        let (function, text) = (atom(&world, &target), world.show(target.0, &target.1));
+        let (function, text) = (atom(world, &target), world.show(target.0, &target.1));
         Some(ValueChange { function, text, before: before.values.get(&target).cloned(), after, assigned })
     });
     let mut values: Vec<ValueChange> = values.collect();
     values.sort_by(|left, right| left.text.cmp(&right.text));
-    let (added, deleted) = (missing(&world, after, &before), missing(&world, &before, after));
-    Ok(Advance { added, deleted, values, duration: running.duration })
+    let (added, deleted) = (missing(world, after, &before), missing(world, &before, after));
+    let metric = metric(world, after, &running.duration);
+    Ok(Advance { added, deleted, values, duration: running.duration, metric })
 }
 
 impl Advance {
@@ -132,8 +148,12 @@ pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational
     let world = World::new(domain, problem);
     let options = Options::default();
     let execution = Execution::new(&world, &options);
-    let metric = problem.metric.as_ref()?;
-    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(&world, &execution.state) };
+    metric(&world, &execution.state, total_time)
+}
+
+fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
+    let metric = world.problem.metric.as_ref()?;
+    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
     evaluator.value(&metric.expression, &Bindings::default()).ok()
 }
 

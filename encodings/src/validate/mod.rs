@@ -31,7 +31,7 @@ use rustc_hash::FxHashSet;
 use crate::pddl::ast::{Action, ActionBody, Domain, Effect, Name, Problem};
 use crate::pddl::number::to_decimal;
 
-pub use advance::{Advance, ValueChange, advance, metric_after};
+pub use advance::{Advance, ValueChange, advance, advance_each, metric_after};
 pub use plan::{PlanStep, PlanText};
 pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
 

@@ -1,0 +1,274 @@
+//! Planning again and again for one mission, from what does not change: the live planner of an adaptation loop.
+//!
+//! What is available and the state are assumptions here, not facts \[1\]: the mission is ground once, with every design available and
+//! without conclusions from numbers. A problem is then a state of that task, see [`layout`], and a set of available
+//! designs is a part of its operators, see [`mask`]. What depends on that set alone (operators, projections with their costs to
+//! go, designs that none dominates) is kept for the sets that were met last, since components that fail also recover. What is
+//! left for each problem is the search, whose estimates are exact in projections, and the choice among equal plans. Its answers are
+//! those of grounding and optimizing anew, only that nothing is proved a second time by SAT.
+//!
+//! Why no SAT solver is kept with assumptions: on maps of 50 to 200 places the search ends within milliseconds, and the same proof
+//! takes a solver seconds; what it would have learnt of one cost limit says nothing about the next.
+//!
+//! - \[1\] N. Eén, N. Sörensson: Temporal induction by incremental SAT solving, ENTCS 89(4), 2003.
+
+mod layout;
+mod mask;
+mod solve;
+mod usage;
+
+use std::fmt;
+use std::sync::Arc;
+
+use num_rational::BigRational;
+
+use crate::bounds::Bounds;
+use crate::ground::{Config, Generality, ground_for};
+use crate::lifted::ObjectId;
+use crate::limits::Limits;
+use crate::pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
+use crate::pddl::types::TypeHierarchy;
+use crate::plan::Step;
+use crate::search::Prepared;
+use crate::task::Task;
+use crate::validate::Advance;
+use layout::{Layout, Situation};
+use usage::Usage;
+
+/// Numbers of the initial state have at most so many decimals, as a power of ten.
+const PRECISION: i64 = 1_000_000;
+/// For so many sets of available designs what was found out about them is kept.
+const SETS: usize = 8;
+
+/// Plans for problems of one domain that differ in their state and in what is available.
+#[derive(Clone)]
+pub struct Replanner {
+    base: Arc<Base>,
+    /// The sets of available designs met last, the latest at the end.
+    sets: Vec<(Vec<Vec<ObjectId>>, Arc<Set>)>,
+}
+
+/// What holds for all problems.
+struct Base {
+    /// With everything available.
+    task: Task,
+    layout: Layout,
+    /// For each schema the parameters that must be available, each with the predicate that says so.
+    requirements: Vec<Vec<(usize, usize)>>,
+}
+
+/// What holds for all states in which the same is available.
+struct Set {
+    task: Task,
+    bounds: Bounds,
+    prepared: Option<Prepared>,
+}
+
+/// A step that a plan may begin with, whatever the operators of the task are: what is left of an action under way, with one
+/// of the configurations that it can go on with.
+#[derive(Debug, Clone)]
+pub struct First {
+    /// The function and the design chosen for it.
+    pub configuration: Vec<(String, String)>,
+    /// All arguments; of plans that are as good the one whose arguments are declared first is chosen.
+    pub arguments: Vec<String>,
+    /// What the step changes.
+    pub change: Advance,
+    /// The metric of the mission if it ended with the step; without a metric, 1.
+    pub metric: BigRational,
+}
+
+/// What is asked for.
+#[derive(Debug)]
+pub struct Query<'a> {
+    /// With what is available now; of the same domain, and checked.
+    pub problem: &'a Problem,
+    /// If there are any, plans begin with one of them.
+    pub first: &'a [First],
+    /// The metric of the mission if it ended now; without a metric, 0.
+    pub metric: BigRational,
+    /// A plan to stay close to among those that are as good: names and arguments of its actions after the first step.
+    pub close_to: Option<&'a [(String, Vec<String>)]>,
+    /// When to stop.
+    pub limits: &'a Limits,
+}
+
+/// What planning has come to.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Replanned {
+    /// A plan; none has a better metric: proved.
+    Optimal {
+        /// Which of the first steps it begins with, if there were any.
+        first: Option<usize>,
+        /// The steps after that.
+        steps: Vec<Step>,
+        /// The metric of the whole mission.
+        metric: BigRational,
+    },
+    /// There is no plan of any length: proved.
+    Unsolvable,
+    /// The problem differs in more than state and availability.
+    Misfit,
+    /// A limit came first.
+    Unknown,
+}
+
+impl Replanner {
+    /// Grounds a problem with all that `available` says of some object taken for available. None if the domain does not lend
+    /// itself to that: where availability is asked for otherwise than as a condition of actions on their parameters, where
+    /// facts change by themselves, where actions earn something, or where the problem cannot be ground at all.
+    pub fn new(domain: &Domain, problem: &Problem, available: &[Name], config: &Config) -> Option<Self> {
+        let requirements = usage::requirements(domain, available)?;
+        let in_goal = |name: &Name| usage::in_condition(&problem.goal, name) > 0;
+        let is_timed = |element: &InitialElement| matches!(element, InitialElement::Timed(..));
+        if available.iter().any(in_goal) || problem.init.iter().any(is_timed) {
+            return None;
+        }
+        let full = with_all(domain, problem, available);
+        let generality = Generality { numbers: Some(PRECISION) };
+        let task = ground_for(domain, &full, config, &generality).ok()?;
+        if task.operators.iter().any(|operator| operator.cost.minimum() < 0 || operator.wait.is_some()) {
+            return None;
+        }
+        let layout = Layout::new(Usage::of(domain, problem), available, problem, &task);
+        Some(Self { base: Arc::new(Base { task, layout, requirements }), sets: Vec::new() })
+    }
+
+    /// A best plan for a problem.
+    pub fn plan(&mut self, query: &Query<'_>) -> Replanned {
+        let base = self.base.clone();
+        let Some(situation) = base.layout.situation(&base.task, query.problem) else {
+            return Replanned::Misfit;
+        };
+        let set = self.set(&situation.available, query.limits);
+        solve::solve(&base, &set, &situation, query)
+    }
+
+    /// The smallest part of what is not available that alone leaves no plan for an unsolvable problem: with any one of these objects
+    /// there would be one, were all others available, too. Nothing if other things are the reason; none if that could not be
+    /// found out. The deletion-based search for a minimal unsatisfiable core \[1\].
+    ///
+    /// - \[1\] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
+    pub fn blocking(&mut self, query: &Query<'_>) -> Option<Vec<String>> {
+        let base = self.base.clone();
+        let situation = base.layout.situation(&base.task, query.problem)?;
+        let all = base.possible();
+        let missing: Vec<(usize, ObjectId)> = (0..all.len())
+            .flat_map(|predicate| all[predicate].iter().map(move |object| (predicate, *object)))
+            .filter(|(predicate, object)| situation.available[*predicate].binary_search(object).is_err())
+            .collect();
+        let mut blocking = missing.clone();
+        let is_solvable = |blocked: &[(usize, ObjectId)]| {
+            let open = |predicate: usize| {
+                let is_open = |object: &&ObjectId| !blocked.contains(&(predicate, **object));
+                all[predicate].iter().filter(is_open).copied().collect()
+            };
+            let available: Vec<Vec<ObjectId>> = (0..all.len()).map(open).collect();
+            let situation = Situation { available, ..situation.clone() };
+            let set = base.restrict(&situation.available, query.limits);
+            match solve::solve(&base, &set, &situation, query) {
+                Replanned::Optimal { .. } => Some(true),
+                Replanned::Unsolvable => Some(false),
+                Replanned::Misfit | Replanned::Unknown => None,
+            }
+        };
+        if !is_solvable(&[])? {
+            return Some(Vec::new());
+        }
+        for one in &missing {
+            let rest: Vec<_> = blocking.iter().copied().filter(|other| other != one).collect();
+            if !is_solvable(&rest)? {
+                blocking = rest;
+            }
+        }
+        let name = |(_, object): &(usize, ObjectId)| base.task.object_names[object.index()].clone();
+        let mut names: Vec<String> = blocking.iter().map(name).collect();
+        names.sort();
+        names.dedup();
+        Some(names)
+    }
+
+    /// What is known of a set of available designs, or is found out now.
+    fn set(&mut self, available: &[Vec<ObjectId>], limits: &Limits) -> Arc<Set> {
+        let found = match self.sets.iter().position(|(known, _)| known == available) {
+            Some(position) => self.sets.remove(position).1,
+            None => Arc::new(self.base.restrict(available, limits)),
+        };
+        if self.sets.len() >= SETS {
+            self.sets.remove(0);
+        }
+        // What was cut short by a limit is not good for the next time.
+        if !limits.reached() {
+            self.sets.push((available.to_vec(), found.clone()));
+        }
+        found
+    }
+}
+
+impl Base {
+    fn restrict(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Set {
+        let is_allowed = |schema: u32, position: usize, object: ObjectId| {
+            let mut needed = self.requirements[schema as usize].iter().filter(|(own, _)| *own == position);
+            needed.all(|(_, predicate)| available[*predicate].binary_search(&object).is_ok())
+        };
+        let task = mask::restrict(&self.task, &is_allowed);
+        let bounds = Bounds::new(&task, limits);
+        let prepared = Prepared::new(&task);
+        Set { task, bounds, prepared }
+    }
+
+    /// For each predicate the objects that some operator needs to be available, sorted.
+    fn possible(&self) -> Vec<Vec<ObjectId>> {
+        let count = self.requirements.iter().flatten().map(|(_, predicate)| predicate + 1).max().unwrap_or(0);
+        let mut found = vec![Vec::new(); count];
+        for operator in &self.task.operators {
+            for (position, predicate) in &self.requirements[operator.schema as usize] {
+                match operator.arguments[*position] {
+                    crate::task::Argument::Object(object) => found[*predicate].push(object),
+                    crate::task::Argument::Slot(slot) => {
+                        let slot = &operator.slots[slot as usize];
+                        let designs = &self.task.slots[slot.slot.index()].designs;
+                        found[*predicate].extend(slot.designs.iter().map(|index| designs[*index as usize]));
+                    }
+                }
+            }
+        }
+        for objects in &mut found {
+            objects.sort_unstable();
+            objects.dedup();
+        }
+        found
+    }
+}
+
+/// The problem with everything available that can be.
+fn with_all(domain: &Domain, problem: &Problem, available: &[Name]) -> Problem {
+    let hierarchy = TypeHierarchy::of(domain);
+    let mut full = problem.clone();
+    full.init.retain(|element| match element {
+        InitialElement::Fact(atom) | InitialElement::NegatedFact(atom) => {
+            !available.contains(&atom.predicate.name)
+        }
+        _ => true,
+    });
+    let declared = domain.predicates.iter().filter(|declared| available.contains(&declared.identifier.name));
+    for declared in declared {
+        let Some(parameter) = declared.parameters.first() else { continue };
+        let objects = domain.constants.iter().chain(&problem.objects);
+        for object in objects.filter(|object| hierarchy.fits(&object.r#type, &parameter.r#type)) {
+            let name = Identifier { name: object.identifier.name.clone(), span: Span::default() };
+            full.init.push(InitialElement::Fact(Atom {
+                predicate: declared.identifier.clone(),
+                arguments: vec![Term::Constant(name)],
+                span: Span::default(),
+            }));
+        }
+    }
+    full
+}
+
+impl fmt::Debug for Replanner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Replanner").field("sets", &self.sets.len()).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,133 @@
+//! A situation to a best plan: a search from each first step that may lead to one, then the choice among equal plans.
+//!
+//! The search from the most promising first step comes first; one whose lower bound is above the best metric so far is not
+//! searched from. Equal plans are chosen from as without first steps: fewest steps, fewest reconfigurations, model order. A plan to
+//! stay close to is kept if it is as good as any; otherwise, of plans with fewest steps, one with most of its steps.
+
+use num_rational::BigRational;
+use rustc_hash::FxHashSet;
+
+use crate::lifted::ObjectId;
+use crate::plan::{GroundPlan, GroundStep, decode, resolve};
+use crate::replan::layout::Situation;
+use crate::replan::{Base, Query, Replanned, Set};
+use crate::search::{Found, search_from};
+use crate::task::{State, Task};
+use crate::ties;
+
+/// Where a plan may begin.
+struct Start {
+    first: Option<usize>,
+    state: State,
+    /// The function and the design of the first step.
+    designs: Vec<(ObjectId, ObjectId)>,
+    /// By the order of declaration.
+    arguments: Vec<ObjectId>,
+    /// What counts for it already, less being better.
+    own: BigRational,
+}
+
+/// Plans for a situation.
+pub(super) fn solve(base: &Base, set: &Set, situation: &Situation, query: &Query<'_>) -> Replanned {
+    if base.task.unreachable.is_some() {
+        return Replanned::Unsolvable;
+    }
+    let Some(prepared) = &set.prepared else { return Replanned::Unknown };
+    let Some(starts) = starts(base, situation, query) else { return Replanned::Misfit };
+    let scale = |cost: i64| BigRational::new(cost.into(), set.task.objective.scale.into());
+    let promise = |start: Start| Some((&start.own + scale(set.bounds.estimate(&start.state)?), start));
+    let mut open: Vec<(BigRational, Start)> = starts.into_iter().filter_map(promise).collect();
+    open.sort_by(|left, right| left.0.cmp(&right.0).then_with(|| left.1.arguments.cmp(&right.1.arguments)));
+    let mut best: Option<(BigRational, usize)> = None;
+    let mut winners: Vec<(Start, GroundPlan)> = Vec::new();
+    for (bound, start) in open {
+        if best.as_ref().is_some_and(|(least, _)| bound > *least) {
+            break;
+        }
+        let plan = match search_from(&set.task, &set.bounds, prepared, &start.state, query.limits) {
+            Found::Optimal(plan) => plan,
+            Found::None => continue,
+            Found::Unknown => return Replanned::Unknown,
+        };
+        let value = (&start.own + scale(plan.cost), plan.steps.len());
+        match &best {
+            Some(known) if value > *known => continue,
+            Some(known) if value == *known => {}
+            _ => {
+                best = Some(value);
+                winners.clear();
+            }
+        }
+        winners.push((start, plan));
+    }
+    let Some((value, _)) = best else { return Replanned::Unsolvable };
+    let metric = if set.task.objective.maximize { -value } else { value };
+    let (first, plan) = choose(set, query, winners);
+    Replanned::Optimal { first, steps: decode(&set.task, &plan).steps, metric }
+}
+
+/// Where plans may begin; none if the task is not good for that.
+fn starts(base: &Base, situation: &Situation, query: &Query<'_>) -> Option<Vec<Start>> {
+    let sign = |metric: &BigRational| if base.task.objective.maximize { -metric } else { metric.clone() };
+    if query.first.is_empty() {
+        let (designs, arguments) = (Vec::new(), Vec::new());
+        let (state, own) = (situation.state.clone(), sign(&query.metric));
+        return Some(vec![Start { first: None, state, designs, arguments, own }]);
+    }
+    let start = |(index, first): (usize, &super::First)| {
+        let pair = |(function, design): &(String, String)| {
+            Some((base.layout.object(function)?, base.layout.object(design)?))
+        };
+        Some(Start {
+            first: Some(index),
+            state: base.layout.advance(&base.task, &situation.state, &first.change)?,
+            designs: first.configuration.iter().map(pair).collect::<Option<_>>()?,
+            arguments: first.arguments.iter().map(|name| base.layout.object(name)).collect::<Option<_>>()?,
+            own: sign(&first.metric),
+        })
+    };
+    query.first.iter().enumerate().map(start).collect()
+}
+
+/// The chosen one among equal plans, and the first step that it begins with.
+fn choose(set: &Set, query: &Query<'_>, winners: Vec<(Start, GroundPlan)>) -> (Option<usize>, GroundPlan) {
+    let old: Vec<GroundStep> =
+        query.close_to.into_iter().flatten().filter_map(|step| find(&set.task, step)).collect();
+    let close_to: FxHashSet<GroundStep> = old.into_iter().collect();
+    let chosen = winners.into_iter().map(|(start, plan)| {
+        let beginning = ties::Beginning { state: &start.state, designs: &start.designs, close_to: &close_to };
+        let (plan, changes) = ties::choose_from(&set.task, &set.bounds, query.limits, plan, &beginning);
+        ((changes.unwrap_or((usize::MAX, usize::MAX)), start.arguments), start.first, plan)
+    });
+    let least = chosen.min_by(|left, right| left.0.cmp(&right.0));
+    least.map_or_else(|| (None, GroundPlan { steps: Vec::new(), cost: 0 }), |(_, first, plan)| (first, plan))
+}
+
+/// A step of a plan in names, if the task still has it.
+fn find(task: &Task, (action, arguments): &(String, Vec<String>)) -> Option<GroundStep> {
+    let same = |object: ObjectId, name: &String| task.object_names[object.index()].eq_ignore_ascii_case(name);
+    for (operator, id) in task.operators.iter().zip((0..).map(crate::task::OperatorId)) {
+        if !task.schema_names[operator.schema as usize].eq_ignore_ascii_case(action)
+            || operator.arguments.len() != arguments.len()
+        {
+            continue;
+        }
+        let mut choice = vec![0; operator.slots.len()];
+        let fits = operator.arguments.iter().zip(arguments).all(|(argument, name)| match argument {
+            crate::task::Argument::Object(object) => same(*object, name),
+            crate::task::Argument::Slot(slot) => {
+                let size = operator.slots[*slot as usize].designs.len() as u16;
+                let design = (0..size).find(|design| {
+                    choice[*slot as usize] = *design;
+                    same(resolve(task, operator, &choice, *argument), name)
+                });
+                choice[*slot as usize] = design.unwrap_or(0);
+                design.is_some()
+            }
+        });
+        if fits && operator.admits(&choice) {
+            return Some(GroundStep { operator: id, choice });
+        }
+    }
+    None
+}

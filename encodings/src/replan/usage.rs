@@ -1,0 +1,228 @@
+//! A domain to what its symbols are used for: which conditions read them, which effects change them, and which parameters must be
+//! available.
+//!
+//! Only a syntactic look: a symbol that is read somewhere counts as read everywhere.
+
+use rustc_hash::FxHashSet;
+
+use crate::pddl::ast::{
+    Action, ActionBody, Atom, Condition, Domain, Effect, Expression, Name, Problem, Term,
+};
+
+/// What symbols are used for.
+#[derive(Debug, Default)]
+pub(super) struct Usage {
+    /// Predicates that conditions of actions and effects, axioms, or quantifiers of the goal read.
+    read: FxHashSet<Name>,
+    /// Atoms of the goal, as keys.
+    goal: FxHashSet<String>,
+    /// Predicates and functions that effects or axioms change.
+    changed: FxHashSet<Name>,
+    /// Functions that conditions, durations and effects read.
+    functions: FxHashSet<Name>,
+}
+
+impl Usage {
+    pub(super) fn of(domain: &Domain, problem: &Problem) -> Self {
+        let mut usage = Self::default();
+        for action in &domain.actions {
+            usage.action(action);
+        }
+        for derived in &domain.derived {
+            usage.changed.insert(derived.head.identifier.name.clone());
+            usage.condition(&derived.condition, false);
+        }
+        usage.condition(&problem.goal, true);
+        usage
+    }
+
+    /// Whether effects or axioms change a predicate or function.
+    pub(super) fn is_changed(&self, name: &Name) -> bool {
+        self.changed.contains(name)
+    }
+
+    /// Whether anything asks for an atom.
+    pub(super) fn is_read(&self, predicate: &Name, key: &str) -> bool {
+        self.read.contains(predicate) || self.goal.contains(key)
+    }
+
+    /// Whether anything but the metric asks for a function.
+    pub(super) fn is_function_read(&self, function: &Name) -> bool {
+        self.functions.contains(function)
+    }
+
+    fn action(&mut self, action: &Action) {
+        match &action.body {
+            ActionBody::Instantaneous { precondition, effect } => {
+                self.condition(precondition, false);
+                self.effect(effect);
+            }
+            ActionBody::Durative { duration, conditions, effects } => {
+                for constraint in duration {
+                    self.expression(&constraint.expression);
+                }
+                for (_, condition) in conditions {
+                    self.condition(condition, false);
+                }
+                for (_, effect) in effects {
+                    self.effect(effect);
+                }
+            }
+        }
+    }
+
+    /// `is_ground`: of atoms without variables only these very atoms are read.
+    fn condition(&mut self, condition: &Condition, is_ground: bool) {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                for part in parts {
+                    self.condition(part, is_ground);
+                }
+            }
+            Condition::Not(part) => self.condition(part, is_ground),
+            Condition::Imply(left, right) => {
+                self.condition(left, is_ground);
+                self.condition(right, is_ground);
+            }
+            Condition::Exists(_, part) | Condition::ForAll(_, part) => self.condition(part, false),
+            Condition::Atom(atom) if is_ground => {
+                self.goal.insert(key(atom));
+            }
+            Condition::Atom(atom) => {
+                self.read.insert(atom.predicate.name.clone());
+            }
+            Condition::Equal(..) => {}
+            Condition::Compare(_, left, right, _) => {
+                self.expression(left);
+                self.expression(right);
+            }
+        }
+    }
+
+    fn effect(&mut self, effect: &Effect) {
+        match effect {
+            Effect::And(parts) => parts.iter().for_each(|part| self.effect(part)),
+            Effect::ForAll(_, part) => self.effect(part),
+            Effect::When(condition, part) => {
+                self.condition(condition, false);
+                self.effect(part);
+            }
+            Effect::Add(atom) | Effect::Delete(atom) => {
+                self.changed.insert(atom.predicate.name.clone());
+            }
+            Effect::Assign(_, target, value, _) => {
+                self.changed.insert(target.predicate.name.clone());
+                self.expression(value);
+            }
+        }
+    }
+
+    fn expression(&mut self, expression: &Expression) {
+        match expression {
+            Expression::Fluent(atom) => {
+                self.functions.insert(atom.predicate.name.clone());
+            }
+            Expression::Operation(_, parts, _) => parts.iter().for_each(|part| self.expression(part)),
+            Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
+        }
+    }
+}
+
+/// An atom as text, however it is spelt: `(robot_at wp1)`.
+pub(super) fn key(atom: &Atom) -> String {
+    let mut text = String::with_capacity(32);
+    text.push('(');
+    text.push_str(atom.predicate.name.as_str());
+    for term in &atom.arguments {
+        text.push(' ');
+        text.push_str(identifier(term).as_str());
+    }
+    text.push(')');
+    text.make_ascii_lowercase();
+    text
+}
+
+/// The name of a variable or constant.
+pub(super) fn identifier(term: &Term) -> &Name {
+    match term {
+        Term::Variable(identifier) | Term::Constant(identifier) => &identifier.name,
+    }
+}
+
+/// For each action the parameters that must be available, by position, each with the predicate that says so, by position
+/// among `predicates`. None if one of the predicates is used otherwise: then a task in which more is available has
+/// not all operators of one in which less is.
+pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<Vec<(usize, usize)>>> {
+    let mut found = Vec::new();
+    let mut mentions = 0;
+    for action in &domain.actions {
+        let mut own = Vec::new();
+        let conditions: Vec<&Condition> = match &action.body {
+            ActionBody::Instantaneous { precondition, .. } => vec![precondition],
+            ActionBody::Durative { conditions, .. } => conditions.iter().map(|(_, part)| part).collect(),
+        };
+        for atom in conditions.into_iter().flat_map(conjuncts) {
+            let Some(predicate) = predicates.iter().position(|name| *name == atom.predicate.name) else {
+                continue;
+            };
+            let [Term::Variable(variable)] = atom.arguments.as_slice() else { return None };
+            let is_own = |parameter: &crate::pddl::ast::TypedName| parameter.identifier.name == variable.name;
+            own.push((action.parameters.iter().position(is_own)?, predicate));
+            mentions += 1;
+        }
+        found.push(own);
+    }
+    let all: usize = predicates.iter().map(|predicate| occurrences(domain, predicate)).sum();
+    (all == mentions).then_some(found)
+}
+
+/// The atoms of a conjunction.
+fn conjuncts(condition: &Condition) -> Vec<&Atom> {
+    match condition {
+        Condition::And(parts) => parts.iter().flat_map(conjuncts).collect(),
+        Condition::Atom(atom) => vec![atom],
+        _ => Vec::new(),
+    }
+}
+
+/// How often conditions and effects of a domain mention a predicate.
+fn occurrences(domain: &Domain, predicate: &Name) -> usize {
+    let bodies = domain.actions.iter().map(|action| match &action.body {
+        ActionBody::Instantaneous { precondition, effect } => {
+            in_condition(precondition, predicate) + in_effect(effect, predicate)
+        }
+        ActionBody::Durative { conditions, effects, .. } => {
+            let conditions = conditions.iter().map(|(_, part)| in_condition(part, predicate));
+            conditions.chain(effects.iter().map(|(_, part)| in_effect(part, predicate))).sum()
+        }
+    });
+    let derived = domain.derived.iter().map(|derived| {
+        usize::from(derived.head.identifier.name == *predicate) + in_condition(&derived.condition, predicate)
+    });
+    bodies.chain(derived).sum()
+}
+
+/// How often a condition mentions a predicate.
+pub(super) fn in_condition(condition: &Condition, predicate: &Name) -> usize {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => {
+            parts.iter().map(|part| in_condition(part, predicate)).sum()
+        }
+        Condition::Not(part) | Condition::Exists(_, part) | Condition::ForAll(_, part) => {
+            in_condition(part, predicate)
+        }
+        Condition::Imply(left, right) => in_condition(left, predicate) + in_condition(right, predicate),
+        Condition::Atom(atom) => usize::from(atom.predicate.name == *predicate),
+        Condition::Equal(..) | Condition::Compare(..) => 0,
+    }
+}
+
+fn in_effect(effect: &Effect, predicate: &Name) -> usize {
+    match effect {
+        Effect::And(parts) => parts.iter().map(|part| in_effect(part, predicate)).sum(),
+        Effect::ForAll(_, part) => in_effect(part, predicate),
+        Effect::When(condition, part) => in_condition(condition, predicate) + in_effect(part, predicate),
+        Effect::Add(atom) | Effect::Delete(atom) => usize::from(atom.predicate.name == *predicate),
+        Effect::Assign(..) => 0,
+    }
+}

@@ -1,0 +1,137 @@
+//! The situation to a question for the live planner, and its answer to a plan of the loop.
+//!
+//! The live planner knows the mission's own domain only. What is left of an action under way is a step that comes first: its
+//! configurations are tried one by one on the domain in which that action is shortened, see [`super::resume`].
+
+use encodings::validate::advance_each;
+use encodings::{First, Limits, Query, Replanned, Replanner};
+use num_rational::BigRational;
+
+use super::plan::{Ask, Outcome};
+use super::resume::{GATE, resume};
+use super::step::PlannedStep;
+
+/// So many configurations of the action under way are tried at most.
+const CONFIGURATIONS: usize = 256;
+
+/// A planner that is kept from one plan to the next.
+#[derive(Debug, Clone, Default)]
+pub(super) enum Live {
+    /// There is none yet.
+    #[default]
+    Untried,
+    /// The mission is not suited.
+    Unsuited,
+    /// For the problem that it was made for, and for those that are like it.
+    Ready(Replanner),
+}
+
+impl Live {
+    /// A proved answer; none if it has to be found without a live planner.
+    pub(super) fn plan(&mut self, ask: &Ask<'_>, limits: &Limits) -> Option<Outcome> {
+        let metric = ask.metric()?;
+        let first = match ask.running {
+            Some(_) => first_steps(ask)?,
+            None => Vec::new(),
+        };
+        if ask.running.is_some() && first.is_empty() {
+            return Some(none(Vec::new()));
+        }
+        let (steps, first): (Vec<PlannedStep>, Vec<First>) = first.into_iter().unzip();
+        let close_to: Option<Vec<(String, Vec<String>)>> = ask
+            .close_to
+            .map(|plan| plan.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect());
+        let query = Query {
+            problem: ask.problem,
+            first: &first,
+            metric: metric.clone(),
+            close_to: close_to.as_deref(),
+            limits,
+        };
+        let mut answer = self.ask(ask, &query, false)?;
+        if answer == Replanned::Misfit {
+            answer = self.ask(ask, &query, true)?;
+        }
+        match answer {
+            Replanned::Optimal { first: begins, steps: rest, metric } => {
+                let begins = begins.and_then(|index| steps.into_iter().nth(index));
+                let rest = rest.iter().map(|step| PlannedStep::new(ask.mission, step));
+                let steps = begins.into_iter().chain(rest).collect();
+                Some(Outcome { steps: Some(steps), cost: metric, proved: true, ..none(Vec::new()) })
+            }
+            Replanned::Unsolvable if ask.running.is_none() => {
+                let Self::Ready(replanner) = self else { return None };
+                Some(none(replanner.blocking(&query).unwrap_or_default()))
+            }
+            Replanned::Unsolvable => Some(none(Vec::new())),
+            _ => None,
+        }
+    }
+
+    fn ask(&mut self, ask: &Ask<'_>, query: &Query<'_>, anew: bool) -> Option<Replanned> {
+        if anew || matches!(self, Self::Untried) {
+            let made = ask.mission.replanner(ask.problem, query.limits);
+            *self = made.map_or(Self::Unsuited, Self::Ready);
+        }
+        match self {
+            Self::Ready(replanner) => Some(replanner.plan(query)),
+            _ => None,
+        }
+    }
+}
+
+/// That there is no plan.
+fn none(blocking: Vec<String>) -> Outcome {
+    Outcome {
+        steps: None,
+        cost: BigRational::default(),
+        proved: true,
+        because: "no plan reaches the goal".to_owned(),
+        blocking,
+    }
+}
+
+impl Ask<'_> {
+    /// The metric of the mission if it ended now; without a metric, 0.
+    fn metric(&self) -> Option<BigRational> {
+        let zero = BigRational::default();
+        if self.problem.metric.is_none() {
+            return Some(zero);
+        }
+        encodings::validate::metric_after(self.mission.domain(), self.problem, &zero)
+    }
+}
+
+/// What is left of the action under way, with each configuration that it can go on with; none if those are too many, or unknown.
+fn first_steps(ask: &Ask<'_>) -> Option<Vec<(PlannedStep, First)>> {
+    let running = ask.running?;
+    let mut steps = vec![running.step.clone()];
+    for (function, _) in &running.step.configuration {
+        let designs = ask.mission.designs_of(function);
+        if designs.is_empty() || steps.len() * designs.len() > CONFIGURATIONS {
+            return None;
+        }
+        let with =
+            |step: &PlannedStep| designs.iter().map(|design| step.with_design(function, design)).collect();
+        steps = steps.iter().flat_map(|step| -> Vec<PlannedStep> { with(step) }).collect();
+    }
+    let domain = resume(ask.mission.domain(), &running.step, &running.progress);
+    let plan_steps: Vec<_> = steps.iter().map(PlannedStep::to_plan_step).collect();
+    let before = ask.metric()?;
+    let advances = advance_each(&domain, ask.problem, &plan_steps);
+    let mut first = Vec::new();
+    for (mut step, change) in steps.into_iter().zip(advances) {
+        let Ok(mut change) = change else { continue };
+        change.added.retain(|atom| atom.predicate.name.as_str() != GATE);
+        let one = BigRational::from_integer(1.into());
+        let metric = if ask.problem.metric.is_some() { change.metric.clone()? } else { one };
+        step.duration.clone_from(&change.duration);
+        step.cost = &metric - &before;
+        let (configuration, arguments) = (step.configuration.clone(), step.arguments.clone());
+        first.push((step, First { configuration, arguments, change, metric }));
+    }
+    Some(first)
+}
+
+#[cfg(test)]
+mod tests;
