@@ -4,14 +4,17 @@
     python3 benches/peers/run.py --venv DIR --install            # once: the peers, from PyPI, into a virtual environment
     python3 benches/peers/run.py --venv DIR --sizes 10,20 --csv peers.csv
 
-Instances come from `../shared/tools/gen_ratpa.py`. Every planner gets the encoding of an instance
+Instances with one to three functions come from `../shared/tools/gen_ratpa.py`, those with four from `factored.py`. Every planner gets the encoding of an instance
 that it reads: c and b are classical (b with a battery in discrete levels), n has numeric fluents; the optimum of b and n is
-the same. Times are of the whole process and its children, from its start to its end: wall clock, and processor time
-in brackets, on one core (`taskset`). A planner counts only if it ends by itself, claiming an optimum, and the
-claim is that of the generator's own Dijkstra. Standard library only.
+the same. Times are of the whole process and its children, from its start to its end, on one core (`taskset`). The
+limit is on processor time, so that other load on the machine harms nobody; wall clock may be ten times as long. A planner
+counts only if it ends by itself, claiming an optimum, and the claim is that of the generator's own search. A planner that
+came to a limit is not run on instances of the same kind with at least as many waypoints, designs and functions
+(`--all` runs it); these count as not proved, with status `skipped`. What the CSV file has already is not run again.
+Standard library only.
 
-`up-aries` 0.5.0 from PyPI is not among them: it refuses all encodings ("Real types are not supported", and with integer
-fluents "kind(cost)? == ExpressionKind::Constant", as costs of actions are fluents here).
+`up-aries` 0.5.0 from PyPI is not among them: it proves no optimum of such problems by its own word (its `aries-opt` takes
+hierarchical problems only, "optimality cannot be proven for generative planning").
 """
 
 import argparse
@@ -29,10 +32,14 @@ import tempfile
 import time
 from pathlib import Path
 
+import factored
+
 ROOT = Path(__file__).resolve().parents[2]
 TOOLS = ROOT.parent / "shared" / "tools"
 PACKAGES = ["up-fast-downward", "up-enhsp", "kairos-planner", "up-symk"]
 NUMERIC, CLASSICAL = "numeric", "classical"
+# Wall-clock time over processor time, at most; rows of a table of costs, at most.
+PATIENCE, ROWS = 10, 300_000
 
 
 def planners(venv, seconds):
@@ -44,7 +51,7 @@ def planners(venv, seconds):
     symk = str(site / "up_symk/symk/fast-downward.py")
     enhsp = ["java", "-Xmx4g", "-jar", str(site / "up_enhsp/ENHSP/enhsp.jar")]
     kairos = [str(venv / "bin" / "kairos"), "solve"]
-    options = ["--timeout", str(seconds), "--threads", "1", "--format", "json"]
+    options = ["--timeout", str(PATIENCE * seconds), "--threads", "1", "--format", "json"]
     metaplan = str(Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "metaplan")
     both = {NUMERIC: "n", CLASSICAL: "c"}
     return [
@@ -93,9 +100,9 @@ def run(command, directory, seconds, megabytes):
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     started = time.monotonic()
     process = subprocess.Popen(command, cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                               start_new_session=True, preexec_fn=lambda: limit(command, megabytes))
+                               start_new_session=True, preexec_fn=lambda: limit(command, seconds, megabytes))
     try:
-        output, _ = process.communicate(timeout=seconds)
+        output, _ = process.communicate(timeout=PATIENCE * seconds)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         output, _ = process.communicate()
@@ -106,7 +113,8 @@ def run(command, directory, seconds, megabytes):
     return wall, processor, after.ru_maxrss / 1024, process.returncode, output
 
 
-def limit(command, megabytes):
+def limit(command, seconds, megabytes):
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
     # The virtual machine of Java reserves far more address space than it uses; its heap is limited by its own option.
     if "java" not in command:
         resource.setrlimit(resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))
@@ -118,47 +126,80 @@ def generate(arguments, script):
 
 
 def instances(options, directory):
-    """Name, kind, and the optimum by the generator's own search."""
-    for n in options.sizes:
+    """Name, size, kind, the encodings of it, and the optimum by the generator's own search."""
+    for k in options.functions:
         for m in options.designs:
-            for k in options.functions:
+            for n in options.sizes:
+                size = (n, m, k)
+                if k > 3:
+                    yield from factored_instances(size, options.seed, directory)
+                    continue
                 name = f"ugv-n{n}-m{m}-k{k}"
                 facts = generate(["--family", "ugv", "--n", str(n), "--m", str(m), "--k", str(k), "--seed",
                                   str(options.seed), "--metric", "weighted", "--enc", "c,b,n", "--out", directory,
                                   "--name", name, "--oracle"], "gen_ratpa.py")
-                yield name, NUMERIC, facts["opt_bn"][0] if facts["opt_bn"] else "none"
-                yield name, CLASSICAL, facts["opt_c"][0] if facts["opt_c"] else "none"
+                yield name, size, NUMERIC, "bn", facts["opt_bn"][0] if facts["opt_bn"] else "none"
+                yield name, size, CLASSICAL, "c", facts["opt_c"][0] if facts["opt_c"] else "none"
+
+
+def factored_instances(size, seed, directory):
+    """Without encoding b, and without c where its table is too long."""
+    made = factored.Map(*size, seed)
+    name = "factored-n{}-m{}-k{}".format(*size)
+    kinds = [(NUMERIC, "n", True)] + [(CLASSICAL, "c", False)] * (made.classical_rows() <= ROWS)
+    for kind, encoding, battery in kinds:
+        Path(directory, f"{name}.{encoding}.domain.pddl").write_text(made.domain(battery))
+        Path(directory, f"{name}.{encoding}.problem.pddl").write_text(made.problem(battery))
+        optimum = made.optimum(battery)
+        yield name, size, kind, encoding, "none" if optimum is None else optimum
 
 
 def measure(options):
-    rows = []
+    rows, known, beyond = [], {}, []
+    if Path(options.csv).exists():
+        with open(options.csv, newline="") as file:
+            known = {tuple(row[:3]): row for row in csv.reader(file)}
     with tempfile.TemporaryDirectory() as directory, open(options.csv, "w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["instance", "kind", "planner", "encoding", "status", "cost", "optimum", "wall_s", "cpu_s",
                          "peak_mb", "load"])
-        for name, kind, optimum in instances(options, directory):
+        for name, size, kind, written, optimum in instances(options, directory):
             for planner, encodings, command, cost in planners(options.venv, options.seconds):
-                if kind not in encodings or (options.only and planner not in options.only):
+                if encodings.get(kind, "-") not in written or (options.only and planner not in options.only):
                     continue
                 encoding = encodings[kind]
-                files = [f"{name}.{encoding}.{part}.pddl" for part in ["domain", "problem"]]
-                largest = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-                wall, processor, peak, code, output = run(command(*files), directory, options.seconds, options.memory)
-                try:
-                    found = cost(output, code) if code != 124 and wall < options.seconds else None
-                except (ValueError, KeyError):
-                    found = None
-                right = found == optimum or (found not in (None, "none") and float(found) == optimum)
-                status = "proved" if right else "wrong" if found is not None else "limit" if wall >= options.seconds else "failed"
-                # The kernel tells the largest child so far only.
-                peak = round(peak) if peak > largest else ""
-                row = [name, kind, planner, encoding, status, found, optimum, round(wall, 3), round(processor, 3), peak,
-                       round(os.getloadavg()[0], 1)]
+                hopeless = any(other == (planner, kind) and all(a <= b for a, b in zip(reached, size)) for other, reached in beyond)
+                if (name, kind, planner) in known:
+                    row = known[name, kind, planner]
+                elif hopeless and not options.all:
+                    row = [name, kind, planner, encoding, "skipped", None, optimum, "", "", "", ""]
+                else:
+                    files = [f"{name}.{encoding}.{part}.pddl" for part in ["domain", "problem"]]
+                    row = [name, kind, planner, encoding, *one(command(*files), cost, optimum, directory, options)]
+                if row[4] == "limit":
+                    beyond.append(((planner, kind), size))
                 writer.writerow(row)
                 file.flush()
                 rows.append(dict(zip(["name", "kind", "planner", "encoding", "status", "cost", "optimum", "wall", "cpu"], row)))
                 print(*row, flush=True)
     return rows
+
+
+def one(command, cost, optimum, directory, options):
+    """Status, cost found, optimum, times, peak memory and load of one run."""
+    largest = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    wall, processor, peak, code, output = run(command, directory, options.seconds, options.memory)
+    # Who is stopped by the limit has used a little less than it, as far as the parent is told.
+    late = code == 124 or processor >= 0.9 * options.seconds
+    try:
+        found = None if late else cost(output, code)
+    except (ValueError, KeyError):
+        found = None
+    right = found == optimum or (found not in (None, "none") and float(found) == optimum)
+    status = "proved" if right else "wrong" if found is not None else "limit" if late else "failed"
+    # The kernel tells the largest child so far only.
+    peak = round(peak) if peak > largest else ""
+    return [status, found, optimum, round(wall, 3), round(processor, 3), peak, round(os.getloadavg()[0], 1)]
 
 
 def table(rows):
@@ -187,8 +228,9 @@ def main():
     parser.add_argument("--designs", type=numbers, default=[3, 6, 12], help="designs of each function")
     parser.add_argument("--functions", type=numbers, default=[1, 2, 3, 4], help="functions of each move")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=60, help="limit on wall-clock time")
+    parser.add_argument("--seconds", type=float, default=60, help="limit on processor time")
     parser.add_argument("--memory", type=int, default=8192, help="limit on address space, in MB")
+    parser.add_argument("--all", action="store_true", help="run hopeless instances, too")
     parser.add_argument("--only", type=lambda text: text.split(","), help="planners")
     parser.add_argument("--csv", default="peers.csv")
     parser.add_argument("--table", metavar="CSV", help="only the table of a file that was written before")

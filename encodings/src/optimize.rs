@@ -21,7 +21,7 @@ use crate::ties;
 /// Formulas with more operator variables than this are not built.
 const FORMULA_LIMIT: usize = 30_000_000;
 /// What the quick search has proved, the SAT solver may spend this many conflicts on proving again…
-const CONFIRM_CONFLICTS: u64 = 5_000;
+const CONFIRM_CONFLICTS: u64 = 1_000;
 /// … if the formula has at most this many operator variables.
 const CONFIRM_SIZE: usize = 5_000;
 /// Formulas with at most this many operator variables are solved once more without the help of bounds.
@@ -116,7 +116,7 @@ impl Run<'_> {
         let found = if self.config.quick_search {
             search(self.task, &bounds, &self.config.limits)
         } else {
-            Found::Unknown
+            Found::Unknown(None)
         };
         self.statistics.search = started.elapsed();
         let within =
@@ -126,7 +126,8 @@ impl Run<'_> {
             Found::Optimal(plan) if within(&plan) => {
                 (Some(ties::choose(self.task, &bounds, &self.config.limits, plan)), true)
             }
-            Found::Optimal(_) | Found::Unknown => (None, false),
+            Found::Unknown(Some(plan)) if within(&plan) => (Some(plan), false),
+            Found::Optimal(_) | Found::Unknown(_) => (None, false),
         };
         let incumbent = match incumbent {
             Some(plan) => plan,

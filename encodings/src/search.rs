@@ -3,7 +3,8 @@
 //!
 //! States that agree on all finite-domain variables are compared by cost and by numeric variables; where a higher value
 //! never hurts (a battery), a state that costs no less and has no more of anything is dropped. That is the label-setting
-//! search of resource-constrained shortest paths [1]. If it ends before its limits, its answer is exact.
+//! search of resource-constrained shortest paths [1]. If it ends before its limits, its answer is exact. If it does not end
+//! soon, a greedy search, which looks at estimates only, finds some plan meanwhile.
 //!
 //! [1] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
 //! windows, INFOR 26(3), 1988.
@@ -22,6 +23,8 @@ use crate::task::{Fact, OperatorId, State, Task};
 
 /// How many states are stored at most.
 const STATE_LIMIT: usize = 400_000;
+/// After so many states without a plan the greedy search has its turn, with as many.
+const SOON: usize = 20_000;
 /// States with larger numbers are left out.
 const NUMBER_LIMIT: u64 = 1 << 60;
 
@@ -32,8 +35,8 @@ pub(crate) enum Found {
     Optimal(GroundPlan),
     /// There is no plan: every reachable state was visited, or is dominated by one that was.
     None,
-    /// A limit was reached first.
-    Unknown,
+    /// A limit was reached first; the best plan so far.
+    Unknown(Option<GroundPlan>),
 }
 
 struct Node {
@@ -71,12 +74,19 @@ struct Search<'a> {
     open: BinaryHeap<Reverse<(i64, u32, u32)>>,
     /// Whether states were left out because their numbers do not fit.
     incomplete: bool,
+    /// Whether only estimates decide what comes next.
+    greedy: bool,
+    /// The cheapest goal state so far.
+    best: Option<u32>,
+    /// What a known plan costs: nothing dearer is looked at.
+    limit: i64,
 }
 
 /// Searches a task whose operators all cost at least 0.
 pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
     let prepared = Prepared::new(task);
-    prepared.map_or(Found::Unknown, |prepared| search_from(task, bounds, &prepared, &task.initial, limits))
+    let found = prepared.map(|prepared| search_from(task, bounds, &prepared, &task.initial, limits));
+    found.unwrap_or(Found::Unknown(None))
 }
 
 /// Searches it from a state of its own.
@@ -87,7 +97,26 @@ pub(crate) fn search_from(
     initial: &State,
     limits: &Limits,
 ) -> Found {
-    Search::new(task, bounds, prepared, initial).run(limits)
+    let mut search = Search::new(task, bounds, prepared, initial, false);
+    if let Some(found) = search.run(limits, SOON) {
+        return found;
+    }
+    let mut some = None;
+    if search.best.is_none() {
+        let mut greedy = Search::new(task, bounds, prepared, initial, true);
+        greedy.run(limits, SOON);
+        some = greedy.best_plan();
+        search.limit = some.as_ref().map_or(i64::MAX, |plan| plan.cost);
+    }
+    match search.run(limits, STATE_LIMIT) {
+        Some(Found::Unknown(plan)) => Found::Unknown(cheaper(plan, some)),
+        Some(found) => found,
+        None => Found::Unknown(cheaper(search.best_plan(), some)),
+    }
+}
+
+fn cheaper(one: Option<GroundPlan>, other: Option<GroundPlan>) -> Option<GroundPlan> {
+    one.into_iter().chain(other).min_by_key(|plan| (plan.cost, plan.steps.len()))
 }
 
 /// A state's basic values and numbers, and what was paid on the way to it.
@@ -102,8 +131,8 @@ pub(crate) fn closed_labels(
     cost: Option<i64>,
 ) -> Option<Vec<ClosedLabel>> {
     let prepared = Prepared::new(task)?;
-    let mut search = Search::new(task, bounds, &prepared, &task.initial);
-    match (search.run(limits), cost) {
+    let mut search = Search::new(task, bounds, &prepared, &task.initial, false);
+    match (search.run(limits, STATE_LIMIT)?, cost) {
         (Found::Optimal(plan), Some(cost)) if plan.cost >= cost => {}
         (Found::None, None) => {}
         _ => return None,
@@ -118,7 +147,13 @@ pub(crate) fn closed_labels(
 }
 
 impl<'a> Search<'a> {
-    fn new(task: &'a Task, bounds: &'a Bounds, prepared: &'a Prepared, initial: &State) -> Self {
+    fn new(
+        task: &'a Task,
+        bounds: &'a Bounds,
+        prepared: &'a Prepared,
+        initial: &State,
+        greedy: bool,
+    ) -> Self {
         let mut search = Search {
             task,
             bounds,
@@ -127,30 +162,41 @@ impl<'a> Search<'a> {
             seen: FxHashMap::default(),
             open: BinaryHeap::new(),
             incomplete: false,
+            greedy,
+            best: None,
+            limit: i64::MAX,
         };
         search.push(initial.clone(), 0, 0, None);
         search
     }
 
-    fn run(&mut self, limits: &Limits) -> Found {
+    /// None if there are more states than `most` before anything is known; it may be called again.
+    fn run(&mut self, limits: &Limits, most: usize) -> Option<Found> {
         let mut expanded = 0_usize;
-        while let Some(Reverse((_, steps, id))) = self.open.pop() {
+        while self.nodes.len() <= most {
+            let Some(Reverse((_, steps, id))) = self.open.pop() else {
+                return Some(if self.incomplete { Found::Unknown(self.best_plan()) } else { Found::None });
+            };
             if self.nodes[id as usize].dominated {
                 continue;
             }
             if self.task.is_goal(&self.nodes[id as usize].state) {
                 if self.incomplete {
-                    return Found::Unknown;
+                    return Some(Found::Unknown(self.best_plan()));
                 }
-                return Found::Optimal(self.plan(id));
+                return Some(Found::Optimal(self.plan(id)));
             }
             expanded += 1;
-            if self.nodes.len() > STATE_LIMIT || (expanded.is_multiple_of(256) && limits.reached()) {
-                return Found::Unknown;
+            if expanded.is_multiple_of(256) && limits.reached() {
+                return Some(Found::Unknown(self.best_plan()));
             }
             self.expand(id, steps);
         }
-        if self.incomplete { Found::Unknown } else { Found::None }
+        None
+    }
+
+    fn best_plan(&self) -> Option<GroundPlan> {
+        self.best.map(|goal| self.plan(goal))
     }
 
     fn expand(&mut self, id: u32, steps: u32) {
@@ -171,6 +217,9 @@ impl<'a> Search<'a> {
 
     fn push(&mut self, state: State, cost: i64, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
         let Some(estimate) = self.bounds.estimate(&state) else { return };
+        if cost + estimate > self.limit {
+            return;
+        }
         if state.numbers.iter().any(|number| number.unsigned_abs() > NUMBER_LIMIT) {
             self.incomplete = true;
             return;
@@ -202,8 +251,13 @@ impl<'a> Search<'a> {
                 front.push(id);
             }
         }
+        if (self.best.is_none() || cost < self.limit) && self.task.is_goal(&state) {
+            self.best = Some(id);
+            self.limit = cost;
+        }
         self.nodes.push(Node { state, cost, steps, parent, dominated: false });
-        self.open.push(Reverse((cost + estimate, steps, id)));
+        let so_far = if self.greedy { 0 } else { cost };
+        self.open.push(Reverse((so_far + estimate, steps, id)));
     }
 
     fn plan(&self, goal: u32) -> GroundPlan {

@@ -22,8 +22,11 @@ use crate::task::{State, Task};
 use missions::Mission;
 use random::Random;
 
-/// Longest plans that are looked for.
+/// Plans of so many steps are looked for at least.
 const STEPS: usize = 6;
+
+/// Longer ones, up to the step bound, only to this number.
+const MOST_STEPS: usize = 16;
 
 /// More than any plan of the small tasks below costs.
 const MUCH: i64 = 200;
@@ -60,26 +63,28 @@ fn check(seed: u64, backend: &Backend) {
     let (domain, problem) = (Source::new("d", mission.domain()), Source::new("p", mission.problem()));
     let (domain, problem, _) = read(&domain, &problem).expect("PDDL");
     let task = ground(&domain, &problem, &Config::default()).expect("a task");
-    let costs = mission.oracle_by_steps(STEPS);
+    let optimum = mission.oracle();
     if task.unreachable.is_some() {
-        assert!(costs.iter().all(Option::is_none), "seed {seed}");
+        assert!(optimum.is_none(), "seed {seed}");
         return;
     }
-    let optimum = mission.oracle();
+    let (scale, offset) = (task.objective.scale, task.objective.offset);
+    let bounds = Bounds::new(&task, &Limits::none());
+    let below = optimum.map_or(MUCH, |optimum| optimum * scale - offset - 1);
+    let step_bound = bounds.window(&task, Some(below), None).steps.unwrap_or(STEPS);
+    let costs = mission.oracle_by_steps(step_bound.clamp(STEPS, MOST_STEPS));
     assert!(
         costs.iter().flatten().all(|cost| optimum.is_some_and(|optimum| optimum <= *cost)),
         "seed {seed}"
     );
-    let scale = task.objective.scale;
-    let bounds = Bounds::new(&task, &Limits::none());
     for bounds in [&bounds, &Bounds::trivial(&task)] {
         for (steps, cost) in costs.iter().enumerate() {
             let solvable = |limit| is_solvable(&task, bounds, steps, limit, Semantics::Sequential, backend);
             let context = || format!("seed {seed}, {backend:?}, {steps} steps: {mission:?}");
             match cost {
                 Some(cost) => {
-                    assert!(solvable(cost * scale - task.objective.offset), "{}", context());
-                    assert!(!solvable(cost * scale - task.objective.offset - 1), "{}", context());
+                    assert!(solvable(cost * scale - offset), "{}", context());
+                    assert!(!solvable(cost * scale - offset - 1), "{}", context());
                 }
                 None => assert!(!solvable(i64::from(i32::MAX)), "{}", context()),
             }
@@ -101,7 +106,7 @@ fn formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
 #[test]
 #[ignore = "takes minutes"]
 fn many_formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
-    for backend in built_in() {
+    for backend in crate::sat::tests::backends() {
         (25..2_100).for_each(|seed| check(seed, &backend));
     }
 }
@@ -261,14 +266,61 @@ fn depot(seed: u64) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
+fn ground_text((domain, problem): (String, String)) -> Task {
+    let (domain, problem, _) = read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
+    let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")], ..Config::default() };
+    ground(&domain, &problem, &config).expect("a task")
+}
+
+/// Estimates never fall by more than a step costs, and are 0 at the goal: so they are lower bounds. Returns whether the shares of
+/// several projections say more of the initial state than any projection alone.
+fn check_estimates(text: &(String, String)) -> bool {
+    let task = ground_text(text.clone());
+    if task.unreachable.is_some() {
+        return false;
+    }
+    let (bounds, alone) =
+        (Bounds::new(&task, &Limits::none()), Bounds::of_projections(&task, &Limits::none()));
+    let mut seen = rustc_hash::FxHashSet::from_iter([task.initial.clone()]);
+    let mut open = vec![task.initial.clone()];
+    while let Some(state) = open.pop() {
+        let estimate = bounds.estimate(&state);
+        assert!(!task.is_goal(&state) || estimate == Some(0), "{estimate:?} at a goal: {text:?}");
+        for (next, step) in successors(&task, &state) {
+            if let Some(after) = bounds.estimate(&next) {
+                assert!(estimate.is_some_and(|estimate| estimate <= step + after), "{state:?}: {text:?}");
+            }
+            if seen.len() < 3_000 && seen.insert(next.clone()) {
+                open.push(next);
+            }
+        }
+    }
+    bounds.estimate(&task.initial) > alone.estimate(&task.initial)
+}
+
+#[test]
+fn estimates_are_consistent_and_shares_add_up() {
+    let fleets = (0..12).filter(|seed| check_estimates(&fleet(*seed))).count();
+    let depots = (0..12).filter(|seed| check_estimates(&depot(*seed))).count();
+    assert!(fleets > 3 && depots > 3, "shares add up for {fleets} fleets and {depots} depots");
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn many_estimates_are_consistent() {
+    for seed in 12..600 {
+        check_estimates(&fleet(seed));
+        check_estimates(&depot(seed));
+        let mission = Mission::random(seed);
+        check_estimates(&(mission.domain(), mission.problem()));
+    }
+}
+
 /// What a task's formulas say in all semantics. Returns whether several operators stood at a step, and whether anything
 /// was equal.
-fn check_all((domain, problem): (String, String), backend: &Backend) -> (bool, bool) {
-    let text = problem.clone();
-    let (domain, problem) = (Source::new("d", domain), Source::new("p", problem));
-    let (domain, problem, _) = read(&domain, &problem).expect("PDDL");
-    let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")], ..Config::default() };
-    let task = ground(&domain, &problem, &config).expect("a task");
+fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
+    let task = ground_text(text.clone());
+    let text = text.1;
     if task.unreachable.is_some() {
         return (false, false);
     }

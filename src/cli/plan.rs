@@ -123,8 +123,13 @@ fn limits(arguments: &Arguments) -> Result<Limits, Failure> {
         memory::watch(megabytes, limits.interrupt())?;
     }
     let interrupt = limits.interrupt();
-    // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual.
-    let _ = ctrlc::set_handler(move || interrupt.store(true, Ordering::Relaxed));
+    // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual. Who presses it again
+    // does not want the best plan so far, either.
+    let _ = ctrlc::set_handler(move || {
+        if interrupt.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
     Ok(limits)
 }
 

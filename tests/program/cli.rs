@@ -332,6 +332,48 @@ fn every_solver_proves_the_same() {
 fn memory_is_limited() {
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "0"]), 2, &["0 is not in"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "4000"]), 0, &["optimal, proved"]);
+    let enough = ["--memory-limit", "80"];
+    check(
+        &plan(&sliding_tiles(""), &tiles_in_reverse(), &enough),
+        12,
+        &["a limit was reached", "nothing is proved"],
+    );
+    let help = "(:action ask_for_help :parameters () :effect (and (solved) (increase (total-cost) 1000)))";
+    let found = plan(&sliding_tiles(help), &tiles_in_reverse(), &enough);
+    check(&found, 1, &["ask_for_help", "cost 1000", "not proved optimal"]);
+}
+
+/// The puzzle of fifteen tiles, of which no search comes to an end.
+fn sliding_tiles(further: &str) -> String {
+    let right: Vec<String> = (1..16).map(|tile| format!("(on t{tile} c{tile})")).collect();
+    let constants: Vec<String> = (1..16).map(|tile| format!("t{tile} - tile c{tile} - cell")).collect();
+    format!(
+        "(define (domain tiles) (:requirements :typing :action-costs) (:types tile cell)
+          (:constants {constants})
+          (:predicates (on ?t - tile ?c - cell) (blank ?c - cell) (beside ?a ?b - cell) (solved))
+          (:functions (total-cost) - number)
+          {further}
+          (:action finish :parameters () :precondition (and {right}) :effect (solved))
+          (:action slide :parameters (?t - tile ?from ?to - cell)
+            :precondition (and (beside ?from ?to) (on ?t ?from) (blank ?to))
+            :effect (and (not (on ?t ?from)) (not (blank ?to)) (on ?t ?to) (blank ?from) (increase (total-cost) 1))))",
+        constants = constants.join(" "),
+        right = right.join(" "),
+    )
+}
+
+fn tiles_in_reverse() -> String {
+    let place = |tile: i32| (tile / 4, tile % 4);
+    let beside = |a: i32, b: i32| (place(a).0 - place(b).0).abs() + (place(a).1 - place(b).1).abs() == 1;
+    let pairs = (0..16).flat_map(|a| (0..16).map(move |b| (a, b))).filter(|(a, b)| beside(*a, *b));
+    let pairs: Vec<String> = pairs.map(|(a, b)| format!("(beside c{a} c{b})")).collect();
+    let tiles: Vec<String> = (1..16).map(|tile| format!("(on t{tile} c{})", 16 - tile)).collect();
+    format!(
+        "(define (problem p) (:domain tiles) (:objects c0 - cell)
+          (:init (blank c0) (= (total-cost) 0) {} {}) (:goal (solved)) (:metric minimize (total-cost)))",
+        pairs.join(" "),
+        tiles.join(" ")
+    )
 }
 
 #[test]

@@ -2,16 +2,21 @@
 //!
 //! A projection of the task to a few finite-domain variables is small enough to be solved outright: Dijkstra from its
 //! goal states gives a consistent, admissible estimate [1]; dynamic programming over (step, abstract state) says which
-//! operators can still be at which step of a plan cheaper than the best known one, and beyond which step there is none.
+//! operators can still be at which step of a plan cheaper than the best known one, and beyond which step there is none. Shares
+//! of the costs make estimates of several projections add up.
 //!
 //! [1] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
+mod partition;
 mod projection;
 mod resources;
 
 pub(crate) use projection::Projection;
 
+use partition::Partition;
 use resources::Resource;
+
+use smallvec::SmallVec;
 
 use crate::limits::Limits;
 use crate::quantity::NumericId;
@@ -23,11 +28,16 @@ const STEP_LIMIT: usize = 4_000;
 const STATE_LIMIT: usize = 20_000;
 /// How many projections to pairs of variables are tried.
 const PAIR_LIMIT: usize = 40;
+/// Beyond the best few, projections cost more time than they save steps.
+const KEPT: usize = 12;
 
 /// Projections of a task, the one with the highest estimate of the initial state first.
 pub(crate) struct Bounds {
     pub(crate) projections: Vec<Projection>,
     resources: Vec<Resource>,
+    /// Sums of shares, and the projections that only these use.
+    partitions: Vec<Partition>,
+    further: Vec<Projection>,
 }
 
 /// What is known of plans whose cost stays below some limit.
@@ -40,6 +50,21 @@ pub(crate) struct Window {
 
 impl Bounds {
     pub(crate) fn new(task: &Task, limits: &Limits) -> Self {
+        let mut bounds = Self::of_projections(task, limits);
+        bounds.projections.append(&mut bounds.further);
+        if !limits.reached() {
+            bounds.partitions = partition::partitions(task, &bounds.projections);
+        }
+        let kept = bounds.projections.len().min(KEPT);
+        bounds.further = bounds.projections.split_off(kept);
+        if bounds.partitions.is_empty() {
+            bounds.further.clear();
+        }
+        bounds
+    }
+
+    /// Bounds that each rest on one projection.
+    pub(crate) fn of_projections(task: &Task, limits: &Limits) -> Self {
         let basic = |variable: &crate::task::VariableId| variable.index() < task.basic;
         let goal_variables: Vec<_> = task.goal.facts.iter().map(|fact| fact.variable).filter(basic).collect();
         let mut patterns: Vec<Vec<_>> = goal_variables.iter().map(|variable| vec![*variable]).collect();
@@ -68,22 +93,36 @@ impl Bounds {
             }
         }
         projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
-        // Beyond the best few, projections cost more time than they save steps.
-        projections.truncate(12);
+        let further = projections.split_off(projections.len().min(KEPT));
         let resources = resources::resources(task, &projections);
-        Self { projections, resources }
+        Self { projections, resources, partitions: Vec::new(), further }
     }
 
     /// Bounds that say nothing: the projection to no variable at all.
     pub(crate) fn trivial(task: &Task) -> Self {
-        Self { projections: vec![Projection::new(task, Vec::new())], resources: Vec::new() }
+        Self {
+            projections: vec![Projection::new(task, Vec::new())],
+            resources: Vec::new(),
+            partitions: Vec::new(),
+            further: Vec::new(),
+        }
     }
 
     /// A lower bound on the cost from a state to the goal; none if the goal cannot be reached.
     pub(crate) fn estimate(&self, state: &State) -> Option<i64> {
         let mut best = 0;
-        for projection in &self.projections {
-            best = best.max(projection.estimate(state)?);
+        if self.partitions.is_empty() {
+            for projection in &self.projections {
+                best = best.max(projection.estimate(state)?);
+            }
+        } else {
+            let mut states: SmallVec<[u32; 16]> = SmallVec::new();
+            for projection in self.projections.iter().chain(&self.further) {
+                let own = projection.state(state);
+                best = best.max(projection.to_go(own)?);
+                states.push(own);
+            }
+            best = self.partitions.iter().map(|partition| partition.estimate(&states)).fold(best, i64::max);
         }
         let enough = |resource: &Resource| resource.suffices(state, &self.projections);
         self.resources.iter().all(enough).then_some(best)

@@ -67,7 +67,8 @@ impl Projection {
             }
             projection.operators.push((cost, transitions));
         }
-        projection.to_go = projection.costs_to_go();
+        let costs: Vec<i64> = projection.operators.iter().map(|(cost, _)| *cost).collect();
+        projection.to_go = projection.costs_to_go(&costs);
         projection
     }
 
@@ -152,8 +153,24 @@ impl Projection {
         reached.into_iter().map(index).collect()
     }
 
-    fn costs_to_go(&self) -> Vec<Option<i64>> {
-        self.distances(|operator| self.operators[operator].0, self.goals.iter().map(|goal| (*goal, 0)))
+    /// The cost to go from each abstract state, if operators cost so much.
+    pub(crate) fn costs_to_go(&self, costs: &[i64]) -> Vec<Option<i64>> {
+        self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)))
+    }
+
+    /// The least costs of operators with which the cost to go is as given.
+    pub(crate) fn saturated(&self, to_go: &[Option<i64>]) -> impl Iterator<Item = i64> {
+        self.operators.iter().map(|(_, transitions)| {
+            let falls = transitions
+                .iter()
+                .filter_map(|t| Some(to_go[t.source as usize]? - to_go[t.target as usize]?));
+            falls.fold(0, i64::max)
+        })
+    }
+
+    /// How much has to be looked at to compute costs to go.
+    pub(crate) fn effort(&self) -> usize {
+        self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
     }
 
     /// The least number of steps from each abstract state to the goal.

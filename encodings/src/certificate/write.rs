@@ -41,7 +41,7 @@ pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Cert
         let argument = Argument { format: ARGUMENT_FORMAT.into(), ..Argument::default() };
         return written(&model(task), &argument);
     }
-    let bounds = Bounds::new(task, limits);
+    let bounds = Bounds::of_projections(task, limits);
     let cost = solution.ground.as_ref().map(|plan| plan.cost);
     let labels = closed_labels(task, &bounds, limits, cost)?;
     let label = |(values, numbers, cost): (Vec<u32>, Vec<i64>, i64)| Label(values, numbers, cost);

@@ -154,10 +154,10 @@ fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
     let bodies = task.world.definitions.axioms.iter().map(|axiom| &axiom.body);
     let comparisons = conditions.chain(bodies).flat_map(|condition| &condition.comparisons);
-    let mut open: Vec<NumericId> = comparisons
+    let mut read: FxHashSet<NumericId> = comparisons
         .flat_map(|(linear, _)| linear.coefficients.iter().map(|(variable, _)| *variable))
         .collect();
-    let mut read: FxHashSet<NumericId> = open.iter().copied().collect();
+    let mut open: Vec<NumericId> = read.iter().copied().collect();
     while let Some(variable) = open.pop() {
         let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));
         for (source, _) in values.flat_map(|value| &value.coefficients) {

@@ -47,7 +47,7 @@ pub(super) fn solve(base: &Base, set: &Set, situation: &Situation, query: &Query
         let plan = match search_from(&set.task, &set.bounds, prepared, &start.state, query.limits) {
             Found::Optimal(plan) => plan,
             Found::None => continue,
-            Found::Unknown => return Replanned::Unknown,
+            Found::Unknown(_) => return Replanned::Unknown,
         };
         let value = (&start.own + scale(plan.cost), plan.steps.len());
         match &best {

@@ -7,7 +7,7 @@ mod batsat;
 mod cadical;
 mod program;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod varisat;
 
 use std::str::FromStr;

@@ -17,7 +17,7 @@ const PROGRAMS: [&str; 6] = [
 
 /// The built-in ones, and the programs that are there.
 #[allow(clippy::print_stdout)]
-fn backends() -> Vec<Backend> {
+pub(crate) fn backends() -> Vec<Backend> {
     let built_in = Backend::BUILT_IN.iter().map(|name| name.parse().expect("a name"));
     let mut found: Vec<Backend> = built_in.collect();
     for program in PROGRAMS {

@@ -1,0 +1,105 @@
+//! Costs divided among projections, so that their estimates add up.
+//!
+//! Saturated cost partitioning [1]: projections take their share of the operators' costs one after the other, each only as
+//! much as its estimates need; what is left is for the next. The order decides how much that is, so that several are tried. The
+//! sum is consistent, as each estimate is for the costs it took. What one projection cannot see at all, such as goals of
+//! another robot, or changes of designs off its pattern, another one counts.
+//!
+//! [1] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical planning, JAIR 67, 2020.
+
+use std::cmp::Reverse;
+
+use crate::bounds::Projection;
+use crate::task::Task;
+
+/// How many sums are kept.
+const KEPT: usize = 4;
+/// How many orders are tried at most, and how many transitions may be looked at in all.
+const ORDERS: usize = 60;
+const EFFORT: usize = 6_000_000;
+
+/// Estimates that may be added up: positions of projections, and the share of the cost to go from each abstract state.
+pub(super) struct Partition {
+    parts: Vec<(usize, Vec<Option<i64>>)>,
+}
+
+impl Partition {
+    /// The sum for a state, of which the abstract states are given by position.
+    pub(super) fn estimate(&self, states: &[u32]) -> i64 {
+        let shares = self.parts.iter().map(|(position, to_go)| to_go[states[*position] as usize]);
+        // Dead ends are noticed by the projections themselves.
+        shares.map(|share| share.unwrap_or(0)).sum()
+    }
+
+    fn new(projections: &[Projection], costs: &[i64], order: &[usize]) -> Self {
+        let mut left = costs.to_vec();
+        let mut parts = Vec::new();
+        for position in order {
+            let to_go = projections[*position].costs_to_go(&left);
+            if to_go.iter().any(|cost| cost.is_some_and(|cost| cost > 0)) {
+                for (left, taken) in left.iter_mut().zip(projections[*position].saturated(&to_go)) {
+                    *left -= taken;
+                }
+                parts.push((*position, to_go));
+            }
+        }
+        Self { parts }
+    }
+}
+
+/// Sums of shares for the projections of a task, the one with the highest estimate of the initial state first; none where one
+/// projection alone is as good.
+pub(super) fn partitions(task: &Task, projections: &[Projection]) -> Vec<Partition> {
+    let costs: Vec<i64> = task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect();
+    let initial: Vec<u32> = projections.iter().map(|projection| projection.state(&task.initial)).collect();
+    let alone = |position: usize| projections[position].to_go(initial[position]).unwrap_or(0);
+    let useful: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
+    let transitions: usize = useful.iter().map(|position| projections[*position].effort()).sum();
+    if useful.len() < 2 || transitions > EFFORT {
+        return Vec::new();
+    }
+    let mut budget = (EFFORT / transitions.max(1)).clamp(1, ORDERS);
+    let mut tried: Vec<(i64, Vec<usize>, Partition)> = Vec::new();
+    let mut attempt = |order: Vec<usize>, tried: &mut Vec<(i64, Vec<usize>, Partition)>| {
+        if budget == 0 || tried.iter().any(|(_, known, _)| *known == order) {
+            return;
+        }
+        budget -= 1;
+        let partition = Partition::new(projections, &costs, &order);
+        tried.push((partition.estimate(&initial), order, partition));
+        // Stable: of equal ones the earlier stays first.
+        tried.sort_by_key(|(estimate, ..)| Reverse(*estimate));
+    };
+    let greedy = by_yield(projections, &useful, alone);
+    attempt(greedy.clone(), &mut tried);
+    for first in &useful {
+        let rest = greedy.iter().filter(|position| *position != first);
+        attempt(std::iter::once(first).chain(rest).copied().collect(), &mut tried);
+    }
+    // Then the best order, with two neighbours exchanged.
+    for place in 1..useful.len() {
+        let mut order = tried[0].1.clone();
+        order.swap(place - 1, place);
+        attempt(order, &mut tried);
+    }
+    let best = useful.iter().map(|position| alone(*position)).max().unwrap_or(0);
+    if tried[0].0 <= best {
+        return Vec::new();
+    }
+    tried.truncate(KEPT);
+    tried.into_iter().map(|(.., partition)| partition).collect()
+}
+
+/// Projections that give much and take little come first.
+fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> i64) -> Vec<usize> {
+    let taken = |position: usize| {
+        let projection = &projections[position];
+        projection.saturated(projection.costs()).sum::<i64>().max(1)
+    };
+    let mut order: Vec<(usize, i64, i64)> =
+        useful.iter().map(|position| (*position, alone(*position), taken(*position))).collect();
+    order.sort_by(|(_, a, s), (_, b, t)| {
+        (i128::from(*b) * i128::from(*s)).cmp(&(i128::from(*a) * i128::from(*t)))
+    });
+    order.into_iter().map(|(position, ..)| position).collect()
+}
