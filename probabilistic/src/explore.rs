@@ -5,12 +5,10 @@
 
 use std::hash::Hash;
 
-use indexmap::IndexSet;
-use rustc_hash::FxBuildHasher;
-
 use crate::error::Error;
 use crate::mdp::Mdp;
 use crate::number::Number;
+use crate::states::States;
 
 /// The action of the loop that a state without choices gets.
 pub const DEADLOCK: u32 = u32::MAX;
@@ -25,6 +23,18 @@ pub trait Generator<N: Number> {
 
     /// How many rewards each choice has.
     fn rewards(&self) -> usize;
+
+    /// How many codes there are, where [`code`](Self::code) numbers the states that can be thought of; then states are
+    /// found in a table and not by hashing.
+    fn codes(&self) -> Option<usize> {
+        None
+    }
+
+    /// The code of a state, less than [`codes`](Self::codes). States that lead to each other should have codes that
+    /// are close.
+    fn code(&self, _state: &Self::State) -> usize {
+        0
+    }
 
     /// Writes all choices of a state.
     ///
@@ -101,7 +111,7 @@ pub struct Explored<S, N> {
     /// The process; state 0 is where it starts.
     pub mdp: Mdp<N>,
     /// The states by number.
-    pub states: IndexSet<S, FxBuildHasher>,
+    pub states: States<S>,
     /// For each reward its value for each choice.
     pub rewards: Vec<Vec<N>>,
     /// How many states had no choice and got a loop.
@@ -116,8 +126,9 @@ pub fn explore<N: Number, G: Generator<N>>(
     generator: &G,
     bounds: &Bounds<'_>,
 ) -> Result<Explored<G::State, N>, Error> {
-    let mut states: IndexSet<G::State, FxBuildHasher> = IndexSet::default();
-    states.insert(generator.initial());
+    let mut states = States::new(generator.codes());
+    let initial = generator.initial();
+    states.insert(generator.code(&initial), initial);
     let mut mdp = Mdp::default();
     let kinds = generator.rewards();
     let mut rewards: Vec<Vec<N>> = vec![Vec::new(); kinds];
@@ -136,11 +147,8 @@ pub fn explore<N: Number, G: Generator<N>>(
         for (action, end) in choices.ends.drain(..) {
             for _ in begin..end {
                 if let Some((target, probability)) = transitions.next() {
-                    let (target, new) = states.insert_full(target);
-                    if new && states.len() > bounds.states {
-                        return Err(Error::StateLimit { states: states.len(), limit: bounds.states });
-                    }
-                    mdp.push_transition(target as u32, probability);
+                    let target = states.insert(generator.code(&target), target);
+                    mdp.push_transition(target, probability);
                 }
             }
             begin = end;
@@ -148,6 +156,9 @@ pub fn explore<N: Number, G: Generator<N>>(
             for values in &mut rewards {
                 values.push(reward.next().unwrap_or_else(N::zero));
             }
+        }
+        if states.len() > bounds.states {
+            return Err(Error::StateLimit { states: states.len(), limit: bounds.states });
         }
         if mdp.open_choices() == 0 {
             deadlocks += 1;

@@ -19,6 +19,7 @@ pub mod policy;
 pub mod prism;
 pub mod property;
 pub mod solve;
+pub mod states;
 
 pub use error::{Diagnostic, Error, Place};
 pub use mdp::Mdp;

@@ -1,6 +1,6 @@
 //! No text makes the reader or the checker panic, and what is written reads back as the same model.
 
-use metaplan_probabilistic::check::{Options, check};
+use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use metaplan_probabilistic::explore::Bounds;
 use metaplan_probabilistic::{jani, prism, property};
 use proptest::prelude::*;
@@ -108,8 +108,13 @@ fn exact_and_rounded_answers_agree() {
     }
 }
 
+/// `PROPTEST_CASES`, or a few.
+fn cases() -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(200)
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn broken_models_are_refused_without_panic(at in 0..MODEL.len(), length in 0_usize..40, word in 0..WORDS.len()) {
@@ -122,5 +127,32 @@ proptest! {
         let text: Vec<&str> = words.into_iter().map(|word| WORDS[word]).collect();
         survive(&format!("mdp {}", text.join(" ")));
         let _ = property::parse(&text.join(" "));
+    }
+}
+
+/// A walk over a square that hangs together in two dimensions; elimination fills up, so it is iterated from both sides.
+#[test]
+#[ignore = "a minute in debug: a component of 90,000 states"]
+fn a_large_component_gets_bounds() {
+    let model = prism::parse(
+        "mdp
+         module walk
+           x:[0..299] init 0;
+           y:[0..299] init 0;
+           home:bool init false;
+           [east] !home -> 0.9:(x'=mod(x+1,300)) + 0.08:(y'=mod(y+1,300)) + 0.02:(home'=true);
+           [north] !home -> 0.5:(y'=mod(y+7,300)) + 0.48:(x'=mod(x+299,300)) + 0.02:(home'=true);
+         endmodule
+         rewards \"cost\" [east] true : 1 + mod(x*y,5); [north] true : 2 + mod(x+y,3); endrewards
+         label \"home\" = home;",
+    )
+    .expect("a model");
+    for question in ["R{\"cost\"}min=? [ F \"home\" ]", "R{\"cost\"}max=? [ F \"home\" ]"] {
+        let property = property::parse(question).expect("a property");
+        let options = Options { exactness: Exactness::Never, ..Options::default() };
+        let report = check(&model, &property, &options).expect("an answer");
+        let Outcome::Value(Answer::Finite(cost)) = report.outcome else { panic!("{:?}", report.outcome) };
+        assert!(cost.lower <= cost.value && cost.value <= cost.upper);
+        assert!(cost.upper - cost.lower <= 1e-6 * cost.value, "{cost:?}");
     }
 }

@@ -90,24 +90,23 @@ impl From<Situation> for State {
 
 #[derive(Debug, Clone)]
 struct Move<N> {
-    arc: u32,
+    action: u32,
     to: usize,
-    time: N,
-    energy: N,
     levels: u32,
     /// Success without and with a collision, and failure; by whether the component is lost then.
     outcomes: [[N; 3]; 2],
-    collisions: N,
+    /// Those of the process.
+    rewards: Vec<N>,
 }
 
 #[derive(Debug, Clone)]
 struct Change<N> {
+    action: u32,
     to: usize,
-    time: N,
-    energy: N,
     levels: u32,
     success: N,
     failure: N,
+    rewards: Vec<N>,
 }
 
 /// The process of a mission in one kind of number.
@@ -123,13 +122,19 @@ pub struct Process<N> {
     /// Which configurations the loss takes away.
     lost: Vec<bool>,
     risk: Risk,
-    rewards: Vec<usize>,
+    /// How many rewards are computed.
+    rewards: usize,
+    /// Levels of the battery, with none.
+    levels: usize,
 }
 
 impl<N: Number> Process<N> {
     /// The process with some risks, and with some of the [`REWARDS`].
     pub fn new(mission: &Coadaptation, risk: Risk, rewards: &[&str]) -> Self {
         let number = |value| N::from_rational(value);
+        let wanted: Vec<usize> =
+            rewards.iter().filter_map(|name| REWARDS.iter().position(|known| known == name)).collect();
+        let rewards_of = |all: [N; 5]| wanted.iter().map(|index| all[*index].clone()).collect::<Vec<N>>();
         let unit = mission.battery.map_or(1, |battery| battery.unit);
         let levels = |energy: &num_rational::BigRational| {
             let levels = (N::from_rational(energy).to_f64() / f64::from(unit)).ceil();
@@ -151,12 +156,16 @@ impl<N: Number> Process<N> {
                     [success.times(&N::one().minus(&hit)), success.times(&hit), N::one().minus(&success)];
                 let keep = N::one().minus(&rate);
                 moves[arc.from][design].push(Move {
-                    arc: index as u32,
+                    action: Action::Move(index).number(),
                     to: arc.to,
-                    time: number(&traversal.time),
-                    energy: number(&traversal.energy),
                     levels: levels(&traversal.energy),
-                    collisions: ends[1].clone(),
+                    rewards: rewards_of([
+                        number(&traversal.time),
+                        number(&traversal.energy),
+                        ends[1].clone(),
+                        N::zero(),
+                        N::one(),
+                    ]),
                     outcomes: [
                         ends.each_ref().map(|p| p.times(&keep)),
                         ends.each_ref().map(|p| p.times(&rate)),
@@ -169,10 +178,16 @@ impl<N: Number> Process<N> {
                 mission.switches[old][new].as_ref().filter(|_| mission.configurations[new].available)?;
             let success = number(&switch.success);
             Some(Change {
+                action: Action::Change(new).number(),
                 to: new,
-                time: number(&switch.time),
-                energy: number(&switch.energy),
                 levels: levels(&switch.energy),
+                rewards: rewards_of([
+                    number(&switch.time),
+                    number(&switch.energy),
+                    N::zero(),
+                    N::one(),
+                    N::zero(),
+                ]),
                 failure: N::one().minus(&success),
                 success,
             })
@@ -187,10 +202,11 @@ impl<N: Number> Process<N> {
             changes,
             lost: (0..designs).map(|design| risk.loss && mission.lost(design)).collect(),
             risk,
-            rewards: rewards
-                .iter()
-                .filter_map(|name| REWARDS.iter().position(|known| known == name))
-                .collect(),
+            rewards: wanted.len(),
+            levels: mission
+                .battery
+                .filter(|_| risk.battery)
+                .map_or(1, |battery| battery.initial as usize + 1),
         }
     }
 
@@ -205,10 +221,6 @@ impl<N: Number> Process<N> {
     pub fn is_goal(&self, state: State) -> bool {
         let situation = state.situation();
         situation.place == self.goal && !situation.failed
-    }
-
-    fn rewards_of<'r>(&'r self, all: &'r [N; 5]) -> impl Iterator<Item = N> + 'r {
-        self.rewards.iter().map(|index| all[*index].clone())
     }
 
     fn enough(&self, battery: u32, levels: u32) -> Option<u32> {
@@ -251,7 +263,18 @@ impl<N: Number> Generator<N> for Process<N> {
     }
 
     fn rewards(&self) -> usize {
-        self.rewards.len()
+        self.rewards
+    }
+
+    /// States between which one gets without moving lie side by side, and what uses little battery close to them.
+    fn codes(&self) -> Option<usize> {
+        self.levels.checked_mul(self.moves.len())?.checked_mul(8)?.checked_mul(self.lost.len())
+    }
+
+    fn code(&self, state: &State) -> usize {
+        let s = state.situation();
+        let flags = usize::from(s.hit) | usize::from(s.failed) << 1 | usize::from(s.lost) << 2;
+        ((s.battery as usize * self.moves.len() + s.place) * 8 + flags) * self.lost.len() + s.configuration
     }
 
     fn successors(&self, state: &State, choices: &mut Choices<State, N>) -> Result<(), Error> {
@@ -266,8 +289,7 @@ impl<N: Number> Generator<N> for Process<N> {
             }
             choices.to(Situation { configuration: change.to, battery, ..s }.into(), change.success.clone());
             choices.to(Situation { battery, ..s }.into(), change.failure.clone());
-            let rewards = [change.time.clone(), change.energy.clone(), N::zero(), N::one(), N::zero()];
-            choices.end(Action::Change(change.to).number(), self.rewards_of(&rewards));
+            choices.end(change.action, change.rewards.iter().cloned());
         }
         if s.lost && self.lost[s.configuration] {
             return Ok(());
@@ -275,16 +297,19 @@ impl<N: Number> Generator<N> for Process<N> {
         for step in &self.moves[s.place][s.configuration] {
             let Some(battery) = self.enough(s.battery, step.levels) else { continue };
             let arrived = Situation { place: step.to, battery, ..s };
+            // Failed missions are over: where the battery and the collisions stood does not matter any more.
+            let failed = Situation { failed: true, battery, ..s };
             for (lost, ends) in [s.lost, true].into_iter().zip(&step.outcomes) {
-                // Failed missions are over: where the battery and the collisions stood does not matter any more.
-                let failed = Situation { failed: true, battery, ..s };
-                choices.to(Situation { lost, ..arrived }.into(), ends[0].clone());
-                choices.to(Situation { lost, hit: true, ..arrived }.into(), ends[1].clone());
-                choices.to(Situation { lost, ..failed }.into(), ends[2].clone());
+                let ways = [
+                    Situation { lost, ..arrived },
+                    Situation { lost, hit: true, ..arrived },
+                    Situation { lost, ..failed },
+                ];
+                for (situation, probability) in ways.into_iter().zip(ends) {
+                    choices.to(situation.into(), probability.clone());
+                }
             }
-            let rewards =
-                [step.time.clone(), step.energy.clone(), step.collisions.clone(), N::zero(), N::one()];
-            choices.end(Action::Move(step.arc as usize).number(), self.rewards_of(&rewards));
+            choices.end(step.action, step.rewards.iter().cloned());
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::error::Error;
-use crate::explore::Explored;
+use crate::explore::{Explored, Generator};
 use crate::number::Number;
 use crate::prism::{Packed, Program};
 use crate::solve::NONE;
@@ -98,7 +98,9 @@ impl PolicyTable {
         for (number, row) in self.rows.iter().enumerate() {
             let problem = |what: &str| Error::Policy(format!("state {}: {what}", number + 1));
             let values: Vec<i64> = order.iter().map(|at| row.values[*at]).collect();
-            let state = program.pack(&values).and_then(|packed| explored.states.get_index_of(&packed));
+            let state = program
+                .pack(&values)
+                .and_then(|packed| explored.states.number(program.code(&packed), &packed));
             let state = state.ok_or_else(|| problem("the model does not reach this state"))?;
             let choices = explored.mdp.choices(state);
             let choice = choices.start + row.choice;

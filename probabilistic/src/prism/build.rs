@@ -1,28 +1,15 @@
 //! Declarations, commands and rewards of the syntax tree to those of a program.
 
-use rustc_hash::FxHashMap;
-
 use crate::error::Diagnostic;
 use crate::number::Number;
-use crate::prism::ast::{self, BinaryOp, Type};
+use crate::prism::ast::{self, Type};
 use crate::prism::code::Code;
 use crate::prism::compile::Names;
-use crate::prism::model::{Command, RewardItem, UNNAMED, Update, Variable};
+use crate::prism::guard::Guard;
+use crate::prism::model::{Command, RewardItem, Update, Variable};
 
-/// The variables that a guard fixes to one value.
-pub fn fixed_values<N: Number>(guard: &Code<N>) -> Vec<(u32, i64)> {
-    match guard {
-        Code::All(parts) => parts.iter().flat_map(fixed_values).collect(),
-        Code::Compare(BinaryOp::Equal, Type::Int, left, right) => match (&**left, &**right) {
-            (Code::Variable(variable), Code::Whole(value))
-            | (Code::Whole(value), Code::Variable(variable)) => {
-                vec![(*variable, *value)]
-            }
-            _ => Vec::new(),
-        },
-        _ => Vec::new(),
-    }
-}
+/// How far the sum of probabilities may be from one, as in PRISM; what is within is scaled to one.
+pub const SUM_TOLERANCE: f64 = 1e-5;
 
 pub fn declare<N: Number>(names: &mut Names<N>, variable: &ast::Variable) -> Result<Variable, Diagnostic> {
     let whole = |names: &mut Names<N>, expression: &ast::Expr, kind| match names.constant(expression, kind)? {
@@ -94,21 +81,30 @@ pub fn compile_command<N: Number>(
         }
         updates.push(Update { probability, assignments });
     }
-    if problems.is_empty() { Ok(Command { guard, updates, place: command.place }) } else { Err(problems) }
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let certain = certain(&updates);
+    Ok(Command { guard: Guard::new(guard), updates, certain, place: command.place })
+}
+
+/// The probabilities of updates where nothing can be wrong with them.
+fn certain<N: Number>(updates: &[Update<N>]) -> Option<Vec<N>> {
+    let constant = |update: &Update<N>| {
+        let value = update.probability.is_constant().then(|| update.probability.number(&[]));
+        value.and_then(Result::ok).filter(|value| *value >= N::zero())
+    };
+    let all: Vec<N> = updates.iter().map(constant).collect::<Option<_>>()?;
+    let sum = all.iter().fold(N::zero(), |sum, value| sum.plus(value));
+    let off = (sum.to_f64() - 1.0).abs();
+    (sum == N::one() || !N::EXACT && off <= 1e-13).then_some(all)
 }
 
 pub fn reward_item<N: Number>(
     item: &ast::RewardItem,
     names: &mut Names<N>,
-    numbers: &FxHashMap<&str, u32>,
 ) -> Result<RewardItem<N>, Diagnostic> {
-    let action = match &item.action {
-        None => None,
-        Some(None) => Some(UNNAMED),
-        // An action that no command has never happens.
-        Some(Some(name)) => Some(numbers.get(name.as_str()).copied().unwrap_or(UNNAMED - 1)),
-    };
-    let guard = names.typed(&item.guard, Type::Bool)?;
+    let guard = Guard::new(names.typed(&item.guard, Type::Bool)?);
     let reward = names.typed(&item.reward, Type::Double)?;
-    Ok(RewardItem { action, guard, reward, place: item.place })
+    Ok(RewardItem { guard, reward, place: item.place })
 }

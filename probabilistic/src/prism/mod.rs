@@ -9,10 +9,12 @@ mod build;
 mod code;
 mod compile;
 pub(crate) mod expression;
+mod guard;
 pub(crate) mod lexer;
 mod model;
 mod parser;
 mod rename;
+mod run;
 mod state;
 mod write;
 

@@ -1,21 +1,19 @@
-//! A model and the values of its constants to a generator of successors.
+//! A model and the values of its constants to a program that can be run.
 //!
-//! Commands whose guards fix one variable (`l=5 & …`) are found by its value, so that the cost of a state does not grow
-//! with the number of commands for other states.
+//! Commands whose guards fix one variable (`l=5 & …`) are found by its value, and so are the actions that have such
+//! commands, so that the cost of a state does not grow with the number of commands for other states.
 
 use rustc_hash::FxHashMap;
 
 use crate::error::{Diagnostic, Error, Place};
-use crate::explore::{Choices, Generator};
 use crate::number::Number;
 use crate::prism::ast::{self, Model, ModelKind, Type};
-use crate::prism::build::{compile_command, declare, fixed_values, reward_item};
-use crate::prism::code::{Code, Fault};
+use crate::prism::build::{compile_command, declare, reward_item};
+use crate::prism::code::Code;
 use crate::prism::compile::{Names, Settings};
+use crate::prism::guard::Guard;
 use crate::prism::state::{Layout, Packed, Valuation};
 
-/// How far the sum of probabilities may be from one, as in PRISM; what is within is scaled to one.
-const SUM_TOLERANCE: f64 = 1e-5;
 /// The action number of commands without name.
 pub const UNNAMED: u32 = u32::MAX - 1;
 
@@ -39,23 +37,43 @@ pub struct Update<N> {
 
 #[derive(Debug, Clone)]
 pub struct Command<N> {
-    pub guard: Code<N>,
+    pub guard: Guard<N>,
     pub updates: Vec<Update<N>>,
+    /// The probabilities of the updates, where no variable occurs in them and they sum to one.
+    pub certain: Option<Vec<N>>,
     pub place: Place,
 }
 
 /// The commands of one module that bear one action.
 #[derive(Debug, Clone, Default)]
-struct Group<N> {
-    commands: Vec<Command<N>>,
+pub(super) struct Group<N> {
+    pub commands: Vec<Command<N>>,
     /// The variable by whose value commands are found, its least value, and the commands for each value.
-    index: Option<(u32, i64, Vec<Vec<u32>>)>,
+    pub index: Option<(u32, i64, Vec<Vec<u32>>)>,
+}
+
+/// For each value of a variable the actions that may be possible, as bits.
+#[derive(Debug, Clone)]
+pub(super) struct Mask {
+    pub variable: u32,
+    pub least: i64,
+    pub table: Vec<Vec<u64>>,
+}
+
+/// A reward structure.
+#[derive(Debug, Clone)]
+pub(super) struct Structure<N> {
+    /// Of states.
+    pub states: Vec<RewardItem<N>>,
+    /// Of choices without action.
+    pub unnamed: Vec<RewardItem<N>>,
+    /// For each action.
+    pub actions: Vec<Vec<RewardItem<N>>>,
 }
 
 #[derive(Debug, Clone)]
 pub struct RewardItem<N> {
-    pub action: Option<u32>,
-    pub guard: Code<N>,
+    pub guard: Guard<N>,
     pub reward: Code<N>,
     pub place: Place,
 }
@@ -72,14 +90,15 @@ pub struct Program<N> {
     /// The names of its reward structures.
     pub reward_names: Vec<String>,
     pub(crate) names: Names<N>,
-    layout: Layout,
+    pub(super) layout: Layout,
     /// For each action the modules that take part, each with its commands.
-    synchronised: Vec<Vec<Group<N>>>,
+    pub(super) synchronised: Vec<Vec<Group<N>>>,
     /// For each module the commands without action.
-    free: Vec<Group<N>>,
-    rewards: Vec<Vec<RewardItem<N>>>,
+    pub(super) free: Vec<Group<N>>,
+    pub(super) masks: Vec<Mask>,
+    pub(super) rewards: Vec<Structure<N>>,
     /// Which rewards are computed.
-    wanted: Vec<usize>,
+    pub(super) wanted: Vec<usize>,
 }
 
 impl<N: Number> Program<N> {
@@ -99,6 +118,7 @@ impl<N: Number> Program<N> {
             layout: Layout::default(),
             synchronised: Vec::new(),
             free: Vec::new(),
+            masks: Vec::new(),
             rewards: Vec::new(),
             wanted: Vec::new(),
         };
@@ -132,10 +152,27 @@ impl<N: Number> Program<N> {
             program.module(module, model, &mut names, &numbers, &mut problems);
         }
         for rewards in &model.rewards {
-            let items = rewards.items.iter().filter_map(|item| {
-                reward_item(item, &mut names, &numbers).map_err(|problem| problems.push(problem)).ok()
-            });
-            program.rewards.push(items.collect());
+            let mut structure = Structure {
+                states: Vec::new(),
+                unnamed: Vec::new(),
+                actions: vec![Vec::new(); program.actions.len()],
+            };
+            for item in &rewards.items {
+                match reward_item(item, &mut names) {
+                    Ok(found) => match &item.action {
+                        None => structure.states.push(found),
+                        Some(None) => structure.unnamed.push(found),
+                        // An action that no command has never happens.
+                        Some(Some(name)) => {
+                            if let Some(number) = numbers.get(name.as_str()) {
+                                structure.actions[*number as usize].push(found);
+                            }
+                        }
+                    },
+                    Err(problem) => problems.push(problem),
+                }
+            }
+            program.rewards.push(structure);
         }
         for label in &model.labels {
             if let Err(problem) = names.typed(&label.expression, Type::Bool) {
@@ -210,8 +247,8 @@ impl<N: Number> Program<N> {
     fn index(&mut self) {
         let variables = &self.variables;
         for group in self.synchronised.iter_mut().flatten().chain(&mut self.free) {
-            let fixed: Vec<Vec<(u32, i64)>> =
-                group.commands.iter().map(|command| fixed_values(&command.guard)).collect();
+            let fixed: Vec<&[(u32, i64)]> =
+                group.commands.iter().map(|command| command.guard.fixed()).collect();
             let count = |variable: u32| {
                 fixed.iter().filter(|fixed| fixed.iter().any(|(known, _)| *known == variable)).count()
             };
@@ -234,205 +271,27 @@ impl<N: Number> Program<N> {
             }
             group.index = Some((best, least, table));
         }
+        self.mask();
     }
 
-    /// The sum of the rewards of one structure, for a state or for the transitions of an action.
-    fn reward(&self, structure: usize, action: Option<u32>, values: &[i64]) -> Result<N, Error> {
-        let mut sum = N::zero();
-        for item in self.rewards[structure].iter().filter(|item| item.action == action) {
-            let fault = |fault| at(fault, item.place);
-            if item.guard.holds(values).map_err(fault)? {
-                let reward = item.reward.number(values).map_err(fault)?;
-                if reward < N::zero() {
-                    let text = format!("a negative reward, {}", reward.to_f64());
-                    return Err(Diagnostic::new("Q304", item.place, text).into());
-                }
-                sum = sum.plus(&reward);
-            }
-        }
-        Ok(sum)
-    }
-}
-
-type Outcome<N> = Vec<(Valuation, N)>;
-
-impl<N: Number> Program<N> {
-    /// All combinations of what the enabled commands of some groups do together.
-    fn combine(
-        &self,
-        groups: &[Group<N>],
-        values: &Valuation,
-        found: &mut Vec<Outcome<N>>,
-    ) -> Result<(), Error> {
-        let Some((first, others)) = groups.split_first() else { return Ok(()) };
-        let mut combined: Vec<Outcome<N>> = Vec::new();
-        for command in enabled(first, values) {
-            let effects = self.effects(command?, values)?;
-            let outcome =
-                effects.into_iter().map(|(probability, changes)| (changed(values, &changes), probability));
-            combined.push(outcome.collect());
-        }
-        for group in others {
-            if combined.is_empty() {
-                return Ok(());
-            }
-            let mut next = Vec::new();
-            for command in enabled(group, values) {
-                let effects = self.effects(command?, values)?;
-                next.extend(combined.iter().map(|outcome| join(outcome, &effects)));
-            }
-            combined = next;
-        }
-        found.append(&mut combined);
-        Ok(())
-    }
-
-    /// The updates of a command in a state: probability, and the new values.
-    fn effects(&self, command: &Command<N>, values: &[i64]) -> Result<Vec<Effect<N>>, Error> {
-        let fault = |fault| at(fault, command.place);
-        let mut effects = Vec::with_capacity(command.updates.len());
-        let mut sum = N::zero();
-        for update in &command.updates {
-            let probability = update.probability.number(values).map_err(fault)?;
-            if probability < N::zero() {
-                let text = format!("a negative probability, {}", probability.to_f64());
-                return Err(Diagnostic::new("Q302", command.place, text).into());
-            }
-            sum = sum.plus(&probability);
-            if probability.is_zero() {
-                continue;
-            }
-            let mut changes = Vec::with_capacity(update.assignments.len());
-            for (variable, code, place) in &update.assignments {
-                let value = code.whole(values).map_err(|fault| at(fault, *place))?;
-                let Variable { name, least, greatest, .. } = &self.variables[*variable as usize];
-                if !(*least..=*greatest).contains(&value) {
-                    let text =
-                        format!("`{name}` becomes {value}, which is not in its range [{least}..{greatest}]");
-                    return Err(Diagnostic::new("Q305", *place, text).into());
-                }
-                changes.push((*variable, value));
-            }
-            effects.push((probability, changes));
-        }
-        if sum == N::one() {
-            return Ok(effects);
-        }
-        let off = (sum.to_f64() - 1.0).abs();
-        if off.is_nan() || off > SUM_TOLERANCE {
-            let text = format!("the probabilities sum to {}, not to 1", sum.to_f64());
-            return Err(Diagnostic::new("Q301", command.place, text).into());
-        }
-        if N::EXACT || off > 1e-13 {
-            for (probability, _) in &mut effects {
-                *probability = probability.over(&sum);
-            }
-        }
-        Ok(effects)
-    }
-
-    fn all_outcomes(&self, values: &Valuation) -> Result<Vec<(u32, Outcome<N>)>, Error> {
-        let mut all = Vec::new();
-        let mut found = Vec::new();
-        for group in &self.free {
-            self.combine(std::slice::from_ref(group), values, &mut found)?;
-        }
-        all.extend(found.drain(..).map(|outcome| (UNNAMED, outcome)));
+    /// Notes for each value of a variable which actions it leaves possible.
+    fn mask(&mut self) {
+        let words = self.actions.len().div_ceil(64);
+        let mut masks: Vec<Mask> = Vec::new();
         for (action, groups) in self.synchronised.iter().enumerate() {
-            self.combine(groups, values, &mut found)?;
-            all.extend(found.drain(..).map(|outcome| (action as u32, outcome)));
-        }
-        Ok(all)
-    }
-}
-
-type Effect<N> = (N, Vec<(u32, i64)>);
-
-fn join<N: Number>(outcome: &Outcome<N>, effects: &[Effect<N>]) -> Outcome<N> {
-    let mut joined = Vec::with_capacity(outcome.len() * effects.len());
-    for (values, before) in outcome {
-        for (probability, changes) in effects {
-            joined.push((changed(values, changes), before.times(probability)));
-        }
-    }
-    joined
-}
-
-fn changed(values: &Valuation, changes: &[(u32, i64)]) -> Valuation {
-    let mut values = values.clone();
-    for (variable, value) in changes {
-        values[*variable as usize] = *value;
-    }
-    values
-}
-
-/// The enabled commands of a group.
-fn enabled<'a, N: Number>(
-    group: &'a Group<N>,
-    values: &'a [i64],
-) -> impl Iterator<Item = Result<&'a Command<N>, Error>> {
-    let (listed, all): (&[u32], _) = match &group.index {
-        Some((variable, least, table)) => (&table[(values[*variable as usize] - least) as usize], 0),
-        None => (&[], group.commands.len()),
-    };
-    let candidates = listed.iter().map(|number| *number as usize).chain(0..all);
-    candidates.filter_map(move |number| {
-        let command = &group.commands[number];
-        match command.guard.holds(values) {
-            Ok(true) => Some(Ok(command)),
-            Ok(false) => None,
-            Err(fault) => Some(Err(at(fault, command.place))),
-        }
-    })
-}
-
-impl<N: Number> Generator<N> for Program<N> {
-    type State = Packed;
-
-    fn initial(&self) -> Packed {
-        let values: Valuation = self.variables.iter().map(|variable| variable.initial).collect();
-        self.layout.pack(&values)
-    }
-
-    fn rewards(&self) -> usize {
-        self.wanted.len()
-    }
-
-    fn successors(&self, state: &Packed, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
-        let mut values = Valuation::new();
-        self.layout.unpack(state, &mut values);
-        let all = self.all_outcomes(&values)?;
-        let mut of_state = Vec::with_capacity(self.wanted.len());
-        for structure in &self.wanted {
-            of_state.push(self.reward(*structure, None, &values)?);
-        }
-        let count = crate::prism::code::from_whole::<N>(all.len() as i64);
-        let mut total = of_state.clone();
-        let is_chain = self.kind == ModelKind::Dtmc && all.len() > 1;
-        for (action, outcome) in &all {
-            let mut rewards = Vec::with_capacity(self.wanted.len());
-            for (at, structure) in self.wanted.iter().enumerate() {
-                let more = self.reward(*structure, Some(*action), &values)?;
-                if is_chain {
-                    total[at] = total[at].plus(&more.over(&count));
+            for (variable, least, commands) in groups.iter().filter_map(|group| group.index.as_ref()) {
+                let at = masks.iter().position(|mask| mask.variable == *variable).unwrap_or_else(|| {
+                    let table = vec![vec![u64::MAX; words]; commands.len()];
+                    masks.push(Mask { variable: *variable, least: *least, table });
+                    masks.len() - 1
+                });
+                for (row, list) in masks[at].table.iter_mut().zip(commands) {
+                    if list.is_empty() {
+                        row[action / 64] &= !(1 << (action % 64));
+                    }
                 }
-                rewards.push(of_state[at].plus(&more));
-            }
-            for (values, probability) in outcome {
-                let probability = if is_chain { probability.over(&count) } else { probability.clone() };
-                choices.to(self.layout.pack(values), probability);
-            }
-            if !is_chain {
-                choices.end(*action, rewards);
             }
         }
-        if is_chain {
-            choices.end(UNNAMED, total);
-        }
-        Ok(())
+        self.masks = masks;
     }
-}
-
-fn at(Fault(text): Fault, place: Place) -> Error {
-    Diagnostic::new("Q303", place, text).into()
 }

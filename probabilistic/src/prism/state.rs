@@ -14,11 +14,15 @@ pub struct Layout {
     fields: Vec<Field>,
     words: usize,
     used: u32,
+    /// The variables, greatest range first.
+    order: Vec<u32>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Field {
     least: i64,
+    /// Above the least one.
+    greatest: u64,
     word: u32,
     shift: u32,
     mask: u64,
@@ -36,8 +40,10 @@ impl Layout {
         let mask = if bits == 64 { u64::MAX } else { (1 << bits) - 1 };
         // A variable of one value takes no bits; its shift must stay below the word's size.
         let shift = if bits == 0 { 0 } else { self.used };
-        self.fields.push(Field { least, word: self.words as u32 - 1, shift, mask });
+        self.fields.push(Field { least, greatest: size, word: self.words as u32 - 1, shift, mask });
         self.used += bits;
+        self.order.push(self.order.len() as u32);
+        self.order.sort_by_key(|number| std::cmp::Reverse(self.fields[*number as usize].greatest));
     }
 
     /// Packs values, each in its range.
@@ -49,12 +55,46 @@ impl Layout {
         packed
     }
 
+    /// The values of all variables.
+    pub fn values(&self, packed: &Packed) -> impl Iterator<Item = i64> {
+        self.fields.iter().map(|field| field.least.wrapping_add(field.raw(packed) as i64))
+    }
+
     /// Unpacks all values into a buffer.
     pub fn unpack(&self, packed: &Packed, values: &mut Valuation) {
         values.clear();
-        values.extend(self.fields.iter().map(|field| {
-            let raw = packed[field.word as usize] >> field.shift & field.mask;
-            field.least.wrapping_add(raw as i64)
-        }));
+        values.extend(self.values(packed));
+    }
+
+    /// Changes one variable.
+    pub fn set(&self, packed: &mut Packed, variable: u32, value: i64) {
+        let field = &self.fields[variable as usize];
+        let word = &mut packed[field.word as usize];
+        *word =
+            *word & !(field.mask << field.shift) | (value.wrapping_sub(field.least) as u64) << field.shift;
+    }
+
+    /// How many combinations of values there are, if they can be counted.
+    pub fn codes(&self) -> Option<usize> {
+        self.fields.iter().try_fold(1_usize, |product, field| product.checked_mul(field.size()?))
+    }
+
+    /// The number of a combination; the variable with the greatest range weighs most.
+    pub fn code(&self, packed: &Packed) -> usize {
+        self.order.iter().fold(0, |code, number| {
+            let field = &self.fields[*number as usize];
+            code.wrapping_mul(field.size().unwrap_or(0)).wrapping_add(field.raw(packed) as usize)
+        })
+    }
+}
+
+impl Field {
+    fn raw(&self, packed: &Packed) -> u64 {
+        packed[self.word as usize] >> self.shift & self.mask
+    }
+
+    /// How many values there are.
+    fn size(&self) -> Option<usize> {
+        usize::try_from(self.greatest).ok()?.checked_add(1)
     }
 }

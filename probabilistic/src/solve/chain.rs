@@ -71,9 +71,13 @@ impl<N: Number> Rows<N> {
     }
 }
 
+/// Entries that elimination may touch in doubles before it is given up: chains that hang together in two dimensions fill
+/// up, and are better iterated.
+const ELIMINATION: u64 = 300_000_000;
+
 /// Solves the chain in which state `i` has the row `policy[i]`, with the constants of the rows.
 ///
-/// None if some state never leaves.
+/// None if some state never leaves, or if elimination takes too long.
 pub fn solve_chain<N: Number>(
     rows: &Rows<N>,
     policy: &[u32],
@@ -142,6 +146,7 @@ fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) ->
     }
     let order = elimination_order(&rows, &users);
     let mut done = vec![false; members.len()];
+    let mut work = 0_u64;
     for pivot in &order {
         let p = *pivot as usize;
         done[p] = true;
@@ -152,10 +157,14 @@ fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) ->
         );
         for user in std::mem::take(&mut users[p]) {
             if !done[user as usize] {
+                work += (row.entries.len() + rows[user as usize].entries.len()) as u64;
                 substitute(&mut rows[user as usize], *pivot, &row, user, &mut users);
             }
         }
         rows[p] = row;
+        if !N::EXACT && work > ELIMINATION {
+            return None;
+        }
     }
     // What is left in a row refers to states that were eliminated later, whose values are known first.
     for pivot in order.iter().rev() {

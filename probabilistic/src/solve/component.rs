@@ -3,6 +3,7 @@
 use crate::number::Number;
 use crate::solve::certify::certify;
 use crate::solve::chain::{Rows, solve_chain};
+use crate::solve::interval::{self, Enclosed};
 use crate::solve::local::{EndComponents, Local, NONE, attractor, end_components};
 use crate::solve::{Direction, Run};
 
@@ -37,6 +38,14 @@ impl<N: Number> Quotient<N> {
 impl<N: Number> Run<'_, N> {
     /// Solves a component of more than one state; none where exact arithmetic takes too long.
     pub fn component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
+        let done = self.whole_component(component, local);
+        for state in component {
+            self.position[*state as usize] = NONE;
+        }
+        done
+    }
+
+    fn whole_component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
         self.cut(component, local, |_, _| true);
         let members = self.sure_members(local);
         if self.problem.rewards.is_some() {
@@ -174,15 +183,22 @@ impl<N: Number> Run<'_, N> {
             ends = end_components(local, |_| false);
         }
         let quotient = quotient(local, &ends);
-        let Some((policy, values)) = self.iterate(local, &quotient) else {
-            if N::EXACT {
-                return None;
-            }
+        let found = self.iterate(local, &quotient).map(|(policy, values)| {
+            let direction = self.problem.direction;
+            let errors = if N::EXACT { Vec::new() } else { certify(&quotient, &policy, &values, direction) };
+            Enclosed { policy, values, errors }
+        });
+        let certified = |found: &Enclosed<N>| found.errors.iter().all(|error| error.is_finite());
+        let found = match found {
+            Some(found) if certified(&found) => Some(found),
+            None if N::EXACT => return None,
+            // Elimination cannot solve it, or its solution has no certificate.
+            other => interval::enclose(&quotient, self.problem.direction).or(other),
+        };
+        let Some(Enclosed { policy, values, errors }) = found else {
             self.unknown(local);
             return Some(());
         };
-        let errors =
-            if N::EXACT { Vec::new() } else { certify(&quotient, &policy, &values, self.problem.direction) };
         let outside = self.outside_error(local);
         for (number, state) in local.states.iter().enumerate() {
             let (block, state) = (ends.block[number] as usize, *state as usize);

@@ -10,11 +10,13 @@
 pub(crate) mod certify;
 pub(crate) mod chain;
 mod component;
+mod interval;
 pub(crate) mod local;
+mod ways;
 
 use fixedbitset::FixedBitSet;
 
-use crate::graph::components;
+use crate::graph::visit_components;
 use crate::mdp::Mdp;
 use crate::number::Number;
 
@@ -116,6 +118,9 @@ impl<N: Number> Solution<N> {
 /// How much exact arithmetic may cost, in bits touched, before it is given up.
 const EXACT_WORK: u64 = 3_000_000_000;
 
+/// Exact arithmetic takes too long.
+struct TooMuchWork;
+
 /// What the components share while a problem is solved.
 pub(crate) struct Run<'a, N> {
     pub problem: Problem<'a, N>,
@@ -140,31 +145,33 @@ pub fn solve<N: Number>(problem: Problem<'_, N>, hint: Option<&[u32]>) -> Option
         sure: problem.terminal.clone(),
         policy: vec![NONE; n],
     };
-    let order = components(n, |state| {
-        if problem.is_sink(state as usize) { &[] } else { problem.mdp.successors(state as usize) }
-    });
     let mut run = Run { problem, solution, hint, position: vec![NONE; n], work: 0 };
     run.solution.sure.grow(n);
-    let mut local = local::Local::new();
-    for component in order.iter() {
-        if run.problem.is_sink(component[0] as usize) {
-            if run.problem.rewards.is_some() && !run.problem.terminal.contains(component[0] as usize) {
-                run.solution.infinite.insert(component[0] as usize);
-            }
-            continue;
-        }
+    let (mut local, mut ways) = (local::Local::new(), ways::Ways::default());
+    let successors = |state: u32| {
+        if problem.is_sink(state as usize) { &[] } else { problem.mdp.successors(state as usize) }
+    };
+    visit_components(n, successors, |component| {
         match component {
+            [state] if problem.is_sink(*state as usize) => run.sink(*state as usize),
             [state] => run.single(*state as usize),
-            _ => run.component(component, &mut local)?,
+            _ if run.ways(component, &mut ways) => {}
+            _ => run.component(component, &mut local).ok_or(TooMuchWork)?,
         }
-        if N::EXACT && run.work > EXACT_WORK {
-            return None;
-        }
-    }
+        if N::EXACT && run.work > EXACT_WORK { Err(TooMuchWork) } else { Ok(()) }
+    })
+    .ok()?;
     Some(run.solution)
 }
 
 impl<N: Number> Run<'_, N> {
+    /// A state at which it ends, well or badly.
+    fn sink(&mut self, state: usize) {
+        if self.problem.rewards.is_some() && !self.problem.terminal.contains(state) {
+            self.solution.infinite.insert(state);
+        }
+    }
+
     /// Whether the sure states are those of the best policy, or those of all policies.
     pub fn sure_by_choice(&self) -> bool {
         self.problem.rewards.is_some() == (self.problem.direction == Direction::Min)
