@@ -13,6 +13,15 @@ pub struct Situation {
     cost: i64,
 }
 
+impl Situation {
+    /// The same state with nothing paid so far, for those to whom only states matter.
+    #[must_use]
+    pub fn unpaid(mut self) -> Self {
+        self.cost = 0;
+        self
+    }
+}
+
 /// An action that can be executed in some state.
 #[derive(Debug, Clone)]
 pub struct Transition {

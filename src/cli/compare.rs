@@ -1,22 +1,25 @@
 //! `metaplan compare`.
 
-use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use encodings::Limits;
+use encodings::pddl::ast::Problem;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 use metaplan::message::Message;
-use metaplan::mission::{Mission, source};
+use metaplan::mission::Mission;
 use metaplan::probabilistic::{
-    Action, Coadaptation, Comparison, Config, Failure as Unfinished, Measures, Planned, Risk, Roles,
-    Situation, compare,
+    Action, Coadaptation, Comparison, Config, Failure as Unfinished, Planned, Risk, Roles, Situation, Stages,
+    Tasked, compare,
 };
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::cli::check::failure as process_failure;
+use crate::cli::compare_table::{
+    Pair, Row, as_json, as_text, csv, memory_since, published_rows, row_json, rows,
+};
 use crate::cli::{Common, Exit, Failure, Format, Situation as Given, output};
 
 /// Arguments of `compare`.
@@ -70,47 +73,6 @@ fn loss(text: &str) -> Result<(String, f64), String> {
     if (0.0..=1.0).contains(&rate) { Ok((component.to_owned(), rate)) } else { Err(wrong()) }
 }
 
-/// The measures of the table, in its order.
-const MEASURES: [&str; 12] = [
-    "goal",
-    "goal_with_reserve",
-    "no_collision",
-    "collisions",
-    "time",
-    "energy",
-    "reconfigurations",
-    "time_if_successful",
-    "energy_if_successful",
-    "penalised_time",
-    "replans",
-    "states",
-];
-
-fn values(measures: &Measures) -> [Option<f64>; 12] {
-    [
-        Some(measures.goal),
-        Some(measures.goal_with_reserve),
-        Some(measures.no_collision),
-        Some(measures.collisions),
-        measures.time,
-        measures.energy,
-        measures.reconfigurations,
-        measures.time_if_successful,
-        measures.energy_if_successful,
-        measures.penalised_time,
-        Some(measures.replans),
-        Some(measures.states as f64),
-    ]
-}
-
-/// A row of the table.
-struct Row {
-    pair: Option<(String, String)>,
-    kind: String,
-    name: String,
-    values: Vec<Option<f64>>,
-}
-
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mission = arguments.situation.mission(&arguments.inputs)?;
@@ -124,7 +86,16 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
-    let coadaptation = Coadaptation::new(&mission, &problem, &roles)?;
+    let spelt_out = Coadaptation::is_spelt_out(&problem, &roles);
+    let tasked = if spelt_out { None } else { Some(Tasked::new(&mission, &problem, &roles)?) };
+    let coadaptation = match &tasked {
+        Some(tasked) => tasked.coadaptation.clone(),
+        None => Coadaptation::new(&mission, &problem, &roles)?,
+    };
+    if tasked.is_some() && arguments.pairs.is_some() {
+        let text = "`--pairs` is for missions whose problem spells out places (see the README)";
+        return Err(Failure::usage(Message::error("M129", text)));
+    }
     if let Some(loss) = &coadaptation.loss
         && !coadaptation.configurations.iter().any(|known| known.components.contains(&loss.component))
     {
@@ -138,7 +109,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mut comparisons = Vec::new();
     let progress = bar(arguments, common);
     for (pair, mission, coadaptation) in missions(arguments, &mission, coadaptation, &roles)? {
-        comparisons.push((pair, one(arguments, &mission, &coadaptation, &roles)?));
+        comparisons.push((pair, one(arguments, &mission, &coadaptation, &roles, tasked.as_ref())?));
         progress.set_position(comparisons.len() as u64);
     }
     progress.finish_and_clear();
@@ -166,8 +137,6 @@ fn bar(arguments: &Arguments, common: &Common) -> ProgressBar {
     let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     ProgressBar::with_draw_target(arguments.pairs.map(|pairs| pairs as u64), target)
 }
-
-type Pair = (String, String);
 
 /// The mission itself, or the same mission between other places.
 fn missions(
@@ -200,6 +169,7 @@ fn one(
     mission: &Mission,
     coadaptation: &Coadaptation,
     roles: &Roles,
+    tasked: Option<&Tasked>,
 ) -> Result<Comparison, Failure> {
     let mut risk = Risk::all(coadaptation);
     risk.battery &= !arguments.no_battery;
@@ -208,8 +178,16 @@ fn one(
         penalty: arguments.penalty,
         priority: arguments.priority as usize,
         states: arguments.state_limit,
+        memory: &memory_since,
     };
-    let mut planner = |situation: &Situation| plan(mission, coadaptation, roles, risk, *situation);
+    let mut planner = |situation: &Situation| match tasked {
+        Some(tasked) => solve(
+            mission,
+            |mission| tasked.problem(mission, situation),
+            |steps| tasked.actions(situation, steps),
+        ),
+        None => plan(mission, coadaptation, roles, risk, *situation),
+    };
     compare(coadaptation, &config, &mut planner).map_err(|error| match error {
         Unfinished::Process(error) => process_failure(error, &mission.name),
         Unfinished::Planner(messages) => messages.into(),
@@ -224,7 +202,6 @@ fn plan(
     risk: Risk,
     situation: Situation,
 ) -> Result<Planned, Vec<Message>> {
-    let started = Instant::now();
     let one = |message| vec![message];
     let mut mission = mission.clone();
     mission.set(&roles.location, &coadaptation.places[situation.place]).map_err(one)?;
@@ -237,19 +214,32 @@ fn plan(
     if let Some(loss) = coadaptation.loss.as_ref().filter(|_| situation.lost) {
         mission.fail(&loss.component).map_err(one)?;
     }
-    let (problem, _) = mission.filled()?;
+    let actions = |steps: &[encodings::Step]| {
+        Some(steps.iter().filter_map(|step| action(coadaptation, &step.arguments)).collect())
+    };
+    solve(&mission, |mission| mission.filled().map(|(problem, _)| problem), actions)
+}
+
+/// The plan of a problem, and what it took.
+fn solve(
+    mission: &Mission,
+    problem: impl FnOnce(&Mission) -> Result<Problem, Vec<Message>>,
+    actions: impl FnOnce(&[encodings::Step]) -> Option<Vec<Action>>,
+) -> Result<Planned, Vec<Message>> {
+    let started = Instant::now();
+    let problem = problem(mission)?;
     let task = mission.ground(&problem, &[], &Limits::none())?;
+    let ground = started.elapsed();
     let solution = encodings::optimize(&task, &encodings::Config::default(), &mut |_| {});
-    let actions = solution.plan.map(|plan| {
-        let step = |step: &encodings::Step| action(coadaptation, &step.arguments);
-        plan.steps.iter().filter_map(step).collect()
-    });
+    let actions = solution.plan.and_then(|plan| actions(&plan.steps));
     let statistics = &solution.statistics;
+    let (build, solve) = (ground + statistics.encode, statistics.search + statistics.solve);
+    let extract = started.elapsed().saturating_sub(build + solve);
     Ok(Planned {
         actions,
         variables: statistics.variables as u64,
         clauses: statistics.clauses as u64,
-        time: started.elapsed(),
+        time: Stages { build, solve, extract },
     })
 }
 
@@ -263,202 +253,4 @@ fn action(mission: &Coadaptation, arguments: &[String]) -> Option<Action> {
     }
     let design = arguments.last()?;
     mission.configurations.iter().position(|known| same(&known.name, design)).map(Action::Change)
-}
-
-fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
-    let row = |kind: &str, name: &str, values: Vec<Option<f64>>| Row {
-        pair: pair.cloned(),
-        kind: kind.to_owned(),
-        name: name.to_owned(),
-        values,
-    };
-    let mut rows: Vec<Row> = comparison
-        .candidates
-        .iter()
-        .map(|candidate| {
-            row(&candidate.kind.to_string(), &candidate.name, values(&candidate.measures).to_vec())
-        })
-        .collect();
-    let mut bound = vec![None; MEASURES.len()];
-    bound[4] = comparison.hindsight;
-    rows.push(row("f", "hindsight bound on the time", bound));
-    rows
-}
-
-fn published_rows(path: &std::path::Path) -> Result<Vec<Row>, Failure> {
-    let file = source(path)?;
-    let wrong = |text: String| Message::at("M126", file.name(), None, text);
-    let json: Value = serde_json::from_str(file.text()).map_err(|error| {
-        Message::at("M126", file.name(), Some((error.line(), error.column())), format!("no JSON: {error}"))
-    })?;
-    let list = json.as_array().ok_or_else(|| wrong("a list of objects is needed".to_owned()))?;
-    let mut rows = Vec::new();
-    for (number, entry) in list.iter().enumerate() {
-        let fields = entry.as_object().ok_or_else(|| wrong(format!("entry {}: no object", number + 1)))?;
-        let unknown = fields.keys().find(|key| *key != "name" && !MEASURES.contains(&key.as_str()));
-        if let Some(unknown) = unknown {
-            let text = format!(
-                "entry {}: `{unknown}` is no measure; these are: {}",
-                number + 1,
-                MEASURES.join(", ")
-            );
-            return Err(wrong(text).into());
-        }
-        rows.push(Row {
-            pair: None,
-            kind: "+".to_owned(),
-            name: entry["name"].as_str().unwrap_or("published").to_owned(),
-            values: MEASURES.iter().map(|measure| entry[*measure].as_f64()).collect(),
-        });
-    }
-    Ok(rows)
-}
-
-fn shown(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".to_owned(), |value| format!("{}", (value * 1e6).round() / 1e6))
-}
-
-fn as_text(rows: &[Row], comparisons: &[(Option<Pair>, Comparison)]) -> String {
-    let columns = [
-        "P(goal)",
-        "P(reserve)",
-        "P(no hit)",
-        "hits",
-        "time",
-        "energy",
-        "reconf.",
-        "time|goal",
-        "energy|goal",
-        "penalised",
-        "re-plans",
-    ];
-    let mut header = vec!["", "candidate"];
-    header.extend(columns);
-    let name = |row: &Row| match &row.pair {
-        Some((start, goal)) => format!("{start}-{goal}: {}", row.name),
-        None => row.name.clone(),
-    };
-    let table = output::table(
-        &header,
-        rows.iter().map(|row| {
-            let cells = row.values.iter().take(columns.len()).map(|value| shown(*value));
-            [row.kind.clone(), name(row)].into_iter().chain(cells).collect()
-        }),
-    );
-    let mut text = table;
-    for (pair, c) in comparisons {
-        let of = pair.as_ref().map(|(start, goal)| format!("{start}-{goal}: ")).unwrap_or_default();
-        let _ = writeln!(text, "\n{of}a mission that fails costs {}", shown(Some(c.penalty)));
-        let proved = c.no_price.map(|why| format!(" (provably zero: {why})")).unwrap_or_default();
-        let _ = writeln!(text, "price of determinism {}{proved}", shown(c.price_of_determinism()));
-        let _ = writeln!(
-            text,
-            "price of the open loop {}, value of re-planning {}",
-            shown(c.price_of_open_loop()),
-            shown(c.value_of_replanning())
-        );
-        let front: Vec<_> =
-            c.front.iter().map(|[t, p]| format!("({}, {})", shown(Some(*t)), shown(Some(*p)))).collect();
-        let _ = writeln!(text, "front of time and P(goal, no collision): {}", front.join(" "));
-        if let Some(loss) = &c.loss {
-            let _ = writeln!(text, "{} is lost after …", loss.component);
-            let steps = loss.steps.iter().map(|step| {
-                let times = [step.open_loop, step.replanned, step.solved_again, step.anticipated];
-                std::iter::once(step.moves.to_string()).chain(times.map(shown)).collect()
-            });
-            text += &output::table(
-                &["moves", "plan carried on", "new plan", "solved again", "anticipating"],
-                steps,
-            );
-        }
-        let k = &c.costs;
-        let seconds = Duration::as_secs_f64;
-        let _ = writeln!(
-            text,
-            "process: {} states, {} transitions, built in {:.3} s, solved in {:.3} s; \
-             plans: {}, the first in {:.3} s, the others in {:.3} s, formula of {} variables and {} clauses",
-            k.states,
-            k.transitions,
-            seconds(&k.build),
-            seconds(&k.solve),
-            k.plans,
-            seconds(&k.first_plan),
-            seconds(&k.more_plans),
-            k.variables,
-            k.clauses
-        );
-    }
-    if let Some(peak) = peak_memory() {
-        let _ = writeln!(text, "peak memory of all together: {peak} MB");
-    }
-    text
-}
-
-/// The greatest resident memory of this program in megabytes, where the system tells it.
-fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes / 1024)
-}
-
-fn csv(rows: &[Row]) -> String {
-    let mut text = format!("start,goal_place,kind,candidate,{}\n", MEASURES.join(","));
-    for row in rows {
-        let (start, goal) = row.pair.clone().unwrap_or_default();
-        let values: Vec<_> =
-            row.values.iter().map(|value| value.map(|v| v.to_string()).unwrap_or_default()).collect();
-        let name = row.name.replace('"', "\"\"");
-        let _ = writeln!(text, "{start},{goal},{},\"{name}\",{}", row.kind, values.join(","));
-    }
-    text
-}
-
-fn row_json(row: &Row) -> Value {
-    let mut fields = Map::new();
-    fields.insert("kind".to_owned(), json!(row.kind));
-    fields.insert("name".to_owned(), json!(row.name));
-    fields.extend(MEASURES.iter().zip(&row.values).map(|(name, value)| ((*name).to_owned(), json!(value))));
-    Value::Object(fields)
-}
-
-fn as_json(pair: Option<&Pair>, c: &Comparison) -> Value {
-    let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
-    let loss = c.loss.as_ref().map(|loss| {
-        let steps = loss.steps.iter().map(|step| {
-            json!({
-                "moves": step.moves,
-                "open_loop": step.open_loop,
-                "replanned": step.replanned,
-                "solved_again": step.solved_again,
-                "anticipated": step.anticipated,
-            })
-        });
-        json!({ "component": loss.component, "rate": loss.rate, "steps": steps.collect::<Vec<_>>() })
-    });
-    json!({
-        "start": pair.map(|(start, _)| start),
-        "goal": pair.map(|(_, goal)| goal),
-        "candidates": rows(pair, c).iter().map(row_json).collect::<Vec<_>>(),
-        "front": c.front,
-        "penalty": c.penalty,
-        "price_of_determinism": c.price_of_determinism(),
-        "price_provably_zero": c.no_price,
-        "price_of_open_loop": c.price_of_open_loop(),
-        "value_of_replanning": c.value_of_replanning(),
-        "loss": loss,
-        "costs": {
-            "states": c.costs.states,
-            "transitions": c.costs.transitions,
-            "plans": c.costs.plans,
-            "variables": c.costs.variables,
-            "clauses": c.costs.clauses,
-            "milliseconds": {
-                "build": milliseconds(c.costs.build),
-                "solve": milliseconds(c.costs.solve),
-                "first_plan": milliseconds(c.costs.first_plan),
-                "more_plans": milliseconds(c.costs.more_plans),
-            },
-            "peak_memory_mb": peak_memory(),
-        },
-    })
 }

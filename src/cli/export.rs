@@ -7,7 +7,7 @@ use encodings::pddl::ast::Problem;
 use encodings::pddl::{portable, print_domain, print_problem};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
-use metaplan::probabilistic::{Coadaptation, Risk, program};
+use metaplan::probabilistic::{Coadaptation, Risk, Tasked, program, published_program};
 use serde_json::json;
 
 use crate::cli::{Common, Exit, Failure, Format, Situation, output};
@@ -21,6 +21,9 @@ pub struct Arguments {
     /// What to write.
     #[arg(long = "to", value_enum, value_name = "FORMAT")]
     target: Target,
+    /// Which reading of the probabilistic approach becomes a model.
+    #[arg(long, value_enum, default_value_t = Setting::Corrected)]
+    setting: Setting,
     #[command(flatten)]
     situation: Situation,
     /// A directory for `domain.pddl` and `problem.pddl`, made if it is not there; for models, a file. Standard output by
@@ -39,6 +42,16 @@ enum Target {
     Prism,
     /// The co-adaptation process in JANI.
     Jani,
+}
+
+/// What a model says about a mission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Setting {
+    /// Every route, reconfiguration anywhere, collisions that are remembered, a battery that limits moves.
+    Corrected,
+    /// The five shortest routes, one reconfiguration before the first move, the last risky move decides whether it
+    /// collided, and no battery is ever empty.
+    Published,
 }
 
 /// Runs the command.
@@ -76,8 +89,16 @@ fn process(
     mission: &Mission,
     problem: &Problem,
 ) -> Result<Exit, Failure> {
-    let coadaptation = Coadaptation::new(mission, problem, mission.roles())?;
-    let model = program(&coadaptation, Risk::all(&coadaptation));
+    let roles = mission.roles();
+    let coadaptation = if Coadaptation::is_spelt_out(problem, roles) {
+        Coadaptation::new(mission, problem, roles)?
+    } else {
+        Tasked::new(mission, problem, roles)?.coadaptation
+    };
+    let model = match arguments.setting {
+        Setting::Corrected => program(&coadaptation, Risk::all(&coadaptation)),
+        Setting::Published => published_program(&coadaptation),
+    };
     let text = match arguments.target {
         Target::Jani => match probabilistic::jani::write(&mission.name, &model) {
             Ok(json) => output::pretty(&json),

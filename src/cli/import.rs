@@ -46,6 +46,9 @@ struct CamaraMap {
     /// A mission in which the battery does not matter.
     #[arg(long)]
     no_battery: bool,
+    /// At which speeds each way of localisation is a configuration.
+    #[arg(long, value_enum, default_value_t = Speeds::All)]
+    speeds: Speeds,
     /// Seconds that enabling or disabling one component takes.
     #[arg(long, value_name = "SECONDS", default_value_t = 5)]
     switch: u32,
@@ -67,6 +70,15 @@ enum Risk {
     /// Those of collisions.
     Collisions,
     /// Those of collisions, and of moves that do not get to their end.
+    All,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Speeds {
+    /// Full speed only, for which the map has measurements: 6 configurations.
+    Full,
+    /// Full, half and safe speed, as in the original: 18 configurations. Slower ones take longer, in proportion; at safe speed
+    /// nothing is hit.
     All,
 }
 
@@ -94,6 +106,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         switch_seconds: map.switch,
         collisions: map.risk != Risk::None,
         failures: map.risk == Risk::All,
+        speeds: map.speeds == Speeds::All,
     };
     let files = import_map(file.name(), file.text(), &options)?;
     std::fs::create_dir_all(&map.output).map_err(|error| {

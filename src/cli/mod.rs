@@ -3,6 +3,7 @@
 mod alternatives;
 mod check;
 mod compare;
+mod compare_table;
 mod convert;
 mod explain;
 mod export;

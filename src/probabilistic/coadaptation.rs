@@ -242,6 +242,13 @@ impl Coadaptation {
         })
     }
 
+    /// Whether a problem spells out places and configurations, as [`Coadaptation::new`] reads them; otherwise the states
+    /// of the task serve ([`Tasked`](crate::probabilistic::Tasked)).
+    pub fn is_spelt_out(problem: &Problem, roles: &Roles) -> bool {
+        let facts = Facts::new(problem);
+        [&roles.configured, &roles.suits].iter().any(|role| !facts.of(role).is_empty())
+    }
+
     /// The configurations that the loss of the component takes away.
     pub fn lost(&self, configuration: usize) -> bool {
         self.loss
@@ -270,7 +277,7 @@ fn natural(names: &mut Vec<String>) {
     names.dedup();
 }
 
-fn components(view: &View<'_>, design: &str) -> Vec<String> {
+pub(super) fn components(view: &View<'_>, design: &str) -> Vec<String> {
     let found = view.function_designs().into_iter().find(|known| known.individual.name == design);
     found
         .map(|found| found.components.iter().map(|component| component.name.clone()).collect())
@@ -278,13 +285,13 @@ fn components(view: &View<'_>, design: &str) -> Vec<String> {
 }
 
 /// The facts and values of a problem by symbol.
-struct Facts {
+pub(super) struct Facts {
     facts: BTreeMap<String, Vec<Vec<String>>>,
     values: BTreeMap<Vec<String>, BigRational>,
 }
 
 impl Facts {
-    fn new(problem: &Problem) -> Self {
+    pub fn new(problem: &Problem) -> Self {
         let mut result = Self { facts: BTreeMap::new(), values: BTreeMap::new() };
         for element in &problem.init {
             match element {
@@ -349,7 +356,7 @@ impl Facts {
         self.of(name).first().and_then(|arguments| arguments.last().cloned())
     }
 
-    fn value(&self, name: &str, arguments: &[&String]) -> Option<BigRational> {
+    pub fn value(&self, name: &str, arguments: &[&String]) -> Option<BigRational> {
         let mut key = vec![name.to_ascii_lowercase()];
         key.extend(arguments.iter().map(|argument| (*argument).clone()));
         self.values.get(&key).cloned()

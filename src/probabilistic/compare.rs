@@ -11,7 +11,7 @@ use probabilistic::explore::{Bounds, explore};
 
 use crate::message::Message;
 use crate::probabilistic::coadaptation::Coadaptation;
-use crate::probabilistic::loss::{self, LossReport};
+use crate::probabilistic::loss::{self, Hindsight, LossReport, Spent};
 use crate::probabilistic::play::{Measures, play};
 use crate::probabilistic::process::{Action, Process, REWARDS, Risk, Situation, State};
 use crate::probabilistic::published::{published, shortest_routes};
@@ -28,15 +28,33 @@ pub struct Planned {
     /// Its clauses.
     pub clauses: u64,
     /// How long it took.
-    pub time: Duration,
+    pub time: Stages,
+}
+
+/// How long the parts of an answer took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stages {
+    /// To build what is solved: the process, or the ground task and its formulas.
+    pub build: Duration,
+    /// To solve it.
+    pub solve: Duration,
+    /// To read out what to do.
+    pub extract: Duration,
+}
+
+impl Stages {
+    /// All of it.
+    pub fn total(&self) -> Duration {
+        self.build + self.solve + self.extract
+    }
 }
 
 /// Finds plans; asked once for each situation.
 pub type Planner<'a> = dyn FnMut(&Situation) -> Result<Planned, Vec<Message>> + 'a;
 
 /// How a comparison is made.
-#[derive(Debug, Clone)]
-pub struct Config {
+#[derive(Clone)]
+pub struct Config<'a> {
     /// What is uncertain in the referee.
     pub risk: Risk,
     /// The time that a failed mission costs; ten times the fastest plan's if not given.
@@ -45,6 +63,8 @@ pub struct Config {
     pub priority: usize,
     /// More states than this are an error.
     pub states: usize,
+    /// Tells the greatest memory in megabytes since it was last asked, where that is known.
+    pub memory: &'a dyn Fn() -> Option<u64>,
 }
 
 /// One way to decide, and what comes of it.
@@ -65,14 +85,18 @@ pub struct Costs {
     pub states: usize,
     /// Of the process.
     pub transitions: usize,
-    /// To build the process.
-    pub build: Duration,
-    /// To solve it, for all objectives together.
-    pub solve: Duration,
+    /// What the policies of single objectives decide, in all states that they get to.
+    pub decisions: usize,
+    /// The process, for all objectives together.
+    pub process: Stages,
+    /// The greatest memory in megabytes until the process was solved, with what the planner has left.
+    pub process_memory: Option<u64>,
     /// How many plans were made.
     pub plans: usize,
     /// The first one (cold).
-    pub first_plan: Duration,
+    pub first_plan: Stages,
+    /// The greatest memory in megabytes while the first one was made.
+    pub plan_memory: Option<u64>,
     /// The other ones together (warm).
     pub more_plans: Duration,
     /// Of the largest formula.
@@ -88,8 +112,8 @@ pub struct Comparison {
     pub candidates: Vec<Candidate>,
     /// The vertices of the front of time and probability of success without collision, where each time is finite.
     pub front: Vec<[f64; 2]>,
-    /// A time that no way to decide gets below, even one that knows beforehand what will be lost.
-    pub hindsight: Option<f64>,
+    /// Bounds on time and energy that no way to decide gets below, even one that knows beforehand what will be lost.
+    pub hindsight: [Hindsight; 2],
     /// The penalty for failed missions.
     pub penalty: f64,
     /// Why re-planning cannot be worse than the best policy, where that is known without computing it.
@@ -128,27 +152,34 @@ impl Comparison {
 /// The planner's, or a limit on states.
 pub fn compare(
     mission: &Coadaptation,
-    config: &Config,
+    config: &Config<'_>,
     planner: &mut Planner<'_>,
 ) -> Result<Comparison, Failure> {
-    let mut costs = Costs::default();
+    // The planner comes first, so that its memory can be told from that of the process.
+    (config.memory)();
+    let mut memo = Memo { planner, plans: BTreeMap::new(), costs: Costs::default() };
+    let first = memo.plan(&Situation::start(mission, config.risk))?;
+    memo.costs.plan_memory = (config.memory)();
     let started = Instant::now();
     let process = Process::<f64>::new(mission, config.risk, &REWARDS);
     let bounds = Bounds { states: config.states, ..Bounds::default() };
     let explored = explore(&process, &bounds)?;
-    costs.build = started.elapsed();
-    costs.states = explored.mdp.states();
-    costs.transitions = explored.mdp.transition_count();
-    let mut memo = Memo { planner, plans: BTreeMap::new(), costs };
-    let first = memo.plan(&Situation::start(mission, config.risk))?;
+    memo.costs.process.build = started.elapsed();
+    memo.costs.states = explored.mdp.states();
+    memo.costs.transitions = explored.mdp.transition_count();
     let fastest = first.as_ref().map(|plan| time_of(mission, plan));
     let penalty = config.penalty.unwrap_or_else(|| 10.0 * fastest.unwrap_or(1000.0).max(1.0));
-    let referee = Referee { mission, risk: config.risk, penalty, explored };
+    let referee = Referee { mission, risk: config.risk, penalty, process, explored };
     let mut candidates = Vec::new();
     let started = Instant::now();
     let policies = referee.policies();
     let (front, vertices) = referee.front();
-    memo.costs.solve = started.elapsed();
+    memo.costs.process.solve = started.elapsed();
+    memo.costs.process_memory = (config.memory)();
+    let started = Instant::now();
+    let decisions: usize = policies.iter().map(|(_, policy)| referee.decisions(policy).len()).sum();
+    memo.costs.process.extract = started.elapsed();
+    memo.costs.decisions = decisions;
     let mut anticipating = None;
     for (name, policy) in policies.into_iter().chain(vertices) {
         let measures = referee.play_policy(&policy)?;
@@ -178,7 +209,8 @@ pub fn compare(
         }
         _ => None,
     };
-    let hindsight = loss::hindsight(mission, config.risk, penalty);
+    let hindsight = [(Spent::Time, penalty), (Spent::Energy, f64::INFINITY)]
+        .map(|(spent, penalty)| loss::hindsight(mission, config.risk, penalty, spent));
     Ok(Comparison {
         candidates,
         front,
@@ -248,7 +280,7 @@ impl Memo<'_, '_> {
         if self.costs.plans == 0 {
             self.costs.first_plan = planned.time;
         } else {
-            self.costs.more_plans += planned.time;
+            self.costs.more_plans += planned.time.total();
         }
         self.costs.plans += 1;
         self.costs.variables = self.costs.variables.max(planned.variables);

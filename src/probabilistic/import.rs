@@ -32,6 +32,8 @@ pub struct MapOptions {
     pub collisions: bool,
     /// Whether the probabilities that moves fail are imported.
     pub failures: bool,
+    /// Whether each configuration comes at all three speeds, as in the original, or at full speed only.
+    pub speeds: bool,
 }
 
 impl Default for MapOptions {
@@ -46,6 +48,7 @@ impl Default for MapOptions {
             switch_seconds: 5,
             collisions: true,
             failures: true,
+            speeds: true,
         }
     }
 }
@@ -99,6 +102,58 @@ const DESIGNS: [Design; 6] = [
         &["marker_localization", "marker_recognizer", "camera", "headlamp", "map_server_obstacles"],
     ),
 ];
+
+/// A speed of the robot: name, metres a second, power in milliwatts beside that of the configuration, and whether bumps do
+/// harm. All measurements of the map count for full speed, which comes first.
+struct Speed(&'static str, f64, f64, bool);
+
+const SPEEDS: [Speed; 3] = [
+    Speed("full", 0.68, 6026.0, true),
+    Speed("half", 0.35, 14_004.0, true),
+    Speed("safe", 0.24, 4000.0, false),
+];
+
+/// A legal configuration: a way of localisation at a speed.
+#[derive(Clone, Copy)]
+struct Legal {
+    design: &'static Design,
+    speed: &'static Speed,
+    /// Whether the speed is a component like others, because there are several.
+    several: bool,
+}
+
+impl Legal {
+    fn all(options: &MapOptions) -> impl Iterator<Item = Self> + use<> {
+        let several = options.speeds;
+        let speeds = &SPEEDS[..if several { SPEEDS.len() } else { 1 }];
+        let of = move |design| speeds.iter().map(move |speed| Self { design, speed, several });
+        DESIGNS.iter().flat_map(of)
+    }
+
+    fn is_full(self) -> bool {
+        self.speed.0 == SPEEDS[0].0
+    }
+
+    fn object(self) -> String {
+        let name = object(self.design.0);
+        if self.is_full() { format!("fd_{name}") } else { format!("fd_{name}_{}", self.speed.0) }
+    }
+
+    fn components(self) -> Vec<String> {
+        let own = self.design.4.iter().map(|name| (*name).to_owned());
+        own.chain(self.several.then(|| format!("{}_speed", self.speed.0))).collect()
+    }
+
+    /// How much longer it takes than at full speed.
+    fn slowness(self) -> f64 {
+        SPEEDS[0].1 / self.speed.1
+    }
+
+    /// How much more energy it takes than at full speed.
+    fn effort(self) -> f64 {
+        self.slowness() * (self.design.1 + self.speed.2) / (self.design.1 + SPEEDS[0].2)
+    }
+}
 
 /// Metres a second at which energy is computed.
 const SPEED: f64 = 0.68;
@@ -193,7 +248,7 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
     }
     Ok(Files {
         manifest: manifest(&options.name),
-        knowledge: knowledge(&options.name),
+        knowledge: knowledge(options),
         domain: domain(options),
         problem: problem(&map, options),
     })
@@ -202,10 +257,6 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
 fn object(name: &str) -> String {
     let safe: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     safe.to_ascii_lowercase()
-}
-
-fn design_object(name: &str) -> String {
-    format!("fd_{}", object(name))
 }
 
 fn manifest(name: &str) -> String {
@@ -217,7 +268,8 @@ fn manifest(name: &str) -> String {
     )
 }
 
-fn knowledge(name: &str) -> String {
+fn knowledge(options: &MapOptions) -> String {
+    let name = &options.name;
     let mut text = format!(
         "# The configurations of a robot, by the components that they need.\n\n\
          @prefix : <http://metacontrol.org/metaplan/{name}#> .\n\
@@ -228,18 +280,18 @@ fn knowledge(name: &str) -> String {
          :f_move a owl:NamedIndividual , t:Function .\n\
          :a_move a owl:NamedIndividual , t:Action ; t:requiresF :f_move .\n\n"
     );
-    let components: BTreeSet<_> =
-        DESIGNS.iter().flat_map(|Design(.., components)| components.iter()).collect();
+    let components: BTreeSet<String> = Legal::all(options).flat_map(Legal::components).collect();
     for component in components {
         let _ = writeln!(text, ":c_{component} a owl:NamedIndividual , t:Component .");
     }
     text.push('\n');
-    for Design(name, .., components) in &DESIGNS {
-        let components: Vec<_> = components.iter().map(|component| format!(":c_{component}")).collect();
+    for legal in Legal::all(options) {
+        let components: Vec<_> =
+            legal.components().iter().map(|component| format!(":c_{component}")).collect();
         let _ = writeln!(
             text,
             ":{} a owl:NamedIndividual , t:FunctionDesign ; t:solvesF :f_move ;\n    t:requiresC {} .",
-            design_object(name),
+            legal.object(),
             components.join(" , ")
         );
     }
@@ -317,7 +369,8 @@ fn problem(map: &Map, options: &MapOptions) -> String {
     };
     let mut init = String::new();
     for arc in &arcs {
-        for Design(name, power, sees, source, _) in &DESIGNS {
+        for legal in Legal::all(options) {
+            let Design(_, power, sees, source, _) = legal.design;
             if dark.contains(arc) && !sees {
                 continue;
             }
@@ -327,15 +380,17 @@ fn problem(map: &Map, options: &MapOptions) -> String {
             let seconds = value(&times)
                 .filter(|seconds| *seconds > 0.0)
                 .unwrap_or_else(|| rounded(rounded(metres, 6) / speed(source), 4));
-            let energy = (metres * SPEED * power * ENERGY).trunc();
+            let seconds = if legal.is_full() { seconds } else { rounded(seconds * legal.slowness(), 4) };
+            let energy = metres * SPEED * power * ENERGY;
+            let energy = (if legal.is_full() { energy } else { energy * legal.effort() }).trunc();
             for (from, to) in [(&arc.0, &arc.1), (&arc.1, &arc.0)] {
-                let (from, to, design) = (object(from), object(to), design_object(name));
+                let (from, to, design) = (object(from), object(to), legal.object());
                 let _ = writeln!(init, "    (suits {design} {from} {to})");
                 let _ = writeln!(init, "    (= (time {from} {to} {design}) {seconds})");
                 let _ = writeln!(init, "    (= (energy {from} {to} {design}) {energy})");
                 let numbers = [
                     ("success", value(&successes).filter(|_| options.failures), 1.0),
-                    ("hit", value(&hits).filter(|_| options.collisions), 0.0),
+                    ("hit", value(&hits).filter(|_| options.collisions && legal.speed.3), 0.0),
                 ];
                 for (role, value, usual) in numbers {
                     if let Some(value) = value.filter(|value| (value - usual).abs() > 0.0) {
@@ -345,27 +400,24 @@ fn problem(map: &Map, options: &MapOptions) -> String {
             }
         }
     }
-    for Design(old, .., before) in &DESIGNS {
-        for Design(new, .., after) in DESIGNS.iter().filter(|Design(new, ..)| new != old) {
+    for old in Legal::all(options) {
+        for new in Legal::all(options).filter(|new| new.object() != old.object()) {
+            let (before, after) = (old.components(), new.components());
             let off = before.iter().filter(|component| !after.contains(component)).count();
             let on = after.iter().filter(|component| !before.contains(component)).count();
             let seconds = (off + on) as u32 * options.switch_seconds;
-            let _ = writeln!(
-                init,
-                "    (= (switch_time {} {}) {seconds})",
-                design_object(old),
-                design_object(new)
-            );
+            let _ = writeln!(init, "    (= (switch_time {} {}) {seconds})", old.object(), new.object());
         }
     }
     let mut places: Vec<_> = arcs.iter().flat_map(|(a, b)| [object(a), object(b)]).collect();
     places.extend([object(&options.start), object(&options.goal)]);
     places.sort_by_key(|name| (name.len(), name.clone()));
     places.dedup();
-    let designs: Vec<_> = DESIGNS.iter().map(|Design(name, ..)| design_object(name)).collect();
+    let designs: Vec<_> = Legal::all(options).map(Legal::object).collect();
     let battery =
         options.battery.map(|battery| format!("    (= (battery) {battery}) (= (reserve) {RESERVE})\n"));
     let battery = battery.unwrap_or_default();
+    let initial = format!("fd_{}", object(&options.configuration));
     format!(
         "(define (problem {})\n  (:domain coadaptation)\n  (:objects\n    {} - waypoint\n    {} - functiondesign)\n  \
          (:init\n    (robot_at {}) (configured {})\n{battery}    \
@@ -374,7 +426,7 @@ fn problem(map: &Map, options: &MapOptions) -> String {
         places.join(" "),
         designs.join(" "),
         object(&options.start),
-        design_object(&options.configuration),
+        initial,
         object(&options.goal)
     )
 }

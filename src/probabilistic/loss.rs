@@ -5,7 +5,7 @@ use probabilistic::explore::{Bounds, explore};
 use probabilistic::solve::solve;
 use probabilistic::{Direction, Problem};
 
-use crate::probabilistic::coadaptation::Coadaptation;
+use crate::probabilistic::coadaptation::{Coadaptation, Switch, Traversal};
 use crate::probabilistic::compare::{Failure, Memo, after, time_of};
 use crate::probabilistic::process::{Action, Process, Risk, Situation};
 use crate::probabilistic::referee::Referee;
@@ -45,14 +45,7 @@ pub(super) fn report(
     let mission = referee.mission;
     let loss = mission.loss.as_ref();
     let mut steps = Vec::new();
-    let mut at = Situation {
-        place: mission.start,
-        configuration: mission.initial,
-        hit: false,
-        failed: false,
-        lost: false,
-        battery: mission.battery.filter(|_| referee.risk.battery).map_or(0, |battery| battery.initial),
-    };
+    let mut at = Situation::start(mission, referee.risk);
     let (start, mut moves) = (at, 0);
     for done in 0..=plan.len() {
         let moved = done == 0 || matches!(plan[done - 1], Action::Move(_));
@@ -146,34 +139,62 @@ fn solved_again(referee: &Referee<'_>, from: Situation, spent: f64) -> Result<Op
 /// Moves after which a loss that has not come is left out.
 const HORIZON: usize = 2000;
 
-/// A time that nobody gets below: the expected time of who knows beforehand after which move the component is lost.
-/// Collisions, failures and the battery are left out, which can only make it smaller.
-pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64) -> Option<f64> {
-    let size = mission.places.len() * mission.configurations.len();
-    let at = |place: usize, design: usize| place * mission.configurations.len() + design;
-    let start = at(mission.start, mission.initial);
-    let never = relaxed(mission, false, &vec![f64::INFINITY; size], true);
-    let Some(loss) = mission.loss.as_ref().filter(|_| risk.loss) else {
-        return Some(never[start]).filter(|time| time.is_finite());
-    };
-    let rate = loss.rate.to_f64()?;
-    let mut known = relaxed(mission, true, &vec![f64::INFINITY; size], true);
+/// What is spent on the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spent {
+    /// Time.
+    Time,
+    /// Energy.
+    Energy,
+}
+
+impl Spent {
+    fn traversal(self, traversal: &Traversal) -> f64 {
+        let spent = if self == Self::Time { &traversal.time } else { &traversal.energy };
+        spent.to_f64().unwrap_or(f64::INFINITY)
+    }
+
+    fn switch(self, switch: &Switch) -> f64 {
+        let spent = if self == Self::Time { &switch.time } else { &switch.energy };
+        spent.to_f64().unwrap_or(f64::INFINITY)
+    }
+}
+
+/// Bounds that nobody gets below.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Hindsight {
+    /// The least that a mission can take which gets to its goal.
+    pub least: Option<f64>,
+    /// The expected least of who knows beforehand after which move the component is lost; a mission that cannot get to its
+    /// goal then costs the penalty.
+    pub expected: Option<f64>,
+}
+
+/// What nobody gets below. Collisions, failures and the battery are left out, which can only make it smaller.
+pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent) -> Hindsight {
+    let start = mission.start * mission.configurations.len() + mission.initial;
+    let never = relaxed(mission, spent, false, None);
+    let least = Some(never[start]).filter(|value| value.is_finite());
+    let rate = mission.loss.as_ref().filter(|_| risk.loss).and_then(|loss| loss.rate.to_f64());
+    let Some(rate) = rate else { return Hindsight { least, expected: least } };
+    let mut known = relaxed(mission, spent, true, None);
     // The loss comes with a move at the earliest.
     let (mut expected, mut left) = (0.0, 1.0);
     for _ in 0..HORIZON {
-        known = relaxed(mission, false, &known, false);
-        let time = known[start].min(penalty);
-        expected += left * rate * time;
+        known = relaxed(mission, spent, false, Some(&known));
+        let value = known[start].min(penalty);
+        expected += left * rate * value;
         left *= 1.0 - rate;
-        if left < 1e-15 || (time - never[start]).abs() < 1e-12 {
+        if left < 1e-15 || (value - never[start]).abs() < 1e-12 {
             break;
         }
     }
-    Some(expected + left * never[start].min(penalty))
+    let expected = expected + left * never[start].min(penalty);
+    Hindsight { least, expected: Some(expected).filter(|value| value.is_finite()) }
 }
 
-/// Least times to the goal. With `to_the_end`, moves go on as they are; otherwise what comes after one move is `later`.
-fn relaxed(mission: &Coadaptation, lost: bool, later: &[f64], to_the_end: bool) -> Vec<f64> {
+/// The least that it takes to the goal. What comes after one move is `later`, where that is given.
+fn relaxed(mission: &Coadaptation, spent: Spent, lost: bool, later: Option<&[f64]>) -> Vec<f64> {
     let designs = mission.configurations.len();
     let at = |place: usize, design: usize| place * designs + design;
     let usable = |design: usize| mission.configurations[design].available && !(lost && mission.lost(design));
@@ -185,19 +206,16 @@ fn relaxed(mission: &Coadaptation, lost: bool, later: &[f64], to_the_end: bool) 
         let mut changed = false;
         for arc in &mission.arcs {
             for (design, traversal) in arc.by.iter().enumerate().filter(|(design, _)| usable(*design)) {
-                let Some(time) = traversal.as_ref().and_then(|traversal| traversal.time.to_f64()) else {
-                    continue;
+                let Some(traversal) = traversal else { continue };
+                let rest = match later {
+                    _ if arc.to == mission.goal => 0.0,
+                    Some(later) => later[at(arc.to, design)],
+                    None => best[at(arc.to, design)],
                 };
-                let rest = if arc.to == mission.goal {
-                    0.0
-                } else if to_the_end {
-                    best[at(arc.to, design)]
-                } else {
-                    later[at(arc.to, design)]
-                };
+                let whole = spent.traversal(traversal) + rest;
                 let here = &mut best[at(arc.from, design)];
-                if arc.from != mission.goal && time + rest < *here {
-                    *here = time + rest;
+                if arc.from != mission.goal && whole < *here {
+                    *here = whole;
                     changed = true;
                 }
             }
@@ -206,9 +224,9 @@ fn relaxed(mission: &Coadaptation, lost: bool, later: &[f64], to_the_end: bool) 
             for old in 0..designs {
                 for new in (0..designs).filter(|new| usable(*new)) {
                     let Some(switch) = &mission.switches[old][new] else { continue };
-                    let time = switch.time.to_f64().unwrap_or(f64::INFINITY) + best[at(place, new)];
-                    if time < best[at(place, old)] {
-                        best[at(place, old)] = time;
+                    let whole = spent.switch(switch) + best[at(place, new)];
+                    if whole < best[at(place, old)] {
+                        best[at(place, old)] = whole;
                         changed = true;
                     }
                 }

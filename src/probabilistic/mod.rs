@@ -14,12 +14,16 @@ mod program;
 mod published;
 mod referee;
 mod route;
+mod single_way;
+mod task;
 
 pub use coadaptation::{Arc, Battery, Coadaptation, Configuration, Loss, Roles, Switch, Traversal};
-pub use compare::{Candidate, Comparison, Config, Costs, Failure, Planned, Planner, compare};
+pub use compare::{Candidate, Comparison, Config, Costs, Failure, Planned, Planner, Stages, compare};
 pub use import::{Files, MapOptions, import_map};
-pub use loss::{LossAt, LossReport};
+pub use loss::{Hindsight, LossAt, LossReport};
 pub use play::Measures;
 pub use process::{Action, Process, REWARDS, Risk, Situation, State};
 pub use program::program;
 pub use published::{Published, published, shortest_routes};
+pub use single_way::published_program;
+pub use task::Tasked;

@@ -39,25 +39,25 @@ struct Writer<'a> {
     risk: Risk,
 }
 
-fn equals(variable: &str, value: usize) -> Expr {
+pub(super) fn equals(variable: &str, value: usize) -> Expr {
     Expr::name(variable).op(BinaryOp::Equal, Expr::int(value as i64))
 }
 
-fn not(expression: Expr) -> Expr {
+pub(super) fn not(expression: Expr) -> Expr {
     Expr::new(ExprKind::Not(Box::new(expression)))
 }
 
-fn all(parts: impl IntoIterator<Item = Expr>) -> Expr {
+pub(super) fn all(parts: impl IntoIterator<Item = Expr>) -> Expr {
     parts.into_iter().reduce(|all, part| all.op(BinaryOp::And, part)).unwrap_or(Expr::bool(true))
 }
 
-fn number(value: &BigRational) -> Expr {
+pub(super) fn number(value: &BigRational) -> Expr {
     Expr::new(ExprKind::Number(value.clone()))
 }
 
-type Assignments = Vec<(String, Expr, Place)>;
+pub(super) type Assignments = Vec<(String, Expr, Place)>;
 
-fn assign(name: &str, value: Expr) -> (String, Expr, Place) {
+pub(super) fn assign(name: &str, value: Expr) -> (String, Expr, Place) {
     (name.to_owned(), value, Place::default())
 }
 
@@ -249,16 +249,16 @@ impl Writer<'_> {
     }
 }
 
-fn item(action: &str, guard: Expr, reward: Expr) -> RewardItem {
+pub(super) fn item(action: &str, guard: Expr, reward: Expr) -> RewardItem {
     RewardItem { action: Some(Some(action.to_owned())), guard, reward, place: Place::default() }
 }
 
-fn command(action: String, guard: Expr, updates: Vec<Update>) -> Command {
+pub(super) fn command(action: String, guard: Expr, updates: Vec<Update>) -> Command {
     Command { action: Some(action), guard, updates, place: Place::default() }
 }
 
 /// The ends that are possible; one that is certain stands without its probability.
-fn updates(ends: impl IntoIterator<Item = (BigRational, Assignments)>) -> Vec<Update> {
+pub(super) fn updates(ends: impl IntoIterator<Item = (BigRational, Assignments)>) -> Vec<Update> {
     let possible: Vec<_> = ends.into_iter().filter(|(probability, _)| !probability.is_zero()).collect();
     let certain = possible.len() == 1;
     let update = |(probability, assignments): (BigRational, Assignments)| Update {

@@ -14,7 +14,7 @@ use crate::probabilistic::process::Action;
 use probabilistic::Number;
 
 /// How many routes are kept.
-const ROUTES: usize = 5;
+pub(super) const ROUTES: usize = 5;
 /// The weight of the priority property, and of each other one.
 const WEIGHTS: [f64; 2] = [0.6, 0.2];
 /// Partial routes after which the search for routes gives up.
@@ -57,6 +57,10 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     let rest = to_goal(mission, &scaled);
     let mut queue =
         BinaryHeap::from([Reverse((rest[mission.start].unwrap_or(u64::MAX), Vec::<usize>::new()))]);
+    let mut leaving = vec![Vec::new(); mission.places.len()];
+    for (number, arc) in mission.arcs.iter().enumerate() {
+        leaving[arc.from].push(number);
+    }
     let (mut found, mut steps) = (Vec::new(), 0);
     while let Some(Reverse((estimate, route))) = queue.pop() {
         steps += 1;
@@ -74,14 +78,14 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
         let so_far: u64 = route.iter().map(|arc| scaled(*arc)).sum();
         let seen: BTreeSet<usize> =
             route.iter().map(|arc| mission.arcs[*arc].from).chain(std::iter::once(at)).collect();
-        for (number, arc) in mission.arcs.iter().enumerate() {
-            if arc.from == at
-                && !seen.contains(&arc.to)
+        for number in &leaving[at] {
+            let arc = &mission.arcs[*number];
+            if !seen.contains(&arc.to)
                 && let Some(rest) = rest[arc.to]
             {
                 let mut longer = route.clone();
-                longer.push(number);
-                queue.push(Reverse((so_far + scaled(number) + rest, longer)));
+                longer.push(*number);
+                queue.push(Reverse((so_far + scaled(*number) + rest, longer)));
             }
         }
     }
@@ -90,6 +94,10 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
 
 /// The length of the shortest way from each place to the goal.
 fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
+    let mut entering = vec![Vec::new(); mission.places.len()];
+    for (number, arc) in mission.arcs.iter().enumerate() {
+        entering[arc.to].push(number);
+    }
     let mut best: Vec<Option<u64>> = vec![None; mission.places.len()];
     let mut queue = BinaryHeap::from([Reverse((0_u64, mission.goal))]);
     while let Some(Reverse((so_far, place))) = queue.pop() {
@@ -97,9 +105,10 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
             continue;
         }
         best[place] = Some(so_far);
-        for (number, arc) in mission.arcs.iter().enumerate().filter(|(_, arc)| arc.to == place) {
-            if best[arc.from].is_none() {
-                queue.push(Reverse((so_far + length(number), arc.from)));
+        for number in &entering[place] {
+            let from = mission.arcs[*number].from;
+            if best[from].is_none() {
+                queue.push(Reverse((so_far + length(*number), from)));
             }
         }
     }

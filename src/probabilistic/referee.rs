@@ -2,7 +2,7 @@
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
-use probabilistic::explore::Explored;
+use probabilistic::explore::{DEADLOCK, Explored, Generator};
 use probabilistic::pareto::{Objective, Pareto};
 use probabilistic::policy::with_secondary;
 use probabilistic::solve::{NONE, Solution, solve};
@@ -20,6 +20,7 @@ pub struct Referee<'a> {
     pub mission: &'a Coadaptation,
     pub risk: Risk,
     pub penalty: f64,
+    pub process: Process<f64>,
     pub explored: Explored<State, f64>,
 }
 
@@ -125,9 +126,29 @@ impl Referee<'_> {
 
     /// What a policy does in a situation.
     pub fn decision(&self, policy: &[u32], situation: Situation) -> Option<Action> {
-        let number = self.explored.states.get_index_of(&State::from(situation))?;
+        let state = State::from(situation);
+        let number = self.explored.states.number(self.process.code(&state), &state)?;
         let choice = policy.get(number).filter(|choice| **choice != NONE)?;
         Some(Action::from_number(self.explored.mdp.action(*choice as usize)))
+    }
+
+    /// What a policy does in each state that it gets to.
+    pub fn decisions(&self, policy: &[u32]) -> Vec<(Situation, Action)> {
+        let mdp = &self.explored.mdp;
+        let mut seen = FixedBitSet::with_capacity(mdp.states());
+        let (mut queue, mut decisions, mut at) = (vec![0_usize], Vec::new(), 0);
+        seen.insert(0);
+        while let Some(state) = queue.get(at).copied() {
+            at += 1;
+            let choice = policy[state];
+            if choice == NONE || mdp.action(choice as usize) == DEADLOCK {
+                continue;
+            }
+            let action = Action::from_number(mdp.action(choice as usize));
+            decisions.push((self.explored.states[state].situation(), action));
+            queue.extend(mdp.targets(choice as usize).iter().map(|t| *t as usize).filter(|t| !seen.put(*t)));
+        }
+        decisions
     }
 
     pub fn play_policy(&self, policy: &[u32]) -> Result<Measures, Error> {

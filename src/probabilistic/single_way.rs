@@ -1,0 +1,213 @@
+//! A mission to a model of the published setting in the PRISM language, beside the corrected one of [`program`](super::program()).
+//!
+//! As in the models that Cámara, Schmerl and Garlan (SEAMS 2020) generate for each route: one reconfiguration at most, before
+//! the first move; then along one of the routes that were kept. The flag `collided` is overwritten at each move that
+//! can collide, a move never fails, and a battery that is empty ends nothing. Their models are one for each route; here
+//! the route is the first choice, so that one question finds the best of them, and a constant fixes it.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, ToPrimitive, Zero};
+use probabilistic::Place;
+use probabilistic::prism::ast::{
+    BinaryOp, Constant, Expr, ExprKind, Function, Model, ModelKind, Module, Named, Rewards, Type, Variable,
+};
+use probabilistic::prism::identifier;
+
+use crate::probabilistic::coadaptation::Coadaptation;
+use crate::probabilistic::program::{all, assign, command, equals, item, not, number, updates};
+use crate::probabilistic::published::{ROUTES, shortest_routes};
+
+/// The mission as a model of the published setting: `r` is the route (0 before it is chosen), `p` how many of its arcs are
+/// behind the robot, `c` the configuration, `b` the battery; `rd` says that a reconfiguration was made.
+pub fn published_program(mission: &Coadaptation) -> Model {
+    let routes = shortest_routes(mission, ROUTES);
+    let writer = Writer { mission, routes };
+    Model {
+        kind: ModelKind::Mdp,
+        remark: writer.remark(),
+        constants: vec![Constant {
+            name: "ROUTE".to_owned(),
+            kind: Type::Int,
+            value: None,
+            place: Place::default(),
+        }],
+        formulas: Vec::new(),
+        globals: Vec::new(),
+        modules: vec![Module {
+            name: "robot".to_owned(),
+            variables: writer.variables(),
+            commands: writer.commands(),
+            place: Place::default(),
+        }],
+        rewards: writer.rewards(),
+        labels: writer.labels(),
+    }
+}
+
+struct Writer<'a> {
+    mission: &'a Coadaptation,
+    routes: Vec<Vec<usize>>,
+}
+
+fn name(what: &str, thing: &str) -> String {
+    identifier(&format!("{what}_{thing}"))
+}
+
+impl Writer<'_> {
+    fn remark(&self) -> String {
+        let mut text =
+            "A co-adaptation mission in the published setting. ROUTE fixes the route, 0 leaves it open."
+                .to_owned();
+        for (number, route) in self.routes.iter().enumerate() {
+            let places = route.iter().map(|arc| self.mission.places[self.mission.arcs[*arc].to].as_str());
+            let start = std::iter::once(self.mission.places[self.mission.start].as_str());
+            let places: Vec<&str> = start.chain(places).collect();
+            text += &format!("\nroute {}: {}", number + 1, places.join(" "));
+        }
+        let designs = self.mission.configurations.iter().enumerate();
+        let designs: Vec<_> = designs.map(|(number, c)| format!("{number} = {}", c.name)).collect();
+        text + &format!("\nc, the configuration: {}", designs.join(", "))
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        let range = |name: &str, greatest: usize, initial: usize| Variable {
+            name: name.to_owned(),
+            range: Some((Expr::int(0), Expr::int(greatest as i64))),
+            initial: Some(Expr::int(initial as i64)),
+            place: Place::default(),
+        };
+        let flag = |name: &str| Variable {
+            name: name.to_owned(),
+            range: None,
+            initial: Some(Expr::bool(false)),
+            place: Place::default(),
+        };
+        let longest = self.routes.iter().map(Vec::len).max().unwrap_or(0).max(1);
+        let designs = self.mission.configurations.len();
+        let mut variables = vec![
+            range("r", self.routes.len().max(1), 0),
+            range("p", longest, 0),
+            range("c", designs.max(2) - 1, self.mission.initial),
+            flag("rd"),
+            flag("collided"),
+        ];
+        let battery = self.mission.battery;
+        variables
+            .extend(battery.map(|battery| range("b", battery.initial as usize, battery.initial as usize)));
+        variables
+    }
+
+    /// What is left of the battery, at least nothing.
+    fn spent(&self, energy: &BigRational) -> Vec<(String, Expr, Place)> {
+        let Some(battery) = self.mission.battery else { return Vec::new() };
+        let levels =
+            (energy / BigRational::from(BigInt::from(battery.unit))).ceil().to_i64().unwrap_or(i64::MAX);
+        if levels == 0 {
+            return Vec::new();
+        }
+        let left = Expr::name("b").op(BinaryOp::Minus, Expr::int(levels));
+        let left = Expr::new(ExprKind::Call(Function::Max, vec![Expr::int(0), left]));
+        vec![assign("b", left)]
+    }
+
+    fn commands(&self) -> Vec<probabilistic::prism::ast::Command> {
+        let mission = self.mission;
+        let mut commands = Vec::new();
+        for route in 1..=self.routes.len() {
+            let open = Expr::name("ROUTE").op(BinaryOp::Equal, Expr::int(0));
+            let wanted =
+                open.op(BinaryOp::Or, Expr::name("ROUTE").op(BinaryOp::Equal, Expr::int(route as i64)));
+            let chosen = vec![assign("r", Expr::int(route as i64))];
+            let guard = all([equals("r", 0), wanted]);
+            commands.push(command(
+                name("route", &route.to_string()),
+                guard,
+                updates([(BigRational::one(), chosen)]),
+            ));
+        }
+        let chosen = || Expr::name("r").op(BinaryOp::NotEqual, Expr::int(0));
+        for (new, configuration) in mission.configurations.iter().enumerate().filter(|(_, c)| c.available) {
+            let Some(switch) = &mission.switches[mission.initial][new] else { continue };
+            let guard = all([chosen(), equals("p", 0), not(Expr::name("rd")), equals("c", mission.initial)]);
+            let mut changed = self.spent(&switch.energy);
+            changed.extend([assign("c", Expr::int(new as i64)), assign("rd", Expr::bool(true))]);
+            let updates = updates([(BigRational::one(), changed)]);
+            commands.push(command(name("set", &configuration.name), guard, updates));
+        }
+        for (route, arcs) in self.routes.iter().enumerate() {
+            for (position, arc) in arcs.iter().enumerate() {
+                for (design, traversal) in mission.arcs[*arc].by.iter().enumerate() {
+                    let Some(traversal) =
+                        traversal.as_ref().filter(|_| mission.configurations[design].available)
+                    else {
+                        continue;
+                    };
+                    let guard = all([equals("r", route + 1), equals("p", position), equals("c", design)]);
+                    let mut moved = self.spent(&traversal.energy);
+                    moved.push(assign("p", Expr::int(position as i64 + 1)));
+                    let with = |collided: bool| {
+                        let flag = std::iter::once(assign("collided", Expr::bool(collided)));
+                        moved.iter().cloned().chain(flag).collect::<Vec<_>>()
+                    };
+                    let ends = if traversal.hit.is_zero() {
+                        updates([(BigRational::one(), moved.clone())])
+                    } else {
+                        let missed = BigRational::one() - &traversal.hit;
+                        updates([(traversal.hit.clone(), with(true)), (missed, with(false))])
+                    };
+                    commands.push(command(self.go(*arc), guard, ends));
+                }
+            }
+        }
+        commands
+    }
+
+    fn go(&self, arc: usize) -> String {
+        let arc = &self.mission.arcs[arc];
+        name("go", &format!("{}_{}", self.mission.places[arc.from], self.mission.places[arc.to]))
+    }
+
+    fn rewards(&self) -> Vec<Rewards> {
+        let mission = self.mission;
+        let (mut time, mut energy) = (Vec::new(), Vec::new());
+        let mut put = |action: &str, guard: Expr, spent: [&BigRational; 2]| {
+            for (list, value) in [&mut time, &mut energy].into_iter().zip(spent) {
+                if !value.is_zero() {
+                    list.push(item(action, guard.clone(), number(value)));
+                }
+            }
+        };
+        for (new, configuration) in mission.configurations.iter().enumerate() {
+            if let Some(switch) = &mission.switches[mission.initial][new] {
+                put(&name("set", &configuration.name), Expr::bool(true), [&switch.time, &switch.energy]);
+            }
+        }
+        let arcs: std::collections::BTreeSet<usize> = self.routes.iter().flatten().copied().collect();
+        for arc in arcs {
+            for (design, traversal) in mission.arcs[arc].by.iter().enumerate() {
+                if let Some(traversal) = traversal {
+                    put(&self.go(arc), equals("c", design), [&traversal.time, &traversal.energy]);
+                }
+            }
+        }
+        let named = [("time", time), ("energy", energy)];
+        named
+            .into_iter()
+            .map(|(name, items)| Rewards { name: name.to_owned(), items, place: Place::default() })
+            .collect()
+    }
+
+    fn labels(&self) -> Vec<Named> {
+        let ends = self.routes.iter().enumerate();
+        let ends = ends.map(|(route, arcs)| all([equals("r", route + 1), equals("p", arcs.len())]));
+        let goal = ends.reduce(|any, end| any.op(BinaryOp::Or, end)).unwrap_or(Expr::bool(false));
+        let label = |name: &str, expression: Expr| Named {
+            name: name.to_owned(),
+            expression,
+            place: Place::default(),
+        };
+        let safe = all([goal.clone(), not(Expr::name("collided"))]);
+        vec![label("goal", goal), label("safe_goal", safe)]
+    }
+}

@@ -1,0 +1,287 @@
+//! Any mission to a co-adaptation process: places are the states of its ground task, and configurations the designs that
+//! its actions name.
+//!
+//! Missions that spell out places and configurations become a process more directly ([`Coadaptation::new`]). For all others
+//! the task is explored: what can be reached by its actions, numbers included. Actions choose their designs freely, so
+//! that reconfiguration takes nothing; what it takes to act is how much the metric grows.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use encodings::pddl::ast::{InitialElement, Name, Problem};
+use encodings::validate::{PlanStep, advance};
+use encodings::{Exact, Limits, Situation as TaskState, Step, Task, Transition};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Zero};
+
+use crate::message::Message;
+use crate::mission::Mission;
+use crate::probabilistic::coadaptation::{
+    Arc, Coadaptation, Configuration, Facts, Loss, Roles, Switch, Traversal, components,
+};
+use crate::probabilistic::process::{Action, Situation};
+
+/// States of the task beyond which it does not become a process.
+const STATES: usize = 50_000;
+
+/// A mission as a process, with the way back to its actions.
+#[derive(Debug, Clone)]
+pub struct Tasked {
+    /// The process.
+    pub coadaptation: Coadaptation,
+    /// For each place one way to get there: the place before it, and the action.
+    origins: Vec<Option<(usize, Act)>>,
+    /// For each place what the actions do there.
+    moves: Vec<HashMap<Act, (usize, usize)>>,
+}
+
+/// An action with its arguments, as the ground task has it.
+type Act = (String, Vec<String>);
+
+impl Tasked {
+    /// Explores the task of a mission, as [`Mission::filled`] has filled its problem.
+    ///
+    /// # Errors
+    /// What the planner does not handle, or too many states.
+    pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Vec<Message>> {
+        let timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
+        if timed {
+            let text = "timed initial literals have no place in a decision process";
+            return Err(vec![Message::error("M127", text)]);
+        }
+        let task = mission.ground(problem, &[], &Limits::none())?;
+        let view = mission.knowledge().map(crate::knowledge::Knowledge::view);
+        let named = |of: &dyn Fn(&ontology::tomasys::View<'_>) -> Vec<String>| {
+            view.as_ref().map(of).unwrap_or_default().into_iter().collect::<BTreeSet<String>>()
+        };
+        let mut explorer = Explorer {
+            facts: Facts::new(problem),
+            roles,
+            designs: named(&|view| view.function_designs().into_iter().map(|d| d.individual.name).collect()),
+            functions: named(&|view| view.functions().into_iter().map(|function| function.name).collect()),
+            task: &task,
+            places: vec![task.start().unpaid()],
+            numbers: HashMap::new(),
+            configurations: Vec::new(),
+            arcs: BTreeMap::new(),
+            origins: vec![None],
+            moves: Vec::new(),
+        };
+        explorer.explore()?;
+        let parts = |name: &String| {
+            let of = |design: &str| view.as_ref().map(|view| components(view, design)).unwrap_or_default();
+            name.split('+').flat_map(of).collect()
+        };
+        Ok(explorer.finish(parts))
+    }
+
+    /// The problem that is left in a situation: the actions that lead to its place have taken place.
+    ///
+    /// # Errors
+    /// The mission with the component lost does not fit its domain.
+    pub fn problem(&self, mission: &Mission, situation: &Situation) -> Result<Problem, Vec<Message>> {
+        let mut way = Vec::new();
+        let mut place = situation.place;
+        while let Some((before, act)) = &self.origins[place] {
+            way.push(act);
+            place = *before;
+        }
+        let (mut current, _) = mission.filled()?;
+        let mut changed = mission.clone();
+        if let Some(loss) = self.coadaptation.loss.as_ref().filter(|_| situation.lost) {
+            changed.fail(&loss.component).map_err(|message| vec![message])?;
+        }
+        let (mut left, _) = changed.filled()?;
+        for (action, arguments) in way.into_iter().rev() {
+            let step = PlanStep {
+                action: Name::new(action),
+                arguments: arguments.iter().map(|name| Name::new(name)).collect(),
+                start: None,
+                duration: None,
+                line: 0,
+            };
+            let done = advance(mission.domain(), &current, &step, false).map_err(|violation| {
+                vec![Message::error(
+                    "M128",
+                    format!("a step of the process cannot be executed: {violation:?}"),
+                )]
+            })?;
+            done.apply(&mut current.init);
+            done.apply(&mut left.init);
+        }
+        Ok(left)
+    }
+
+    /// What the steps of a plan do from a situation.
+    pub fn actions(&self, situation: &Situation, steps: &[Step]) -> Option<Vec<Action>> {
+        let (mut place, mut configuration) = (situation.place, situation.configuration);
+        let mut actions = Vec::new();
+        for step in steps {
+            if place == self.coadaptation.goal {
+                break;
+            }
+            let (arc, needed) = *self.moves[place].get(&(step.action.clone(), step.arguments.clone()))?;
+            if needed != configuration {
+                actions.push(Action::Change(needed));
+                configuration = needed;
+            }
+            actions.push(Action::Move(arc));
+            place = self.coadaptation.arcs[arc].to;
+        }
+        Some(actions)
+    }
+}
+
+struct Explorer<'a> {
+    facts: Facts,
+    roles: &'a Roles,
+    designs: BTreeSet<String>,
+    functions: BTreeSet<String>,
+    task: &'a Task,
+    places: Vec<TaskState>,
+    numbers: HashMap<TaskState, usize>,
+    configurations: Vec<String>,
+    /// From a place to another one, by configuration.
+    arcs: BTreeMap<(usize, usize), BTreeMap<usize, Traversal>>,
+    origins: Vec<Option<(usize, Act)>>,
+    /// For each place and action the place after it and the configuration.
+    moves: Vec<HashMap<Act, (usize, usize)>>,
+}
+
+impl Explorer<'_> {
+    fn explore(&mut self) -> Result<(), Vec<Message>> {
+        let start = self.places[0].clone();
+        self.numbers.insert(start, 0);
+        let mut at = 0;
+        while at < self.places.len() {
+            if self.places.len() > STATES {
+                let text =
+                    format!("the task has more than {STATES} states, too many for a process of its states");
+                return Err(vec![Message::error("M127", text)]);
+            }
+            let state = self.places[at].clone();
+            self.moves.push(HashMap::new());
+            // Nothing comes after the goal.
+            let transitions =
+                if self.task.reaches_goal(&state) { Vec::new() } else { self.task.transitions(&state) };
+            for transition in transitions {
+                self.transition(at, &state, transition);
+            }
+            at += 1;
+        }
+        Ok(())
+    }
+
+    fn transition(&mut self, from: usize, state: &TaskState, transition: Transition) {
+        let before = self.task.metric(state);
+        let after = self.task.metric(&transition.after);
+        let rational =
+            |exact: Exact| BigRational::new(BigInt::from(exact.numerator), BigInt::from(exact.denominator));
+        let time = rational(after) - rational(before);
+        let target = transition.after.unpaid();
+        let to = self.numbers.get(&target).copied().unwrap_or_else(|| {
+            self.numbers.insert(target.clone(), self.places.len());
+            self.places.push(target);
+            self.origins.push(Some((from, (transition.action.clone(), transition.arguments.clone()))));
+            self.places.len() - 1
+        });
+        let (designs, others): (Vec<&String>, Vec<&String>) =
+            transition.arguments.iter().partition(|argument| self.designs.contains(*argument));
+        let name = designs.iter().map(|design| design.as_str()).collect::<Vec<_>>().join("+");
+        let name = if name.is_empty() { "none".to_owned() } else { name };
+        let configuration =
+            self.configurations.iter().position(|known| *known == name).unwrap_or_else(|| {
+                self.configurations.push(name);
+                self.configurations.len() - 1
+            });
+        let others = others.into_iter().filter(|argument| !self.functions.contains(*argument));
+        let key: Vec<&String> = others.chain(designs).collect();
+        let value = |role: &str| self.facts.value(role, &key);
+        let traversal = Traversal {
+            time,
+            energy: value(&self.roles.energy).unwrap_or_else(BigRational::zero),
+            success: value(&self.roles.success).unwrap_or_else(BigRational::one),
+            hit: value(&self.roles.hit).unwrap_or_else(BigRational::zero),
+        };
+        let by = self.arcs.entry((from, to)).or_default();
+        // Of two actions that do the same, the quicker one.
+        if by.get(&configuration).is_none_or(|known| traversal.time < known.time) {
+            by.insert(configuration, traversal);
+        }
+        self.moves[from].insert((transition.action, transition.arguments), (to, configuration));
+    }
+
+    /// The objects of the only atom that holds, where that tells all states apart; numbers otherwise.
+    fn names(&self) -> Vec<String> {
+        let strip = |atom: &str| {
+            let inner = atom.trim_matches(['(', ')']);
+            inner.split_once(' ').map_or(inner, |(_, arguments)| arguments).replace(' ', "_")
+        };
+        let one = |state: &TaskState| match self.task.holding(state)[..] {
+            [atom] => Some(strip(atom)),
+            _ => None,
+        };
+        let single: Option<Vec<String>> = self.places.iter().map(one).collect();
+        let told_apart = |names: &Vec<String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
+        single
+            .filter(told_apart)
+            .unwrap_or_else(|| (0..self.places.len()).map(|number| format!("s{number}")).collect())
+    }
+
+    fn finish(mut self, components: impl Fn(&String) -> Vec<String>) -> Tasked {
+        let goals: Vec<bool> = self.places.iter().map(|place| self.task.reaches_goal(place)).collect();
+        // All states of the goal become one place, the last one.
+        let goal = self.places.len();
+        let mut names = self.names();
+        names.push("goal".to_owned());
+        if self.configurations.is_empty() {
+            self.configurations.push("none".to_owned());
+        }
+        let designs = self.configurations.len();
+        let mut merged: BTreeMap<(usize, usize), Vec<Option<Traversal>>> = BTreeMap::new();
+        for ((from, to), by) in self.arcs {
+            let to = if goals[to] { goal } else { to };
+            let row = merged.entry((from, to)).or_insert_with(|| vec![None; designs]);
+            for (configuration, traversal) in by {
+                let known = &mut row[configuration];
+                if known.as_ref().is_none_or(|known| traversal.time < known.time) {
+                    *known = Some(traversal);
+                }
+            }
+        }
+        let numbers: BTreeMap<(usize, usize), usize> = merged.keys().copied().zip(0..).collect();
+        let moves = self.moves.into_iter().enumerate().map(|(from, acts)| {
+            let arc = |to: usize| numbers[&(from, if goals[to] { goal } else { to })];
+            acts.into_iter().map(|(act, (to, configuration))| (act, (arc(to), configuration))).collect()
+        });
+        let free = |old: usize, new: usize| {
+            (old != new).then(|| Switch {
+                time: BigRational::zero(),
+                energy: BigRational::zero(),
+                success: BigRational::one(),
+            })
+        };
+        let loss = self.roles.loss_component.clone().map(|component| Loss {
+            component,
+            rate: probabilistic::number::from_shortest_decimal(self.roles.loss_rate)
+                .unwrap_or_else(BigRational::zero),
+        });
+        let configurations: Vec<Configuration> = self
+            .configurations
+            .iter()
+            .map(|name| Configuration { name: name.clone(), components: components(name), available: true })
+            .collect();
+        let coadaptation = Coadaptation {
+            start: if goals[0] { goal } else { 0 },
+            goal,
+            places: names,
+            initial: 0,
+            configurations,
+            arcs: merged.into_iter().map(|((from, to), by)| Arc { from, to, by }).collect(),
+            switches: (0..designs).map(|old| (0..designs).map(|new| free(old, new)).collect()).collect(),
+            battery: None,
+            loss,
+        };
+        Tasked { coadaptation, origins: self.origins, moves: moves.collect() }
+    }
+}
