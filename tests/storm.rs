@@ -287,8 +287,8 @@ const CASES: [Case; 2] = [
 /// Our mission with a battery and the size of its levels, as `14000/20`.
 fn larger(battery: &str, case: &Case) -> (Coadaptation, Risk) {
     let number = |text: &str| text.parse::<u32>().expect("a number");
-    let (battery, unit) =
-        battery.split_once('/').map_or((number(battery), 1), |(b, u)| (number(b), number(u)));
+    let (battery, unit) = battery.split_once('/').unwrap_or((battery, "1"));
+    let (battery, unit) = (number(battery), number(unit));
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let (mission, _) = Mission::read(&root.join("missions/camara_like.toml")).expect("a mission");
     let (problem, _) = mission.filled().expect("filled");

@@ -56,18 +56,21 @@ fn name(what: &str, thing: &str) -> String {
 
 impl Writer<'_> {
     fn remark(&self) -> String {
-        let mut text =
-            "A co-adaptation mission in the published setting. ROUTE fixes the route, 0 leaves it open."
-                .to_owned();
-        for (number, route) in self.routes.iter().enumerate() {
-            let places = route.iter().map(|arc| self.mission.places[self.mission.arcs[*arc].to].as_str());
-            let start = std::iter::once(self.mission.places[self.mission.start].as_str());
-            let places: Vec<&str> = start.chain(places).collect();
-            text += &format!("\nroute {}: {}", number + 1, places.join(" "));
-        }
+        let place = |place: usize| self.mission.places[place].as_str();
+        let routes = self.routes.iter().enumerate().map(|(number, route)| {
+            let places = route.iter().map(|arc| place(self.mission.arcs[*arc].to));
+            let places: Vec<&str> = std::iter::once(place(self.mission.start)).chain(places).collect();
+            format!("route {}: {}", number + 1, places.join(" "))
+        });
         let designs = self.mission.configurations.iter().enumerate();
         let designs: Vec<_> = designs.map(|(number, c)| format!("{number} = {}", c.name)).collect();
-        text + &format!("\nc, the configuration: {}", designs.join(", "))
+        let lines: Vec<String> = routes.collect();
+        format!(
+            "A co-adaptation mission in the published setting. ROUTE fixes the route, 0 leaves it open.\n{}\nc, the \
+             configuration: {}",
+            lines.join("\n"),
+            designs.join(", ")
+        )
     }
 
     fn variables(&self) -> Vec<Variable> {

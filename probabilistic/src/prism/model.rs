@@ -217,7 +217,7 @@ impl<N: Number> Program<N> {
         problems: &mut Vec<Diagnostic>,
     ) {
         let mut free = Group { commands: Vec::new(), index: None };
-        let mut by_action: Vec<(u32, Group<N>)> = Vec::new();
+        let mut by_action: FxHashMap<u32, Group<N>> = FxHashMap::default();
         for command in &module.commands {
             let writable = |name: &str| {
                 let own = module.variables.iter().any(|variable| variable.name == name);
@@ -228,10 +228,10 @@ impl<N: Number> Program<N> {
                     None => free.commands.push(compiled),
                     Some(action) => {
                         let number = numbers[action.as_str()];
-                        match by_action.iter_mut().find(|(known, _)| *known == number) {
-                            Some((_, group)) => group.commands.push(compiled),
-                            None => by_action.push((number, Group { commands: vec![compiled], index: None })),
-                        }
+                        let group = by_action
+                            .entry(number)
+                            .or_insert_with(|| Group { commands: Vec::new(), index: None });
+                        group.commands.push(compiled);
                     }
                 },
                 Err(more) => problems.extend(more),
