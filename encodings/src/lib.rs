@@ -39,8 +39,9 @@ mod tests;
 
 pub use alternatives::{Alternatives, Forced, alternatives};
 pub use certificate::{
-    Certificate, Checked, Fault, Inputs as RefutationInputs, Outputs as RefutationOutputs, StepBound,
-    certify, check as check_certificate, check_refutation, describes, refute, verification_conditions,
+    Certificate, Checked, Faithful, Fault, Inputs as RefutationInputs, Outputs as RefutationOutputs,
+    StepBound, certify, check as check_certificate, check_refutation, describes, faithful, refute,
+    verification_conditions,
 };
 pub use encode::Semantics;
 pub use error::{Error, File, Place};

@@ -144,6 +144,7 @@ impl Task {
     fn limit(&mut self, objective: usize, budget: i64) {
         let variable = NumericId(self.initial.numbers.len() as u32);
         self.initial.numbers.push(budget);
+        self.number_names.push(String::new());
         let always = self.operators.iter().all(|operator| Self::cost(operator, objective).minimum() >= 0);
         for operator in &mut self.operators {
             let cost = Self::cost(operator, objective).clone();

@@ -8,8 +8,8 @@ use encodings::pddl::ast::{Domain, Name, Problem};
 use encodings::pddl::{self, Source};
 use encodings::validate::{Options, PlanText, validate};
 use encodings::{
-    Checked, GroundConfig, RefutationInputs, check_certificate, check_refutation, describes, ground,
-    verification_conditions,
+    Checked, Faithful, GroundConfig, RefutationInputs, check_certificate, check_refutation, describes,
+    faithful, ground, verification_conditions,
 };
 use num_rational::BigRational;
 
@@ -159,20 +159,36 @@ pub(super) fn plan(
     Ok((format!("{steps} steps, valid, metric {claimed}"), value))
 }
 
-/// Grounds the files again; returns also whether operators take time.
+/// Whether the task stands for the files, and whether its operators take time: instance by instance, or else by grounding
+/// the files again.
 fn same_task(
     domain: &Domain,
     problem: &Problem,
     solves: &[String],
     written: &str,
 ) -> Result<(String, bool), String> {
+    let reason = match faithful(domain, problem, written) {
+        Faithful::Yes { instances, idle, timed } => {
+            let said = format!(
+                "it stands for the files: {instances} instances of actions, {idle} of which change nothing that it knows"
+            );
+            return Ok((said, timed));
+        }
+        Faithful::Unknown(reason) => reason,
+        Faithful::No(reason) => return Err(reason),
+        _ => "another construct".to_owned(),
+    };
     let solves = solves.iter().map(|name| Name::new(name)).collect();
     let config = GroundConfig { solves, ..GroundConfig::default() };
     let task = ground(domain, problem, &config)
         .map_err(|errors| errors.first().map_or_else(String::new, ToString::to_string))?;
     if describes(written, &task) {
-        Ok((format!("what the files ground to: {} operators", task.operator_count()), task.is_timed()))
+        let said = format!(
+            "what the files ground to: {} operators; not compared instance by instance: {reason}",
+            task.operator_count()
+        );
+        Ok((said, task.is_timed()))
     } else {
-        Err("the files ground to another task".to_owned())
+        Err(format!("the files ground to another task ({reason})"))
     }
 }

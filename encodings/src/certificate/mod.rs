@@ -7,6 +7,7 @@
 //! successor of a label is covered or cut off again, then no plan of any length is cheaper than the claim: by
 //! induction over its steps. A claim without a cost is that there is no plan.
 //!
+//! `faithful` compares a written task with its files, without grounding them.
 //! `clausal` has a second argument for small tasks: a formula, its refutation, and a bound on the number of steps.
 //! `smt` writes the first one as verification conditions for an SMT solver.
 //!
@@ -19,6 +20,7 @@
 mod argument;
 mod check;
 mod clausal;
+mod faithful;
 mod model;
 mod semantics;
 mod shape;
@@ -28,5 +30,6 @@ mod write;
 
 pub use check::{Checked, Fault, check};
 pub use clausal::{Inputs, Outputs, StepBound, check_refutation, refute};
+pub use faithful::{Faithful, faithful};
 pub use smt::verification_conditions;
 pub use write::{Certificate, certify, describes};

@@ -18,6 +18,9 @@ pub(super) struct Model {
     pub(super) basic: usize,
     pub(super) values: Vec<u32>,
     pub(super) numbers: Vec<i64>,
+    /// The numeric fluents that they are, and how many times their values.
+    pub(super) fluents: Vec<String>,
+    pub(super) number_scale: i64,
     /// The designs that may fill each slot, as objects.
     pub(super) slots: Vec<Vec<u32>>,
     /// Lists of slots that operators fill, each with the designs that suit.

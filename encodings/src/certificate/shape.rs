@@ -37,7 +37,10 @@ pub(super) fn task(model: &Model) -> Found {
     require(small && model.numbers.iter().all(|number| in_range((*number).into())), || {
         "a number is too large".into()
     })?;
-    require(model.objective.scale > 0 && model.time_scale > 0, || "a scale that is not positive".into())?;
+    require(model.fluents.len() == model.numbers.len(), || "not one fluent for each number".into())?;
+    require(model.objective.scale > 0 && model.time_scale > 0 && model.number_scale > 0, || {
+        "a scale that is not positive".into()
+    })?;
     for uses in &model.uses {
         for (slot, designs) in uses {
             let slot = model.slots.get(*slot as usize).ok_or("a slot that is not there")?;

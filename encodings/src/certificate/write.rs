@@ -129,6 +129,8 @@ fn model(task: &Task) -> Model {
         basic: task.basic,
         values: task.initial.values.clone(),
         numbers: task.initial.numbers.clone(),
+        fluents: task.number_names.clone(),
+        number_scale: task.number_scale,
         slots: task.slots.iter().map(|slot| slot.designs.iter().map(|design| design.0).collect()).collect(),
         uses: writer.uses.all,
         exclusions: writer.exclusions.all,

@@ -1,0 +1,188 @@
+//! Objects, what holds at first, and what never changes.
+
+use num_rational::BigRational;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::pddl::ast::{
+    ActionBody, Atom, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
+};
+use crate::pddl::types::TypeHierarchy;
+
+/// A predicate or function with objects, both by number.
+pub(super) type Key = (u32, Vec<u32>);
+
+pub(super) struct World<'w> {
+    pub(super) problem: &'w Problem,
+    types: TypeHierarchy,
+    symbols: FxHashMap<Name, u32>,
+    names: Vec<Name>,
+    /// Objects with their types; an object may be declared more than once.
+    objects: Vec<(u32, Vec<&'w TypeExpression>)>,
+    by_name: FxHashMap<u32, usize>,
+    facts: FxHashSet<Key>,
+    /// The facts of a predicate that never changes, and those with an object at a place.
+    rows: FxHashMap<u32, Vec<Vec<u32>>>,
+    rows_with: FxHashMap<(u32, usize, u32), Vec<usize>>,
+    values: FxHashMap<Key, BigRational>,
+    /// Predicates and functions that some action changes.
+    changing: FxHashSet<u32>,
+}
+
+impl<'w> World<'w> {
+    pub(super) fn new(domain: &'w Domain, problem: &'w Problem) -> Result<Self, String> {
+        if !domain.derived.is_empty() {
+            return Err("derived predicates".to_owned());
+        }
+        let mut world = Self {
+            problem,
+            types: TypeHierarchy::of(domain),
+            symbols: FxHashMap::default(),
+            names: Vec::new(),
+            objects: Vec::new(),
+            by_name: FxHashMap::default(),
+            facts: FxHashSet::default(),
+            rows: FxHashMap::default(),
+            rows_with: FxHashMap::default(),
+            values: FxHashMap::default(),
+            changing: FxHashSet::default(),
+        };
+        for declaration in domain.predicates.iter().chain(&domain.functions) {
+            world.intern(&declaration.identifier.name);
+        }
+        world.intern(&Name::new("total-cost"));
+        for entry in domain.constants.iter().chain(&problem.objects) {
+            let symbol = world.intern(&entry.identifier.name);
+            let place = *world.by_name.entry(symbol).or_insert(world.objects.len());
+            if place == world.objects.len() {
+                world.objects.push((symbol, Vec::new()));
+            }
+            world.objects[place].1.push(&entry.r#type);
+        }
+        for action in &domain.actions {
+            match &action.body {
+                ActionBody::Instantaneous { effect, .. } => world.note_changes(effect)?,
+                ActionBody::Durative { effects, .. } => {
+                    effects.iter().try_for_each(|(_, effect)| world.note_changes(effect))?;
+                }
+            }
+        }
+        for element in &problem.init {
+            world.state(element)?;
+        }
+        Ok(world)
+    }
+
+    fn intern(&mut self, name: &Name) -> u32 {
+        if let Some(symbol) = self.symbols.get(name) {
+            return *symbol;
+        }
+        let symbol = self.names.len() as u32;
+        self.symbols.insert(name.clone(), symbol);
+        self.names.push(name.clone());
+        symbol
+    }
+
+    fn note_changes(&mut self, effect: &Effect) -> Result<(), String> {
+        match effect {
+            Effect::And(parts) => parts.iter().try_for_each(|part| self.note_changes(part)),
+            Effect::Add(atom) | Effect::Delete(atom) | Effect::Assign(_, atom, ..) => {
+                let symbol = self.symbol(&atom.predicate.name)?;
+                self.changing.insert(symbol);
+                Ok(())
+            }
+            Effect::ForAll(..) => Err("universal effects".to_owned()),
+            Effect::When(..) => Err("conditional effects".to_owned()),
+        }
+    }
+
+    fn state(&mut self, element: &InitialElement) -> Result<(), String> {
+        match element {
+            InitialElement::Fact(atom) => {
+                let key = self.key(atom, &FxHashMap::default())?;
+                if self.facts.insert(key.clone()) {
+                    let rows = self.rows.entry(key.0).or_default();
+                    for (place, object) in key.1.iter().enumerate() {
+                        self.rows_with.entry((key.0, place, *object)).or_default().push(rows.len());
+                    }
+                    rows.push(key.1);
+                }
+            }
+            InitialElement::NegatedFact(_) => {}
+            InitialElement::Value(atom, value, _) => {
+                let key = self.key(atom, &FxHashMap::default())?;
+                self.values.insert(key, value.clone());
+            }
+            InitialElement::Timed(..) => return Err("timed initial literals".to_owned()),
+        }
+        Ok(())
+    }
+
+    pub(super) fn symbol(&self, name: &Name) -> Result<u32, String> {
+        self.symbols.get(name).copied().ok_or_else(|| format!("{name}, which is declared nowhere"))
+    }
+
+    /// The object that a term stands for.
+    pub(super) fn object(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Result<u32, String> {
+        match term {
+            Term::Variable(identifier) => binding
+                .get(&identifier.name)
+                .copied()
+                .ok_or_else(|| format!("{}, which is free", identifier.name)),
+            Term::Constant(identifier) => self.symbol(&identifier.name),
+        }
+    }
+
+    pub(super) fn key(&self, atom: &Atom, binding: &FxHashMap<&Name, u32>) -> Result<Key, String> {
+        let objects = atom.arguments.iter().map(|term| self.object(term, binding));
+        Ok((self.symbol(&atom.predicate.name)?, objects.collect::<Result<_, _>>()?))
+    }
+
+    /// An atom or fluent as it is written, in small letters.
+    pub(super) fn show(&self, key: &Key) -> String {
+        let words = std::iter::once(&key.0).chain(&key.1);
+        let words: Vec<String> = words.map(|symbol| self.name(*symbol).to_ascii_lowercase()).collect();
+        format!("({})", words.join(" "))
+    }
+
+    pub(super) fn name(&self, symbol: u32) -> &str {
+        self.names.get(symbol as usize).map_or("?", Name::as_str)
+    }
+
+    pub(super) fn changes(&self, symbol: u32) -> bool {
+        self.changing.contains(&symbol)
+    }
+
+    pub(super) fn holds_initially(&self, key: &Key) -> bool {
+        self.facts.contains(key)
+    }
+
+    pub(super) fn initial_atoms(&self) -> impl Iterator<Item = Key> + '_ {
+        self.facts.iter().cloned()
+    }
+
+    pub(super) fn initial_value(&self, key: &Key) -> Option<&BigRational> {
+        self.values.get(key)
+    }
+
+    pub(super) fn is_of(&self, object: u32, wanted: &TypeExpression) -> bool {
+        let place = self.by_name.get(&object);
+        place.is_some_and(|place| self.objects[*place].1.iter().any(|given| self.types.fits(given, wanted)))
+    }
+
+    pub(super) fn objects_of(&self, wanted: &TypeExpression) -> Vec<u32> {
+        let all = self.objects.iter().map(|(object, _)| *object);
+        all.filter(|object| self.is_of(*object, wanted)).collect()
+    }
+
+    /// The facts of a predicate, or those with an object at a place.
+    pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> Vec<&Vec<u32>> {
+        let Some(rows) = self.rows.get(&predicate) else { return Vec::new() };
+        match place {
+            None => rows.iter().collect(),
+            Some((place, object)) => {
+                let found = self.rows_with.get(&(predicate, place, object));
+                found.into_iter().flatten().map(|row| &rows[*row]).collect()
+            }
+        }
+    }
+}
