@@ -105,7 +105,7 @@ fn change(certificate: &str, name: &str, edit: &dyn Fn(String) -> String) {
 #[test]
 fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
     type Edit = fn(String) -> String;
-    let cases: [(&str, Edit, &str); 16] = [
+    let cases: [(&str, Edit, &str); 17] = [
         (
             "knowledge.nt",
             |text| text.replace("fd_aruco>", "fd_marker>"),
@@ -143,7 +143,13 @@ fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
             "plan        failed",
         ),
         ("problem.pddl", |text| text.replace("(fd_available fd_amcl_kinect)", ""), "plan        failed"),
-        ("task.json", |text| text.replacen("\"constant\":", "\"constant\":1", 1), "task        failed"),
+        // A task that allows more stands for the files still, but the argument does not hold for it.
+        ("task.json", |text| text.replacen("\"constant\":", "\"constant\":1", 1), "argument    failed"),
+        (
+            "task.json",
+            |text| text.replacen("\"number_scale\":", "\"number_scale\":1", 1),
+            "task        failed",
+        ),
         ("argument.json", |text| text.replacen("\"values\":[", "\"values\":[9999,", 1), "argument    failed"),
         ("argument.json", |_| "[".repeat(100_000), "argument    failed"),
         ("domain.pddl", |text| text.replace(":effect", ":efect"), "files       failed"),
