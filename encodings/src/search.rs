@@ -22,7 +22,7 @@ use crate::successors::{OperatorIndex, undominated};
 use crate::task::{Fact, OperatorId, State, Task};
 
 /// How many states are stored at most.
-const STATE_LIMIT: usize = 400_000;
+pub(crate) const STATE_LIMIT: usize = 400_000;
 /// After so many states without a plan the greedy search has its turn, with as many.
 const SOON: usize = 20_000;
 /// States with larger numbers are left out.
@@ -85,30 +85,32 @@ struct Search<'a> {
 /// Searches a task whose operators all cost at least 0.
 pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
     let prepared = Prepared::new(task);
-    let found = prepared.map(|prepared| search_from(task, bounds, &prepared, &task.initial, limits));
+    let found =
+        prepared.map(|prepared| search_from(task, bounds, &prepared, &task.initial, STATE_LIMIT, limits));
     found.unwrap_or(Found::Unknown(None))
 }
 
-/// Searches it from a state of its own.
+/// Searches it from a state of its own, storing at most so many states.
 pub(crate) fn search_from(
     task: &Task,
     bounds: &Bounds,
     prepared: &Prepared,
     initial: &State,
+    most: usize,
     limits: &Limits,
 ) -> Found {
     let mut search = Search::new(task, bounds, prepared, initial, false);
-    if let Some(found) = search.run(limits, SOON) {
+    if let Some(found) = search.run(limits, SOON.min(most)) {
         return found;
     }
     let mut some = None;
     if search.best.is_none() {
         let mut greedy = Search::new(task, bounds, prepared, initial, true);
-        greedy.run(limits, SOON);
+        greedy.run(limits, SOON.min(most));
         some = greedy.best_plan();
         search.limit = some.as_ref().map_or(i64::MAX, |plan| plan.cost);
     }
-    match search.run(limits, STATE_LIMIT) {
+    match search.run(limits, most) {
         Some(Found::Unknown(plan)) => Found::Unknown(cheaper(plan, some)),
         Some(found) => found,
         None => Found::Unknown(cheaper(search.best_plan(), some)),

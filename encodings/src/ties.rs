@@ -74,16 +74,17 @@ struct Ties<'a> {
 pub(crate) fn choose(task: &Task, bounds: &Bounds, limits: &Limits, plan: GroundPlan) -> GroundPlan {
     let close_to = FxHashSet::default();
     let beginning = Beginning { state: &task.initial, designs: &[], close_to: &close_to };
-    choose_from(task, bounds, limits, plan, &beginning).0
+    choose_from(task, bounds, limits, plan, (usize::MAX, usize::MAX), &beginning).0
 }
 
-/// The same for plans that begin in another state, or after steps that are settled; with its changes, if plans were few
-/// enough to tell.
+/// The same for plans that begin in another state, or after steps that are settled; with its changes, if they are at most so
+/// many and plans were few enough to tell.
 pub(crate) fn choose_from(
     task: &Task,
     bounds: &Bounds,
     limits: &Limits,
     plan: GroundPlan,
+    most: Changes,
     beginning: &Beginning<'_>,
 ) -> (GroundPlan, Option<Changes>) {
     let mut functions: Vec<ObjectId> =
@@ -112,16 +113,21 @@ pub(crate) fn choose_from(
     };
     let state = beginning.state.clone();
     let start = Label { state, designs, cost: 0, steps: 0, changes: (0, 0), parent: None };
-    match ties.first(start, &plan.steps) {
+    match ties.first(start, most, &plan.steps) {
         Some((steps, changes)) => (GroundPlan { steps, cost: plan.cost }, Some(changes)),
         None => (plan, None),
     }
 }
 
 impl Ties<'_> {
-    /// The first plan in order, and its changes; none if there are too many to tell.
-    fn first(&mut self, start: Label, known: &[GroundStep]) -> Option<(Vec<GroundStep>, Changes)> {
-        let (mut suffix, changes) = self.fewest_changes(&start, (usize::MAX, usize::MAX))?;
+    /// The first plan in order, and its changes; none if those are more, or if there are too many plans to tell.
+    fn first(
+        &mut self,
+        start: Label,
+        most: Changes,
+        known: &[GroundStep],
+    ) -> Option<(Vec<GroundStep>, Changes)> {
+        let (mut suffix, changes) = self.fewest_changes(&start, most)?;
         if suffix.len() != known.len() {
             return None;
         }
@@ -217,6 +223,10 @@ impl Ties<'_> {
 
     /// A way from a label to the goal with fewest changes in all, at most so many.
     fn fewest_changes(&mut self, from: &Label, most: Changes) -> Option<(Vec<GroundStep>, Changes)> {
+        // The last step may be one change too many.
+        if from.changes > most {
+            return None;
+        }
         let mut labels = vec![Label { parent: None, ..from.clone() }];
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
         let mut seen = Seen::default();

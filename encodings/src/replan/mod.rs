@@ -29,7 +29,7 @@ use crate::limits::Limits;
 use crate::pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
 use crate::pddl::types::TypeHierarchy;
 use crate::plan::Step;
-use crate::search::Prepared;
+use crate::search::{Prepared, STATE_LIMIT};
 use crate::task::Task;
 use crate::validate::Advance;
 use layout::{Layout, Situation};
@@ -39,6 +39,10 @@ use usage::Usage;
 const PRECISION: i64 = 1_000_000;
 /// For so many sets of available designs what was found out about them is kept.
 const SETS: usize = 8;
+
+/// The search for what blocks a mission stores at most so many states each time: its answer is a help, and should not take longer
+/// than the plan.
+const BLOCKING_STATES: usize = 5_000;
 
 /// Plans for problems of one domain that differ in their state and in what is available.
 #[derive(Clone)]
@@ -141,7 +145,7 @@ impl Replanner {
             return Replanned::Misfit;
         };
         let set = self.set(&situation.available, query.limits);
-        solve::solve(&base, &set, &situation, query)
+        solve::solve(&base, &set, &situation, query, STATE_LIMIT)
     }
 
     /// The smallest part of what is not available that alone leaves no plan for an unsolvable problem: with any one of these objects
@@ -166,7 +170,7 @@ impl Replanner {
             let available: Vec<Vec<ObjectId>> = (0..all.len()).map(open).collect();
             let situation = Situation { available, ..situation.clone() };
             let set = base.restrict(&situation.available, query.limits);
-            match solve::solve(&base, &set, &situation, query) {
+            match solve::solve(&base, &set, &situation, query, BLOCKING_STATES) {
                 Replanned::Optimal { .. } => Some(true),
                 Replanned::Unsolvable => Some(false),
                 Replanned::Misfit | Replanned::Unknown => None,

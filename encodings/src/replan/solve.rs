@@ -27,8 +27,14 @@ struct Start {
     own: BigRational,
 }
 
-/// Plans for a situation.
-pub(super) fn solve(base: &Base, set: &Set, situation: &Situation, query: &Query<'_>) -> Replanned {
+/// Plans for a situation; no search stores more than so many states.
+pub(super) fn solve(
+    base: &Base,
+    set: &Set,
+    situation: &Situation,
+    query: &Query<'_>,
+    most: usize,
+) -> Replanned {
     if base.task.unreachable.is_some() {
         return Replanned::Unsolvable;
     }
@@ -44,7 +50,8 @@ pub(super) fn solve(base: &Base, set: &Set, situation: &Situation, query: &Query
         if best.as_ref().is_some_and(|(least, _)| bound > *least) {
             break;
         }
-        let plan = match search_from(&set.task, &set.bounds, prepared, &start.state, query.limits) {
+        let found = search_from(&set.task, &set.bounds, prepared, &start.state, most, query.limits);
+        let plan = match found {
             Found::Optimal(plan) => plan,
             Found::None => continue,
             Found::Unknown(_) => return Replanned::Unknown,
@@ -90,17 +97,40 @@ fn starts(base: &Base, situation: &Situation, query: &Query<'_>) -> Option<Vec<S
 }
 
 /// The chosen one among equal plans, and the first step that it begins with.
-fn choose(set: &Set, query: &Query<'_>, winners: Vec<(Start, GroundPlan)>) -> (Option<usize>, GroundPlan) {
-    let old: Vec<GroundStep> =
-        query.close_to.into_iter().flatten().filter_map(|step| find(&set.task, step)).collect();
-    let close_to: FxHashSet<GroundStep> = old.into_iter().collect();
-    let chosen = winners.into_iter().map(|(start, plan)| {
+fn choose(
+    set: &Set,
+    query: &Query<'_>,
+    mut winners: Vec<(Start, GroundPlan)>,
+) -> (Option<usize>, GroundPlan) {
+    let old = query.close_to.into_iter().flatten();
+    let close_to: FxHashSet<GroundStep> = old.filter_map(|step| find(&set.task, step)).collect();
+    winners.sort_by(|left, right| left.0.arguments.cmp(&right.0.arguments));
+    let mut chosen = None;
+    let mut most = Some((usize::MAX, usize::MAX));
+    for (start, plan) in winners {
+        // One that comes later in order has to have fewer changes.
+        let Some(limit) = most else { break };
         let beginning = ties::Beginning { state: &start.state, designs: &start.designs, close_to: &close_to };
-        let (plan, changes) = ties::choose_from(&set.task, &set.bounds, query.limits, plan, &beginning);
-        ((changes.unwrap_or((usize::MAX, usize::MAX)), start.arguments), start.first, plan)
-    });
-    let least = chosen.min_by(|left, right| left.0.cmp(&right.0));
-    least.map_or_else(|| (None, GroundPlan { steps: Vec::new(), cost: 0 }), |(_, first, plan)| (first, plan))
+        let (plan, changes) =
+            ties::choose_from(&set.task, &set.bounds, query.limits, plan, limit, &beginning);
+        most = match changes {
+            Some(changes) => fewer(changes),
+            None => most,
+        };
+        if chosen.is_none() || changes.is_some() {
+            chosen = Some((start.first, plan));
+        }
+    }
+    chosen.unwrap_or((None, GroundPlan { steps: Vec::new(), cost: 0 }))
+}
+
+/// The most changes that are fewer than these.
+fn fewer((departures, reconfigurations): ties::Changes) -> Option<ties::Changes> {
+    match (departures, reconfigurations) {
+        (0, 0) => None,
+        (departures, 0) => Some((departures - 1, usize::MAX)),
+        (departures, reconfigurations) => Some((departures, reconfigurations - 1)),
+    }
 }
 
 /// A step of a plan in names, if the task still has it.
