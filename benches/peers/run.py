@@ -101,16 +101,34 @@ def run(command, directory, seconds, megabytes):
     started = time.monotonic()
     process = subprocess.Popen(command, cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                                start_new_session=True, preexec_fn=lambda: limit(command, seconds, megabytes))
-    try:
-        output, _ = process.communicate(timeout=PATIENCE * seconds)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        output, _ = process.communicate()
+    late = False
+    while True:
+        try:
+            output, _ = process.communicate(timeout=0.2)
+            break
+        except subprocess.TimeoutExpired:
+            if not late and (used(process.pid) > seconds or time.monotonic() - started > PATIENCE * seconds):
+                late = True
+                os.killpg(process.pid, signal.SIGKILL)
+    if late:
         process.returncode = 124
     wall = time.monotonic() - started
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return wall, processor, after.ru_maxrss / 1024, process.returncode, output
+
+
+def used(group):
+    """Processor time in seconds of a process group and of those of its children that have ended."""
+    ticks = 0
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[2]) == group:
+            ticks += sum(map(int, fields[11:15]))
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def limit(command, seconds, megabytes):
