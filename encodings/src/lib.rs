@@ -21,6 +21,7 @@ mod task;
 mod alternatives;
 mod bounds;
 mod certificate;
+mod concurrent;
 mod encode;
 mod limits;
 mod objectives;
@@ -43,6 +44,7 @@ pub use certificate::{
     StepBound, certify, check as check_certificate, check_refutation, describes, faithful, refute,
     verification_conditions,
 };
+pub use concurrent::{Concurrent, ground_concurrent, optimize_concurrent};
 pub use encode::Semantics;
 pub use error::{Error, File, Place};
 pub use ground::{Config as GroundConfig, ground};

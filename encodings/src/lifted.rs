@@ -75,6 +75,8 @@ pub(crate) struct Predicate {
     pub(crate) arity: usize,
     pub(crate) fluent: bool,
     pub(crate) derived: bool,
+    /// Says that an instance of a schema is under way; it has the parameters of the schema, and no name in the files.
+    pub(crate) running: bool,
 }
 
 /// A numeric function; it is a fluent if an action changes it, else static.
@@ -98,6 +100,8 @@ pub(crate) struct Schema {
     pub(crate) middle_condition: Formula,
     /// The part of it that must hold from the start to the end; the planner asks only if something happens by itself.
     pub(crate) over_all: Formula,
+    /// The part of it that must hold at the end.
+    pub(crate) at_end: Formula,
     pub(crate) end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; none for an instantaneous action.
     pub(crate) duration: Option<Expression>,

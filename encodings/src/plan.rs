@@ -1,5 +1,7 @@
 //! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
 
+use num_rational::Ratio;
+
 use crate::lifted::ObjectId;
 use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 
@@ -112,30 +114,57 @@ pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
         }
         let sizes = operator.sizes();
         let duration = operator.duration.at(&step.choice, &sizes);
-        let configuration = configuration(task, operator, &step.choice);
-        let mut reconfigured = Vec::new();
-        for (function, design) in &configuration {
+        let cost = sign * operator.cost.at(&step.choice, &sizes);
+        let mut step = Step::new(task, operator, &step.choice, (clock, duration, cost));
+        step.note_reconfigured(&mut current);
+        steps.push(step);
+        clock += duration;
+    }
+    Plan { steps, cost: metric(task, plan.cost) }
+}
+
+impl Plan {
+    /// When the last action ends, in the domain's time unit.
+    pub fn makespan(&self) -> Exact {
+        let exact = |exact: Exact| Ratio::new(i128::from(exact.numerator), i128::from(exact.denominator));
+        let ends = self.steps.iter().map(|step| exact(step.start) + exact(step.duration));
+        let last = ends.max().unwrap_or_default();
+        Exact { numerator: *last.numer() as i64, denominator: *last.denom() as i64 }
+    }
+}
+
+impl Step {
+    /// An operator in names, with its start and duration in the task's time unit and its cost in the task's cost unit.
+    pub(crate) fn new(
+        task: &Task,
+        operator: &Operator,
+        choice: &[u16],
+        (start, duration, cost): (i64, i64, i64),
+    ) -> Self {
+        Self {
+            action: task.schema_names[operator.schema as usize].clone(),
+            arguments: arguments(task, operator, choice),
+            configuration: configuration(task, operator, choice),
+            reconfigured: Vec::new(),
+            start: Exact::scaled(start, task.time_scale),
+            duration: Exact::scaled(duration, task.time_scale),
+            cost: Exact::scaled(cost, task.objective.scale),
+        }
+    }
+
+    /// Notes the functions whose design is not the one in `current`, which has the last design of each; and updates it.
+    pub(crate) fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
+        for (function, design) in &self.configuration {
             match current.iter_mut().find(|(known, _)| known == function) {
                 Some((_, known)) if known == design => {}
                 Some((_, known)) => {
                     known.clone_from(design);
-                    reconfigured.push(function.clone());
+                    self.reconfigured.push(function.clone());
                 }
                 None => current.push((function.clone(), design.clone())),
             }
         }
-        steps.push(Step {
-            action: task.schema_names[operator.schema as usize].clone(),
-            arguments: arguments(task, operator, &step.choice),
-            configuration,
-            reconfigured,
-            start: Exact::scaled(clock, task.time_scale),
-            duration: Exact::scaled(duration, task.time_scale),
-            cost: Exact::scaled(sign * operator.cost.at(&step.choice, &sizes), task.objective.scale),
-        });
-        clock += duration;
     }
-    Plan { steps, cost: metric(task, plan.cost) }
 }
 
 /// The metric of the problem file for a sum of operator costs.

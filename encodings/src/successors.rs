@@ -13,9 +13,14 @@ pub(crate) struct OperatorIndex {
 
 impl OperatorIndex {
     pub(crate) fn new(task: &Task) -> Self {
+        Self::over(task, (0..task.operators.len() as u32).map(OperatorId))
+    }
+
+    /// An index of some operators, ascending.
+    pub(crate) fn over(task: &Task, operators: impl Iterator<Item = OperatorId>) -> Self {
         let mut index = Self { by_fact: FxHashMap::default(), always: Vec::new() };
-        for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
-            let widest = operator
+        for id in operators {
+            let widest = task.operators[id.index()]
                 .condition
                 .facts
                 .iter()

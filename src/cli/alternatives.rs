@@ -8,6 +8,7 @@ use metaplan::mission::Mission;
 use serde_json::{Value, json};
 
 use crate::cli::Failure;
+use crate::cli::concurrent::Reading;
 use crate::cli::plan::{confirm, steps_text};
 use crate::cli::plan_json::step_json;
 
@@ -22,7 +23,7 @@ pub(super) fn find(
 ) -> Result<Option<Alternatives>, Failure> {
     let Some(mut found) = encodings::alternatives(task, solution, most, config) else { return Ok(None) };
     for plan in &found.plans {
-        confirm(mission, problem, task, plan)?;
+        confirm(mission, problem, plan, &Reading::sequential(task))?;
     }
     found.plans = found.plans.into_iter().map(|plan| mission.written(plan)).collect();
     Ok(Some(found))

@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 
 use encodings::pddl::ast::{Metric, Problem};
-use encodings::{Front, Point, Status, Task};
+use encodings::{Front, Point, Status};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use serde_json::{Value, json};
 
+use crate::cli::concurrent::Reading;
 use crate::cli::plan::{Stages, confirm, status_word, text as plan_text};
 use crate::cli::plan_json::json as plan_json;
 use crate::cli::{Failure, output};
@@ -55,18 +56,18 @@ impl Objectives {
         &self,
         mission: &Mission,
         problem: &Problem,
-        task: &Task,
         point: &Point,
+        reading: &Reading,
     ) -> Result<(), Failure> {
         let Some(plan) = &point.solution.plan else { return Ok(()) };
         if self.metrics.is_empty() {
-            return confirm(mission, problem, task, plan);
+            return confirm(mission, problem, plan, reading);
         }
         for (metric, value) in self.metrics.iter().zip(&point.values) {
             let problem = Problem { metric: Some(metric.clone()), ..problem.clone() };
             let mut plan = plan.clone();
             plan.cost = *value;
-            confirm(mission, &problem, task, &plan)?;
+            confirm(mission, &problem, &plan, reading)?;
         }
         Ok(())
     }

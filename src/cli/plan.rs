@@ -9,8 +9,8 @@ use clap::{Args, ValueEnum};
 use encodings::pddl::ast::{Name, Problem};
 use encodings::validate::{Options, PlanStep, PlanText, validate};
 use encodings::{
-    Alternatives, Backend, BackendError, Config, Exact, Front, Improvement, Limits, Plan, Point, Proof,
-    Semantics, Solution, Status, Step, Task, Unbounded,
+    Alternatives, Backend, BackendError, Config, Exact, Front, Improvement, Limits, Plan, Point, Semantics,
+    Solution, Status, Step, Task,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::certificate;
@@ -20,9 +20,11 @@ use metaplan::mission::{Blocking, Mission};
 use num_rational::BigRational;
 use serde_json::json;
 
+use crate::cli::concurrent::{self, Overlap, Reading};
 use crate::cli::objectives::Objectives;
 use crate::cli::plan_json::json as plan_json;
 use crate::cli::plan_text::plan_text;
+use crate::cli::plan_verdict::{blocking_text, verdict};
 use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, memory, output};
 
 /// Arguments of `plan`.
@@ -63,6 +65,8 @@ pub struct Arguments {
     /// Up to so many further plans that are as good as the best one, and which choices all such plans share.
     #[arg(long, value_name = "N", conflicts_with_all = ["minimize", "pareto", "plan_format"])]
     alternatives: Option<usize>,
+    #[command(flatten)]
+    overlap: Overlap,
     /// Only the plan, in a format that other tools read.
     #[arg(long, value_enum)]
     plan_format: Option<PlanFormat>,
@@ -145,6 +149,25 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     output::warnings(common, mission.warnings().chain(&warnings));
     let read = started.elapsed();
     let objectives = Objectives::read(&mission, &problem, &arguments.minimize, arguments.pareto.as_deref())?;
+    let progress = progress(common);
+    let mut report = |improvement: Improvement| {
+        progress.set_message(format!(
+            "cost {}, lower bound {}, up to {} steps",
+            improvement.cost, improvement.lower_bound, improvement.horizon
+        ));
+    };
+    if let Some(separation) = arguments.overlap.separation() {
+        if objectives.metrics.len() > 1 {
+            let text = "`--concurrent` takes one objective; add several with weights";
+            return Err(Failure::usage(Message::error("M109", text)));
+        }
+        let point = concurrent::solve(&mission, &problem, &objectives, separation, &limits, &mut report)?;
+        progress.finish_and_clear();
+        let ground = started.elapsed().saturating_sub(read + point.solution.statistics.search);
+        let stages = Stages { read, ground };
+        objectives.confirm(&mission, &problem, &point, &Reading::concurrent(separation))?;
+        return finish(point, &Beside::default(), &mission, &objectives, &stages, (arguments, common));
+    }
     let task = mission.ground(&problem, &objectives.metrics, &limits).map_err(|messages| {
         let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
         Failure { exit, messages }
@@ -154,21 +177,14 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let backend = arguments.solver.clone();
     let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
     let config = Config { horizon, semantics, limits, backend, ..Config::default() };
-    let progress = progress(common);
-    let mut report = |improvement: Improvement| {
-        progress.set_message(format!(
-            "cost {}, lower bound {}, up to {} steps",
-            improvement.cost, improvement.lower_bound, improvement.horizon
-        ));
-    };
     if arguments.pareto.is_some() {
         let front = encodings::pareto(&task, &config, &mut report);
         progress.finish_and_clear();
         return show_front(front, (&mission, &problem, &task), &objectives, &stages, (arguments, common));
     }
-    let mut point = encodings::lexicographic(&task, &config, &mut report);
+    let point = encodings::lexicographic(&task, &config, &mut report);
     progress.finish_and_clear();
-    objectives.confirm(&mission, &problem, &task, &point)?;
+    objectives.confirm(&mission, &problem, &point, &Reading::sequential(&task))?;
     if let Some(directory) = &arguments.certificate {
         certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
             .unwrap_or_else(|message| output::warnings(common, &[message]));
@@ -185,14 +201,25 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Status::Unsolvable => mission.blocking(&problem, &config),
         _ => None,
     };
+    let beside = Beside { others, blocking };
+    finish(point, &beside, &mission, &objectives, &stages, (arguments, common))
+}
+
+/// Shows the answer, or writes it to a file.
+fn finish(
+    mut point: Point,
+    beside: &Beside,
+    mission: &Mission,
+    objectives: &Objectives,
+    stages: &Stages,
+    (arguments, common): (&Arguments, &Common),
+) -> Result<Exit, Failure> {
     // What `validate` executes has the designs, what the user's own domain has no place for them has not.
     if arguments.plan_format != Some(PlanFormat::Ipc) {
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
-    let beside = Beside { others, blocking };
     let status = point.solution.status;
-    match (show(&point, &beside, &mission.name, &objectives, &stages, (arguments, common)), &arguments.output)
-    {
+    match (show(&point, beside, &mission.name, objectives, stages, (arguments, common)), &arguments.output) {
         (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
             output::note(&verdict(&point.solution));
@@ -205,6 +232,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 }
 
 /// What is known besides the plan.
+#[derive(Default)]
 struct Beside {
     others: Option<Alternatives>,
     blocking: Option<Blocking>,
@@ -227,6 +255,9 @@ fn show(
             if let Some(others) = &beside.others {
                 alternatives::attach(&mut answer, others);
             }
+            if let (Some(_), Some(plan)) = (arguments.overlap.separation(), &solution.plan) {
+                answer["makespan"] = output::number(plan.makespan());
+            }
             if let Some(Blocking::Designs(designs)) = &beside.blocking {
                 answer["blocking"] = json!(designs);
             }
@@ -236,7 +267,9 @@ fn show(
             let plan = text(name, solution, common.verbose, stages);
             let others = beside.others.as_ref().map(|others| alternatives::text(others, solution));
             let blocking = beside.blocking.as_ref().map(blocking_text);
-            Some(plan + &objectives.values_text(point) + &others.or(blocking).unwrap_or_default())
+            let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
+            let makespan = concurrent::makespan_text(overlaps);
+            Some(plan + &objectives.values_text(point) + &makespan + &others.or(blocking).unwrap_or_default())
         }
         (Some(format), _) => solution.plan.as_ref().map(|plan| plan_text(plan, format)),
     }
@@ -270,7 +303,7 @@ fn show_front(
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
     for point in &mut front.points {
-        objectives.confirm(mission, problem, task, point)?;
+        objectives.confirm(mission, problem, point, &Reading::sequential(task))?;
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let text = match common.format {
@@ -285,7 +318,12 @@ fn show_front(
 }
 
 /// Has the independent validator execute the plan; what it refuses, or measures otherwise, is not shown.
-pub(super) fn confirm(mission: &Mission, problem: &Problem, task: &Task, plan: &Plan) -> Result<(), Failure> {
+pub(super) fn confirm(
+    mission: &Mission,
+    problem: &Problem,
+    plan: &Plan,
+    reading: &Reading,
+) -> Result<(), Failure> {
     let rational = |exact: Exact| BigRational::new(exact.numerator.into(), exact.denominator.into());
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
@@ -294,9 +332,8 @@ pub(super) fn confirm(mission: &Mission, problem: &Problem, task: &Task, plan: &
         duration: (step.duration.numerator != 0).then(|| rational(step.duration)),
         line: 0,
     });
-    let verdict =
-        validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &Options::default());
-    let reason = match (&verdict.violation, measure(problem, &verdict, plan.steps.len(), task.is_timed())) {
+    let verdict = validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &reading.options);
+    let reason = match (&verdict.violation, measure(problem, &verdict, plan.steps.len(), reading.timed)) {
         (Some(violation), _) => {
             format!("the validator refuses the plan that was found: {}", violation.message)
         }
@@ -340,72 +377,6 @@ pub(super) fn status_word(status: Status) -> &'static str {
         Status::UnsolvableWithinHorizon => "unsolvable_within_horizon",
         Status::Unknown => "unknown",
     }
-}
-
-/// The answer in a sentence: what is claimed, and whether it is proved.
-fn verdict(solution: &Solution) -> String {
-    let horizon = solution.horizon;
-    match (solution.status, &solution.proof, solution.unbounded) {
-        (Status::Optimal, Some(Proof::Sat { step_bound }), _) => format!(
-            "optimal, proved: no cheaper plan has up to {} (unsatisfiable), and none with more can be cheaper\n",
-            steps(*step_bound)
-        ),
-        (Status::Optimal, Some(Proof::Bound), _) => {
-            "optimal, proved: the cost equals a lower bound on the cost of all plans\n".to_owned()
-        }
-        (Status::Optimal, _, _) => {
-            "optimal, proved: the search left out only states that are dominated or too dear\n".to_owned()
-        }
-        (Status::Feasible, proof, Some(unbounded)) => {
-            let why = match unbounded {
-                Unbounded::Proved => {
-                    "the metric has no best value: an action that improves it can be repeated for ever"
-                }
-                Unbounded::Suspected => "the metric may have no best value: actions improve it",
-            };
-            let reading = if proof.is_some() { "proved best" } else { "best found" };
-            format!(
-                "{why}\nbounded reading: fewest steps first, then the metric; {reading} among plans of {horizon} steps\n"
-            )
-        }
-        (Status::Feasible, _, None) => {
-            format!("a plan, not proved optimal (plans of up to {} considered)\n", steps(horizon))
-        }
-        (Status::Unsolvable, Some(Proof::Relaxation(reason)), _) => {
-            format!("no plan exists, proved: {reason}\n")
-        }
-        (Status::Unsolvable, Some(Proof::Sat { step_bound }), _) => format!(
-            "no plan exists, proved: none has up to {} (unsatisfiable), and a shortest one has no more\n",
-            steps(*step_bound)
-        ),
-        (Status::Unsolvable, _, _) => {
-            "no plan exists, proved: every reachable state was visited or is dominated\n".to_owned()
-        }
-        (Status::UnsolvableWithinHorizon, _, _) => {
-            format!("no plan with up to {}, proved; longer ones were not considered\n", steps(horizon))
-        }
-        (Status::Unknown, _, _) => {
-            "a limit was reached before a plan was found; nothing is proved\n".to_owned()
-        }
-    }
-}
-
-/// Why there is no plan, as far as designs are the reason.
-fn blocking_text(blocking: &Blocking) -> String {
-    match blocking {
-        Blocking::Designs(designs) => format!(
-            "it is for designs that are not available: there is no plan without {}; with any one of them, and all \
-             others, there would be\n",
-            designs.join(", ")
-        ),
-        Blocking::Other => {
-            "it is not for designs: with all of them available there would be none either\n".to_owned()
-        }
-    }
-}
-
-fn steps(count: usize) -> String {
-    if count == 1 { "1 step".to_owned() } else { format!("{count} steps") }
 }
 
 pub(super) fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> String {

@@ -32,7 +32,7 @@ pub struct Arguments {
     tolerance: BigRational,
 }
 
-fn time(text: &str) -> Result<BigRational, String> {
+pub(super) fn time(text: &str) -> Result<BigRational, String> {
     let value = text.parse::<serde_json::Number>().ok().and_then(|number| decimal(&Value::Number(number)));
     value
         .filter(|value| *value >= BigRational::default())

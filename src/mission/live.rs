@@ -154,9 +154,12 @@ impl Mission {
         objectives: &[Metric],
         limits: &Limits,
     ) -> Result<Task, Vec<Message>> {
-        let config =
-            GroundConfig { solves: self.solves(), objectives: objectives.to_vec(), limits: limits.clone() };
+        let config = self.config(objectives, limits);
         encodings::ground(domain, problem, &config)
             .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
+    }
+
+    pub(super) fn config(&self, objectives: &[Metric], limits: &Limits) -> GroundConfig {
+        GroundConfig { solves: self.solves(), objectives: objectives.to_vec(), limits: limits.clone() }
     }
 }

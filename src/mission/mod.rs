@@ -14,7 +14,8 @@ use std::path::Path;
 
 use encodings::pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use encodings::pddl::{self, Severity, Source};
-use encodings::{Limits, Plan, Task};
+use encodings::{Concurrent, Limits, Plan, Task};
+use num_rational::BigRational;
 
 use crate::knowledge::Knowledge;
 use crate::mapek::Settings;
@@ -274,6 +275,23 @@ impl Mission {
         limits: &Limits,
     ) -> Result<Task, Vec<Message>> {
         self.ground_with(&self.domain, problem, objectives, limits)
+    }
+
+    /// Grounds a filled problem for plans whose actions overlap; those that interfere are to lie `separation` apart, in the
+    /// domain's time unit.
+    ///
+    /// # Errors
+    /// Every construct that cannot be planned with, with its place.
+    pub fn ground_concurrent(
+        &self,
+        problem: &Problem,
+        objectives: &[Metric],
+        separation: &BigRational,
+        limits: &Limits,
+    ) -> Result<Concurrent, Vec<Message>> {
+        let config = self.config(objectives, limits);
+        encodings::ground_concurrent(&self.domain, problem, &config, separation)
+            .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
     }
 }
 

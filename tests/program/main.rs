@@ -3,6 +3,7 @@
 mod certificate;
 mod cli;
 mod common;
+mod concurrent;
 mod explain;
 mod export;
 mod probabilistic;

@@ -8,7 +8,7 @@
 
 mod derived;
 mod effects;
-mod evaluate;
+pub(crate) mod evaluate;
 mod events;
 mod finish;
 mod frame;
@@ -20,12 +20,14 @@ mod metric;
 mod mutex;
 mod normal_form;
 mod prune;
-mod reach;
+pub(crate) mod reach;
 mod relaxed;
-mod residual;
+pub(crate) mod residual;
 
-use crate::configuration::{design_parameters, slot_parameters};
+use crate::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::error::Error;
+use crate::ground::reach::Reached;
+use crate::lifted::Lifted;
 use crate::limits::Limits;
 use crate::normalize::normalize;
 use crate::pddl::ast::{Domain, Metric, Name, Problem};
@@ -85,12 +87,27 @@ pub(crate) fn ground_for(
         .zip(&designs)
         .map(|(schema, designs)| slot_parameters(&lifted, schema, designs))
         .collect();
-    let reached = reach::reach(&lifted, &slots).map_err(|error| vec![error])?;
-    let mut ground = instantiate::instantiate(&lifted, &designs, &slots, &reached, &config.limits)?;
-    metric::attach_costs(&lifted, &mut ground)?;
-    if config.limits.reached() {
+    ground_lifted(&lifted, &designs, &slots, generality, &config.limits).map(|(task, _)| task)
+}
+
+/// Grounds a lifted task. For each schema: its design parameters, and those of them that become slots.
+///
+/// # Errors
+/// As [`ground`].
+pub(crate) fn ground_lifted(
+    lifted: &Lifted,
+    designs: &[Vec<SlotParameter>],
+    slots: &[Vec<SlotParameter>],
+    generality: &Generality,
+    limits: &Limits,
+) -> Result<(Task, Reached), Vec<Error>> {
+    let reached = reach::reach(lifted, slots).map_err(|error| vec![error])?;
+    let mut ground = instantiate::instantiate(lifted, designs, slots, &reached, limits)?;
+    metric::attach_costs(lifted, &mut ground)?;
+    if limits.reached() {
         return Err(vec![Error::Interrupted]);
     }
-    let unreachable = prune::prune(&lifted, &mut ground, generality);
-    finish::finish(&lifted, ground, unreachable, generality).map_err(|error| vec![error])
+    let unreachable = prune::prune(lifted, &mut ground, generality);
+    let task = finish::finish(lifted, ground, unreachable, generality).map_err(|error| vec![error])?;
+    Ok((task, reached))
 }

@@ -202,7 +202,9 @@ fn refinements(
             let free = (0..arguments.len()).find(|p| arguments[*p] == *object && !positions.contains(p));
             positions.extend(free);
         }
-        if positions.len() == key.len() && arguments.len() <= key.len() + 1 {
+        // What is under way is counted whatever its other arguments are: it stands for where they have left.
+        let is_running = task.world.lifted.predicates.get(predicate.index()).is_some_and(|p| p.running);
+        if positions.len() == key.len() && (arguments.len() <= key.len() + 1 || is_running) {
             let mut parts = candidate.clone();
             parts.push(Part { predicate: *predicate, key: positions });
             parts.sort_unstable();

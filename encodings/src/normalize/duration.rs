@@ -33,7 +33,7 @@ pub(super) fn is_rewarded(metrics: &[Metric]) -> Option<bool> {
 }
 
 /// The factor of total time in an expression.
-fn time_factor(expression: &Expression) -> Option<Rational> {
+pub(crate) fn time_factor(expression: &Expression) -> Option<Rational> {
     let number = |expression: &Expression| match expression {
         Expression::Number(number) => Some(*number),
         _ => None,

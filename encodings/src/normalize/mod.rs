@@ -5,7 +5,7 @@
 //! that are not fixed) is refused here, with its place.
 
 mod condition;
-mod duration;
+pub(crate) mod duration;
 mod objects;
 
 use num_rational::BigRational;
@@ -155,6 +155,7 @@ impl Normalizer {
                     .derived
                     .iter()
                     .any(|axiom| axiom.head.identifier.name == declared.identifier.name),
+                running: false,
             })
             .collect();
         let mut functions: Vec<_> = domain
@@ -208,6 +209,7 @@ impl Normalizer {
             start_effects: Vec::new(),
             middle_condition: Formula::truth(),
             over_all: Formula::truth(),
+            at_end: Formula::truth(),
             end_effects: Vec::new(),
             duration: None,
             place: scope.place(action.span),
@@ -218,18 +220,21 @@ impl Normalizer {
                 self.effect(effect, &mut scope, &mut schema.end_effects);
             }
             ast::ActionBody::Durative { duration, conditions, effects } => {
-                let (mut start, mut middle, mut over_all) = (Vec::new(), Vec::new(), Vec::new());
+                let (mut start, mut middle) = (Vec::new(), Vec::new());
+                let (mut over_all, mut at_end) = (Vec::new(), Vec::new());
                 schema.duration = Some(self.duration(duration, action, &mut scope, &mut start));
                 for (time, condition) in conditions {
                     let formula = self.condition(condition, true, &mut scope);
-                    if *time == ConditionTime::OverAll {
-                        over_all.push(formula.clone());
+                    match time {
+                        ConditionTime::OverAll => over_all.push(formula.clone()),
+                        ConditionTime::AtEnd => at_end.push(formula.clone()),
+                        ConditionTime::AtStart => {}
                     }
                     if *time == ConditionTime::AtStart { &mut start } else { &mut middle }.push(formula);
                 }
                 (schema.start_condition, schema.middle_condition) =
                     (Formula::And(start), Formula::And(middle));
-                schema.over_all = Formula::And(over_all);
+                (schema.over_all, schema.at_end) = (Formula::And(over_all), Formula::And(at_end));
                 for (time, effect) in effects {
                     let target = match time {
                         EffectTime::AtStart => &mut schema.start_effects,
@@ -336,8 +341,13 @@ impl Normalizer {
             waited: PredicateId(self.predicates.len() as u32 + 1),
         };
         if !events.is_empty() {
-            let predicate =
-                |name, arity| Predicate { name: Name::new(name), arity, fluent: true, derived: false };
+            let predicate = |name, arity| Predicate {
+                name: Name::new(name),
+                arity,
+                fluent: true,
+                derived: false,
+                running: false,
+            };
             self.functions.push(Function { name: Name::new("the clock"), fluent: true });
             self.predicates.extend([predicate("the phase", 1), predicate("has waited", 0)]);
             self.objects.extend((0..=events.len()).map(|number| Name::new(&format!("phase {number}"))));

@@ -1,0 +1,256 @@
+//! The operators of a split task: which halves belong together, and what each reads and writes.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::concurrent::compile::{Happening, Instance, Role, Unit};
+use crate::concurrent::footprint::{Footprint, Footprints, Reads};
+use crate::concurrent::keys::{Designs, Keys, prune};
+use crate::concurrent::split::{Half, Split};
+use crate::error::Error;
+use crate::ground::evaluate::{AtomId, Binding, World};
+use crate::ground::reach::Reached;
+use crate::lifted::{Change, Effect, ObjectId};
+use crate::quantity::NumericId;
+use crate::task::{Argument, OperatorId, Task};
+
+/// The halves of an instance that the ground task has.
+#[derive(Clone, Copy, Default)]
+struct Halves {
+    start: Option<OperatorId>,
+    over_all: Option<OperatorId>,
+    end: Option<OperatorId>,
+}
+
+fn object(argument: Argument) -> Option<ObjectId> {
+    if let Argument::Object(object) = argument { Some(object) } else { None }
+}
+
+fn designs(task: &Task, operator: OperatorId) -> Designs {
+    let configuration = &task.operators[operator.index()].configuration;
+    let mut designs: Designs =
+        configuration.iter().filter_map(|(function, design)| Some((*function, object(*design)?))).collect();
+    designs.sort_unstable();
+    designs
+}
+
+/// A schema of the domain with arguments.
+type InstanceKey = (usize, Vec<ObjectId>);
+
+pub(super) struct Builder<'a> {
+    footprints: Footprints<'a>,
+    split: &'a Split,
+    /// In the unit of all times.
+    separation: i64,
+    /// What each operator writes.
+    written: Vec<Footprint>,
+    instances: FxHashMap<InstanceKey, Halves>,
+    order: Vec<InstanceKey>,
+    /// The schemas that have a condition over all which can change.
+    held: FxHashSet<usize>,
+}
+
+impl<'a> Builder<'a> {
+    pub(super) fn new(split: &'a Split, reached: &'a Reached, separation: i64) -> Self {
+        let held = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
+        Self {
+            footprints: Footprints::new(World::new(&split.lifted, reached)),
+            split,
+            separation,
+            written: Vec::new(),
+            instances: FxHashMap::default(),
+            order: Vec::new(),
+            held: held.map(|origin| origin.schema).collect(),
+        }
+    }
+
+    /// Pairs the halves of instances, and collects what operators write.
+    pub(super) fn collect(&mut self, task: &Task) -> Result<(), Vec<Error>> {
+        let mut errors = Vec::new();
+        let mut refused = FxHashSet::default();
+        for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+            let origin = self.split.origins[operator.schema as usize];
+            let schema = &self.split.lifted.schemas[operator.schema as usize];
+            let arguments: Vec<ObjectId> = operator.arguments.iter().copied().filter_map(object).collect();
+            let mut binding: Binding = arguments.iter().map(|object| Some(*object)).collect();
+            binding.resize(schema.variables, None);
+            let effects = match origin.half {
+                Half::Start | Half::End | Half::Whole => &schema.end_effects[..],
+                Half::OverAll | Half::Timed(_) => &[],
+            };
+            // What is under way, and whether a plan has waited, has no place in the files.
+            let waited = (!self.split.events.is_empty()).then_some(self.split.lifted.time.waited);
+            let effects: Vec<Effect> = effects
+                .iter()
+                .filter(|effect| match effect.change {
+                    Change::Add(predicate, _) | Change::Delete(predicate, _) => {
+                        Some(predicate) != waited && !self.split.lifted.predicates[predicate.index()].running
+                    }
+                    Change::Assign { .. } => true,
+                })
+                .cloned()
+                .collect();
+            match self.footprints.writes(schema, &effects, &binding) {
+                Ok(footprint) => self.written.push(footprint),
+                Err(error) => {
+                    if refused.insert(origin.schema) {
+                        errors.push(error);
+                    }
+                    self.written.push(Footprint::default());
+                }
+            }
+            if matches!(origin.half, Half::Whole | Half::Timed(_)) {
+                continue;
+            }
+            let key = (origin.schema, arguments);
+            if !self.instances.contains_key(&key) {
+                self.order.push(key.clone());
+            }
+            let halves = self.instances.entry(key).or_default();
+            match origin.half {
+                Half::Start => halves.start = Some(id),
+                Half::End => halves.end = Some(id),
+                _ => halves.over_all = Some(id),
+            }
+        }
+        if errors.is_empty() { Ok(()) } else { Err(errors) }
+    }
+
+    /// The instances that can be executed, and which operators are their starts and ends.
+    pub(super) fn instances(
+        &self,
+        task: &Task,
+        unit: Unit,
+        roles: &mut [Role],
+    ) -> Result<Vec<Instance>, Error> {
+        let mut instances = Vec::new();
+        for key in &self.order {
+            let Halves { start: Some(start), over_all, end: Some(end) } = self.instances[key] else {
+                continue;
+            };
+            let conflicts = |id: OperatorId| self.written[id.index()].conflicts();
+            if self.held.contains(&key.0) && over_all.is_none() || conflicts(start) || conflicts(end) {
+                continue;
+            }
+            let duration = unit.duration(task, start)?;
+            if duration < self.separation {
+                let schema = &self.split.schemas[key.0];
+                let construct =
+                    format!("an instance of `{}` that takes less time than the separation", schema.name);
+                let instead = "a smaller `--epsilon`".into();
+                return Err(Error::Unsupported { construct, instead, place: schema.place });
+            }
+            roles[start.index()] = Role::Start(instances.len() as u32);
+            roles[end.index()] = Role::End(instances.len() as u32);
+            let designs = designs(task, start);
+            instances.push(Instance { start, end, over_all, duration, designs, joint: Vec::new() });
+        }
+        Ok(instances)
+    }
+
+    /// What each operator writes.
+    pub(super) fn written(&self) -> &[Footprint] {
+        &self.written
+    }
+
+    /// What each operator waits for and lets others wait for, and how many kinds of access there are.
+    pub(super) fn happenings(
+        mut self,
+        task: &Task,
+        roles: &[Role],
+        instances: &mut [Instance],
+    ) -> (Vec<Happening>, usize) {
+        let whole = (0..roles.len()).filter(|id| roles[*id] == Role::Whole);
+        let whole = whole.flat_map(|id| designs(task, OperatorId(id as u32)));
+        let used = instances.iter().flat_map(|instance| instance.designs.iter().copied());
+        let mut keys = Keys::new(self.separation, used.chain(whole).collect());
+        let index = self.footprints.index();
+        let mut happenings = Vec::new();
+        for (id, (role, mut written)) in
+            (0..).map(OperatorId).zip(roles.iter().zip(std::mem::take(&mut self.written)))
+        {
+            let mut happening = Happening { role: *role, ..Happening::default() };
+            if let Some((reads, over_all)) = self.reads(task, id, *role) {
+                (written.reads, written.reads_numbers) = index.look_up(&reads);
+                let over_all = index.look_up(&over_all);
+                happening.accesses = keys.of(&written);
+                join(&mut happening, &mut keys, &over_all, instances, (task, id));
+                let atoms: Vec<AtomId> = written.added.iter().chain(&written.deleted).copied().collect();
+                let numbers = written.numbers.iter().map(|(number, _)| *number);
+                happening.writes = ids(&atoms, numbers);
+            }
+            happenings.push(happening);
+        }
+        prune(happenings.iter_mut().map(|happening| &mut happening.accesses));
+        (happenings, keys.len())
+    }
+
+    /// What an operator reads when it happens, and what its condition over all reads; none if it never happens, or by itself.
+    fn reads(&self, task: &Task, id: OperatorId, role: Role) -> Option<(Reads, Reads)> {
+        let operator = &task.operators[id.index()];
+        let origin = self.split.origins[operator.schema as usize];
+        let schema = self.split.schemas.get(origin.schema).filter(|_| role != Role::Never)?;
+        let lifted = &self.split.lifted;
+        let mut binding: Binding = operator.arguments.iter().copied().map(object).collect();
+        binding.resize(schema.variables, None);
+        let (mut reads, mut over_all) = (Reads::default(), Reads::default());
+        if !matches!(role, Role::End(_)) {
+            reads.condition(lifted, &schema.start_condition, &binding);
+            reads.effects(lifted, &schema.start_effects, &binding);
+        }
+        if !matches!(role, Role::Start(_)) {
+            reads.condition(lifted, &schema.at_end, &binding);
+            reads.effects(lifted, &schema.end_effects, &binding);
+        }
+        over_all.condition(lifted, &schema.over_all, &binding);
+        Some((reads, over_all))
+    }
+}
+
+/// Adds what comes from conditions over all and from designs.
+fn join(
+    happening: &mut Happening,
+    keys: &mut Keys,
+    over_all: &(Vec<AtomId>, Vec<NumericId>),
+    instances: &mut [Instance],
+    (task, id): (&Task, OperatorId),
+) {
+    let accesses = &mut happening.accesses;
+    match happening.role {
+        Role::Start(instance) => {
+            accesses.after.push((keys.ended(instance), 0));
+            let instance = &mut instances[instance as usize];
+            accesses.join(&keys.over_all(over_all));
+            accesses.after.extend(keys.designs(&instance.designs));
+            happening.designs.clone_from(&instance.designs);
+            if instance.over_all.is_some_and(|id| is_joint(task, id)) {
+                instance.joint = ids(&over_all.0, over_all.1.iter().copied());
+            }
+        }
+        Role::End(instance) => {
+            accesses.marks.push(keys.ended(instance));
+            accesses.marks.extend(keys.over_all(over_all).marks);
+            accesses.marks.extend(keys.used(&instances[instance as usize].designs, false));
+        }
+        _ => {
+            happening.designs = designs(task, id);
+            accesses.after.extend(keys.designs(&happening.designs));
+            accesses.marks.extend(keys.used(&happening.designs, true));
+        }
+    }
+}
+
+/// Whether several happenings can keep up a condition together.
+fn is_joint(task: &Task, over_all: OperatorId) -> bool {
+    let condition = &task.operators[over_all.index()].condition;
+    !condition.clauses.is_empty()
+        || !condition.comparisons.is_empty()
+        || condition.facts.iter().any(|fact| fact.variable.index() >= task.basic)
+}
+
+fn ids(atoms: &[AtomId], numbers: impl Iterator<Item = NumericId>) -> Vec<u32> {
+    let atoms = atoms.iter().map(|atom| 2 * atom.0);
+    let mut all: Vec<u32> = atoms.chain(numbers.map(|number| 2 * number.0 + 1)).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}

@@ -1,0 +1,409 @@
+//! What of the past still matters for when things can happen.
+//!
+//! A sequence of happenings with the constraints between their times is a simple temporal network [1]. All that the future
+//! asks of it are lower bounds: not before this, not within the separation of that. So of the past only the latest time of
+//! each kind of access to each atom is kept, as a lower bound, and, of the actions under way, their starts as *floats*: they
+//! can be put off, and what came after them with them, so that an end meets what it has to meet. An end fixes its float as
+//! early as it can be. Times of happenings that do not interfere are not ordered by their place in the sequence [2].
+//!
+//! [1] R. Dechter, I. Meiri, J. Pearl: Temporal constraint networks, Artificial Intelligence 49, 1991.
+//! [2] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
+
+use crate::concurrent::time::{Float, Time};
+
+/// A kind of access to an atom or a number.
+pub(super) type Key = u32;
+
+/// The start of an action under way: at its float and this much later.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Open {
+    pub(super) instance: u32,
+    pub(super) float: Float,
+    pub(super) offset: i64,
+    /// Of an action with a condition over all that several happenings can keep up together: the last of them.
+    last: Option<Time>,
+}
+
+#[derive(Debug, Clone)]
+struct Start {
+    lower: Time,
+    /// The start is before this.
+    upper: i64,
+}
+
+/// The times that matter in a node of the search.
+#[derive(Debug, Clone)]
+pub(super) struct Clocks {
+    /// Ascending by key.
+    entries: Vec<(Key, Time)>,
+    /// When variables got their values, ascending by variable; those of the initial state have no entry.
+    changed: Vec<(u32, Time)>,
+    floats: Vec<Start>,
+    /// Ascending by instance.
+    opens: Vec<Open>,
+    /// The time at which all must happen until each condition over all holds again.
+    group: Option<(Float, i64)>,
+    /// Negative if nothing has happened.
+    latest: Time,
+    /// The time of the last timed initial literals; negative before.
+    floor: i64,
+}
+
+/// Whether a happening is a start, an end, or both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Start,
+    End,
+    Whole,
+}
+
+/// A happening, as far as its time is concerned.
+pub(super) struct Happening<'h> {
+    pub(super) kind: Kind,
+    pub(super) instance: u32,
+    /// Of the instance.
+    pub(super) duration: i64,
+    /// It lies this much after the last access of these kinds.
+    pub(super) after: &'h [(Key, i64)],
+    pub(super) marks: &'h [Key],
+    /// Whether the instance has a condition over all that several happenings can keep up together.
+    pub(super) joint: bool,
+    /// Whether this happening writes what such a condition of an instance reads.
+    pub(super) touches: &'h dyn Fn(u32) -> bool,
+    /// The variables that get another value.
+    pub(super) changes: &'h [u32],
+    /// Whether every condition over all holds afterwards.
+    pub(super) settled: bool,
+}
+
+impl Clocks {
+    pub(super) fn opens(&self) -> &[Open] {
+        &self.opens
+    }
+
+    /// Whether a condition over all does not hold, and something else must happen at once.
+    pub(super) fn unsettled(&self) -> bool {
+        self.group.is_some()
+    }
+
+    pub(super) fn is_open(&self, instance: u32) -> bool {
+        self.opens.binary_search_by_key(&instance, |open| open.instance).is_ok()
+    }
+
+    /// When nothing has happened yet.
+    pub(super) fn new() -> Self {
+        Self {
+            entries: Vec::new(),
+            changed: Vec::new(),
+            floats: Vec::new(),
+            opens: Vec::new(),
+            group: None,
+            latest: Time::constant(-1),
+            floor: -1,
+        }
+    }
+
+    /// The least time at which everything so far has happened.
+    pub(super) fn latest(&self) -> i64 {
+        self.latest.base.max(0)
+    }
+
+    /// The least time at which an action under way has started.
+    pub(super) fn start(&self, open: &Open) -> i64 {
+        self.floats[usize::from(open.float)].lower.base + open.offset
+    }
+
+    /// The least time at which a variable got its value; none if it has had it from the beginning.
+    pub(super) fn changed(&self, variable: u32) -> Option<i64> {
+        self.change(variable).map(|time| time.base)
+    }
+
+    fn change(&self, variable: u32) -> Option<&Time> {
+        let position = self.changed.binary_search_by_key(&variable, |(own, _)| *own).ok()?;
+        Some(&self.changed[position].1)
+    }
+
+    fn entry(&self, key: Key) -> Option<&Time> {
+        let position = self.entries.binary_search_by_key(&key, |(own, _)| *own).ok()?;
+        Some(&self.entries[position].1)
+    }
+
+    /// What must agree between clocks that can be compared.
+    pub(super) fn signature(&self, out: &mut Vec<u32>) {
+        for open in &self.opens {
+            out.extend([
+                open.instance,
+                u32::from(open.float),
+                open.offset as u32,
+                (open.offset >> 32) as u32,
+            ]);
+        }
+        if let Some((float, offset)) = self.group {
+            out.extend([u32::MAX, u32::from(float), offset as u32, (offset >> 32) as u32]);
+        }
+    }
+
+    /// The clocks after a happening; none if no time is left for it.
+    pub(super) fn after(&self, happening: &Happening<'_>) -> Option<Self> {
+        let mut next = self.clone();
+        let mut lower = Time::constant(self.floor.max(0));
+        for (key, by) in happening.after {
+            if let Some(time) = self.entry(*key) {
+                lower.put_off(time, *by);
+            }
+        }
+        for open in &self.opens {
+            if let Some(last) = open.last.as_ref().filter(|_| (happening.touches)(open.instance)) {
+                lower.put_off(last, 0);
+            }
+        }
+        let (float, offset) = match happening.kind {
+            Kind::Start => {
+                let (float, offset) = next.moment(lower, self.group)?;
+                next.open(happening.instance, float, offset);
+                (float, offset)
+            }
+            Kind::End => {
+                let position = next.opens.iter().position(|open| open.instance == happening.instance)?;
+                let Open { float, offset, .. } = next.opens.remove(position);
+                let end = offset + happening.duration;
+                next.raise(float, &lower, end)?;
+                match self.group {
+                    Some((other, at)) if other == float => (at == end).then_some((other, at))?,
+                    Some((other, at)) => {
+                        next.unify(float, other, at - end)?;
+                        (other, at)
+                    }
+                    None => (float, end),
+                }
+            }
+            Kind::Whole => next.moment(lower, self.group)?,
+        };
+        let time = next.at(float, offset);
+        next.note(happening, &time);
+        next.group = (!happening.settled).then_some((float, offset));
+        next.tidy();
+        Some(next)
+    }
+
+    /// A moment that is not before `lower`: the one at which all must happen, or a new one.
+    fn moment(&mut self, lower: Time, group: Option<(Float, i64)>) -> Option<(Float, i64)> {
+        if let Some((float, offset)) = group {
+            self.raise(float, &lower, offset)?;
+            return Some((float, offset));
+        }
+        self.floats.push(Start { lower, upper: i64::MAX });
+        Some((Float::try_from(self.floats.len() - 1).ok()?, 0))
+    }
+
+    fn open(&mut self, instance: u32, float: Float, offset: i64) {
+        let position = self.opens.partition_point(|open| open.instance < instance);
+        self.opens.insert(position, Open { instance, float, offset, last: None });
+    }
+
+    /// The time that lies so much after a float.
+    fn at(&self, float: Float, offset: i64) -> Time {
+        let mut time = self.floats[usize::from(float)].lower.shifted(offset);
+        time.put_off_after(float, offset);
+        time
+    }
+
+    fn note(&mut self, happening: &Happening<'_>, time: &Time) {
+        for key in happening.marks {
+            match self.entries.binary_search_by_key(key, |(own, _)| *own) {
+                Ok(position) => self.entries[position].1.put_off(time, 0),
+                Err(position) => self.entries.insert(position, (*key, time.clone())),
+            }
+        }
+        for variable in happening.changes {
+            self.set_changed(*variable, time.clone());
+        }
+        for open in &mut self.opens {
+            let starts = happening.kind == Kind::Start && open.instance == happening.instance;
+            if (starts && happening.joint) || (open.last.is_some() && (happening.touches)(open.instance)) {
+                open.last = Some(time.clone());
+            }
+        }
+        self.latest.put_off(time, 0);
+    }
+
+    fn set_changed(&mut self, variable: u32, time: Time) {
+        match self.changed.binary_search_by_key(&variable, |(own, _)| *own) {
+            Ok(position) => self.changed[position].1 = time,
+            Err(position) => self.changed.insert(position, (variable, time)),
+        }
+    }
+
+    /// All times apart from those of the floats.
+    fn times(&mut self) -> impl Iterator<Item = &mut Time> {
+        let entries = self.entries.iter_mut().map(|(_, time)| time);
+        let changed = self.changed.iter_mut().map(|(_, time)| time);
+        let lasts = self.opens.iter_mut().filter_map(|open| open.last.as_mut());
+        entries.chain(changed).chain(lasts).chain([&mut self.latest])
+    }
+
+    /// From now on, so much after a float is not before `lower`. None if that cannot be.
+    fn raise(&mut self, float: Float, lower: &Time, offset: i64) -> Option<()> {
+        let mut bound = lower.shifted(-offset);
+        if bound.forget(float).is_some_and(|lag| lag > 0) {
+            return None;
+        }
+        let before = bound.clone();
+        for (other, lag) in &before.lags {
+            let mut further = self.floats[usize::from(*other)].lower.shifted(*lag);
+            if further.forget(float).is_some_and(|lag| lag > 0) {
+                return None;
+            }
+            bound.put_off(&further, 0);
+        }
+        self.floats[usize::from(float)].lower.put_off(&bound, 0);
+        let own = self.floats[usize::from(float)].lower.clone();
+        for time in self.times() {
+            if let Some(lag) = time.lag(float) {
+                time.put_off(&own, lag);
+            }
+        }
+        for index in 0..self.floats.len() {
+            let other = &mut self.floats[index];
+            if let Some(lag) = other.lower.lag(float) {
+                let mut further = own.shifted(lag);
+                if further.forget(index as Float).is_some_and(|lag| lag > 0) {
+                    return None;
+                }
+                other.lower.put_off(&further, 0);
+            }
+        }
+        self.spread()
+    }
+
+    /// What is before something that has to be before some time has to be before it, too. None if that cannot be.
+    fn spread(&mut self) -> Option<()> {
+        for _ in 0..self.floats.len() {
+            for index in 0..self.floats.len() {
+                let Start { lower, upper } = self.floats[index].clone();
+                for (other, lag) in lower.lags.iter().filter(|_| upper < i64::MAX) {
+                    let known = &mut self.floats[usize::from(*other)].upper;
+                    *known = (*known).min(upper - lag);
+                }
+            }
+        }
+        self.floats.iter().all(|start| start.lower.base < start.upper).then_some(())
+    }
+
+    /// One float is another one and so much more.
+    fn unify(&mut self, float: Float, other: Float, by: i64) -> Option<()> {
+        let Start { mut lower, upper } = self.floats[usize::from(float)].clone();
+        let target = &mut self.floats[usize::from(other)];
+        target.upper = target.upper.min(upper.saturating_sub(by));
+        if target.lower.forget(float).is_some_and(|lag| lag + by > 0) {
+            return None;
+        }
+        lower.forget(float);
+        self.raise(other, &lower, by)?;
+        let at = self.at(other, by);
+        for time in self.times() {
+            if let Some(lag) = time.forget(float) {
+                time.put_off(&at, lag);
+            }
+        }
+        for index in 0..self.floats.len() {
+            let start = &mut self.floats[index];
+            if let Some(lag) = start.lower.forget(float) {
+                let mut further = at.shifted(lag);
+                if further.forget(index as Float).is_some_and(|lag| lag > 0) {
+                    return None;
+                }
+                start.lower.put_off(&further, 0);
+            }
+        }
+        for open in self.opens.iter_mut().filter(|open| open.float == float) {
+            (open.float, open.offset) = (other, open.offset + by);
+        }
+        self.spread()
+    }
+
+    /// Forgets floats that nothing hangs on, and numbers the others in the order of the actions under way.
+    fn tidy(&mut self) {
+        let mut order: Vec<Float> = Vec::new();
+        for float in self.opens.iter().map(|open| open.float).chain(self.group.map(|(float, _)| float)) {
+            if !order.contains(&float) {
+                order.push(float);
+            }
+        }
+        let number = |float| order.iter().position(|other| *other == float).map(|position| position as Float);
+        let numbers: Vec<_> = (0..self.floats.len()).map(|float| number(float as Float)).collect();
+        for time in self.times() {
+            time.renumber(&numbers);
+        }
+        let mut floats: Vec<Start> =
+            order.iter().map(|float| self.floats[usize::from(*float)].clone()).collect();
+        for start in &mut floats {
+            start.lower.renumber(&numbers);
+        }
+        self.floats = floats;
+        let renamed = |float: Float| numbers[usize::from(float)].unwrap_or(float);
+        for open in &mut self.opens {
+            open.float = renamed(open.float);
+        }
+        self.group = self.group.map(|(float, offset)| (renamed(float), offset));
+    }
+
+    /// The clocks after timed initial literals that change some variables: all so far was before them, and nothing from now
+    /// on is. None if that cannot be.
+    pub(super) fn timed(&self, time: i64, changes: &[u32]) -> Option<Self> {
+        if self.latest.base >= time || self.unsettled() {
+            return None;
+        }
+        let mut next = self.clone();
+        for (float, lag) in &self.latest.lags {
+            let upper = &mut next.floats[usize::from(*float)].upper;
+            *upper = (*upper).min(time - lag);
+        }
+        next.floor = time;
+        for variable in changes {
+            next.set_changed(*variable, Time::constant(time));
+        }
+        next.spread()?;
+        Some(next)
+    }
+
+    /// Forgets accesses that put nothing off any more: everything that heeds one comes after its guard has changed.
+    pub(super) fn forget(&mut self, guards: &[Option<u32>], separation: i64) {
+        let mut entries = std::mem::take(&mut self.entries);
+        entries.retain(|(key, time)| !self.is_past(*key, time, guards, separation));
+        self.entries = entries;
+    }
+
+    fn is_past(&self, key: Key, time: &Time, guards: &[Option<u32>], separation: i64) -> bool {
+        if time.precedes(&Time::constant(self.floor), separation) {
+            return true;
+        }
+        let guard = guards[key as usize].and_then(|guard| self.change(guard));
+        guard.is_some_and(|guard| time.precedes(guard, separation))
+    }
+
+    /// Whether whatever can follow `other` can follow `self`, no later. Their signatures must agree.
+    pub(super) fn no_later(&self, other: &Self, guards: &[Option<u32>], separation: i64) -> bool {
+        let floats = || self.floats.iter().zip(&other.floats);
+        let lasts = || self.opens.iter().zip(&other.opens);
+        let last = |(own, other): (&Open, &Open)| match (&own.last, &other.last) {
+            (Some(own), Some(other)) => own.precedes(other, 0),
+            _ => true,
+        };
+        if self.floor > other.floor
+            || !self.latest.precedes(&other.latest, 0)
+            || !floats().all(|(own, other)| own.lower.precedes(&other.lower, 0) && own.upper >= other.upper)
+            || !lasts().all(last)
+        {
+            return false;
+        }
+        let mut theirs = other.entries.iter().peekable();
+        self.entries.iter().all(|(key, time)| {
+            while theirs.next_if(|(other, _)| other < key).is_some() {}
+            match theirs.peek() {
+                Some((other, later)) if other == key && time.precedes(later, 0) => true,
+                _ => other.is_past(*key, time, guards, separation),
+            }
+        })
+    }
+}

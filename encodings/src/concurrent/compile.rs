@@ -1,0 +1,180 @@
+//! The split ground task to happenings: what pairs a start with its end, what each waits for, and integers for all times.
+
+use num_integer::Integer;
+use num_traits::ToPrimitive;
+use rustc_hash::FxHashSet;
+
+use crate::concurrent::builder::Builder;
+use crate::concurrent::held::drop_held;
+use crate::concurrent::keys::{Accesses, Designs};
+use crate::concurrent::measure::Measure;
+use crate::concurrent::split::{Half, Split};
+use crate::error::{Error, File, Place};
+use crate::ground::reach::Reached;
+use crate::lifted::Rational;
+use crate::pddl::ast::Span;
+use crate::task::{OperatorId, Task};
+
+/// Times and durations stay below this.
+const LIMIT: i64 = 1 << 46;
+
+/// What a happening is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Role {
+    /// The start of an instance.
+    Start(u32),
+    /// The end of an instance.
+    End(u32),
+    /// All of an action that takes no time.
+    Whole,
+    /// Timed initial literals, at this time.
+    Timed(i64),
+    /// A condition over all, or half of an instance that cannot be executed: never happens.
+    #[default]
+    Never,
+}
+
+/// A happening: an operator of the task with what concerns its time.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Happening {
+    pub(super) role: Role,
+    pub(super) accesses: Accesses,
+    pub(super) designs: Designs,
+    /// The atoms (even) and numbers (odd) that it writes, ascending.
+    pub(super) writes: Vec<u32>,
+    /// The variables that it sets and whose time of change matters.
+    pub(super) sets: Vec<u32>,
+}
+
+/// A durative action with its arguments.
+#[derive(Debug, Clone)]
+pub(super) struct Instance {
+    pub(super) start: OperatorId,
+    pub(super) end: OperatorId,
+    /// The operator whose condition must hold over all.
+    pub(super) over_all: Option<OperatorId>,
+    pub(super) duration: i64,
+    pub(super) designs: Designs,
+    /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
+    pub(super) joint: Vec<u32>,
+}
+
+/// A ground task whose actions can overlap.
+#[derive(Debug, Clone)]
+pub struct Concurrent {
+    pub(crate) task: Task,
+    /// By operator.
+    pub(super) happenings: Vec<Happening>,
+    pub(super) instances: Vec<Instance>,
+    /// For each kind of access a variable whose current value everything reads that waits for such accesses.
+    pub(super) guards: Vec<Option<u32>>,
+    pub(super) measure: Measure,
+    /// How far apart interfering happenings are, in the task's time unit.
+    pub(super) separation: i64,
+}
+
+/// The unit of all times: so many to the unit of the files.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Unit(i128);
+
+impl Unit {
+    /// A unit in which durations, separation and timed initial literals are integers.
+    fn new(task: &Task, split: &Split, separation: Rational) -> Result<Self, Error> {
+        let mut times = split.events.iter().map(|event| event.time).chain([separation]);
+        let common = times.try_fold(i128::from(task.time_scale), |scale, time| {
+            Some(scale.lcm(time.denom())).filter(|scale| *scale < i128::from(LIMIT))
+        });
+        common.map(Self).ok_or_else(|| Error::Overflow { what: "durations and times".into() })
+    }
+
+    fn of(self, time: Rational) -> Result<i64, Error> {
+        let units = (time * Rational::from_integer(self.0)).to_integer().to_i64();
+        units.filter(|units| *units < LIMIT).ok_or_else(|| Error::Overflow { what: "a time".into() })
+    }
+
+    /// A duration of the task, in this unit.
+    pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<i64, Error> {
+        let factor = self.0 as i64 / task.time_scale;
+        let duration = task.operators[operator.index()].duration.constant.checked_mul(factor);
+        let duration = duration.filter(|duration| *duration < LIMIT);
+        duration.ok_or_else(|| Error::Overflow { what: "a duration".into() })
+    }
+}
+
+/// Makes happenings of a split ground task.
+pub(super) fn compile(
+    mut task: Task,
+    split: &Split,
+    reached: &Reached,
+    separation: Rational,
+    time_weight: Rational,
+) -> Result<Concurrent, Vec<Error>> {
+    let one = |error| vec![error];
+    let unit = Unit::new(&task, split, separation).map_err(one)?;
+    let separation = unit.of(separation).map_err(one)?;
+    refuse_rewards(&task, split).map_err(one)?;
+    let mut builder = Builder::new(split, reached, separation);
+    builder.collect(&task)?;
+    let measure = Measure::new(&task.objective, time_weight, unit.0 as i64).map_err(one)?;
+    let mut roles = vec![Role::Never; task.operators.len()];
+    let mut instances = builder.instances(&task, unit, &mut roles).map_err(one)?;
+    for ((operator, role), written) in task.operators.iter().zip(&mut roles).zip(builder.written()) {
+        match split.origins[operator.schema as usize].half {
+            Half::Whole if !written.conflicts() => *role = Role::Whole,
+            Half::Timed(event) => *role = Role::Timed(unit.of(split.events[event].time).map_err(one)?),
+            _ => {}
+        }
+    }
+    let (happenings, keys) = builder.happenings(&task, &roles, &mut instances);
+    task.time_scale = unit.0 as i64;
+    drop_held(&mut task, &instances);
+    let guards = vec![None; keys];
+    let mut concurrent = Concurrent { task, happenings, instances, guards, measure, separation };
+    concurrent.guard();
+    Ok(concurrent)
+}
+
+/// A metric that gets better with more actions has no best plan, or none that the search would know.
+fn refuse_rewards(task: &Task, split: &Split) -> Result<(), Error> {
+    if task.operators.iter().all(|operator| operator.cost.minimum() >= 0) {
+        return Ok(());
+    }
+    let nowhere = Place { file: File::Domain, span: Span::default() };
+    Err(Error::Unsupported {
+        construct: "a metric that an action improves, where actions overlap".into(),
+        instead: "a metric to which every action adds, or planning without `--concurrent`".into(),
+        place: split.lifted.metrics.first().map_or(nowhere, |metric| metric.place),
+    })
+}
+
+impl Concurrent {
+    /// Finds the variables that tell of accesses that they are past, and what happenings set.
+    fn guard(&mut self) {
+        let mut common: Vec<Option<Vec<u32>>> = vec![None; self.guards.len()];
+        for (operator, happening) in self.task.operators.iter().zip(&mut self.happenings) {
+            happening.sets = operator.effects.iter().map(|fact| fact.variable.0).collect();
+            let facts = operator.condition.facts.iter().map(|fact| fact.variable);
+            let facts: Vec<u32> = facts
+                .filter(|variable| variable.index() < self.task.basic)
+                .map(|variable| variable.0)
+                .collect();
+            for (key, _) in &happening.accesses.after {
+                match &mut common[*key as usize] {
+                    Some(known) => known.retain(|variable| facts.contains(variable)),
+                    none => *none = Some(facts.clone()),
+                }
+            }
+        }
+        let set: FxHashSet<u32> =
+            self.happenings.iter().flat_map(|happening| happening.sets.iter().copied()).collect();
+        for (guard, common) in self.guards.iter_mut().zip(common) {
+            let size = |variable: &u32| self.task.variables[*variable as usize].values.len();
+            *guard = common.into_iter().flatten().filter(|variable| set.contains(variable)).max_by_key(size);
+        }
+        let goals = self.task.goal.facts.iter().map(|fact| fact.variable.0);
+        let heeded: FxHashSet<u32> = self.guards.iter().flatten().copied().chain(goals).collect();
+        for happening in &mut self.happenings {
+            happening.sets.retain(|variable| heeded.contains(variable));
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! How much time is left, at least, by each variable of the goal alone.
+//!
+//! A variable changes its values one after another: whatever changes one has read it, so it comes a separation after the change
+//! before, and an action that holds the variable from its start to its end takes its time. The shortest path to the value of
+//! the goal is counted from when the variable got its value.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::concurrent::clocks::Clocks;
+use crate::concurrent::compile::{Concurrent, Role};
+use crate::task::{Fact, Operator, State, VariableId};
+
+/// The time to the goal for each value of a variable; none if there is no way.
+struct Path {
+    variable: usize,
+    left: Vec<Option<i64>>,
+}
+
+/// Paths of the variables of the goal.
+pub(super) struct Estimate {
+    paths: Vec<Path>,
+    separation: i64,
+}
+
+/// A change of a variable: from a value, or from any, to a value, so long after the value before.
+type Edge = (Option<u32>, u32, i64);
+
+/// What is left in a node of the search.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Left {
+    /// The least time at which the goal can be reached.
+    pub(super) makespan: i64,
+    /// The sum over variables, which may be too much.
+    pub(super) sum: i64,
+}
+
+impl Estimate {
+    pub(super) fn new(concurrent: &Concurrent) -> Self {
+        let task = &concurrent.task;
+        let goals = task.goal.facts.iter().filter(|fact| fact.variable.index() < task.basic);
+        let paths = goals.map(|goal| path(concurrent, *goal)).collect();
+        Self { paths, separation: concurrent.separation }
+    }
+
+    /// None if the goal is out of reach.
+    pub(super) fn left(&self, concurrent: &Concurrent, state: &State, clocks: &Clocks) -> Option<Left> {
+        let mut left = Left { makespan: clocks.latest(), sum: 0 };
+        for open in clocks.opens() {
+            let end = clocks.start(open) + concurrent.instances[open.instance as usize].duration;
+            left.makespan = left.makespan.max(end);
+        }
+        for path in &self.paths {
+            let more = path.left[state.values[path.variable] as usize]?;
+            if more > 0 {
+                let since = clocks.changed(path.variable as u32).unwrap_or(-self.separation);
+                left.makespan = left.makespan.max(since + more);
+                left.sum += more;
+            }
+        }
+        Some(left)
+    }
+}
+
+/// Dijkstra's algorithm from the value of the goal backwards.
+fn path(concurrent: &Concurrent, goal: Fact) -> Path {
+    let variable = goal.variable;
+    let values = concurrent.task.variables[variable.index()].values.len();
+    let edges = edges(concurrent, variable);
+    let mut into: Vec<Vec<usize>> = vec![Vec::new(); values];
+    for (index, (_, to, _)) in edges.iter().enumerate() {
+        into[*to as usize].push(index);
+    }
+    let mut left = vec![None; values];
+    let mut open = BinaryHeap::from([Reverse((0, goal.value))]);
+    while let Some(Reverse((distance, value))) = open.pop() {
+        if left[value as usize].is_some() {
+            continue;
+        }
+        left[value as usize] = Some(distance);
+        for (from, _, weight) in into[value as usize].iter().map(|index| edges[*index]) {
+            let all = 0..values as u32;
+            let sources = from.map_or(all, |from| from..from + 1);
+            for source in sources.filter(|source| left[*source as usize].is_none()) {
+                open.push(Reverse((distance + weight, source)));
+            }
+        }
+    }
+    Path { variable: variable.index(), left }
+}
+
+/// All changes of a variable.
+fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
+    let task = &concurrent.task;
+    let operators = || task.operators.iter().zip(&concurrent.happenings);
+    let of = |facts: &[Fact]| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
+    let by_itself = operators().any(|(operator, happening)| {
+        matches!(happening.role, Role::Timed(_)) && of(&operator.effects).is_some()
+    });
+    // What happens by itself keeps no separation.
+    let apart = if by_itself { 0 } else { concurrent.separation };
+    let mut edges = Vec::new();
+    for (operator, happening) in operators() {
+        let Some(to) = of(&operator.effects) else { continue };
+        let from = of(&operator.condition.facts);
+        match happening.role {
+            Role::Never => {}
+            Role::Timed(_) => edges.push((from, to, 0)),
+            Role::Start(_) | Role::Whole => edges.push((from, to, from.map_or(0, |_| apart))),
+            Role::End(instance) => {
+                let instance = &concurrent.instances[instance as usize];
+                let start = &task.operators[instance.start.index()];
+                let held = instance.over_all.map(|id| &task.operators[id.index()]);
+                edges.push(end(instance.duration, (of(&start.effects), from, to), apart, || {
+                    // The value stays from before the start to the end.
+                    let kept = |over_all: &Operator| of(&over_all.condition.facts);
+                    let required = of(&start.condition.facts);
+                    required.filter(|_| held.and_then(kept) == required)
+                }));
+            }
+        }
+    }
+    edges
+}
+
+fn end(
+    duration: i64,
+    (set, from, to): (Option<u32>, Option<u32>, u32),
+    apart: i64,
+    kept: impl FnOnce() -> Option<u32>,
+) -> Edge {
+    match (set, from) {
+        (Some(set), Some(from)) if set == from => (Some(from), to, duration),
+        (None, None) => match kept() {
+            Some(value) => (Some(value), to, duration + apart),
+            None => (None, to, 0),
+        },
+        (_, from) => (from, to, from.map_or(0, |_| apart)),
+    }
+}

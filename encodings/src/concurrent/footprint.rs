@@ -1,0 +1,293 @@
+//! What a happening reads and writes, by the rule of PDDL 2.1 that there are no moving targets [1].
+//!
+//! Everything that a condition or an effect mentions counts as read, whether or not it matters in a state: below a quantifier all
+//! instances of an atom, below a derived predicate all that its axioms depend on.
+//!
+//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::error::Error;
+use crate::ground::evaluate::{AtomId, Binding, Failure, World};
+use crate::ground::residual::Residual;
+use crate::lifted::{
+    Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Schema, Term,
+};
+use crate::pddl::ast::Assignment;
+use crate::quantity::NumericId;
+
+/// How a number changes: two changes of one way commute, unless both assign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum Way {
+    Assign,
+    Add,
+    Scale,
+}
+
+/// Atoms and numbers, ascending. The ids are those of this module alone.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Footprint {
+    pub(super) reads: Vec<AtomId>,
+    pub(super) reads_numbers: Vec<NumericId>,
+    pub(super) added: Vec<AtomId>,
+    pub(super) deleted: Vec<AtomId>,
+    pub(super) numbers: Vec<(NumericId, Way)>,
+}
+
+impl Footprint {
+    /// Whether it changes a number in two ways at once, which cannot be done.
+    pub(super) fn conflicts(&self) -> bool {
+        self.numbers.windows(2).any(|pair| pair[0].0 == pair[1].0)
+    }
+}
+
+/// Atoms or functions with gaps where a quantifier runs through all objects; none for any arguments at all.
+type Pattern<S> = (S, Option<Vec<Option<ObjectId>>>);
+
+/// What is read, before it is looked up.
+#[derive(Default)]
+pub(super) struct Reads {
+    atoms: Vec<Pattern<PredicateId>>,
+    numbers: Vec<Pattern<FunctionId>>,
+}
+
+impl Reads {
+    /// Adds what a condition mentions under a binding of the parameters.
+    pub(super) fn condition(&mut self, lifted: &Lifted, formula: &Formula, binding: &Binding) {
+        match formula {
+            Formula::And(parts) | Formula::Or(parts) => {
+                for part in parts {
+                    self.condition(lifted, part, binding);
+                }
+            }
+            Formula::Exists(_, body) | Formula::ForAll(_, body) => self.condition(lifted, body, binding),
+            Formula::Literal { predicate, terms, .. } => {
+                if lifted.predicates[predicate.index()].derived {
+                    self.through_axioms(lifted, *predicate);
+                }
+                self.atoms.push((*predicate, Some(arguments(terms, binding))));
+            }
+            Formula::Equal { .. } => {}
+            Formula::Compare(_, left, right, _) => {
+                self.expression(left, binding);
+                self.expression(right, binding);
+            }
+        }
+    }
+
+    /// Adds what effects mention besides their targets.
+    pub(super) fn effects(&mut self, lifted: &Lifted, effects: &[Effect], binding: &Binding) {
+        for effect in effects {
+            self.condition(lifted, &effect.condition, binding);
+            if let Change::Assign { expression, .. } = &effect.change {
+                self.expression(expression, binding);
+            }
+        }
+    }
+
+    fn expression(&mut self, expression: &Expression, binding: &Binding) {
+        match expression {
+            Expression::Number(_) | Expression::TotalTime => {}
+            Expression::Function(function, terms, _) => {
+                self.numbers.push((*function, Some(arguments(terms, binding))));
+            }
+            Expression::Negate(inner) => self.expression(inner, binding),
+            Expression::Sum(parts) | Expression::Product(parts, _) => {
+                for part in parts {
+                    self.expression(part, binding);
+                }
+            }
+            Expression::Quotient(left, right, _) => {
+                self.expression(left, binding);
+                self.expression(right, binding);
+            }
+        }
+    }
+
+    fn through_axioms(&mut self, lifted: &Lifted, predicate: PredicateId) {
+        let (mut open, mut seen) = (vec![predicate], FxHashSet::default());
+        while let Some(predicate) = open.pop() {
+            for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
+                let mut below = Self::default();
+                below.literals(&axiom.condition);
+                for (predicate, _) in below.atoms {
+                    if seen.insert(predicate) {
+                        self.atoms.push((predicate, None));
+                        open.push(predicate);
+                    }
+                }
+                self.numbers.extend(below.numbers.into_iter().map(|(function, _)| (function, None)));
+            }
+        }
+    }
+
+    /// What a condition mentions, whatever the arguments are.
+    fn literals(&mut self, formula: &Formula) {
+        match formula {
+            Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| self.literals(part)),
+            Formula::Exists(_, body) | Formula::ForAll(_, body) => self.literals(body),
+            Formula::Literal { predicate, .. } => self.atoms.push((*predicate, None)),
+            Formula::Equal { .. } => {}
+            Formula::Compare(_, left, right, _) => {
+                let nothing = Binding::new();
+                self.expression(left, &nothing);
+                self.expression(right, &nothing);
+            }
+        }
+    }
+}
+
+/// Variables that nothing is bound to are gaps.
+fn arguments(terms: &[Term], binding: &Binding) -> Vec<Option<ObjectId>> {
+    let object = |term: &Term| match term {
+        Term::Object(object) => Some(*object),
+        Term::Parameter(parameter) => binding.get(*parameter as usize).copied().flatten(),
+    };
+    terms.iter().map(object).collect()
+}
+
+/// Collects what is written, then looks up what is read of it.
+pub(super) struct Footprints<'a> {
+    world: World<'a>,
+}
+
+impl<'a> Footprints<'a> {
+    pub(super) fn new(world: World<'a>) -> Self {
+        Self { world }
+    }
+
+    /// What effects write.
+    ///
+    /// # Errors
+    /// An effect under a condition that the state decides.
+    pub(super) fn writes(
+        &mut self,
+        schema: &Schema,
+        effects: &[Effect],
+        binding: &Binding,
+    ) -> Result<Footprint, Error> {
+        let mut footprint = Footprint::default();
+        for effect in effects {
+            let mut bindings = Vec::new();
+            let mut own = binding.clone();
+            self.world.each_binding(&effect.bound, &[], &mut own, &mut |_, binding| {
+                bindings.push(binding.clone());
+                true
+            });
+            for mut binding in bindings {
+                match self.world.residual(&effect.condition, &mut binding) {
+                    Ok(Residual::True) => self.write(&effect.change, &binding, &mut footprint)?,
+                    Ok(Residual::False) | Err(Failure::Undefined) => {}
+                    Ok(_) => {
+                        return Err(Error::Unsupported {
+                            construct: format!(
+                                "an effect of `{}` under a condition that changes, where actions overlap",
+                                schema.name
+                            ),
+                            instead: "an effect without a condition, or planning without `--concurrent`"
+                                .into(),
+                            place: schema.place,
+                        });
+                    }
+                    Err(Failure::Error(error)) => return Err(error),
+                }
+            }
+        }
+        let Footprint { added, deleted, numbers, .. } = &mut footprint;
+        for atoms in [added, deleted] {
+            atoms.sort_unstable();
+            atoms.dedup();
+        }
+        numbers.sort_unstable();
+        numbers.dedup_by(|a, b| a == b && a.1 != Way::Assign);
+        Ok(footprint)
+    }
+
+    fn write(&mut self, change: &Change, binding: &Binding, into: &mut Footprint) -> Result<(), Error> {
+        match change {
+            Change::Add(predicate, terms) | Change::Delete(predicate, terms) => {
+                let atom = self.world.atom(*predicate, &World::arguments(terms, binding));
+                let target =
+                    if matches!(change, Change::Add(..)) { &mut into.added } else { &mut into.deleted };
+                target.push(atom);
+            }
+            Change::Assign { assignment, function, terms, place, .. } => {
+                let way = match assignment {
+                    Assignment::Assign => Way::Assign,
+                    Assignment::Increase | Assignment::Decrease => Way::Add,
+                    Assignment::ScaleUp | Assignment::ScaleDown => Way::Scale,
+                };
+                match self.world.numeric(*function, &World::arguments(terms, binding), *place) {
+                    Ok(number) => into.numbers.push((number, way)),
+                    Err(Failure::Undefined) => {}
+                    Err(Failure::Error(error)) => return Err(error),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// An index of all that has been written so far.
+    pub(super) fn index(&self) -> Written {
+        let mut written = Written::default();
+        for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {
+            let entry = written.atoms.entry(*predicate).or_default();
+            entry.push((arguments.clone(), AtomId(index as u32)));
+        }
+        for (index, (function, arguments)) in self.world.numerics.keys().enumerate() {
+            let entry = written.numbers.entry(*function).or_default();
+            entry.push((arguments.clone(), NumericId(index as u32)));
+        }
+        written.exact = written
+            .atoms
+            .iter()
+            .flat_map(|(predicate, rows)| {
+                rows.iter().map(|(arguments, atom)| ((*predicate, arguments.to_vec()), *atom))
+            })
+            .collect();
+        written
+    }
+}
+
+/// Rows with what they stand for.
+type Rows<V> = Vec<(Box<[ObjectId]>, V)>;
+
+/// Atoms and numbers by their symbols.
+#[derive(Default)]
+pub(super) struct Written {
+    atoms: FxHashMap<PredicateId, Rows<AtomId>>,
+    numbers: FxHashMap<FunctionId, Rows<NumericId>>,
+    exact: FxHashMap<(PredicateId, Vec<ObjectId>), AtomId>,
+}
+
+impl Written {
+    /// What of all that is written is read.
+    pub(super) fn look_up(&self, reads: &Reads) -> (Vec<AtomId>, Vec<NumericId>) {
+        let (mut atoms, mut numbers) = (Vec::new(), Vec::new());
+        for (predicate, pattern) in &reads.atoms {
+            let whole =
+                pattern.as_ref().and_then(|pattern| pattern.iter().copied().collect::<Option<Vec<_>>>());
+            match whole {
+                Some(arguments) => atoms.extend(self.exact.get(&(*predicate, arguments))),
+                None => matching(self.atoms.get(predicate), pattern.as_deref(), &mut atoms),
+            }
+        }
+        for (function, pattern) in &reads.numbers {
+            matching(self.numbers.get(function), pattern.as_deref(), &mut numbers);
+        }
+        atoms.sort_unstable();
+        atoms.dedup();
+        numbers.sort_unstable();
+        numbers.dedup();
+        (atoms, numbers)
+    }
+}
+
+fn matching<V: Copy>(rows: Option<&Rows<V>>, pattern: Option<&[Option<ObjectId>]>, into: &mut Vec<V>) {
+    let fits = |arguments: &[ObjectId]| {
+        pattern.is_none_or(|pattern| {
+            pattern.iter().zip(arguments).all(|(wanted, given)| wanted.is_none_or(|wanted| wanted == *given))
+        })
+    };
+    into.extend(rows.into_iter().flatten().filter(|(arguments, _)| fits(arguments)).map(|(_, value)| *value));
+}

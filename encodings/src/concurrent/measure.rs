@@ -1,0 +1,73 @@
+//! What a plan whose actions overlap is measured by: a weight for its makespan, and the costs of its actions.
+
+use num_integer::Integer;
+use num_traits::{Signed, ToPrimitive};
+
+use crate::error::Error;
+use crate::lifted::{Expression, Metric, Rational};
+use crate::normalize::duration::time_factor;
+use crate::pddl::ast::Direction;
+use crate::plan::Exact;
+use crate::task::Objective;
+
+/// The metric in integers: `time` for each unit of time and `cost` for each unit of cost.
+#[derive(Debug, Clone)]
+pub(super) struct Measure {
+    pub(super) time: i64,
+    pub(super) cost: i64,
+    /// Both together are this many times the metric.
+    scale: i64,
+    offset: i64,
+    maximize: bool,
+}
+
+impl Measure {
+    /// For costs by an objective, and times that are `time_scale` times those of the files.
+    pub(super) fn new(objective: &Objective, weight: Rational, time_scale: i64) -> Result<Self, Error> {
+        let overflow = || Error::Overflow { what: "the metric".into() };
+        let by_time = weight / Rational::from_integer(i128::from(time_scale));
+        let scale = by_time.denom().lcm(&i128::from(objective.scale));
+        let integer = |number: i128| number.to_i64().filter(|number| *number < 1 << 46).ok_or_else(overflow);
+        let cost = integer(scale / i128::from(objective.scale))?;
+        Ok(Self {
+            time: integer((by_time * Rational::from_integer(scale)).to_integer())?,
+            cost,
+            scale: integer(scale)?,
+            offset: objective.offset.checked_mul(cost).ok_or_else(overflow)?,
+            maximize: objective.maximize,
+        })
+    }
+
+    /// A plan of this makespan and cost, in integers.
+    pub(super) fn total(&self, makespan: i64, cost: i64) -> i64 {
+        self.time.saturating_mul(makespan).saturating_add(self.cost.saturating_mul(cost))
+    }
+
+    /// The metric of the file.
+    pub(super) fn metric(&self, total: i64) -> Exact {
+        let sign = if self.maximize { -1 } else { 1 };
+        Exact::scaled(sign * (total + self.offset), self.scale)
+    }
+}
+
+/// The weight of the makespan in a metric to be minimised, and the rest of the metric. None if it is not linear in time.
+pub(super) fn split(metric: &Metric) -> Option<(Rational, Metric)> {
+    let factor = time_factor(&metric.expression)?;
+    let weight = if metric.direction == Direction::Minimize { factor } else { -factor };
+    let rest = Metric { expression: without_time(&metric.expression), ..metric.clone() };
+    (!weight.is_negative()).then_some((weight, rest))
+}
+
+fn without_time(expression: &Expression) -> Expression {
+    let each = |parts: &[Expression]| parts.iter().map(without_time).collect();
+    match expression {
+        Expression::TotalTime => Expression::Number(Rational::from_integer(0)),
+        Expression::Sum(parts) => Expression::Sum(each(parts)),
+        Expression::Product(parts, place) => Expression::Product(each(parts), *place),
+        Expression::Negate(inner) => Expression::Negate(Box::new(without_time(inner))),
+        Expression::Quotient(left, right, place) => {
+            Expression::Quotient(Box::new(without_time(left)), right.clone(), *place)
+        }
+        Expression::Number(_) | Expression::Function(..) => expression.clone(),
+    }
+}

@@ -1,0 +1,202 @@
+//! A PDDL task to a plan whose actions overlap, with the least makespan or the best weighted sum of makespan and costs.
+//!
+//! The semantics is that of PDDL 2.1 [1]: starts and ends of actions are *happenings*; what happens at one time reads the state before
+//! it; happenings that interfere lie apart by the *separation* (epsilon); conditions over all hold from after the start until
+//! before the end. Timed initial literals come first at their time. No instance of an action overlaps with itself. At any time, each function that the running actions
+//! require has one design.
+//!
+//! `split` makes two schemas of a durative action, `compile` finds what each happening waits for, and `search` goes
+//! through all sequences of happenings that matter, with what is left of their simple temporal network in `clocks`.
+//!
+//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003.
+
+mod builder;
+mod clocks;
+mod compile;
+mod estimate;
+mod footprint;
+mod held;
+mod keys;
+mod measure;
+mod schedule;
+mod search;
+mod split;
+mod time;
+
+use std::time::Instant;
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{Signed, ToPrimitive};
+
+use crate::bounds::Bounds;
+use crate::error::{Error, File, Place};
+use crate::ground::{Config as GroundConfig, Generality, ground_lifted};
+use crate::lifted::{Expression, Metric, Rational};
+use crate::limits::Limits;
+use crate::normalize::normalize;
+use crate::pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
+use crate::plan::{Plan, Step};
+use crate::solution::{Improvement, Proof, Solution, Statistics, Status};
+use crate::task::OperatorId;
+
+pub use compile::Concurrent;
+
+use compile::Role;
+use estimate::Estimate;
+use search::{Ended, Search, Sequence};
+
+/// How many nodes the greedy search for a first plan expands.
+const GREEDY: usize = 20_000;
+
+/// Grounds a domain and a problem that have passed `pddl::check`, for plans whose actions overlap. Interfering happenings are
+/// to lie `separation` apart, in the domain's time unit.
+///
+/// # Errors
+/// Every construct that cannot be planned with, with its place.
+pub fn ground_concurrent(
+    domain: &Domain,
+    problem: &Problem,
+    config: &GroundConfig,
+    separation: &BigRational,
+) -> Result<Concurrent, Vec<Error>> {
+    let errors = open_durations(domain);
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let overflow = || vec![Error::Overflow { what: "the separation".into() }];
+    let exact = |number: &BigInt| number.to_i64().map(i128::from).ok_or_else(overflow);
+    let separation = if separation.is_positive() {
+        Rational::new(exact(separation.numer())?, exact(separation.denom())?)
+    } else {
+        return Err(overflow());
+    };
+    let mut lifted = normalize(domain, problem, &config.objectives)?;
+    let place = Place { file: File::Problem, span: Span::default() };
+    let number = |number| Expression::Number(Rational::from_integer(number));
+    let (weight, metric) = match lifted.metrics.first() {
+        Some(metric) => measure::split(metric).ok_or_else(|| {
+            vec![Error::Unsupported {
+                construct: "a metric that rewards time, or is not linear in it, where actions overlap".into(),
+                instead: "a metric that grows with `total-time`, or does not mention it".into(),
+                place: metric.place,
+            }]
+        })?,
+        None => (
+            Rational::from_integer(1),
+            Metric { direction: Direction::Minimize, expression: number(0), place },
+        ),
+    };
+    lifted.metrics = vec![metric];
+    let split = split::split(lifted, &config.solves);
+    let none = vec![Vec::new(); split.designs.len()];
+    let (lifted, designs) = (&split.lifted, &split.designs);
+    let (task, reached) = ground_lifted(lifted, designs, &none, &Generality::default(), &config.limits)?;
+    compile::compile(task, &split, &reached, separation, weight)
+}
+
+/// Durations that the planner would have to choose.
+fn open_durations(domain: &Domain) -> Vec<Error> {
+    let open = |action: &crate::pddl::ast::Action| match &action.body {
+        ActionBody::Durative { duration, .. } => match &duration[..] {
+            [only] if only.operator == Comparison::Equal => None,
+            _ => Some(Error::Unsupported {
+                construct: format!(
+                    "a duration of `{}` that is not fixed, where actions overlap",
+                    action.identifier.name
+                ),
+                instead: "one `(= ?duration …)`".into(),
+                place: Place {
+                    file: File::Domain,
+                    span: duration.first().map_or(action.span, |constraint| constraint.span),
+                },
+            }),
+        },
+        ActionBody::Instantaneous { .. } => None,
+    };
+    domain.actions.iter().filter_map(open).collect()
+}
+
+/// Finds a best plan whose actions overlap; of those, one with the least makespan. `report` hears of every improvement.
+pub fn optimize_concurrent(
+    concurrent: &Concurrent,
+    limits: &Limits,
+    report: &mut dyn FnMut(Improvement),
+) -> Solution {
+    let started = Instant::now();
+    let task = &concurrent.task;
+    let statistics =
+        || Statistics { operators: task.operators.len(), search: started.elapsed(), ..Statistics::default() };
+    let solution = |status, proof| Solution {
+        status,
+        plan: None,
+        ground: None,
+        lower_bound: None,
+        horizon: 0,
+        proof,
+        unbounded: None,
+        statistics: statistics(),
+    };
+    if let Some(reason) = &task.unreachable {
+        return solution(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())));
+    }
+    let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
+    let bounds = (costs || !task.initial.numbers.is_empty()).then(|| Bounds::new(task, limits));
+    let estimate = Estimate::new(concurrent);
+    let mut hear = |sequence: &Sequence, lower: i64| {
+        report(Improvement {
+            cost: concurrent.measure.metric(sequence.value.0),
+            lower_bound: concurrent.measure.metric(lower.min(sequence.value.0)),
+            horizon: sequence.happenings.len(),
+        });
+    };
+    let mut first = Search::new(concurrent, &estimate, bounds.as_ref(), true, None);
+    first.run(limits, GREEDY, &mut |sequence, _| hear(sequence, 0));
+    let mut search = Search::new(concurrent, &estimate, bounds.as_ref(), false, first.incumbent.take());
+    drop(first);
+    let ended = search.run(limits, usize::MAX, &mut hear);
+    let plan = search.incumbent.as_ref().map(|sequence| concurrent.plan(sequence));
+    let (status, lower) = match (&ended, &search.incumbent) {
+        (Ended::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
+        (Ended::Exhausted, None) => (Status::Unsolvable, None),
+        (Ended::Stopped(lower), Some(incumbent)) => (Status::Feasible, Some(*lower.min(&incumbent.value.0))),
+        (Ended::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
+    };
+    let proof = matches!(ended, Ended::Exhausted).then_some(Proof::Search);
+    let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
+    Solution {
+        horizon: steps,
+        plan,
+        lower_bound: lower.map(|lower| concurrent.measure.metric(lower)),
+        ..solution(status, proof)
+    }
+}
+
+impl Concurrent {
+    /// A sequence in names, its actions in the order of their starts.
+    fn plan(&self, sequence: &Sequence) -> Plan {
+        let times = schedule::schedule(self, &sequence.happenings, &sequence.together);
+        let mut steps: Vec<((i64, OperatorId), Step)> = Vec::new();
+        for (id, time) in sequence.happenings.iter().zip(times) {
+            let (end, duration) = match self.happenings[id.index()].role {
+                Role::Start(instance) => {
+                    let instance = &self.instances[instance as usize];
+                    (self.task.operators[instance.end.index()].cost.constant, instance.duration)
+                }
+                Role::Whole => (0, 0),
+                _ => continue,
+            };
+            let operator = &self.task.operators[id.index()];
+            let sign = if self.task.objective.maximize { -1 } else { 1 };
+            let cost = sign * (operator.cost.constant + end);
+            steps.push(((time, *id), Step::new(&self.task, operator, &[], (time, duration, cost))));
+        }
+        steps.sort_by_key(|(place, _)| *place);
+        let mut current = Vec::new();
+        for (_, step) in &mut steps {
+            step.note_reconfigured(&mut current);
+        }
+        let steps = steps.into_iter().map(|(_, step)| step).collect();
+        Plan { steps, cost: self.measure.metric(sequence.value.0) }
+    }
+}

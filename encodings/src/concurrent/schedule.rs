@@ -1,0 +1,87 @@
+//! A sequence of happenings to the earliest times at which they can take place.
+
+use rustc_hash::FxHashMap;
+
+use crate::concurrent::clocks::Key;
+use crate::concurrent::compile::{Concurrent, Role};
+use crate::task::OperatorId;
+
+/// A lower bound: from a happening to another one, at least so much later.
+type Bound = (usize, usize, i64);
+
+/// The earliest times of a sequence that the search has found. `together` says which happenings take place at the time of
+/// the one before.
+pub(super) fn schedule(concurrent: &Concurrent, sequence: &[OperatorId], together: &[bool]) -> Vec<i64> {
+    let mut times = vec![0; sequence.len()];
+    let bounds = bounds(concurrent, sequence, together, &mut times);
+    // No chain of bounds is longer than the sequence.
+    for _ in 0..=sequence.len() {
+        let mut changed = false;
+        for (from, to, by) in &bounds {
+            let least = times[*from] + by;
+            if times[*to] < least {
+                times[*to] = least;
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    times
+}
+
+fn bounds(
+    concurrent: &Concurrent,
+    sequence: &[OperatorId],
+    together: &[bool],
+    times: &mut [i64],
+) -> Vec<Bound> {
+    let mut bounds = Vec::new();
+    let mut marked: FxHashMap<Key, Vec<usize>> = FxHashMap::default();
+    let mut started: FxHashMap<u32, usize> = FxHashMap::default();
+    // For actions under way with a joint condition over all: what has written it last.
+    let mut joint: Vec<(u32, usize)> = Vec::new();
+    let mut floor = 0;
+    for (index, id) in sequence.iter().enumerate() {
+        let happening = &concurrent.happenings[id.index()];
+        if let Role::Timed(time) = happening.role {
+            floor = time;
+        }
+        times[index] = floor;
+        for (key, by) in &happening.accesses.after {
+            bounds.extend(marked.get(key).into_iter().flatten().map(|earlier| (*earlier, index, *by)));
+        }
+        for key in &happening.accesses.marks {
+            marked.entry(*key).or_default().push(index);
+        }
+        if together[index] {
+            bounds.extend([(index - 1, index, 0), (index, index - 1, 0)]);
+        }
+        if let Role::End(instance) = happening.role {
+            joint.retain(|(own, _)| *own != instance);
+        }
+        for (instance, last) in &mut joint {
+            if concurrent.touches(*id, *instance) {
+                bounds.push((*last, index, 0));
+                *last = index;
+            }
+        }
+        match happening.role {
+            Role::Start(instance) => {
+                started.insert(instance, index);
+                if !concurrent.instances[instance as usize].joint.is_empty() {
+                    joint.push((instance, index));
+                }
+            }
+            Role::End(instance) => {
+                let duration = concurrent.instances[instance as usize].duration;
+                if let Some(start) = started.remove(&instance) {
+                    bounds.extend([(start, index, duration), (index, start, -duration)]);
+                }
+            }
+            _ => {}
+        }
+    }
+    bounds
+}

@@ -1,0 +1,310 @@
+//! A* over sequences of happenings.
+//!
+//! A node is a state, the actions under way, and the clocks. Of two nodes with the same state and the same actions under way one
+//! is dropped if whatever can follow it can follow the other one, no later, at no higher cost, and with no less of any
+//! resource. Orders of happenings that do not interfere have the same clocks, so only one of them is pursued. Actions can start at any
+//! time, not only when others end: planners that know no other times are incomplete [1].
+//!
+//! [1] W. Cushing, S. Kambhampati, Mausam, D. Weld: When is temporal planning really temporal?, IJCAI 2007.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::collections::hash_map::Entry;
+
+use rustc_hash::FxHashMap;
+
+use crate::bounds::Bounds;
+use crate::concurrent::clocks::{self, Clocks, Kind};
+use crate::concurrent::compile::{Concurrent, Role};
+use crate::concurrent::estimate::Estimate;
+use crate::limits::Limits;
+use crate::search::is_monotone;
+use crate::successors::OperatorIndex;
+use crate::task::{OperatorId, State};
+
+/// A plan as the search finds it.
+#[derive(Debug, Clone)]
+pub(super) struct Sequence {
+    /// The metric in integers, then the makespan.
+    pub(super) value: (i64, i64),
+    pub(super) happenings: Vec<OperatorId>,
+    /// Which of them take place at the time of the one before.
+    pub(super) together: Vec<bool>,
+}
+
+/// How a search ended.
+pub(super) enum Ended {
+    /// Nothing is left that could be better than the incumbent.
+    Exhausted,
+    /// At a limit: no plan that is not known has a lower metric than this, in integers.
+    Stopped(i64),
+}
+
+struct Node {
+    state: State,
+    clocks: Clocks,
+    cost: i64,
+    /// How many happenings lead here.
+    depth: i64,
+    parent: Option<(u32, OperatorId)>,
+    dominated: bool,
+}
+
+/// The metric, the makespan, the sum of what is left, and the number of the node; greedily, the sum and the depth come
+/// first.
+type Priority = (i64, i64, i64, i64, u32);
+
+pub(super) struct Search<'a> {
+    concurrent: &'a Concurrent,
+    estimate: &'a Estimate,
+    /// Lower bounds on costs, and on resources; none if nothing costs.
+    bounds: Option<&'a Bounds>,
+    index: OperatorIndex,
+    greedy: bool,
+    monotone: bool,
+    nodes: Vec<Node>,
+    seen: FxHashMap<Box<[u32]>, Vec<u32>>,
+    open: BinaryHeap<Reverse<Priority>>,
+    pub(super) incumbent: Option<Sequence>,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(
+        concurrent: &'a Concurrent,
+        estimate: &'a Estimate,
+        bounds: Option<&'a Bounds>,
+        greedy: bool,
+        incumbent: Option<Sequence>,
+    ) -> Self {
+        let begins = |id: &OperatorId| {
+            matches!(concurrent.happenings[id.index()].role, Role::Start(_) | Role::Whole | Role::Timed(_))
+        };
+        let operators = (0..concurrent.task.operators.len() as u32).map(OperatorId).filter(begins);
+        let mut search = Self {
+            concurrent,
+            estimate,
+            bounds,
+            index: OperatorIndex::over(&concurrent.task, operators),
+            greedy,
+            monotone: is_monotone(&concurrent.task),
+            nodes: Vec::new(),
+            seen: FxHashMap::default(),
+            open: BinaryHeap::new(),
+            incumbent,
+        };
+        let state = concurrent.task.initial.clone();
+        search.push(Node { state, clocks: Clocks::new(), cost: 0, depth: 0, parent: None, dominated: false });
+        search
+    }
+
+    /// Searches until nothing better is left, `most` nodes are expanded, or a limit is reached; greedily, until a plan is
+    /// found. `report` hears of each better plan and of what none can get below.
+    pub(super) fn run(
+        &mut self,
+        limits: &Limits,
+        most: usize,
+        report: &mut dyn FnMut(&Sequence, i64),
+    ) -> Ended {
+        let mut expanded = 0;
+        while let Some(Reverse(priority)) = self.open.pop() {
+            let id = priority.4;
+            let value = if self.greedy { (priority.2, priority.3) } else { (priority.0, priority.1) };
+            if self.nodes[id as usize].dominated || !self.is_better(value) {
+                continue;
+            }
+            if self.is_goal(id) {
+                let sequence = self.sequence(id);
+                report(&sequence, value.0);
+                self.incumbent = Some(sequence);
+                if self.greedy {
+                    return Ended::Stopped(0);
+                }
+                continue;
+            }
+            if expanded == most || (expanded.is_multiple_of(64) && limits.reached()) {
+                return Ended::Stopped(if self.greedy { 0 } else { value.0 });
+            }
+            expanded += 1;
+            self.expand(id);
+        }
+        Ended::Exhausted
+    }
+
+    fn is_better(&self, value: (i64, i64)) -> bool {
+        self.incumbent.as_ref().is_none_or(|incumbent| value < incumbent.value)
+    }
+
+    fn is_goal(&self, id: u32) -> bool {
+        let Node { state, clocks, .. } = &self.nodes[id as usize];
+        let role = |id: OperatorId| self.concurrent.happenings[id.index()].role;
+        clocks.opens().is_empty()
+            && !clocks.unsettled()
+            && self.concurrent.task.is_goal(state)
+            && self.index.applicable(&self.concurrent.task, state).into_iter().all(|id| match role(id) {
+                // It takes place before the plan ends.
+                Role::Timed(time) => clocks.latest() < time,
+                _ => true,
+            })
+    }
+
+    fn expand(&mut self, id: u32) {
+        let concurrent = self.concurrent;
+        let Node { state, clocks, .. } = &self.nodes[id as usize];
+        let mut next = self.index.applicable(&concurrent.task, state);
+        next.extend(clocks.opens().iter().map(|open| concurrent.instances[open.instance as usize].end));
+        for operator in next {
+            if let Some(node) = self.successor(id, operator) {
+                self.push(node);
+            }
+        }
+    }
+
+    /// The node after a happening; none if it cannot happen here.
+    fn successor(&self, id: u32, operator_id: OperatorId) -> Option<Node> {
+        let concurrent = self.concurrent;
+        let Node { state, clocks, cost, depth, .. } = &self.nodes[id as usize];
+        let (operator, happening) =
+            (&concurrent.task.operators[operator_id.index()], &concurrent.happenings[operator_id.index()]);
+        if !operator.applicable(state, &[]) {
+            return None;
+        }
+        let (kind, instance) = match happening.role {
+            Role::Start(instance) => (Kind::Start, instance),
+            Role::End(instance) => (Kind::End, instance),
+            Role::Whole | Role::Timed(_) => (Kind::Whole, u32::MAX),
+            Role::Never => return None,
+        };
+        if kind == Kind::Start && clocks.is_open(instance) || self.clashes(clocks, happening) {
+            return None;
+        }
+        let after = concurrent.task.successor(operator, state, &[]);
+        let open = clocks.opens().iter().map(|open| open.instance);
+        let going_on = open.filter(|open| kind != Kind::End || *open != instance);
+        let mut going_on = going_on.chain((kind == Kind::Start).then_some(instance));
+        let settled = going_on.all(|instance| concurrent.holds_over_all(instance, &after));
+        let sets = happening.sets.iter().copied();
+        let changes: Vec<u32> = sets
+            .filter(|variable| state.values[*variable as usize] != after.values[*variable as usize])
+            .collect();
+        let mut clocks = if let Role::Timed(time) = happening.role {
+            if !settled {
+                return None;
+            }
+            clocks.timed(time, &changes)?
+        } else {
+            let own = concurrent.instances.get(instance as usize);
+            clocks.after(&clocks::Happening {
+                kind,
+                instance,
+                duration: own.map_or(0, |own| own.duration),
+                after: &happening.accesses.after,
+                marks: &happening.accesses.marks,
+                joint: own.is_some_and(|own| !own.joint.is_empty()),
+                touches: &|instance| concurrent.touches(operator_id, instance),
+                changes: &changes,
+                settled,
+            })?
+        };
+        clocks.forget(&concurrent.guards, concurrent.separation);
+        let cost = cost + operator.cost.constant;
+        let parent = Some((id, operator_id));
+        Some(Node { state: after, clocks, cost, depth: depth + 1, parent, dominated: false })
+    }
+
+    /// Whether an action under way uses a function with another design.
+    fn clashes(&self, clocks: &Clocks, happening: &crate::concurrent::compile::Happening) -> bool {
+        happening.designs.iter().any(|(function, design)| {
+            clocks.opens().iter().any(|open| {
+                let other = &self.concurrent.instances[open.instance as usize].designs;
+                other.iter().any(|(own, used)| own == function && used != design)
+            })
+        })
+    }
+
+    fn push(&mut self, node: Node) {
+        let concurrent = self.concurrent;
+        let Some(left) = self.estimate.left(concurrent, &node.state, &node.clocks) else { return };
+        let costs = match self.bounds {
+            Some(bounds) => match bounds.estimate(&node.state) {
+                Some(costs) => costs,
+                None => return,
+            },
+            None => 0,
+        };
+        let value = (concurrent.measure.total(left.makespan, node.cost + costs), left.makespan);
+        if !self.is_better(value) {
+            return;
+        }
+        let mut key = node.state.values[..concurrent.task.basic].to_vec();
+        node.clocks.signature(&mut key);
+        if !self.monotone {
+            key.extend(node.state.numbers.iter().flat_map(|number| [*number as u32, (*number >> 32) as u32]));
+        }
+        let id = self.nodes.len() as u32;
+        let (guards, separation) = (&concurrent.guards, concurrent.separation);
+        let dominates = |own: &Node, other: &Node| {
+            own.cost <= other.cost
+                && own.state.numbers.iter().zip(&other.state.numbers).all(|(own, other)| own >= other)
+                && own.clocks.no_later(&other.clocks, guards, separation)
+        };
+        match self.seen.entry(key.into_boxed_slice()) {
+            Entry::Vacant(entry) => {
+                entry.insert(vec![id]);
+            }
+            Entry::Occupied(mut entry) => {
+                let (front, nodes) = (entry.get_mut(), &mut self.nodes);
+                if front.iter().any(|known| dominates(&nodes[*known as usize], &node)) {
+                    return;
+                }
+                front.retain(|known| {
+                    let known = &mut nodes[*known as usize];
+                    known.dominated = dominates(&node, known);
+                    !known.dominated
+                });
+                front.push(id);
+            }
+        }
+        let depth = node.depth;
+        self.nodes.push(node);
+        self.open.push(Reverse(if self.greedy {
+            (left.sum, depth, value.0, value.1, id)
+        } else {
+            (value.0, value.1, left.sum, depth, id)
+        }));
+    }
+
+    fn sequence(&self, goal: u32) -> Sequence {
+        let node = &self.nodes[goal as usize];
+        let latest = node.clocks.latest();
+        let value = (self.concurrent.measure.total(latest, node.cost), latest);
+        let (mut happenings, mut together) = (Vec::new(), Vec::new());
+        let mut at = goal;
+        while let Some((parent, operator)) = self.nodes[at as usize].parent {
+            happenings.push(operator);
+            together.push(self.nodes[parent as usize].clocks.unsettled());
+            at = parent;
+        }
+        happenings.reverse();
+        together.reverse();
+        Sequence { value, happenings, together }
+    }
+}
+
+impl Concurrent {
+    /// Whether what must hold over all of an instance holds in a state.
+    fn holds_over_all(&self, instance: u32, state: &State) -> bool {
+        let condition = self.instances[instance as usize].over_all;
+        let condition = condition.map(|id| &self.task.operators[id.index()].condition);
+        condition.is_none_or(|condition| {
+            condition.holds_propositionally(&state.values)
+                && condition.holds_numerically(&state.numbers, &[], &[])
+        })
+    }
+
+    /// Whether a happening writes what the joint condition over all of an instance reads.
+    pub(super) fn touches(&self, operator: OperatorId, instance: u32) -> bool {
+        let joint = &self.instances[instance as usize].joint;
+        let writes = &self.happenings[operator.index()].writes;
+        !joint.is_empty() && writes.iter().any(|id| joint.binary_search(id).is_ok())
+    }
+}

@@ -1,0 +1,192 @@
+//! Durative actions to their starts and ends: a lifted task whose every schema is a single happening.
+//!
+//! A durative action becomes two instantaneous ones, after Fox and Long's *snap actions* [1], joined by an atom that says
+//! that the instance is under way. What must hold over all becomes a third schema, which never happens: its condition is looked
+//! up while the instance is under way. An instance that takes no time is one happening. Timed initial literals become
+//! schemas without parameters, one after another.
+//!
+//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
+
+use crate::configuration::{SlotParameter, conjuncts, design_parameters, is_static};
+use crate::error::{File, Place};
+use crate::lifted::{
+    Bound, Change, Effect, Event, Expression, Formula, Lifted, ObjectId, Predicate, PredicateId, Rational,
+    Schema, Term,
+};
+use crate::pddl::ast::{Comparison, Name, Span};
+
+/// Which happening of a schema another schema stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Half {
+    Start,
+    /// No happening: what must hold between the start and the end.
+    OverAll,
+    End,
+    /// All of it at once: an instantaneous action, or one that takes no time.
+    Whole,
+    /// Timed initial literals, by position.
+    Timed(usize),
+}
+
+/// Where a schema of the split task comes from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Origin {
+    /// The schema of the domain; of no meaning for timed initial literals.
+    pub(super) schema: usize,
+    pub(super) half: Half,
+}
+
+/// A lifted task that is split into happenings.
+pub(super) struct Split {
+    pub(super) lifted: Lifted,
+    /// The schemas as the domain has them.
+    pub(super) schemas: Vec<Schema>,
+    /// By schema of the split task.
+    pub(super) origins: Vec<Origin>,
+    /// The design parameters of each schema of the split task.
+    pub(super) designs: Vec<Vec<SlotParameter>>,
+    pub(super) events: Vec<Event>,
+}
+
+/// Splits a task. `solves` names the predicates that say which design solves which function.
+pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
+    let schemas = std::mem::take(&mut lifted.schemas);
+    let events = std::mem::take(&mut lifted.events);
+    let (mut origins, mut designs) = (Vec::new(), Vec::new());
+    let waited = lifted.time.waited;
+    if !events.is_empty() {
+        // A plan lasts until its last action ends, so it does not end with what happens by itself.
+        let done = Formula::Literal { positive: false, predicate: waited, terms: Vec::new() };
+        let goal = std::mem::replace(&mut lifted.goal, Formula::truth());
+        lifted.goal = Formula::And(vec![goal, done]);
+    }
+    for (index, schema) in schemas.iter().enumerate() {
+        let own = design_parameters(&lifted, schema, solves);
+        for (half, mut part) in parts(&mut lifted, schema) {
+            if !events.is_empty() && matches!(half, Half::End | Half::Whole) {
+                part.end_effects.push(effect(Change::Delete(waited, Vec::new())));
+            }
+            lifted.schemas.push(part);
+            origins.push(Origin { schema: index, half });
+            designs.push(own.clone());
+        }
+    }
+    for (index, event) in events.iter().enumerate() {
+        let schema = timed(&lifted, index as u32, event);
+        lifted.schemas.push(schema);
+        origins.push(Origin { schema: usize::MAX, half: Half::Timed(index) });
+        designs.push(Vec::new());
+    }
+    Split { lifted, schemas, origins, designs, events }
+}
+
+fn effect(change: Change) -> Effect {
+    Effect { bound: Vec::<Bound>::new(), condition: Formula::truth(), change }
+}
+
+fn literal(predicate: PredicateId, terms: &[Term]) -> Formula {
+    Formula::Literal { positive: true, predicate, terms: terms.to_vec() }
+}
+
+/// The happenings of a schema.
+fn parts(lifted: &mut Lifted, schema: &Schema) -> Vec<(Half, Schema)> {
+    let instantaneous = |condition: Vec<Formula>, effects: Vec<Effect>| Schema {
+        start_condition: Formula::And(condition),
+        start_effects: Vec::new(),
+        middle_condition: Formula::truth(),
+        over_all: Formula::truth(),
+        at_end: Formula::truth(),
+        end_effects: effects,
+        duration: None,
+        ..schema.clone()
+    };
+    let Some(duration) = &schema.duration else { return vec![(Half::Whole, schema.clone())] };
+    let known = if let Expression::Number(number) = duration { Some(*number) } else { None };
+    let zero = Rational::from_integer(0);
+    let compare =
+        |comparison| Formula::Compare(comparison, duration.clone(), Expression::Number(zero), schema.place);
+    let mut all = Vec::new();
+    if known.is_none_or(|known| known == zero) {
+        let condition =
+            vec![compare(Comparison::Equal), schema.start_condition.clone(), schema.at_end.clone()];
+        let effects = schema.start_effects.iter().chain(&schema.end_effects).cloned().collect();
+        all.push((Half::Whole, instantaneous(condition, effects)));
+    }
+    if known == Some(zero) {
+        return all;
+    }
+    let parameters: Vec<Term> = (0..schema.parameters.len() as u32).map(Term::Parameter).collect();
+    let mut symbol = |text: &str, running| {
+        let name = Name::new(&format!("{text} {}", schema.name));
+        let arity = parameters.len();
+        lifted.predicates.push(Predicate { name, arity, fluent: true, derived: false, running });
+        PredicateId(lifted.predicates.len() as u32 - 1)
+    };
+    let running = symbol("running", true);
+    let later = [&schema.over_all, &schema.at_end].into_iter().flat_map(conjuncts);
+    let settled: Vec<Formula> = later.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect();
+    let changing: Vec<&Formula> =
+        conjuncts(&schema.over_all).into_iter().filter(|conjunct| !is_static(lifted, conjunct)).collect();
+
+    let mut condition = vec![schema.start_condition.clone()];
+    condition.extend(known.is_none().then(|| compare(Comparison::Greater)));
+    condition.extend(settled);
+    let mut effects = schema.start_effects.clone();
+    effects.push(effect(Change::Add(running, parameters.clone())));
+    all.push((
+        Half::Start,
+        Schema { duration: schema.duration.clone(), ..instantaneous(condition, effects) },
+    ));
+
+    let mut condition = vec![literal(running, &parameters), schema.at_end.clone()];
+    if !changing.is_empty() {
+        let mut symbol = |text: &str| {
+            let name = Name::new(&format!("{text} {}", schema.name));
+            let arity = parameters.len();
+            lifted.predicates.push(Predicate { name, arity, fluent: true, derived: false, running: false });
+            PredicateId(lifted.predicates.len() as u32 - 1)
+        };
+        let held = symbol("held");
+        let own = [literal(running, &parameters)].into_iter().chain(changing.into_iter().cloned()).collect();
+        let change = effect(Change::Add(held, parameters.clone()));
+        all.push((Half::OverAll, instantaneous(own, vec![change])));
+        condition.push(literal(held, &parameters));
+    }
+    let mut effects = schema.end_effects.clone();
+    effects.push(effect(Change::Delete(running, parameters)));
+    all.push((Half::End, instantaneous(condition, effects)));
+    all
+}
+
+/// What happens by itself at one time, after what happened before.
+fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
+    let phase = |number: u32| vec![Term::Object(ObjectId(lifted.time.first_phase.0 + number))];
+    let mut changes: Vec<(PredicateId, &[ObjectId], bool)> = Vec::new();
+    for (predicate, arguments, holds) in &event.changes {
+        changes.retain(|(other, known, _)| (other, *known) != (predicate, arguments));
+        changes.push((*predicate, arguments, *holds));
+    }
+    let mut effects: Vec<Effect> = changes
+        .into_iter()
+        .map(|(predicate, arguments, holds)| {
+            let terms = arguments.iter().map(|object| Term::Object(*object)).collect();
+            effect(if holds { Change::Add(predicate, terms) } else { Change::Delete(predicate, terms) })
+        })
+        .collect();
+    effects.push(effect(Change::Add(lifted.time.waited, Vec::new())));
+    effects.push(effect(Change::Delete(lifted.time.phase, phase(index))));
+    effects.push(effect(Change::Add(lifted.time.phase, phase(index + 1))));
+    Schema {
+        name: Name::new("timed initial literals"),
+        parameters: Vec::new(),
+        variables: 0,
+        start_condition: literal(lifted.time.phase, &phase(index)),
+        start_effects: Vec::new(),
+        middle_condition: Formula::truth(),
+        over_all: Formula::truth(),
+        at_end: Formula::truth(),
+        end_effects: effects,
+        duration: None,
+        place: Place { file: File::Problem, span: Span::default() },
+    }
+}

@@ -1,0 +1,81 @@
+//! `metaplan plan --concurrent`: plans whose actions overlap.
+
+use clap::Args;
+use encodings::pddl::ast::Problem;
+use encodings::validate::Options;
+use encodings::{Improvement, Limits, Plan, Point, Task, optimize_concurrent};
+use metaplan::mission::Mission;
+use num_rational::BigRational;
+
+use crate::cli::objectives::Objectives;
+use crate::cli::validate::time;
+use crate::cli::{Exit, Failure};
+
+/// Whether and how actions overlap.
+#[derive(Debug, Args)]
+pub(super) struct Overlap {
+    /// Actions may overlap, by the rules of PDDL 2.1: `total-time` is the makespan, which is minimised where the problem has no
+    /// metric.
+    #[arg(long, conflicts_with_all = ["horizon", "solver", "encoding", "pareto", "certificate", "alternatives"])]
+    concurrent: bool,
+    /// With `--concurrent`: how far apart actions that interfere begin and end, in the domain's time unit.
+    #[arg(long, value_name = "TIME", default_value = "0.001", value_parser = positive, requires = "concurrent")]
+    epsilon: BigRational,
+}
+
+fn positive(text: &str) -> Result<BigRational, String> {
+    time(text)
+        .ok()
+        .filter(|value| *value > BigRational::default())
+        .ok_or_else(|| format!("`{text}` is not a time above 0 such as 0.001"))
+}
+
+impl Overlap {
+    /// The separation of actions that interfere; none if actions are executed one after another.
+    pub(super) fn separation(&self) -> Option<&BigRational> {
+        self.concurrent.then_some(&self.epsilon)
+    }
+}
+
+/// How the validator is to read a plan.
+pub(super) struct Reading {
+    pub(super) options: Options,
+    /// Whether a plan without a metric is measured by its time.
+    pub(super) timed: bool,
+}
+
+impl Reading {
+    /// Actions are executed one after another.
+    pub(super) fn sequential(task: &Task) -> Self {
+        Self { options: Options::default(), timed: task.is_timed() }
+    }
+
+    /// Actions overlap.
+    pub(super) fn concurrent(separation: &BigRational) -> Self {
+        Self { options: Options { concurrent: true, tolerance: separation.clone() }, timed: true }
+    }
+}
+
+/// Finds a plan whose actions overlap; `report` hears of improvements.
+pub(super) fn solve(
+    mission: &Mission,
+    problem: &Problem,
+    objectives: &Objectives,
+    separation: &BigRational,
+    limits: &Limits,
+    report: &mut dyn FnMut(Improvement),
+) -> Result<Point, Failure> {
+    let task =
+        mission.ground_concurrent(problem, &objectives.metrics, separation, limits).map_err(|messages| {
+            let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
+            Failure { exit, messages }
+        })?;
+    let solution = optimize_concurrent(&task, limits, report);
+    let values = solution.plan.iter().map(|plan| plan.cost);
+    Ok(Point { values: values.filter(|_| !objectives.metrics.is_empty()).collect(), solution })
+}
+
+/// A line about the makespan.
+pub(super) fn makespan_text(plan: Option<&Plan>) -> String {
+    plan.map_or_else(String::new, |plan| format!("makespan {}\n", plan.makespan()))
+}

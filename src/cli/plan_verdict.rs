@@ -1,0 +1,71 @@
+//! The answer of `metaplan plan` in sentences: what is claimed, and why.
+
+use encodings::{Proof, Solution, Status, Unbounded};
+use metaplan::mission::Blocking;
+
+/// The answer in a sentence: what is claimed, and whether it is proved.
+pub(super) fn verdict(solution: &Solution) -> String {
+    let horizon = solution.horizon;
+    match (solution.status, &solution.proof, solution.unbounded) {
+        (Status::Optimal, Some(Proof::Sat { step_bound }), _) => format!(
+            "optimal, proved: no cheaper plan has up to {} (unsatisfiable), and none with more can be cheaper\n",
+            steps(*step_bound)
+        ),
+        (Status::Optimal, Some(Proof::Bound), _) => {
+            "optimal, proved: the cost equals a lower bound on the cost of all plans\n".to_owned()
+        }
+        (Status::Optimal, _, _) => {
+            "optimal, proved: the search left out only states that are dominated or too dear\n".to_owned()
+        }
+        (Status::Feasible, proof, Some(unbounded)) => {
+            let why = match unbounded {
+                Unbounded::Proved => {
+                    "the metric has no best value: an action that improves it can be repeated for ever"
+                }
+                Unbounded::Suspected => "the metric may have no best value: actions improve it",
+            };
+            let reading = if proof.is_some() { "proved best" } else { "best found" };
+            format!(
+                "{why}\nbounded reading: fewest steps first, then the metric; {reading} among plans of {horizon} steps\n"
+            )
+        }
+        (Status::Feasible, _, None) if horizon == 0 => "a plan, not proved optimal\n".to_owned(),
+        (Status::Feasible, _, None) => {
+            format!("a plan, not proved optimal (plans of up to {} considered)\n", steps(horizon))
+        }
+        (Status::Unsolvable, Some(Proof::Relaxation(reason)), _) => {
+            format!("no plan exists, proved: {reason}\n")
+        }
+        (Status::Unsolvable, Some(Proof::Sat { step_bound }), _) => format!(
+            "no plan exists, proved: none has up to {} (unsatisfiable), and a shortest one has no more\n",
+            steps(*step_bound)
+        ),
+        (Status::Unsolvable, _, _) => {
+            "no plan exists, proved: every reachable state was visited or is dominated\n".to_owned()
+        }
+        (Status::UnsolvableWithinHorizon, _, _) => {
+            format!("no plan with up to {}, proved; longer ones were not considered\n", steps(horizon))
+        }
+        (Status::Unknown, _, _) => {
+            "a limit was reached before a plan was found; nothing is proved\n".to_owned()
+        }
+    }
+}
+
+/// Why there is no plan, as far as designs are the reason.
+pub(super) fn blocking_text(blocking: &Blocking) -> String {
+    match blocking {
+        Blocking::Designs(designs) => format!(
+            "it is for designs that are not available: there is no plan without {}; with any one of them, and all \
+             others, there would be\n",
+            designs.join(", ")
+        ),
+        Blocking::Other => {
+            "it is not for designs: with all of them available there would be none either\n".to_owned()
+        }
+    }
+}
+
+fn steps(count: usize) -> String {
+    if count == 1 { "1 step".to_owned() } else { format!("{count} steps") }
+}

@@ -1,0 +1,98 @@
+//! `metaplan plan --concurrent`: what it prints, and that `validate` agrees.
+
+use serde_json::json;
+
+use crate::common::{Outcome, metaplan, metaplan_in};
+
+const DOMAIN: &str = "(define (domain match) (:requirements :durative-actions :typing)
+  (:types match fuse) (:predicates (light) (handfree) (unused ?m - match) (mended ?f - fuse))
+  (:durative-action light :parameters (?m - match) :duration (= ?duration 5)
+    :condition (and (at start (unused ?m)) (over all (light)))
+    :effect (and (at start (not (unused ?m))) (at start (light)) (at end (not (light)))))
+  (:durative-action mend :parameters (?f - fuse) :duration (= ?duration 2)
+    :condition (and (at start (handfree)) (over all (light)))
+    :effect (and (at start (not (handfree))) (at end (mended ?f)) (at end (handfree)))))";
+
+const PROBLEM: &str = "(define (problem p) (:domain match) (:objects m1 - match f1 f2 - fuse)
+  (:init (handfree) (unused m1)) (:goal (and (mended f1) (mended f2))))";
+
+fn plan(domain: &str, problem: &str, arguments: &[&str]) -> Outcome {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    for (name, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {
+        std::fs::write(directory.path().join(name), text).expect("a file");
+    }
+    let all = ["plan", "domain.pddl", "problem.pddl", "--concurrent"].iter().chain(arguments);
+    metaplan_in(directory.path(), &all.copied().collect::<Vec<_>>(), "")
+}
+
+#[test]
+fn plans_in_every_format() {
+    let ipc = "0.000: (light m1)  [5.000]\n0.000: (mend f1)  [2.000]\n2.001: (mend f2)  [2.000]\n";
+    assert_eq!(plan(DOMAIN, PROBLEM, &["--plan-format", "ipc"]).stdout, ipc);
+    let plansys2 = format!("Solution Found\n{ipc}");
+    assert_eq!(plan(DOMAIN, PROBLEM, &["--plan-format", "plansys2"]).stdout, plansys2);
+    let fine = plan(DOMAIN, PROBLEM, &["--plan-format", "ipc", "--epsilon", "0.00025"]).stdout;
+    assert_eq!(fine, ipc.replace("2.001", "2.00025"));
+    let answer = plan(DOMAIN, PROBLEM, &["--format", "json"]).json();
+    assert_eq!(
+        (&answer["status"], &answer["cost"], &answer["makespan"]),
+        (&json!("optimal"), &json!(5), &json!(5))
+    );
+    let starts: Vec<_> =
+        answer["steps"].as_array().into_iter().flatten().map(|step| &step["start"]).collect();
+    assert_eq!(starts, [&json!(0), &json!(0), &json!(2.001)]);
+    let text = plan(DOMAIN, PROBLEM, &[]);
+    assert_eq!(text.status, 0);
+    assert!(text.stdout.ends_with("dominated or too dear\nmakespan 5\n"), "{}", text.stdout);
+}
+
+#[test]
+fn a_sequence_does_not_do() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    for (name, text) in [("domain.pddl", DOMAIN), ("problem.pddl", PROBLEM)] {
+        std::fs::write(directory.path().join(name), text).expect("a file");
+    }
+    let files = ["domain.pddl", "problem.pddl"];
+    assert_eq!(metaplan_in(directory.path(), &[&["plan"][..], &files].concat(), "").status, 10);
+    let arguments = ["--concurrent", "--format", "json"];
+    let answer = metaplan_in(directory.path(), &[&["plan"][..], &files, &arguments].concat(), "");
+    let arguments = ["-", "--concurrent"];
+    let valid =
+        metaplan_in(directory.path(), &[&["validate"][..], &files, &arguments].concat(), &answer.stdout);
+    assert_eq!((valid.status, valid.stdout.as_str()), (0, "valid, total time 5\n"));
+}
+
+#[test]
+fn what_does_not_go_with_it_is_refused() {
+    let refused = |arguments: &[&str], status: i32, expected: &str| {
+        let outcome = plan(DOMAIN, PROBLEM, arguments);
+        assert_eq!(outcome.status, status, "{arguments:?}: {}", outcome.stderr);
+        assert!(outcome.stderr.contains(expected), "{arguments:?}: {}", outcome.stderr);
+    };
+    refused(&["--certificate", "proof"], 2, "cannot be used with '--certificate <DIR>'");
+    refused(&["--pareto", "total-time,total-cost"], 2, "cannot be used with '--pareto");
+    refused(&["--epsilon", "0"], 2, "`0` is not a time above 0 such as 0.001");
+    refused(&["--epsilon", "3"], 3, "`mend` that takes less time than the separation");
+    refused(&["--minimize", "total-time", "--minimize", "total-time"], 2, "takes one objective");
+    let open = DOMAIN.replace("(= ?duration 2)", "(>= ?duration 2)");
+    let outcome = plan(&open, PROBLEM, &[]);
+    assert_eq!(outcome.status, 3);
+    assert!(outcome.stderr.contains("a duration of `mend` that is not fixed"), "{}", outcome.stderr);
+    let conditional = DOMAIN.replace("(at end (mended ?f))", "(at end (when (light) (mended ?f)))");
+    let outcome = plan(&conditional, PROBLEM, &[]);
+    assert_eq!(outcome.status, 3);
+    assert!(
+        outcome.stderr.contains("an effect of `mend` under a condition that changes"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn missions_take_their_sequences_with_gaps() {
+    for (mission, cost) in [("ugv", 408.3), ("ugv_plain", 408.3), ("uuv", 28.001), ("uuv_plain", 28.001)] {
+        let file = format!("{}/missions/{mission}.toml", env!("CARGO_MANIFEST_DIR"));
+        let answer = metaplan(&["plan", &file, "--concurrent", "--format", "json"]).json();
+        assert_eq!((&answer["status"], &answer["cost"]), (&json!("optimal"), &json!(cost)), "{mission}");
+    }
+}
