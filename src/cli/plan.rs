@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use encodings::pddl::ast::{Name, Problem};
-use encodings::validate::{Options, PlanStep, PlanText, validate};
+use encodings::validate::{PlanStep, PlanText, validate};
 use encodings::{
     Alternatives, Backend, BackendError, Config, Exact, Front, Improvement, Limits, Plan, Point, Semantics,
     Solution, Status, Step, Task,
