@@ -262,7 +262,10 @@ impl<'c> Comparison<'c> {
                 Err(other) => reason = other,
             }
         }
-        let knows_atom = |(key, _): (&Key, &bool)| self.fact(key).is_some();
+        let knows_atom = |(key, holds): (&Key, &bool)| {
+            let before = if *holds { &meaning.positive } else { &meaning.negative };
+            !before.contains(key) && self.fact(key).is_some()
+        };
         let knows_number = |key: &Key| self.numbers.contains_key(&self.world.show(key));
         if !meaning.truths.iter().any(knows_atom)
             && !meaning.changes.keys().any(knows_number)
@@ -273,12 +276,8 @@ impl<'c> Comparison<'c> {
         let call = (u32::MAX, arguments.to_vec());
         let objects = self.world.show(&call).trim_start_matches("(?").to_owned();
         let text = format!("({}{objects}: {reason}", action.identifier.name);
-        // Grounding knows more about what numbers can become.
-        if reason.starts_with("no operator") && !meaning.comparisons.is_empty() {
-            unknown(text)
-        } else {
-            wrong(text)
-        }
+        // Grounding knows more about what can become of numbers, and of atoms.
+        if reason.starts_with("no operator") { unknown(text) } else { wrong(text) }
     }
 
     /// What an instance adds to the metric.
