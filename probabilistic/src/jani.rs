@@ -17,8 +17,13 @@ use crate::prism::ast::{
 /// A model as JANI. Constants without value become parameters of the JANI model.
 ///
 /// # Errors
-/// What JANI cannot say: rewards of commands without action.
+/// What JANI cannot say: rewards of commands without action; formulas that contain themselves.
 pub fn write(name: &str, model: &Model) -> Result<Value, Vec<Diagnostic>> {
+    let endless: Vec<Diagnostic> =
+        model.formulas.iter().filter_map(|formula| endless(model, formula)).collect();
+    if !endless.is_empty() {
+        return Err(endless);
+    }
     let writer = Writer { formulas: &model.formulas };
     let mut problems = Vec::new();
     let actions = actions(model);
@@ -119,6 +124,27 @@ fn system(model: &Model, actions: &BTreeMap<&str, Vec<usize>>) -> Value {
         "elements": model.modules.iter().map(|module| json!({ "automaton": module.name })).collect::<Vec<_>>(),
         "syncs": syncs.collect::<Vec<_>>(),
     })
+}
+
+/// Formulas are written out, which one that contains itself cannot be.
+fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
+    let mut used = Vec::new();
+    formula.expression.names(&mut used);
+    let mut at = 0;
+    while at < used.len() {
+        let name = used[at].0;
+        if name == formula.name {
+            let text = format!("`{name}` stands for something with itself in it");
+            return Some(Diagnostic::new("Q204", formula.place, text));
+        }
+        if !used[..at].iter().any(|(known, _)| *known == name)
+            && let Some(inner) = model.formulas.iter().find(|known| known.name == name)
+        {
+            inner.expression.names(&mut used);
+        }
+        at += 1;
+    }
+    None
 }
 
 struct Writer<'a> {
