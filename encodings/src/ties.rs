@@ -5,11 +5,14 @@
 //! declares first, with the arguments, and then the designs, that the problem declares first. Names play no part. Designs for
 //! which there is a strictly better one (cheaper, or using up less) are not chosen.
 //!
-//! The search for it is held within cost and steps of the plan that is known, by the bounds of both. Where that is not
-//! enough to keep it small, the choice stays what it is then: deterministic, but not in this order.
+//! The search for it is held within cost and steps of the plan that is known, by the bounds of both: one search for the fewest
+//! reconfigurations, then one in depth, in model order, whose first plan is the one. Where that is not enough to keep it small,
+//! the choice stays what it is then: deterministic, but not in this order.
 
+use std::cell::Cell;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::OnceLock;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -19,7 +22,7 @@ use crate::limits::Limits;
 use crate::plan::{GroundPlan, GroundStep, resolve};
 use crate::search::is_monotone;
 use crate::successors::{OperatorIndex, undominated};
-use crate::task::{Operator, OperatorId, State, Task};
+use crate::task::{OperatorId, State, Task};
 
 /// How many labels are made at most.
 const LABEL_LIMIT: usize = 100_000;
@@ -33,18 +36,40 @@ struct Label {
     cost: i64,
     steps: usize,
     changes: Changes,
-    parent: Option<(usize, GroundStep)>,
+}
+
+impl Label {
+    fn place(&self, task: &Task) -> Place {
+        (self.state.values[..task.basic].into(), self.designs.clone())
+    }
 }
 
 /// What is kept small, the more important first: steps that are not of the plan to stay close to, and functions that have changed
 /// their design, each summed over the steps.
 pub(crate) type Changes = (usize, usize);
 
-/// Combinations of designs with their costs.
-type Choices = Vec<(Vec<u16>, i64)>;
+/// A combination of designs of an operator.
+struct Choice {
+    designs: Vec<u16>,
+    cost: i64,
+    /// Functions, by position, and their designs.
+    configuration: Vec<(usize, ObjectId)>,
+    /// Whether it is a step of the plan to stay close to, or there is no such plan.
+    is_kept: bool,
+}
 
-/// Labels by where they have come to.
-type Seen = FxHashMap<(Box<[u32]>, Vec<Option<ObjectId>>), Vec<usize>>;
+/// An operator's combinations of designs in order; none if there are too many.
+type Choices = Option<Vec<Choice>>;
+
+/// Where a label has come to: its values and designs.
+type Place = (Box<[u32]>, Vec<Option<ObjectId>>);
+
+/// Labels, and their positions by where they have come to.
+#[derive(Default)]
+struct Labels {
+    all: Vec<Label>,
+    fronts: FxHashMap<Place, Vec<usize>>,
+}
 
 /// What is before the plan.
 pub(crate) struct Beginning<'a> {
@@ -55,26 +80,74 @@ pub(crate) struct Beginning<'a> {
     pub(crate) close_to: &'a FxHashSet<GroundStep>,
 }
 
+/// What choosing needs to know of a task, whatever state plans begin in.
+pub(crate) struct Prepared {
+    /// By projection and abstract state.
+    steps_to_go: Vec<Vec<Option<i64>>>,
+    index: OperatorIndex,
+    monotone: bool,
+    functions: Vec<ObjectId>,
+    choices: Vec<OnceLock<Choices>>,
+}
+
+impl Prepared {
+    pub(crate) fn new(task: &Task, bounds: &Bounds) -> Self {
+        let configurations = task.operators.iter().flat_map(|operator| &operator.configuration);
+        let mut functions: Vec<ObjectId> = configurations.map(|(function, _)| *function).collect();
+        functions.sort_unstable();
+        functions.dedup();
+        Self {
+            steps_to_go: bounds.projections.iter().map(Projection::steps_to_go).collect(),
+            index: OperatorIndex::new(task),
+            monotone: is_monotone(task),
+            functions,
+            choices: task.operators.iter().map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    /// The combinations that no other one is strictly better than, and those of the steps to stay close to.
+    fn choices_of(&self, task: &Task, id: OperatorId, close_to: &FxHashSet<GroundStep>) -> Choices {
+        let operator = &task.operators[id.index()];
+        let mut choices = undominated(operator, self.monotone, true)?;
+        for step in close_to.iter().filter(|step| step.operator == id) {
+            if choices.iter().all(|(choice, _)| *choice != step.choice) {
+                choices.push((step.choice.clone(), operator.cost_of(&step.choice)));
+            }
+        }
+        choices.sort();
+        let choices = choices.into_iter().map(|(choice, cost)| {
+            let configuration = operator.configuration.iter().filter_map(|(function, argument)| {
+                let design = resolve(task, operator, &choice, *argument);
+                Some((self.functions.binary_search(function).ok()?, design))
+            });
+            let configuration = configuration.collect();
+            let step = GroundStep { operator: id, choice };
+            let is_kept = close_to.is_empty() || close_to.contains(&step);
+            Choice { designs: step.choice, cost, configuration, is_kept }
+        });
+        Some(choices.collect())
+    }
+}
+
 struct Ties<'a> {
     task: &'a Task,
     bounds: &'a Bounds,
+    prepared: &'a Prepared,
     limits: &'a Limits,
-    steps_to_go: Vec<Vec<Option<i64>>>,
-    index: OperatorIndex,
-    choices: Vec<Option<Choices>>,
-    monotone: bool,
-    functions: Vec<ObjectId>,
+    /// Where they depend on the plan to stay close to.
+    choices: Option<Vec<OnceLock<Choices>>>,
     close_to: &'a FxHashSet<GroundStep>,
     cost: i64,
     steps: usize,
-    made: usize,
+    made: Cell<usize>,
 }
 
 /// The chosen one among the plans that cost as much as a cheapest plan with fewest steps.
 pub(crate) fn choose(task: &Task, bounds: &Bounds, limits: &Limits, plan: GroundPlan) -> GroundPlan {
     let close_to = FxHashSet::default();
     let beginning = Beginning { state: &task.initial, designs: &[], close_to: &close_to };
-    choose_from(task, bounds, limits, plan, (usize::MAX, usize::MAX), &beginning).0
+    let prepared = Prepared::new(task, bounds);
+    choose_from(task, bounds, &prepared, limits, plan, (usize::MAX, usize::MAX), &beginning).0
 }
 
 /// The same for plans that begin in another state, or after steps that are settled; with its changes, if they are at most so
@@ -82,182 +155,176 @@ pub(crate) fn choose(task: &Task, bounds: &Bounds, limits: &Limits, plan: Ground
 pub(crate) fn choose_from(
     task: &Task,
     bounds: &Bounds,
+    prepared: &Prepared,
     limits: &Limits,
     plan: GroundPlan,
     most: Changes,
     beginning: &Beginning<'_>,
 ) -> (GroundPlan, Option<Changes>) {
-    let mut functions: Vec<ObjectId> =
-        task.operators.iter().flat_map(|o| o.configuration.iter().map(|(function, _)| *function)).collect();
-    functions.sort_unstable();
-    functions.dedup();
-    let mut designs = vec![None; functions.len()];
+    let mut designs = vec![None; prepared.functions.len()];
     for (function, design) in beginning.designs {
-        if let Ok(position) = functions.binary_search(function) {
+        if let Ok(position) = prepared.functions.binary_search(function) {
             designs[position] = Some(*design);
         }
     }
-    let mut ties = Ties {
+    let own = || task.operators.iter().map(|_| OnceLock::new()).collect();
+    let ties = Ties {
         task,
         bounds,
+        prepared,
         limits,
-        steps_to_go: bounds.projections.iter().map(Projection::steps_to_go).collect(),
-        index: OperatorIndex::new(task),
-        choices: vec![None; task.operators.len()],
-        monotone: is_monotone(task),
+        choices: (!beginning.close_to.is_empty()).then(own),
+        close_to: beginning.close_to,
         cost: plan.cost,
         steps: plan.steps.len(),
-        made: 0,
-        functions,
-        close_to: beginning.close_to,
+        made: Cell::new(0),
     };
-    let state = beginning.state.clone();
-    let start = Label { state, designs, cost: 0, steps: 0, changes: (0, 0), parent: None };
-    match ties.first(start, most, &plan.steps) {
+    let start = Label { state: beginning.state.clone(), designs, cost: 0, steps: 0, changes: (0, 0) };
+    match ties.first(start, most) {
         Some((steps, changes)) => (GroundPlan { steps, cost: plan.cost }, Some(changes)),
         None => (plan, None),
     }
 }
 
+/// What is left to try after a label.
+struct Branch<'a> {
+    label: usize,
+    operators: std::vec::IntoIter<OperatorId>,
+    /// An operator, and those of its choices that are left.
+    current: Option<(OperatorId, std::slice::Iter<'a, Choice>)>,
+}
+
 impl Ties<'_> {
     /// The first plan in order, and its changes; none if those are more, or if there are too many plans to tell.
-    fn first(
-        &mut self,
-        start: Label,
-        most: Changes,
-        known: &[GroundStep],
-    ) -> Option<(Vec<GroundStep>, Changes)> {
-        let (mut suffix, changes) = self.fewest_changes(&start, most)?;
-        if suffix.len() != known.len() {
-            return None;
-        }
-        let mut at = start;
-        let mut chosen = Vec::new();
-        while !suffix.is_empty() {
-            let current = suffix[0].clone();
-            let mut replaced = None;
-            'candidates: for operator in self.index.applicable(self.task, &at.state) {
-                for (choice, cost) in self.choices(operator)? {
-                    if (operator, &choice) >= (current.operator, &current.choice) {
-                        break 'candidates;
-                    }
-                    let step = GroundStep { operator, choice };
-                    let Some(next) = self.successor(&at, &step, cost, None) else { continue };
-                    if let Some((rest, _)) = self.fewest_changes(&next, changes) {
-                        replaced = Some(std::iter::once(step).chain(rest).collect());
-                        break 'candidates;
-                    }
-                    if self.made >= LABEL_LIMIT || self.limits.reached() {
-                        return None;
-                    }
-                }
-            }
-            suffix = replaced.unwrap_or(suffix);
-            let step = suffix.remove(0);
-            let cost = self.task.operators[step.operator.index()].cost_of(&step.choice);
-            at = self.successor(&at, &step, cost, None)?;
-            chosen.push(step);
-        }
-        Some((chosen, changes))
+    fn first(&self, start: Label, most: Changes) -> Option<(Vec<GroundStep>, Changes)> {
+        let (changes, known) = self.fewest_changes(start.clone(), most)?;
+        let steps = self.first_in_order(start, changes, &known)?;
+        (steps.len() == self.steps).then_some((steps, changes))
     }
 
     /// None if there are too many.
-    fn choices(&mut self, operator: OperatorId) -> Option<Choices> {
-        let known = &mut self.choices[operator.index()];
-        if known.is_none() {
-            let schema = &self.task.operators[operator.index()];
-            let mut choices = undominated(schema, self.monotone, true)?;
-            for step in self.close_to.iter().filter(|step| step.operator == operator) {
-                if choices.iter().all(|(choice, _)| *choice != step.choice) {
-                    choices.push((step.choice.clone(), schema.cost_of(&step.choice)));
-                }
-            }
-            choices.sort();
-            *known = Some(choices);
-        }
-        known.clone()
+    fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
+        let choices = self.choices.as_ref().unwrap_or(&self.prepared.choices);
+        let own = || self.prepared.choices_of(self.task, operator, self.close_to);
+        choices[operator.index()].get_or_init(own).as_deref()
     }
 
     /// The label after a step; none if it leads beyond the limits.
-    fn successor(&self, label: &Label, step: &GroundStep, cost: i64, parent: Option<usize>) -> Option<Label> {
-        let operator = &self.task.operators[step.operator.index()];
-        if label.cost + cost > self.cost
-            || label.steps >= self.steps
-            || !operator.condition.holds_numerically(&label.state.numbers, &step.choice, &operator.sizes())
+    fn successor(&self, label: &Label, operator: OperatorId, choice: &Choice) -> Option<Label> {
+        let operator = &self.task.operators[operator.index()];
+        let (cost, steps) = (label.cost + choice.cost, label.steps + 1);
+        let sizes = operator.sizes();
+        if cost > self.cost
+            || steps > self.steps
+            || !operator.condition.holds_numerically(&label.state.numbers, &choice.designs, &sizes)
         {
             return None;
         }
-        let state = self.task.successor(operator, &label.state, &step.choice);
-        let mut next = Label {
-            designs: label.designs.clone(),
-            cost: label.cost + cost,
-            steps: label.steps + 1,
-            changes: label.changes,
-            parent: parent.map(|parent| (parent, step.clone())),
-            state,
-        };
-        let is_other = !self.close_to.is_empty() && !self.close_to.contains(step);
-        next.changes.0 += usize::from(is_other);
-        for (function, design) in self.configuration(operator, &step.choice) {
-            next.changes.1 += usize::from(next.designs[function].is_some_and(|known| known != design));
-            next.designs[function] = Some(design);
-        }
-        let within = next.cost + self.bounds.estimate(&next.state)? <= self.cost;
-        let steps = |(projection, to_go): (&Projection, &Vec<Option<i64>>)| {
-            to_go[projection.state(&next.state) as usize]
-                .is_some_and(|more| next.steps as i64 + more <= self.steps as i64)
-        };
-        (within && self.bounds.projections.iter().zip(&self.steps_to_go).all(steps)).then_some(next)
-    }
-
-    fn configuration<'o>(
-        &'o self,
-        operator: &'o Operator,
-        choice: &'o [u16],
-    ) -> impl Iterator<Item = (usize, ObjectId)> + 'o {
-        operator.configuration.iter().filter_map(move |(function, argument)| {
-            let design = resolve(self.task, operator, choice, *argument);
-            Some((self.functions.binary_search(function).ok()?, design))
-        })
-    }
-
-    /// A way from a label to the goal with fewest changes in all, at most so many.
-    fn fewest_changes(&mut self, from: &Label, most: Changes) -> Option<(Vec<GroundStep>, Changes)> {
-        // The last step may be one change too many.
-        if from.changes > most {
+        let state = self.task.successor(operator, &label.state, &choice.designs);
+        if cost + self.bounds.estimate(&state)? > self.cost {
             return None;
         }
-        let mut labels = vec![Label { parent: None, ..from.clone() }];
+        let most = (self.steps - steps) as i64;
+        let in_time = |(projection, to_go): (&Projection, &Vec<Option<i64>>)| {
+            to_go[projection.state(&state) as usize].is_some_and(|more| more <= most)
+        };
+        if !self.bounds.projections.iter().zip(&self.prepared.steps_to_go).all(in_time) {
+            return None;
+        }
+        let mut next = Label { state, designs: label.designs.clone(), cost, steps, changes: label.changes };
+        next.changes.0 += usize::from(!choice.is_kept);
+        for (function, design) in &choice.configuration {
+            let last = next.designs[*function].replace(*design);
+            next.changes.1 += usize::from(last.is_some_and(|last| last != *design));
+        }
+        Some(next)
+    }
+
+    /// The fewest changes of a plan from a label on, if there is one with at most so many, and the labels that were made.
+    fn fewest_changes(&self, from: Label, most: Changes) -> Option<(Changes, Labels)> {
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
-        let mut seen = Seen::default();
+        let mut labels = Labels { all: vec![from], ..Labels::default() };
         while let Some(Reverse((changes, _, id))) = open.pop() {
-            if self.task.is_goal(&labels[id].state) {
-                return Some((path(&labels, id), changes));
+            if self.task.is_goal(&labels.all[id].state) {
+                return Some((changes, labels));
             }
-            let state = labels[id].state.clone();
-            for operator in self.index.applicable(self.task, &state) {
-                for (choice, cost) in self.choices(operator)? {
-                    let step = GroundStep { operator, choice };
-                    let Some(next) = self.successor(&labels[id], &step, cost, Some(id)) else { continue };
-                    if next.changes > most {
-                        continue;
+            for operator in self.prepared.index.applicable(self.task, &labels.all[id].state) {
+                for choice in self.choices(operator)? {
+                    let Some(next) = self.successor(&labels.all[id], operator, choice) else { continue };
+                    if next.changes <= most && !self.is_beaten(&labels, &next, false) {
+                        open.push(Reverse((next.changes, Reverse(next.steps), labels.all.len())));
+                        self.keep(&mut labels, next)?;
                     }
-                    let key = (next.state.values[..self.task.basic].into(), next.designs.clone());
-                    let front = seen.entry(key).or_default();
-                    if front.iter().any(|known| self.no_worse(&labels[*known], &next)) {
-                        continue;
-                    }
-                    self.made += 1;
-                    if self.made >= LABEL_LIMIT || (self.made.is_multiple_of(256) && self.limits.reached()) {
-                        return None;
-                    }
-                    front.push(labels.len());
-                    open.push(Reverse((next.changes, Reverse(next.steps), labels.len())));
-                    labels.push(next);
                 }
             }
         }
         None
+    }
+
+    /// The first plan in the order of the model with so many changes, the fewest that there can be, by a search in depth. A label is
+    /// not followed where one was that is no worse: if that one led to no plan, neither does this one; and if this one comes
+    /// after that one, a plan from here would be one with fewer steps from there. Nor is one that is worse than a known one in cost,
+    /// steps or changes, which are the least already.
+    fn first_in_order(&self, start: Label, changes: Changes, known: &Labels) -> Option<Vec<GroundStep>> {
+        if self.task.is_goal(&start.state) {
+            return Some(Vec::new());
+        }
+        let branch = |label: usize, state: &State| {
+            let operators = self.prepared.index.applicable(self.task, state).into_iter();
+            Branch { label, operators, current: None }
+        };
+        let mut branches = vec![branch(0, &start.state)];
+        let mut steps: Vec<GroundStep> = Vec::new();
+        let mut labels = Labels { all: vec![start], ..Labels::default() };
+        while let Some(last) = branches.last_mut() {
+            let Some((operator, choices)) = &mut last.current else {
+                if let Some(operator) = last.operators.next() {
+                    last.current = Some((operator, self.choices(operator)?.iter()));
+                } else {
+                    branches.pop();
+                    steps.pop();
+                }
+                continue;
+            };
+            let operator = *operator;
+            let Some(choice) = choices.next() else {
+                last.current = None;
+                continue;
+            };
+            let Some(next) = self.successor(&labels.all[last.label], operator, choice) else { continue };
+            if next.changes <= changes
+                && !self.is_beaten(known, &next, true)
+                && !self.is_beaten(&labels, &next, false)
+            {
+                steps.push(GroundStep { operator, choice: choice.designs.clone() });
+                if self.task.is_goal(&next.state) {
+                    return Some(steps);
+                }
+                branches.push(branch(labels.all.len(), &next.state));
+                self.keep(&mut labels, next)?;
+            }
+        }
+        None
+    }
+
+    /// Whether some label is no worse than another one; if `strictly`, one with less cost, steps or changes.
+    fn is_beaten(&self, labels: &Labels, next: &Label, strictly: bool) -> bool {
+        let is_better =
+            |known: &Label| (known.cost, known.steps, known.changes) != (next.cost, next.steps, next.changes);
+        labels.fronts.get(&next.place(self.task)).is_some_and(|front| {
+            let mut known = front.iter().map(|position| &labels.all[*position]);
+            known.any(|known| self.no_worse(known, next) && (!strictly || is_better(known)))
+        })
+    }
+
+    /// Keeps a label; none if there are too many, or a limit is reached.
+    fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
+        labels.fronts.entry(label.place(self.task)).or_default().push(labels.all.len());
+        labels.all.push(label);
+        let made = self.made.get() + 1;
+        self.made.set(made);
+        let stop = made >= LABEL_LIMIT || (made.is_multiple_of(256) && self.limits.reached());
+        (!stop).then_some(())
     }
 
     fn no_worse(&self, a: &Label, b: &Label) -> bool {
@@ -265,21 +332,10 @@ impl Ties<'_> {
         a.cost <= b.cost
             && a.steps <= b.steps
             && a.changes <= b.changes
-            && if self.monotone {
+            && if self.prepared.monotone {
                 numbers.into_iter().all(|(a, b)| a >= b)
             } else {
                 a.state.numbers == b.state.numbers
             }
     }
-}
-
-fn path(labels: &[Label], goal: usize) -> Vec<GroundStep> {
-    let mut steps = Vec::new();
-    let mut at = goal;
-    while let Some((parent, step)) = &labels[at].parent {
-        steps.push(step.clone());
-        at = *parent;
-    }
-    steps.reverse();
-    steps
 }

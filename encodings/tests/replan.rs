@@ -5,6 +5,9 @@
 mod missions;
 mod random;
 
+use std::path::Path;
+use std::process::Command;
+
 use metaplan_encodings::pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
 use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::validate::metric_after;
@@ -307,4 +310,67 @@ fn a_reconfiguration_at_the_last_step_counts() {
     let steps = solution.plan.as_ref().map(|plan| named(&plan.steps)).expect("a plan");
     assert!(steps.iter().all(|(_, arguments)| arguments[1] == "right"), "{steps:?}");
     compare(&solution, &live(&mut new(&domain, &problem), &domain, &problem), &String::new);
+}
+
+const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
+
+/// A generated map with a battery.
+fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Domain, Problem)> {
+    let directory = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let arguments = ["--family", "ugv", "--seed", "1", "--metric", "weighted", "--enc", "n", "--name", "map"];
+    let sizes = [("--n", waypoints), ("--m", designs), ("--k", functions)];
+    let sizes = sizes.into_iter().flat_map(|(name, size)| [name.to_owned(), size.to_string()]);
+    let mut command = Command::new("python3");
+    command.arg(TOOL).args(arguments).args(sizes).arg("--out").arg(directory);
+    let read =
+        |part: &str| std::fs::read_to_string(directory.join(format!("map.n.{part}.pddl"))).expect("a file");
+    command.output().ok()?.status.success().then(|| parse(&read("domain"), &read("problem")))
+}
+
+/// What the thread has used of the processor so far, in milliseconds.
+fn used() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux tells");
+    text.split(' ').next().and_then(|first| first.parse::<f64>().ok()).expect("nanoseconds") / 1e6
+}
+
+#[test]
+#[ignore = "a measurement, for release builds"]
+fn live_planning_beside_planning_anew() {
+    if !Path::new(TOOL).exists() {
+        println!("skipped: {TOOL} is absent");
+        return;
+    }
+    println!("places designs functions   answers   anew ms  live ms  ratio  slowest anew  slowest live");
+    for (waypoints, designs, functions) in [(20, 3, 2), (50, 6, 2), (100, 6, 2), (200, 6, 2), (100, 12, 3)] {
+        let (domain, mut problem) = generated(waypoints, designs, functions).expect("a map");
+        let possible = Changes::of(&problem, "robot_at", "waypoint", "function_design");
+        let mut random = Random(7);
+        let mut replanner = new(&domain, &problem);
+        let (mut anew, mut kept) = (Vec::new(), Vec::new());
+        for number in 0..40 {
+            let before = used();
+            let expected = from_scratch(&domain, &problem);
+            anew.push(used() - before);
+            let before = used();
+            let mut found = live(&mut replanner, &domain, &problem);
+            if found == Replanned::Misfit {
+                replanner = new(&domain, &problem);
+                found = live(&mut replanner, &domain, &problem);
+            }
+            kept.push(used() - before);
+            compare(&expected, &found, &|| format!("{waypoints} places, change {number}"));
+            possible.happen(&mut problem, &mut random);
+        }
+        let sum = |times: &[f64]| times.iter().sum::<f64>();
+        let most = |times: &[f64]| times.iter().copied().fold(0.0, f64::max);
+        println!(
+            "{waypoints:6} {designs:7} {functions:9} {:9} {:9.1} {:8.1} {:6.2} {:13.1} {:13.1}",
+            anew.len(),
+            sum(&anew) / anew.len() as f64,
+            sum(&kept) / kept.len() as f64,
+            sum(&anew) / sum(&kept),
+            most(&anew),
+            most(&kept),
+        );
+    }
 }

@@ -31,6 +31,7 @@ use crate::pddl::types::TypeHierarchy;
 use crate::plan::Step;
 use crate::search::{Prepared, STATE_LIMIT};
 use crate::task::Task;
+use crate::ties;
 use crate::validate::Advance;
 use layout::{Layout, Situation};
 use usage::Usage;
@@ -66,6 +67,7 @@ struct Set {
     task: Task,
     bounds: Bounds,
     prepared: Option<Prepared>,
+    ties: ties::Prepared,
 }
 
 /// A step that a plan may begin with, whatever the operators of the task are: what is left of an action under way, with one
@@ -218,7 +220,8 @@ impl Base {
         let task = mask::restrict(&self.task, &is_allowed);
         let bounds = Bounds::new(&task, limits);
         let prepared = Prepared::new(&task);
-        Set { task, bounds, prepared }
+        let ties = ties::Prepared::new(&task, &bounds);
+        Set { task, bounds, prepared, ties }
     }
 
     /// For each predicate the objects that some operator needs to be available, sorted.

@@ -112,7 +112,7 @@ fn choose(
         let Some(limit) = most else { break };
         let beginning = ties::Beginning { state: &start.state, designs: &start.designs, close_to: &close_to };
         let (plan, changes) =
-            ties::choose_from(&set.task, &set.bounds, query.limits, plan, limit, &beginning);
+            ties::choose_from(&set.task, &set.bounds, &set.ties, query.limits, plan, limit, &beginning);
         most = match changes {
             Some(changes) => fewer(changes),
             None => most,
