@@ -105,3 +105,30 @@ fn proofs_name_what_they_rest_on() {
     let within = Config { horizon: Some(1), ..Config::default() };
     assert_eq!(optimize(&task, &within, &mut |_| {}).status, Status::UnsolvableWithinHorizon);
 }
+
+/// Changes of one number at one time that contradict each other leave an action inapplicable, as the validator has it.
+#[test]
+fn contradictory_changes_leave_an_action_inapplicable() {
+    let solve = |effect: &str| {
+        let domain = format!(
+            "(define (domain d) (:predicates (done) (lit)) (:functions (x))
+              (:action work :parameters () :effect (and (done) {effect}))
+              (:action light :parameters () :effect (lit)))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (= (x) 2)) (:goal (done)))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+        let task = ground(&domain, &problem, &GroundConfig::default()).map_err(|errors| errors.len())?;
+        Ok(optimize(&task, &Config::default(), &mut |_| {}).plan.map(|plan| plan.steps.len()))
+    };
+    assert_eq!(solve("(assign (x) 5) (increase (x) 1)"), Ok(None));
+    assert_eq!(solve("(increase (x) 1) (assign (x) 3)"), Ok(None));
+    assert_eq!(solve("(scale-up (x) 2) (decrease (x) 1)"), Ok(None));
+    assert_eq!(solve("(assign (x) 5) (assign (x) 6)"), Ok(None));
+    assert_eq!(solve("(assign (x) 5) (assign (x) 5)"), Ok(Some(1)));
+    assert_eq!(solve("(increase (x) 5) (decrease (x) 6)"), Ok(Some(1)));
+    assert_eq!(solve("(scale-up (x) 5) (scale-down (x) 6)"), Ok(Some(1)));
+    // Where it depends on the state, what is lit matters.
+    assert_eq!(solve("(assign (x) 5) (when (not (lit)) (increase (x) 1))"), Ok(Some(2)));
+    assert_eq!(solve("(assign (x) 5) (assign (x) (+ (x) 3))"), Err(1));
+}

@@ -357,6 +357,39 @@ fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, V
     (adds, deletes)
 }
 
+/// Whether changes of one number at one time go together: additions, scalings, and assignments of the same value do.
+/// `Failure::Undefined` if they do not, which leaves the action inapplicable (PDDL 2.1, section 8).
+fn reconcile(earlier: &GroundChange, later: &GroundChange) -> Result<(), Failure> {
+    let (
+        GroundChange::Number { assignment: kind, operand: known, .. },
+        GroundChange::Number { assignment, operand, place, .. },
+    ) = (earlier, later)
+    else {
+        return Ok(());
+    };
+    let way = |assignment: &Assignment| match assignment {
+        Assignment::Assign => 0,
+        Assignment::Increase | Assignment::Decrease => 1,
+        Assignment::ScaleUp | Assignment::ScaleDown => 2,
+    };
+    match (known, operand) {
+        _ if way(kind) != way(assignment) => Err(Failure::Undefined),
+        (Some(known), Some(value)) if way(kind) == 0 && known != value => {
+            let is_constant =
+                |value: &Linear<Rational>| value.coefficients.is_empty() && value.quantity.tables.is_empty();
+            if is_constant(known) && is_constant(value) {
+                return Err(Failure::Undefined);
+            }
+            Err(Failure::Error(Error::Unsupported {
+                construct: "two different values assigned to one number at one time".into(),
+                instead: "one `assign` of each number".into(),
+                place: *place,
+            }))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// What numeric variables become, in terms of the state before the action; `before` are the changes that
 /// the action has made already.
 fn numbers<'c>(
@@ -364,8 +397,16 @@ fn numbers<'c>(
     before: &Numbers,
 ) -> Result<Numbers, Failure> {
     let mut changed = Numbers::default();
+    let mut last: Vec<(NumericId, &GroundChange)> = Vec::new();
     for change in changes {
         let GroundChange::Number { variable, assignment, operand, place } = change else { continue };
+        match last.iter_mut().find(|(known, _)| known == variable) {
+            Some((_, earlier)) => {
+                reconcile(earlier, change)?;
+                *earlier = change;
+            }
+            None => last.push((*variable, change)),
+        }
         let mut operand = operand.clone().ok_or(Failure::Undefined)?;
         substitute(&mut operand, before);
         let current = || {
