@@ -209,7 +209,12 @@ fn configuration(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<(Strin
 /// The states that a plan passes through, the initial one first; none if a step is not applicable or the last
 /// state is not a goal state.
 pub(crate) fn replay(task: &Task, plan: &[GroundStep]) -> Option<(Vec<State>, i64)> {
-    let mut states = vec![task.initial.clone()];
+    replay_from(task, &task.initial, plan)
+}
+
+/// The same from a state of its own.
+pub(crate) fn replay_from(task: &Task, initial: &State, plan: &[GroundStep]) -> Option<(Vec<State>, i64)> {
+    let mut states = vec![initial.clone()];
     let mut cost = 0;
     for step in plan {
         let operator = &task.operators[step.operator.index()];

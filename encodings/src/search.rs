@@ -85,30 +85,33 @@ struct Search<'a> {
 /// Searches a task whose operators all cost at least 0.
 pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
     let prepared = Prepared::new(task);
-    let found =
-        prepared.map(|prepared| search_from(task, bounds, &prepared, &task.initial, STATE_LIMIT, limits));
+    let found = prepared
+        .map(|prepared| search_from(task, bounds, &prepared, &task.initial, i64::MAX, STATE_LIMIT, limits));
     found.unwrap_or(Found::Unknown(None))
 }
 
-/// Searches it from a state of its own, storing at most so many states.
+/// Searches it from a state of its own, storing at most so many states, for a plan that costs at most `limit`: what a known one
+/// costs, or `i64::MAX`.
 pub(crate) fn search_from(
     task: &Task,
     bounds: &Bounds,
     prepared: &Prepared,
     initial: &State,
+    limit: i64,
     most: usize,
     limits: &Limits,
 ) -> Found {
     let mut search = Search::new(task, bounds, prepared, initial, false);
+    search.limit = limit;
     if let Some(found) = search.run(limits, SOON.min(most)) {
         return found;
     }
     let mut some = None;
-    if search.best.is_none() {
+    if search.best.is_none() && limit == i64::MAX {
         let mut greedy = Search::new(task, bounds, prepared, initial, true);
         greedy.run(limits, SOON.min(most));
         some = greedy.best_plan();
-        search.limit = some.as_ref().map_or(i64::MAX, |plan| plan.cost);
+        search.limit = some.as_ref().map_or(limit, |plan| plan.cost);
     }
     match search.run(limits, most) {
         Some(Found::Unknown(plan)) => Found::Unknown(cheaper(plan, some)),

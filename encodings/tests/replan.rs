@@ -106,10 +106,26 @@ fn from_scratch(domain: &Domain, problem: &Problem) -> Solution {
 }
 
 fn live(replanner: &mut Replanner, domain: &Domain, problem: &Problem) -> Replanned {
+    live_with(replanner, domain, problem, None)
+}
+
+fn live_with(
+    replanner: &mut Replanner,
+    domain: &Domain,
+    problem: &Problem,
+    old: Option<&Named>,
+) -> Replanned {
     let zero = BigRational::default();
     let metric = metric_after(domain, problem, &zero).expect("a metric");
     let limits = Limits::none();
-    replanner.plan(&Query { problem, first: &[], metric, close_to: None, limits: &limits })
+    replanner.plan(&Query {
+        problem,
+        first: &[],
+        metric,
+        old: old.map(|old| &old[..]),
+        stay_close: false,
+        limits: &limits,
+    })
 }
 
 fn new(domain: &Domain, problem: &Problem) -> Replanner {
@@ -143,6 +159,7 @@ fn check(seed: u64, changes: usize) -> usize {
     let possible = Changes::of(&problem, "at", "waypoint", "design");
     let mut replanner = new(&domain, &problem);
     let mut misfits = 0;
+    let mut old = None;
     for number in 0..changes {
         let mut found = live(&mut replanner, &domain, &problem);
         if found == Replanned::Misfit {
@@ -152,6 +169,12 @@ fn check(seed: u64, changes: usize) -> usize {
         }
         let context = || format!("seed {seed}, change {number}: {mission:?}: {:?}", problem.init);
         compare(&from_scratch(&domain, &problem), &found, &context);
+        // A plan that is known is none the worse.
+        let again = live_with(&mut replanner, &domain, &problem, old.as_ref());
+        assert_eq!(again, found, "{}", context());
+        if let Replanned::Optimal { steps, .. } = &found {
+            old = Some(named(steps));
+        }
         possible.happen(&mut problem, &mut random);
     }
     misfits
@@ -189,7 +212,8 @@ fn check_close(seed: u64) {
     possible.happen(&mut problem, &mut random);
     let metric = metric_after(&domain, &problem, &BigRational::default()).expect("a metric");
     let limits = Limits::none();
-    let query = Query { problem: &problem, first: &[], metric, close_to: Some(&old), limits: &limits };
+    let query =
+        Query { problem: &problem, first: &[], metric, old: Some(&old), stay_close: true, limits: &limits };
     let Replanned::Optimal { steps, metric, .. } = replanner.plan(&query) else { return };
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
     let solution = optimize(&task, &Config::default(), &mut |_| {});
@@ -239,7 +263,8 @@ fn plans_stay_close_to_the_old_one() {
             problem: &problem,
             first: &[],
             metric: BigRational::default(),
-            close_to,
+            old: close_to,
+            stay_close: true,
             limits: &limits,
         };
         let Replanned::Optimal { steps, .. } = replanner.plan(&query) else { panic!("no plan") };
@@ -247,6 +272,47 @@ fn plans_stay_close_to_the_old_one() {
     };
     assert_ne!(plan(&mut replanner, None), old);
     assert_eq!(plan(&mut replanner, Some(&old)), old);
+}
+
+/// Switches that a robot turns on, in an order of its own, with a limit that has been reached before it begins.
+#[test]
+fn the_old_plan_serves_when_time_is_up() {
+    let domain = "(define (domain robot) (:types switch design function)
+      (:predicates (on ?s - switch) (fd_solve_f ?d - design ?f - function) (fd_available ?d - design))
+      (:functions (total-cost))
+      (:action turn :parameters (?f - function ?d - design ?s - switch)
+        :precondition (and (not (on ?s)) (fd_solve_f ?d ?f) (fd_available ?d))
+        :effect (and (on ?s) (increase (total-cost) 1))))";
+    let names: Vec<String> = (0..14).map(|number| format!("s{number}")).collect();
+    let goal: Vec<String> = names.iter().map(|name| format!("(on {name})")).collect();
+    let problem = format!(
+        "(define (problem many) (:domain robot) (:objects {} - switch f - function hand - design)
+           (:init (fd_solve_f hand f) (fd_available hand) (= (total-cost) 0))
+           (:goal (and {})) (:metric minimize (total-cost)))",
+        names.join(" "),
+        goal.join(" ")
+    );
+    let (domain, mut problem) = parse(domain, &problem);
+    let mut replanner = new(&domain, &problem);
+    let turn = |name: &String| ("turn".to_owned(), vec!["f".to_owned(), "hand".to_owned(), name.clone()]);
+    let old: Named = names.iter().rev().map(turn).collect();
+    let limits = Limits::none().with_time(std::time::Duration::ZERO);
+    let ask = |replanner: &mut Replanner, problem: &Problem, old: Option<&Named>| {
+        let (metric, old) = (BigRational::default(), old.map(|old| &old[..]));
+        replanner.plan(&Query { problem, first: &[], metric, old, stay_close: false, limits: &limits })
+    };
+    let found = ask(&mut replanner, &problem, Some(&old));
+    let Replanned::Feasible { first: None, steps, metric } = found else { panic!("{found:?}") };
+    assert_eq!((named(&steps), metric), (old.clone(), BigRational::from_integer(14.into())));
+    // Where it is no plan any more it is none; what the search has come to is one.
+    problem.init.push(InitialElement::Fact(atom("on s3")));
+    match ask(&mut replanner, &problem, Some(&old)) {
+        Replanned::Feasible { steps, .. } => assert_eq!(steps.len(), 13),
+        other => assert_eq!(other, Replanned::Unknown),
+    }
+    assert!(
+        matches!(live(&mut replanner, &domain, &problem), Replanned::Optimal { steps, .. } if steps.len() == 13)
+    );
 }
 
 /// What blocks a mission is minimal: alone it leaves no plan, and without any part of it there is one.
@@ -260,7 +326,8 @@ fn check_blocking(seed: u64) -> bool {
     let mut replanner = new(&domain, &problem);
     let metric = metric_after(&domain, &problem, &BigRational::default()).expect("a metric");
     let limits = Limits::none();
-    let query = Query { problem: &problem, first: &[], metric, close_to: None, limits: &limits };
+    let query =
+        Query { problem: &problem, first: &[], metric, old: None, stay_close: false, limits: &limits };
     if replanner.plan(&query) != Replanned::Unsolvable {
         return false;
     }
@@ -346,18 +413,21 @@ fn live_planning_beside_planning_anew() {
         let possible = Changes::of(&problem, "robot_at", "waypoint", "function_design");
         let mut random = Random(7);
         let mut replanner = new(&domain, &problem);
-        let (mut anew, mut kept) = (Vec::new(), Vec::new());
+        let (mut anew, mut kept, mut old) = (Vec::new(), Vec::new(), None);
         for number in 0..40 {
             let before = used();
             let expected = from_scratch(&domain, &problem);
             anew.push(used() - before);
             let before = used();
-            let mut found = live(&mut replanner, &domain, &problem);
+            let mut found = live_with(&mut replanner, &domain, &problem, old.as_ref());
             if found == Replanned::Misfit {
                 replanner = new(&domain, &problem);
                 found = live(&mut replanner, &domain, &problem);
             }
             kept.push(used() - before);
+            if let Replanned::Optimal { steps, .. } = &found {
+                old = Some(named(steps));
+            }
             compare(&expected, &found, &|| format!("{waypoints} places, change {number}"));
             possible.happen(&mut problem, &mut random);
         }

@@ -177,17 +177,14 @@ impl Loop {
         let problem = self.filled();
         let running = self.knowledge.running.as_ref().filter(|_| goes_on);
         let steps = running.is_some() || self.knowledge.running.is_none();
-        let close_to: Option<Vec<PlannedStep>> = self
-            .knowledge
-            .plan
-            .as_ref()
-            .filter(|_| self.settings.stay_close && steps)
-            .map(|plan| plan.iter().cloned().collect());
+        let old: Option<Vec<PlannedStep>> =
+            self.knowledge.plan.as_ref().filter(|_| steps).map(|plan| plan.iter().cloned().collect());
         let ask = Ask {
             mission: &self.knowledge.mission,
             problem: &problem,
             running,
-            close_to: close_to.as_deref(),
+            old: old.as_deref(),
+            stay_close: self.settings.stay_close,
         };
         self.planner.plan(&ask)
     }

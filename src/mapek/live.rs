@@ -27,7 +27,7 @@ pub(super) enum Live {
 }
 
 impl Live {
-    /// A proved answer; none if it has to be found without a live planner.
+    /// A proved answer, or the best plan that was known when time was up; none if it has to be found without a live planner.
     pub(super) fn plan(&mut self, ask: &Ask<'_>, limits: &Limits) -> Option<Outcome> {
         let metric = ask.metric()?;
         let first = match ask.running {
@@ -38,26 +38,29 @@ impl Live {
             return Some(none(Vec::new()));
         }
         let (steps, first): (Vec<PlannedStep>, Vec<First>) = first.into_iter().unzip();
-        let close_to: Option<Vec<(String, Vec<String>)>> = ask
-            .close_to
+        let old: Option<Vec<(String, Vec<String>)>> = ask
+            .old
             .map(|plan| plan.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect());
         let query = Query {
             problem: ask.problem,
             first: &first,
             metric: metric.clone(),
-            close_to: close_to.as_deref(),
+            old: old.as_deref(),
+            stay_close: ask.stay_close,
             limits,
         };
         let mut answer = self.ask(ask, &query, false)?;
         if answer == Replanned::Misfit {
             answer = self.ask(ask, &query, true)?;
         }
+        let proved = matches!(answer, Replanned::Optimal { .. });
         match answer {
-            Replanned::Optimal { first: begins, steps: rest, metric } => {
+            Replanned::Optimal { first: begins, steps: rest, metric }
+            | Replanned::Feasible { first: begins, steps: rest, metric } => {
                 let begins = begins.and_then(|index| steps.into_iter().nth(index));
                 let rest = rest.iter().map(|step| PlannedStep::new(ask.mission, step));
                 let steps = begins.into_iter().chain(rest).collect();
-                Some(Outcome { steps: Some(steps), cost: metric, proved: true, ..none(Vec::new()) })
+                Some(Outcome { steps: Some(steps), cost: metric, proved, ..none(Vec::new()) })
             }
             Replanned::Unsolvable if ask.running.is_none() => {
                 let Self::Ready(replanner) = self else { return None };

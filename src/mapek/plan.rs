@@ -42,8 +42,10 @@ pub(crate) struct Ask<'a> {
     pub problem: &'a Problem,
     /// The action that comes first, if one is under way.
     pub running: Option<&'a Running>,
-    /// Steps to stay close to among plans that are as good.
-    pub close_to: Option<&'a [PlannedStep]>,
+    /// The plan at hand, if what is planned for goes on from where it is.
+    pub old: Option<&'a [PlannedStep]>,
+    /// Whether to stay close to it among plans that are as good.
+    pub stay_close: bool,
 }
 
 /// Makes plans.

@@ -93,8 +93,10 @@ pub struct Query<'a> {
     pub first: &'a [First],
     /// The metric of the mission if it ended now; without a metric, 0.
     pub metric: BigRational,
-    /// A plan to stay close to among those that are as good: names and arguments of its actions after the first step.
-    pub close_to: Option<&'a [(String, Vec<String>)]>,
+    /// The plan at hand: names and arguments of its actions after the first step. If it is one still, nothing dearer is looked at.
+    pub old: Option<&'a [(String, Vec<String>)]>,
+    /// Whether of plans that are as good one with most of these actions is chosen.
+    pub stay_close: bool,
     /// When to stop.
     pub limits: &'a Limits,
 }
@@ -111,11 +113,20 @@ pub enum Replanned {
         /// The metric of the whole mission.
         metric: BigRational,
     },
+    /// A limit came first; the best plan known so far, which may be the old one.
+    Feasible {
+        /// Which of the first steps it begins with, if there were any.
+        first: Option<usize>,
+        /// The steps after that.
+        steps: Vec<Step>,
+        /// The metric of the whole mission.
+        metric: BigRational,
+    },
     /// There is no plan of any length: proved.
     Unsolvable,
     /// The problem differs in more than state and availability.
     Misfit,
-    /// A limit came first.
+    /// A limit came before any plan.
     Unknown,
 }
 
@@ -175,7 +186,7 @@ impl Replanner {
             match solve::solve(&base, &set, &situation, query, BLOCKING_STATES) {
                 Replanned::Optimal { .. } => Some(true),
                 Replanned::Unsolvable => Some(false),
-                Replanned::Misfit | Replanned::Unknown => None,
+                Replanned::Feasible { .. } | Replanned::Misfit | Replanned::Unknown => None,
             }
         };
         if !is_solvable(&[])? {

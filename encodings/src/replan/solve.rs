@@ -8,7 +8,7 @@ use num_rational::BigRational;
 use rustc_hash::FxHashSet;
 
 use crate::lifted::ObjectId;
-use crate::plan::{GroundPlan, GroundStep, decode, resolve};
+use crate::plan::{GroundPlan, GroundStep, decode, replay_from, resolve};
 use crate::replan::layout::Situation;
 use crate::replan::{Base, Query, Replanned, Set};
 use crate::search::{Found, search_from};
@@ -44,16 +44,31 @@ pub(super) fn solve(
     let promise = |start: Start| Some((&start.own + scale(set.bounds.estimate(&start.state)?), start));
     let mut open: Vec<(BigRational, Start)> = starts.into_iter().filter_map(promise).collect();
     open.sort_by(|left, right| left.0.cmp(&right.0).then_with(|| left.1.arguments.cmp(&right.1.arguments)));
+    let old: Vec<Option<GroundStep>> =
+        query.old.iter().copied().flatten().map(|step| find(&set.task, step)).collect();
+    let incumbent =
+        |start: &Start| Some(Candidate::new(set, start, old_plan(set, &start.state, query, &old)?));
+    let incumbents: Vec<Option<Candidate>> = open.iter().map(|(_, start)| incumbent(start)).collect();
+    let known = incumbents.iter().flatten().min_by(|left, right| left.value.cmp(&right.value)).cloned();
     let mut best: Option<(BigRational, usize)> = None;
     let mut winners: Vec<(Start, GroundPlan)> = Vec::new();
-    for (bound, start) in open {
-        if best.as_ref().is_some_and(|(least, _)| bound > *least) {
+    for ((bound, start), incumbent) in open.into_iter().zip(incumbents) {
+        let least = best.iter().chain(known.iter().map(|known| &known.value)).map(|(value, _)| value).min();
+        if least.is_some_and(|least| bound > *least) {
             break;
         }
-        let found = search_from(&set.task, &set.bounds, prepared, &start.state, most, query.limits);
+        let limit = incumbent.map_or(i64::MAX, |known| known.plan.cost);
+        let found = search_from(&set.task, &set.bounds, prepared, &start.state, limit, most, query.limits);
         let plan = match found {
             Found::Optimal(plan) => plan,
             Found::None => continue,
+            Found::Unknown(plan) if query.limits.reached() => {
+                let cut_short = plan.map(|plan| Candidate::new(set, &start, plan));
+                let ended = winners.into_iter().map(|(start, plan)| Candidate::new(set, &start, plan));
+                let all = known.into_iter().chain(cut_short).chain(ended);
+                let least = all.min_by(|left, right| left.value.cmp(&right.value));
+                return least.map_or(Replanned::Unknown, |least| least.feasible(set));
+            }
             Found::Unknown(_) => return Replanned::Unknown,
         };
         let value = (&start.own + scale(plan.cost), plan.steps.len());
@@ -69,8 +84,38 @@ pub(super) fn solve(
     }
     let Some((value, _)) = best else { return Replanned::Unsolvable };
     let metric = if set.task.objective.maximize { -value } else { value };
-    let (first, plan) = choose(set, query, winners);
+    let close_to = if query.stay_close { old.into_iter().flatten().collect() } else { FxHashSet::default() };
+    let (first, plan) = choose(set, query, &close_to, winners);
     Replanned::Optimal { first, steps: decode(&set.task, &plan).steps, metric }
+}
+
+/// The old plan, if it is one from a state on.
+fn old_plan(set: &Set, state: &State, query: &Query<'_>, old: &[Option<GroundStep>]) -> Option<GroundPlan> {
+    query.old?;
+    let steps: Vec<GroundStep> = old.iter().cloned().collect::<Option<_>>()?;
+    let cost = replay_from(&set.task, state, &steps)?.1;
+    Some(GroundPlan { steps, cost })
+}
+
+/// A plan that need not be the best.
+#[derive(Clone)]
+struct Candidate {
+    first: Option<usize>,
+    /// The metric of the mission, less being better, and its steps.
+    value: (BigRational, usize),
+    plan: GroundPlan,
+}
+
+impl Candidate {
+    fn new(set: &Set, start: &Start, plan: GroundPlan) -> Self {
+        let cost = BigRational::new(plan.cost.into(), set.task.objective.scale.into());
+        Self { first: start.first, value: (&start.own + cost, plan.steps.len()), plan }
+    }
+
+    fn feasible(self, set: &Set) -> Replanned {
+        let metric = if set.task.objective.maximize { -self.value.0 } else { self.value.0 };
+        Replanned::Feasible { first: self.first, steps: decode(&set.task, &self.plan).steps, metric }
+    }
 }
 
 /// Where plans may begin; none if the task is not good for that.
@@ -100,17 +145,16 @@ fn starts(base: &Base, situation: &Situation, query: &Query<'_>) -> Option<Vec<S
 fn choose(
     set: &Set,
     query: &Query<'_>,
+    close_to: &FxHashSet<GroundStep>,
     mut winners: Vec<(Start, GroundPlan)>,
 ) -> (Option<usize>, GroundPlan) {
-    let old = query.close_to.into_iter().flatten();
-    let close_to: FxHashSet<GroundStep> = old.filter_map(|step| find(&set.task, step)).collect();
     winners.sort_by(|left, right| left.0.arguments.cmp(&right.0.arguments));
     let mut chosen = None;
     let mut most = Some((usize::MAX, usize::MAX));
     for (start, plan) in winners {
         // One that comes later in order has to have fewer changes.
         let Some(limit) = most else { break };
-        let beginning = ties::Beginning { state: &start.state, designs: &start.designs, close_to: &close_to };
+        let beginning = ties::Beginning { state: &start.state, designs: &start.designs, close_to };
         let (plan, changes) =
             ties::choose_from(&set.task, &set.bounds, &set.ties, query.limits, plan, limit, &beginning);
         most = match changes {

@@ -140,7 +140,13 @@ impl Tally {
     fn compare(&mut self, control: &mut Loop, goes_on: bool, context: &dyn Fn() -> String) {
         let problem = control.filled();
         let running = control.knowledge.running.as_ref().filter(|_| goes_on);
-        let ask = Ask { mission: &control.knowledge.mission, problem: &problem, running, close_to: None };
+        let ask = Ask {
+            mission: &control.knowledge.mission,
+            problem: &problem,
+            running,
+            old: None,
+            stay_close: false,
+        };
         let begun = Instant::now();
         let found = control.planner.live.plan(&ask, &Limits::none());
         self.live += begun.elapsed();
