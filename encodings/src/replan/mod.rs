@@ -7,6 +7,9 @@
 //! left for each problem is the search, whose estimates are exact in projections, and the choice among equal plans. Its answers are
 //! those of grounding and optimizing anew, only that nothing is proved a second time by SAT.
 //!
+//! The old plan, where it is a plan still, limits what the search looks at, and is the answer if time is up before there is a
+//! better one.
+//!
 //! Why no SAT solver is kept with assumptions: on maps of 50 to 200 places the search ends within milliseconds, and the same proof
 //! takes a solver seconds; what it would have learnt of one cost limit says nothing about the next.
 //!
