@@ -15,11 +15,12 @@ const FORBIDDEN: [(&str, &[&str]); 5] = [
 ];
 
 /// Crates that only one file or folder may name.
-const SINGLE_FILE: [(&str, &str); 4] = [
+const SINGLE_FILE: [(&str, &str); 5] = [
     ("horned_owl", "ontology/src/horned/"),
     ("varisat::", "encodings/src/sat/"),
     ("batsat::", "encodings/src/sat/"),
     ("cadical::", "encodings/src/sat/"),
+    ("rustsat::", "encodings/src/sat/"),
 ];
 
 fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {

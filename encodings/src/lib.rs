@@ -50,7 +50,7 @@ pub use error::{Error, File, Place};
 pub use ground::{Config as GroundConfig, ground};
 pub use limits::Limits;
 pub use objectives::{Front, Point, lexicographic, pareto};
-pub use optimize::{Config, optimize};
+pub use optimize::{Config, Strategy, optimize};
 pub use plan::{Exact, Plan, Step};
 pub use replan::{First, Query, Replanned, Replanner};
 pub use sat::{Backend, BackendError};

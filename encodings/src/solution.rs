@@ -35,7 +35,7 @@ pub enum Proof {
     Relaxation(String),
 }
 
-/// A better plan was found.
+/// A better plan was found, or a better lower bound.
 #[derive(Debug, Clone, Copy)]
 pub struct Improvement {
     /// The metric of the best plan so far.
@@ -44,6 +44,15 @@ pub struct Improvement {
     pub lower_bound: Exact,
     /// Steps of the formula at hand.
     pub horizon: usize,
+}
+
+impl Improvement {
+    /// How far the bound is from the plan, as a part of the plan's metric: 0 if the plan is proved optimal. Infinite or not a number
+    /// where that metric is 0.
+    pub fn gap(&self) -> f64 {
+        let (cost, bound) = (self.cost.to_f64(), self.lower_bound.to_f64());
+        if self.cost == self.lower_bound { 0.0 } else { (cost - bound).abs() / cost.abs() }
+    }
 }
 
 /// A metric that has no best value, or none that is known.

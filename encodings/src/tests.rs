@@ -3,7 +3,7 @@
 #[path = "../tests/missions/mod.rs"]
 pub(crate) mod missions;
 #[path = "../tests/random/mod.rs"]
-mod random;
+pub(crate) mod random;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
-use crate::encode::{CostLimit, Encoding, Semantics};
+use crate::encode::{CostLimit, Counting, Encoding, Semantics};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
 use crate::pddl::{Source, read};
@@ -41,14 +41,14 @@ fn is_solvable(
     backend: &Backend,
 ) -> bool {
     let window = bounds.window(task, Some(limit), Some(steps));
-    let cost = CostLimit { limit, bounds };
+    let cost = CostLimit { limit, bounds, counting: Counting::Sum };
     let encoding =
         Encoding::new(task, &window.allowed, Some(cost), semantics, &Limits::none()).expect("no limit");
     let mut solver = backend.start(&Limits::none(), u64::MAX);
     for (_, clause) in encoding.formula.clauses() {
         solver.add_clause(clause);
     }
-    let answer = solver.solve();
+    let answer = solver.solve(&[]);
     assert_ne!(answer, Answer::Interrupted, "{backend:?}: {:?}", solver.failure());
     if answer == Answer::Satisfiable {
         let plan = encoding.decode(solver.as_ref());
@@ -92,7 +92,7 @@ fn check(seed: u64, backend: &Backend) {
     }
 }
 
-fn built_in() -> impl Iterator<Item = Backend> {
+pub(crate) fn built_in() -> impl Iterator<Item = Backend> {
     Backend::BUILT_IN.iter().map(|name| name.parse().expect("a name"))
 }
 
@@ -112,7 +112,7 @@ fn many_formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
 }
 
 /// Robots with designs on a map with doors and lamps, some with a battery: much can happen at once, and much interferes.
-fn fleet(seed: u64) -> (String, String) {
+pub(crate) fn fleet(seed: u64) -> (String, String) {
     let mut random = Random(seed);
     let domain = "(define (domain fleet)
       (:types robot place design function)
@@ -177,7 +177,7 @@ fn successors(task: &Task, state: &State) -> Vec<(State, i64)> {
 }
 
 /// The least cost of a plan, by Dijkstra over all states that can be reached.
-fn optimum(task: &Task) -> Option<i64> {
+pub(crate) fn optimum(task: &Task) -> Option<i64> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
     let mut states = vec![task.initial.clone()];
     let mut open = BinaryHeap::from([Reverse((0, 0))]);
@@ -225,7 +225,7 @@ fn costs_by_steps(task: &Task, most: usize) -> Vec<Option<i64>> {
 }
 
 /// Parcels, some of them equal, and robots that carry them, with designs some of which are equal.
-fn depot(seed: u64) -> (String, String) {
+pub(crate) fn depot(seed: u64) -> (String, String) {
     let mut random = Random(seed);
     let domain = "(define (domain depot)
       (:types robot parcel place design function)
@@ -266,7 +266,7 @@ fn depot(seed: u64) -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-fn ground_text((domain, problem): (String, String)) -> Task {
+pub(crate) fn ground_text((domain, problem): (String, String)) -> Task {
     let (domain, problem, _) = read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
     let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")], ..Config::default() };
     ground(&domain, &problem, &config).expect("a task")

@@ -5,22 +5,27 @@ mod missions;
 mod random;
 
 use metaplan_encodings::pddl::{Source, read};
-use metaplan_encodings::{Backend, Config, GroundConfig, Proof, Status, ground, optimize};
+use metaplan_encodings::{Backend, Config, GroundConfig, Proof, Status, Strategy, ground, optimize};
 use missions::Mission;
 
 /// How a mission without a plan, and one with a free metric, is answered: the SAT solver alone cannot tell.
-fn check(seed: u64, quick_search: bool, backend: &Backend) {
+fn check(seed: u64, quick_search: bool, backend: &Backend, strategy: Strategy) {
     let mission = Mission::random(seed);
     let (domain, problem) = (mission.domain(), mission.problem());
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|diagnostics| panic!("seed {seed}: {diagnostics:#?}"));
     let task = ground(&domain, &problem, &GroundConfig::default())
         .unwrap_or_else(|errors| panic!("seed {seed}: {errors:#?}"));
-    let horizon = if quick_search { None } else { Some(14) };
-    let config = Config { quick_search, horizon, backend: backend.clone(), ..Config::default() };
+    let costly = mission.weights.0 > 0 && mission.weights.1 > 0;
+    let bounded = quick_search || costly && mission.oracle().is_some();
+    let horizon = if bounded { None } else { Some(14) };
+    let config = Config { quick_search, horizon, strategy, backend: backend.clone(), ..Config::default() };
     let solution = optimize(&task, &config, &mut |_| {});
-    let context =
-        || format!("seed {seed}, quick search {quick_search}, {backend:?}: {mission:?}: {solution:?}");
+    let context = || {
+        format!(
+            "seed {seed}, quick search {quick_search}, {backend:?}, {strategy:?}: {mission:?}: {solution:?}"
+        )
+    };
     let Some(cost) = mission.oracle() else {
         let allowed = [Status::Unsolvable, Status::UnsolvableWithinHorizon];
         assert!(allowed.contains(&solution.status) && solution.plan.is_none(), "{}", context());
@@ -34,7 +39,7 @@ fn check(seed: u64, quick_search: bool, backend: &Backend) {
     if quick_search {
         assert_eq!(solution.status, Status::Optimal, "{}", context());
     }
-    if mission.weights.0 > 0 && mission.weights.1 > 0 {
+    if costly {
         assert_eq!(solution.status, Status::Optimal, "{}", context());
         assert!(matches!(solution.proof, Some(Proof::Sat { .. } | Proof::Bound)), "{}", context());
     }
@@ -44,15 +49,19 @@ fn built_in() -> impl Iterator<Item = Backend> {
     Backend::BUILT_IN.iter().map(|name| name.parse().expect("a name"))
 }
 
+const STRATEGIES: [Strategy; 3] = [Strategy::Auto, Strategy::Tighten, Strategy::Cores];
+
 #[test]
 fn generated_missions_have_the_optimum_of_the_oracle() {
-    (0..150).for_each(|seed| check(seed, true, &Backend::default()));
+    (0..150).for_each(|seed| check(seed, true, &Backend::default(), Strategy::Auto));
 }
 
 #[test]
 fn the_sat_solvers_alone_find_the_same_optimum() {
     for backend in built_in() {
-        (0..40).for_each(|seed| check(seed, false, &backend));
+        for strategy in STRATEGIES {
+            (0..40).for_each(|seed| check(seed, false, &backend, strategy));
+        }
     }
 }
 
@@ -60,9 +69,11 @@ fn the_sat_solvers_alone_find_the_same_optimum() {
 #[ignore = "takes minutes"]
 fn many_generated_missions_have_the_optimum_of_the_oracle() {
     for backend in built_in() {
-        for seed in 150..2_200 {
-            check(seed, true, &backend);
-            check(seed, false, &backend);
+        for strategy in STRATEGIES {
+            for seed in 150..2_200 {
+                check(seed, true, &backend, strategy);
+                check(seed, false, &backend, strategy);
+            }
         }
     }
 }

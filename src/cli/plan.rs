@@ -47,6 +47,10 @@ pub struct Arguments {
     /// The SAT solver: `varisat`, `batsat`, or a program with its arguments that reads DIMACS on its standard input.
     #[arg(long, value_name = "NAME", default_value = Backend::BUILT_IN[0])]
     solver: Backend,
+    /// How the SAT solver finds a cheapest plan: cheaper and cheaper plans until there is none, or a lower bound that rises until a
+    /// plan costs as much. The cost of the answer is the same.
+    #[arg(long, value_enum, default_value_t)]
+    strategy: Strategy,
     /// How many actions stand at one step of the SAT solver's formulas; if not given, several while a first plan is looked
     /// for, and one from then on. The answer is the same.
     #[arg(long, value_enum)]
@@ -93,6 +97,27 @@ enum Encoding {
     ForAllStep,
     /// Several that can be executed in at least one order.
     ExistsStep,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum Strategy {
+    /// The one that is faster in general.
+    #[default]
+    Auto,
+    /// Cheaper and cheaper plans.
+    Tighten,
+    /// A rising lower bound.
+    Cores,
+}
+
+impl From<Strategy> for encodings::Strategy {
+    fn from(strategy: Strategy) -> Self {
+        match strategy {
+            Strategy::Auto => Self::Auto,
+            Strategy::Tighten => Self::Tighten,
+            Strategy::Cores => Self::Cores,
+        }
+    }
 }
 
 impl From<Encoding> for Semantics {
@@ -152,8 +177,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let progress = progress(common);
     let mut report = |improvement: Improvement| {
         progress.set_message(format!(
-            "cost {}, lower bound {}, up to {} steps",
-            improvement.cost, improvement.lower_bound, improvement.horizon
+            "cost {}, lower bound {}, gap {:.1} %, up to {} steps",
+            improvement.cost,
+            improvement.lower_bound,
+            100.0 * improvement.gap(),
+            improvement.horizon
         ));
     };
     if let Some(separation) = arguments.overlap.separation() {
@@ -176,7 +204,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 
     let backend = arguments.solver.clone();
     let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
-    let config = Config { horizon, semantics, limits, backend, ..Config::default() };
+    let strategy = arguments.strategy.into();
+    let config = Config { horizon, semantics, strategy, limits, backend, ..Config::default() };
     if arguments.pareto.is_some() {
         let front = encodings::pareto(&task, &config, &mut report);
         progress.finish_and_clear();

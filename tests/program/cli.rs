@@ -323,6 +323,10 @@ fn every_solver_proves_the_same() {
         let answer = metaplan(&["plan", "missions/uuv.toml", "--encoding", encoding]);
         check(&answer, 0, &["optimal, proved"]);
     }
+    for strategy in ["auto", "tighten", "cores"] {
+        let answer = metaplan(&["plan", "missions/ugv.toml", "--strategy", strategy]);
+        assert_eq!((answer.status, &answer.stdout), (0, &cheapest.stdout), "{strategy}");
+    }
     let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", "no-such-solver -q"]);
     check(&answer, 2, &["M113", "`no-such-solver` does not serve", "varisat, batsat"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--solver", " "]), 2, &["needs a name"]);

@@ -11,10 +11,10 @@
 mod tests;
 
 use crate::bounds::Bounds;
-use crate::encode::{CostLimit, Encoding, Semantics};
+use crate::encode::{CostLimit, Counting, Encoding, Meaning, Semantics};
 use crate::optimize::Config;
 use crate::plan::{GroundPlan, GroundStep, Plan, decode, replay};
-use crate::sat::{Answer, Lit};
+use crate::sat::{Answer, Lit, Solver};
 use crate::solution::{Solution, Status};
 use crate::task::{Argument, Task};
 
@@ -51,15 +51,20 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     } else {
         bounds.window(task, Some(first.cost), Some(first.steps.len())).allowed
     };
-    let cost = CostLimit { limit: first.cost, bounds: &bounds };
+    let cost = CostLimit { limit: first.cost, bounds: &bounds, counting: Counting::Sum };
     let encoding = Encoding::with_equals(task, &allowed, Some(cost), Semantics::Sequential, &config.limits)?;
-    let mut run = Run { task, encoding, config };
+    let mut solver = config.backend.start(&config.limits, u64::MAX);
+    encoding.formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));
+    let mut run = Run { task, encoding, solver };
     let mut found = vec![first.steps.clone()];
     let mut exhausted = false;
-    let mut blocked = Vec::new();
+    // Excludes the plans that are known as long as it is assumed.
+    let others = run.encoding.formula.fresh(Meaning::Others);
     while found.len() <= most && !exhausted {
-        blocked.extend(found.last().map(|plan| run.encoding.other_than(plan)));
-        match run.solve(&blocked) {
+        if let Some(plan) = found.last() {
+            run.exclude(plan, others);
+        }
+        match run.solve(&[others]) {
             (Answer::Satisfiable, Some(plan)) => found.push(plan),
             (Answer::Unsatisfiable, _) => exhausted = true,
             _ => break,
@@ -74,27 +79,27 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
 struct Run<'a> {
     task: &'a Task,
     encoding: Encoding<'a>,
-    config: &'a Config,
+    solver: Box<dyn Solver>,
 }
 
 /// A choice of the first plan: an operator at a step, or the design of one of its slots (by position).
 type Choice = (usize, Option<u16>);
 
 impl Run<'_> {
-    /// A plan of the formula under further clauses.
-    fn solve(&mut self, further: &[Vec<Lit>]) -> (Answer, Option<Vec<GroundStep>>) {
-        let mut solver = self.config.backend.start(&self.config.limits, u64::MAX);
-        for (_, clause) in self.encoding.formula.clauses() {
-            solver.add_clause(clause);
-        }
-        for clause in further {
-            solver.add_clause(clause);
-        }
-        let answer = solver.solve();
+    /// Excludes a plan if the literal holds.
+    fn exclude(&mut self, plan: &[GroundStep], literal: Lit) {
+        let mut clause = self.encoding.other_than(plan);
+        clause.push(!literal);
+        self.solver.add_clause(&clause);
+    }
+
+    /// A plan of the formula under assumptions.
+    fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
+        let answer = self.solver.solve(assumptions);
         if answer != Answer::Satisfiable {
             return (answer, None);
         }
-        let steps = self.encoding.decode(solver.as_ref());
+        let steps = self.encoding.decode(self.solver.as_ref());
         let is_plan = replay(self.task, &steps).is_some();
         debug_assert!(is_plan, "the encoding admits a sequence that is no plan");
         (answer, is_plan.then_some(steps))
@@ -111,7 +116,10 @@ impl Run<'_> {
             choices.retain(|choice| self.shares(first, plan, *choice));
         }
         while !choices.is_empty() {
-            let other = choices.iter().map(|choice| !self.encoding.choice(first, *choice)).collect();
+            let other = self.encoding.formula.fresh(Meaning::Others);
+            let differs = choices.iter().map(|choice| !self.encoding.choice(first, *choice));
+            let clause: Vec<_> = differs.chain([!other]).collect();
+            self.solver.add_clause(&clause);
             match self.solve(&[other]) {
                 (Answer::Satisfiable, Some(plan)) => {
                     choices.retain(|choice| self.shares(first, &plan, *choice));

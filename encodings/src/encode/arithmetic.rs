@@ -203,7 +203,7 @@ mod tests {
         for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
             solver.add_clause(&[if wanted == Formula::truth() { *bit } else { !*bit }]);
         }
-        solver.solve() == Answer::Satisfiable
+        solver.solve(&[]) == Answer::Satisfiable
     }
 
     fn free(formula: &mut Formula, bits: usize) -> Bits {

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::encode::arithmetic::{Arithmetic, Bits};
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::selection::global;
-use crate::encode::{CostLimit, Encoding};
+use crate::encode::{CostLimit, Counting, Encoding};
 use crate::limits::Limits;
 use crate::sat::Lit;
 use crate::task::{Operator, OperatorId};
@@ -34,9 +34,19 @@ enum Spent {
     /// `at least amount`, for every positive amount that can occur.
     Order(BTreeMap<i64, Lit>),
     Binary(Bits),
+    /// Literals that add their weight if they are true.
+    Apart(Vec<(Lit, i64)>),
 }
 
 impl Cost {
+    /// What every plan costs at least, and what it may pay beyond that.
+    pub(super) fn payments(&self) -> (i64, &[(Lit, i64)]) {
+        match &self.spent {
+            Spent::Apart(literals) => (self.lower, literals),
+            Spent::Order(_) | Spent::Binary(_) => (self.lower, &[]),
+        }
+    }
+
     /// Adds clauses that admit only plans with cost at most `limit`.
     pub(super) fn at_most(&self, formula: &mut Formula, limit: i64) {
         let gap = limit - self.lower;
@@ -51,6 +61,7 @@ impl Cost {
                 }
             }
             Spent::Binary(bits) => Arithmetic { formula, family: Family::Bound }.at_most(bits, gap),
+            Spent::Apart(_) => {}
         }
     }
 }
@@ -75,7 +86,14 @@ impl Encoding<'_> {
         let steps: Option<Vec<Vec<Increments>>> =
             (0..self.horizon).map(|step| Some(self.increments(running(step)?, cost))).collect();
         let steps = steps?;
-        let spent = if amounts_fit(&steps, gap) {
+        let spent = if cost.counting == Counting::Apart {
+            let sources = steps.iter().enumerate().flat_map(|(step, sources)| {
+                sources.iter().enumerate().map(move |(stage, source)| (source, step as u32, stage as u32))
+            });
+            Spent::Apart(
+                sources.flat_map(|(source, step, stage)| self.apart(source, gap, step, stage)).collect(),
+            )
+        } else if amounts_fit(&steps, gap) {
             Spent::Order(self.add_in_order(&steps, gap, limits)?)
         } else {
             Spent::Binary(self.add_in_binary(&steps, gap))
@@ -191,17 +209,7 @@ impl Encoding<'_> {
         step: u32,
         stage: u32,
     ) -> BTreeMap<i64, Lit> {
-        let mut increments: BTreeMap<i64, Lit> = BTreeMap::new();
-        for (premise, amount) in source.iter().filter(|(_, amount)| *amount > 0) {
-            let conclusion = if *amount > gap {
-                !Formula::truth()
-            } else {
-                let formula = &mut self.formula;
-                let meaning = Meaning::Increment { amount: *amount, step, stage };
-                *increments.entry(*amount).or_insert_with(|| formula.fresh(meaning))
-            };
-            self.formula.add(Family::Cost, premise.iter().map(|literal| !*literal).chain([conclusion]));
-        }
+        let increments = self.amounts(source, gap, step, stage);
         if increments.is_empty() {
             return spent.clone();
         }
@@ -225,6 +233,36 @@ impl Encoding<'_> {
             }
         }
         after
+    }
+
+    /// A literal for each positive amount that a source can add, which its premise implies; what is above the gap is a conflict.
+    fn amounts(&mut self, source: &Increments, gap: i64, step: u32, stage: u32) -> BTreeMap<i64, Lit> {
+        let mut increments: BTreeMap<i64, Lit> = BTreeMap::new();
+        for (premise, amount) in source.iter().filter(|(_, amount)| *amount > 0) {
+            let conclusion = if *amount > gap {
+                !Formula::truth()
+            } else {
+                let formula = &mut self.formula;
+                let meaning = Meaning::Increment { amount: *amount, step, stage };
+                *increments.entry(*amount).or_insert_with(|| formula.fresh(meaning))
+            };
+            self.formula.add(Family::Cost, premise.iter().map(|literal| !*literal).chain([conclusion]));
+        }
+        increments
+    }
+
+    /// The amounts of a source, each implying the next smaller one, and what it has more than that.
+    fn apart(&mut self, source: &Increments, gap: i64, step: u32, stage: u32) -> Vec<(Lit, i64)> {
+        let mut weighted: Vec<(Lit, i64)> = Vec::new();
+        let mut before = 0;
+        for (amount, literal) in self.amounts(source, gap, step, stage) {
+            if let Some((smaller, _)) = weighted.last() {
+                self.formula.add(Family::Cost, [!literal, *smaller]);
+            }
+            weighted.push((literal, amount - before));
+            before = amount;
+        }
+        weighted
     }
 
     fn add_in_binary(&mut self, steps: &[Vec<Increments>], gap: i64) -> Bits {

@@ -103,6 +103,10 @@ pub(crate) enum Meaning {
     Later { variable: u32, rounds: u32, step: u32 },
     /// A bit of a number.
     Bit { bit: u32 },
+    /// Plans that are known are excluded.
+    Others,
+    /// So many literals of a core are true.
+    Paid,
     /// A helper of an at-most-one constraint.
     Ladder,
 }
@@ -202,7 +206,12 @@ impl Formula {
 
     /// All clauses in the order in which they were added.
     pub(crate) fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
-        (0..self.clauses.len()).map(|index| {
+        self.clauses_from(0)
+    }
+
+    /// The clauses after so many others.
+    pub(crate) fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
+        (start..self.clauses.len()).map(|index| {
             let start = if index == 0 { 0 } else { self.clauses[index - 1].0 as usize };
             let (end, family) = self.clauses[index];
             (family, &self.literals[start..end as usize])

@@ -30,7 +30,7 @@ use crate::sat::{Lit, Solver};
 use crate::task::{Fact, Literal, OperatorId, Task};
 use conditional::Fires;
 use cost::Cost;
-use formula::{Family, Formula};
+pub(crate) use formula::{Family, Formula, Meaning};
 use interference::Interference;
 pub use interference::Semantics;
 
@@ -59,6 +59,16 @@ pub(crate) struct Encoding<'a> {
 pub(crate) struct CostLimit<'a> {
     pub(crate) limit: i64,
     pub(crate) bounds: &'a Bounds,
+    pub(crate) counting: Counting,
+}
+
+/// What an encoding makes of the costs of steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Counting {
+    /// Their sum, which the limit holds down.
+    Sum,
+    /// Literals with weights, which the solver is to keep false. Only what exceeds the limit by itself is excluded.
+    Apart,
 }
 
 impl<'a> Encoding<'a> {
@@ -157,6 +167,16 @@ impl<'a> Encoding<'a> {
             cost.at_most(&mut self.formula, limit);
             self.cost = Some(cost);
         }
+    }
+
+    /// So many steps can be executed.
+    pub(crate) fn horizon(&self) -> usize {
+        self.horizon
+    }
+
+    /// What every plan costs at least, and literals each of which adds its weight if it is true.
+    pub(crate) fn payments(&self) -> (i64, &[(Lit, i64)]) {
+        self.cost.as_ref().map_or((0, &[]), Cost::payments)
     }
 
     /// The variable of an operator of a plan at its step, or that of the design of one of its slots.

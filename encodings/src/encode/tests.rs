@@ -6,7 +6,7 @@ use insta::assert_snapshot;
 
 use crate::bounds::Bounds;
 use crate::encode::formula::{Family, Meaning};
-use crate::encode::{CostLimit, Encoding, Semantics};
+use crate::encode::{CostLimit, Counting, Encoding, Semantics};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
 use crate::pddl::{Source, read};
@@ -66,6 +66,8 @@ fn name(task: &Task, meaning: Meaning) -> String {
         Meaning::CostAtLeast { amount, step, stage } => format!("spent≥{amount}@{step}.{stage}"),
         Meaning::Increment { amount, step, stage } => format!("add≥{amount}@{step}.{stage}"),
         Meaning::Bit { bit } => format!("bit{bit}"),
+        Meaning::Others => "others".into(),
+        Meaning::Paid => "paid".into(),
         Meaning::Ladder => "ladder".into(),
     }
 }
@@ -91,7 +93,7 @@ fn check(family: Family) -> String {
     let task = task();
     let bounds = Bounds::new(&task, &Limits::none());
     let allowed = vec![vec![true; task.operators.len()]; 2];
-    let cost = CostLimit { limit: 6, bounds: &bounds };
+    let cost = CostLimit { limit: 6, bounds: &bounds, counting: Counting::Sum };
     let encoding =
         Encoding::new(&task, &allowed, Some(cost), Semantics::Sequential, &Limits::none()).expect("no limit");
     clauses(&encoding, family)

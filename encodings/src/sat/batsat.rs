@@ -19,6 +19,7 @@ const CLOCK_INTERVAL: u32 = 64;
 pub(super) struct Batsat {
     solver: batsat::Solver<Watch>,
     buffer: Vec<batsat::Lit>,
+    core: Vec<Lit>,
 }
 
 /// Counts conflicts, and says when to stop.
@@ -55,30 +56,45 @@ impl Batsat {
             decisions: Cell::new(0),
             stopped: Cell::new(false),
         };
-        Self { solver: batsat::Solver::new(batsat::SolverOpts::default(), watch), buffer: Vec::new() }
+        let solver = batsat::Solver::new(batsat::SolverOpts::default(), watch);
+        Self { solver, buffer: Vec::new(), core: Vec::new() }
+    }
+
+    /// Literals of this solver to the buffer.
+    fn translate(&mut self, literals: &[Lit]) {
+        self.buffer.clear();
+        for literal in literals {
+            let variable = self.solver.var_of_int(literal.variable());
+            self.buffer.push(batsat::Lit::new(variable, literal.is_positive()));
+        }
     }
 }
 
 impl Solver for Batsat {
     fn add_clause(&mut self, clause: &[Lit]) {
-        self.buffer.clear();
-        for literal in clause {
-            let variable = self.solver.var_of_int(literal.variable());
-            self.buffer.push(batsat::Lit::new(variable, literal.is_positive()));
-        }
+        self.translate(clause);
         // Whether the clauses are contradictory already is what `solve` says, too.
         let _ = self.solver.add_clause_reuse(&mut self.buffer);
     }
 
-    fn solve(&mut self) -> Answer {
-        let answer = self.solver.solve_limited(&[]);
+    fn solve(&mut self, assumptions: &[Lit]) -> Answer {
+        self.translate(assumptions);
+        self.core.clear();
+        let answer = self.solver.solve_limited(&self.buffer);
         if answer == lbool::TRUE {
             Answer::Satisfiable
         } else if answer == lbool::FALSE {
+            // It comes as the clause that follows.
+            let core = self.solver.unsat_core().iter();
+            self.core.extend(core.map(|literal| Lit::new(literal.var().idx(), !literal.sign())));
             Answer::Unsatisfiable
         } else {
             Answer::Interrupted
         }
+    }
+
+    fn core(&self) -> &[Lit] {
+        &self.core
     }
 
     fn value(&self, variable: u32) -> bool {

@@ -14,6 +14,7 @@ pub(super) struct Cadical {
     assignment: Vec<bool>,
     variables: u32,
     conflicts: u64,
+    core: Vec<Lit>,
 }
 
 /// Counts conflicts, and says when to stop.
@@ -42,7 +43,7 @@ impl Cadical {
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let mut solver = cadical::Solver::new();
         solver.set_callbacks(Some(Watch { limits: limits.clone(), budget, conflicts: 0 }));
-        Self { solver, assignment: Vec::new(), variables: 0, conflicts: 0 }
+        Self { solver, assignment: Vec::new(), variables: 0, conflicts: 0, core: Vec::new() }
     }
 }
 
@@ -54,8 +55,12 @@ impl Solver for Cadical {
         self.solver.add_clause(clause.iter().map(|literal| literal.dimacs()));
     }
 
-    fn solve(&mut self) -> Answer {
-        let answer = self.solver.solve();
+    fn solve(&mut self, assumptions: &[Lit]) -> Answer {
+        self.core.clear();
+        for literal in assumptions {
+            self.variables = self.variables.max(literal.variable() + 1);
+        }
+        let answer = self.solver.solve_with(assumptions.iter().map(|literal| literal.dimacs()));
         self.conflicts = self.solver.get_callbacks().map_or(0, |watch| watch.conflicts);
         match answer {
             Some(true) => {
@@ -63,9 +68,17 @@ impl Solver for Cadical {
                 self.assignment = (0..self.variables).map(value).collect();
                 Answer::Satisfiable
             }
-            Some(false) => Answer::Unsatisfiable,
+            Some(false) => {
+                let failed = assumptions.iter().filter(|literal| self.solver.failed(literal.dimacs()));
+                self.core.extend(failed);
+                Answer::Unsatisfiable
+            }
             None => Answer::Interrupted,
         }
+    }
+
+    fn core(&self) -> &[Lit] {
+        &self.core
     }
 
     fn value(&self, variable: u32) -> bool {

@@ -1,6 +1,7 @@
 //! A formula to an assignment, or to the answer that there is none: SAT solvers behind one trait.
 //!
-//! Each solver has a file, and only that file names its crate. Every formula gets a solver of its own.
+//! Each solver has a file, and only that file names its crate. A solver is incremental: it takes further clauses after each
+//! answer, decides them under assumptions, and says which of these fail together. What it has learnt it keeps.
 
 mod batsat;
 #[cfg(feature = "cadical")]
@@ -8,16 +9,18 @@ mod cadical;
 mod program;
 #[cfg(test)]
 pub(crate) mod tests;
+mod totalizer;
 mod varisat;
 
 use std::str::FromStr;
 
 use crate::limits::Limits;
 use program::Program;
+pub(crate) use totalizer::Totalizer;
 pub(crate) use varisat::refute_with_proof;
 
 /// A literal: a variable, counted from 0, or its negation.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct Lit(u32);
 
 impl Lit {
@@ -26,6 +29,10 @@ impl Lit {
 
     pub(crate) fn positive(variable: u32) -> Self {
         Self(variable << 1)
+    }
+
+    pub(crate) fn new(variable: u32, positive: bool) -> Self {
+        if positive { Self::positive(variable) } else { !Self::positive(variable) }
     }
 
     pub(crate) fn variable(self) -> u32 {
@@ -60,12 +67,15 @@ pub(crate) enum Answer {
     Interrupted,
 }
 
-/// A SAT solver for one formula.
+/// A SAT solver for a formula that grows.
 pub(crate) trait Solver {
-    /// Adds a clause; its variables need no declaration. Not after `solve`.
+    /// Adds a clause; its variables need no declaration.
     fn add_clause(&mut self, clause: &[Lit]);
-    /// Decides the clauses.
-    fn solve(&mut self) -> Answer;
+    /// Decides the clauses added so far together with the assumptions, which hold for this call only.
+    fn solve(&mut self, assumptions: &[Lit]) -> Answer;
+    /// Assumptions of the last call that cannot hold together, if its answer was `Unsatisfiable`; in no particular order, and
+    /// not always as few as possible. None of them if the clauses alone are unsatisfiable.
+    fn core(&self) -> &[Lit];
     /// The value of a variable in the assignment found last.
     fn value(&self, variable: u32) -> bool;
     /// Clauses learnt so far, one for each conflict; 0 if the solver does not tell.
@@ -153,7 +163,7 @@ impl Backend {
             for literal in clauses {
                 solver.add_clause(&[*literal]);
             }
-            let answer = solver.solve();
+            let answer = solver.solve(&[]);
             if answer != expected {
                 let reason = match (answer, solver.failure()) {
                     (Answer::Interrupted, Some(reason)) => reason.to_owned(),

@@ -2,7 +2,8 @@
 //!
 //! Two forms of answers are read: that of the SAT competitions (`s SATISFIABLE`, and the assignment in lines `v …`), and
 //! that of `MiniSat`'s result file (`SAT`, and the assignment on the line below). The process is killed when a limit is
-//! reached. It cannot be told how many clauses it may learn, so where that is limited, its time is.
+//! reached. It cannot be told how many clauses it may learn, so where that is limited, its time is. Each call is a process of its
+//! own that gets assumptions as clauses, so nothing that was learnt is kept, and all assumptions count as failed.
 //!
 //! \[1\] DIMACS challenge: Satisfiability, suggested format, 1993.
 
@@ -30,6 +31,7 @@ pub(super) struct Program {
     clauses: Vec<i32>,
     variables: u32,
     assignment: Vec<bool>,
+    core: Vec<Lit>,
     failure: Option<String>,
 }
 
@@ -45,6 +47,7 @@ impl Program {
             clauses: Vec::new(),
             variables: 0,
             assignment: Vec::new(),
+            core: Vec::new(),
             failure: None,
         }
     }
@@ -75,6 +78,25 @@ impl Program {
             Ok(())
         } else {
             Err("its assignment does not satisfy the formula".to_owned())
+        }
+    }
+
+    /// Runs the program once and judges its answer.
+    fn decide(&mut self) -> Answer {
+        let read = match self.run() {
+            Ok(None) => return Answer::Interrupted,
+            Ok(Some(output)) => read(&output),
+            Err(reason) => Err(reason),
+        };
+        let kept = read.and_then(|(answer, literals)| {
+            if answer == Answer::Satisfiable { self.keep(&literals).map(|()| answer) } else { Ok(answer) }
+        });
+        match kept {
+            Ok(answer) => answer,
+            Err(reason) => {
+                self.failure = Some(reason);
+                Answer::Interrupted
+            }
         }
     }
 
@@ -157,22 +179,22 @@ impl Solver for Program {
         self.clauses.push(0);
     }
 
-    fn solve(&mut self) -> Answer {
-        let read = match self.run() {
-            Ok(None) => return Answer::Interrupted,
-            Ok(Some(output)) => read(&output),
-            Err(reason) => Err(reason),
-        };
-        let kept = read.and_then(|(answer, literals)| {
-            if answer == Answer::Satisfiable { self.keep(&literals).map(|()| answer) } else { Ok(answer) }
-        });
-        match kept {
-            Ok(answer) => answer,
-            Err(reason) => {
-                self.failure = Some(reason);
-                Answer::Interrupted
-            }
+    fn solve(&mut self, assumptions: &[Lit]) -> Answer {
+        let own = self.clauses.len();
+        for literal in assumptions {
+            self.add_clause(&[*literal]);
         }
+        let answer = self.decide();
+        self.clauses.truncate(own);
+        self.core.clear();
+        if answer == Answer::Unsatisfiable {
+            self.core.extend_from_slice(assumptions);
+        }
+        answer
+    }
+
+    fn core(&self) -> &[Lit] {
+        &self.core
     }
 
     fn value(&self, variable: u32) -> bool {

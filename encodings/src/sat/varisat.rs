@@ -1,7 +1,12 @@
 //! Varisat [1] as a back end.
 //!
 //! Varisat has no way to be interrupted. It streams its proof, though, and stops at once when the stream reports an
-//! error; so the proof goes to a sink that counts learnt clauses and fails when a limit is reached.
+//! error; so the proof goes to a sink that counts learnt clauses and fails when a limit is reached. That proof is in Varisat's own
+//! format: DRAT has no place for assumptions and for clauses that come later.
+//!
+//! Its answers are right under assumptions, but which of them fail is so for certain only the first time: from then on there may
+//! be marks left behind by which it names the wrong ones. So later cores are confirmed by one more call, and where that finds an
+//! assignment, a new solver with the same clauses says which assumptions fail.
 //!
 //! \[1\] J. Harder: Varisat, <https://jix.github.io/varisat/>.
 
@@ -17,62 +22,39 @@ use crate::sat::{Answer, Lit, Solver};
 /// A Varisat solver.
 pub(super) struct Varisat {
     solver: varisat::Solver<'static>,
+    /// Whether the solver has failed under assumptions before.
+    failed: bool,
+    limits: Limits,
+    budget: u64,
     conflicts: Rc<Cell<u64>>,
+    /// All clauses, one after the other, and where each ends.
+    literals: Vec<varisat::Lit>,
+    ends: Vec<usize>,
     assignment: Vec<bool>,
-    buffer: Vec<varisat::Lit>,
+    core: Vec<Lit>,
 }
 
 impl Varisat {
     /// A solver that gives up at a limit, or after learning `budget` clauses.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
-        Self::with_proof(limits, budget, Box::new(io::sink()))
-    }
-
-    /// As [`Varisat::new`], with the DRAT proof written somewhere.
-    pub(super) fn with_proof(limits: &Limits, budget: u64, proof: Box<dyn io::Write>) -> Self {
         let conflicts = Rc::new(Cell::new(0));
-        let sink = CountingSink {
+        Self {
+            solver: start(limits, budget, &conflicts),
+            failed: false,
             limits: limits.clone(),
             budget,
-            conflicts: Rc::clone(&conflicts),
-            at_line_start: true,
-            proof,
-        };
-        let mut solver = varisat::Solver::new();
-        solver.write_proof(sink, varisat::ProofFormat::Drat);
-        Self { solver, conflicts, assignment: Vec::new(), buffer: Vec::new() }
-    }
-}
-
-/// Refutes clauses over variables numbered from 1, or finds that they have a model; the proof is in DRAT.
-pub(crate) fn refute_with_proof<'c>(
-    clauses: impl Iterator<Item = &'c [i32]>,
-    proof: Box<dyn io::Write>,
-    limits: &Limits,
-    budget: u64,
-) -> Answer {
-    let mut solver = Varisat::with_proof(limits, budget, proof);
-    for clause in clauses {
-        let literals: Vec<varisat::Lit> =
-            clause.iter().map(|literal| varisat::Lit::from_dimacs(*literal as isize)).collect();
-        solver.solver.add_clause(&literals);
-    }
-    let answer = solver.solve();
-    match solver.solver.close_proof() {
-        Ok(()) => answer,
-        Err(_) => Answer::Interrupted,
-    }
-}
-
-impl Solver for Varisat {
-    fn add_clause(&mut self, clause: &[Lit]) {
-        self.buffer.clear();
-        self.buffer
-            .extend(clause.iter().map(|l| varisat::Lit::from_index(l.variable() as usize, l.is_positive())));
-        self.solver.add_clause(&self.buffer);
+            conflicts,
+            literals: Vec::new(),
+            ends: Vec::new(),
+            assignment: Vec::new(),
+            core: Vec::new(),
+        }
     }
 
-    fn solve(&mut self) -> Answer {
+    /// Decides the clauses under assumptions, once.
+    fn ask(&mut self, assumptions: &[Lit]) -> Answer {
+        let assumed: Vec<varisat::Lit> = assumptions.iter().copied().map(translate).collect();
+        self.solver.assume(&assumed);
         match self.solver.solve() {
             Ok(true) => {
                 self.assignment.clear();
@@ -85,9 +67,95 @@ impl Solver for Varisat {
                 }
                 Answer::Satisfiable
             }
-            Ok(false) => Answer::Unsatisfiable,
+            Ok(false) => {
+                self.core.clear();
+                let failed = self.solver.failed_core().unwrap_or_default().iter();
+                self.core
+                    .extend(failed.map(|literal| Lit::new(literal.index() as u32, literal.is_positive())));
+                self.failed |= !self.core.is_empty();
+                Answer::Unsatisfiable
+            }
             Err(_) => Answer::Interrupted,
         }
+    }
+
+    /// The same clauses in a new solver.
+    fn renew(&mut self) {
+        self.solver = start(&self.limits, self.budget, &self.conflicts);
+        let mut begin = 0;
+        for end in &self.ends {
+            self.solver.add_clause(&self.literals[begin..*end]);
+            begin = *end;
+        }
+        self.failed = false;
+    }
+}
+
+fn start(limits: &Limits, budget: u64, conflicts: &Rc<Cell<u64>>) -> varisat::Solver<'static> {
+    let mut solver = varisat::Solver::new();
+    let (limits, conflicts) = (limits.clone(), Rc::clone(conflicts));
+    let sink = CountingSink { limits, budget, conflicts, steps: Steps::default() };
+    solver.write_proof(sink, varisat::ProofFormat::Varisat);
+    solver
+}
+
+fn translate(literal: Lit) -> varisat::Lit {
+    varisat::Lit::from_index(literal.variable() as usize, literal.is_positive())
+}
+
+/// Refutes clauses over variables numbered from 1, or finds that they have a model; the proof is in DRAT.
+pub(crate) fn refute_with_proof<'c>(
+    clauses: impl Iterator<Item = &'c [i32]>,
+    proof: Box<dyn io::Write>,
+    limits: &Limits,
+    budget: u64,
+) -> Answer {
+    let mut solver = varisat::Solver::new();
+    let sink = DratSink { limits: limits.clone(), budget, conflicts: 0, at_line_start: true, proof };
+    solver.write_proof(sink, varisat::ProofFormat::Drat);
+    for clause in clauses {
+        let literals: Vec<varisat::Lit> =
+            clause.iter().map(|literal| varisat::Lit::from_dimacs(*literal as isize)).collect();
+        solver.add_clause(&literals);
+    }
+    let answer = solver.solve();
+    match (answer, solver.close_proof()) {
+        (Ok(true), Ok(())) => Answer::Satisfiable,
+        (Ok(false), Ok(())) => Answer::Unsatisfiable,
+        _ => Answer::Interrupted,
+    }
+}
+
+impl Solver for Varisat {
+    fn add_clause(&mut self, clause: &[Lit]) {
+        let begin = self.literals.len();
+        self.literals.extend(clause.iter().copied().map(translate));
+        self.ends.push(self.literals.len());
+        self.solver.add_clause(&self.literals[begin..]);
+    }
+
+    fn solve(&mut self, assumptions: &[Lit]) -> Answer {
+        let doubtful = self.failed;
+        let answer = self.ask(assumptions);
+        if answer != Answer::Unsatisfiable || self.core.is_empty() || !doubtful {
+            return answer;
+        }
+        let core = std::mem::take(&mut self.core);
+        match self.ask(&core) {
+            Answer::Unsatisfiable => {
+                self.core = core;
+                Answer::Unsatisfiable
+            }
+            Answer::Satisfiable => {
+                self.renew();
+                self.ask(assumptions)
+            }
+            Answer::Interrupted => Answer::Interrupted,
+        }
+    }
+
+    fn core(&self) -> &[Lit] {
+        &self.core
     }
 
     fn value(&self, variable: u32) -> bool {
@@ -99,13 +167,75 @@ impl Solver for Varisat {
     }
 }
 
-/// Passes a DRAT proof on, counts the clauses that it adds, and fails when a limit or the budget is reached.
+/// What a step of Varisat's proof format consists of: all are numbers.
+#[derive(Clone, Copy)]
+enum Part {
+    /// Says which step it is.
+    Code,
+    /// How many numbers follow (each one or two of them), and perhaps a list after these.
+    Length { each: u64, and_list: bool },
+    /// So many more, and perhaps a list after these.
+    Numbers { left: u64, and_list: bool },
+}
+
+/// Reads a proof in Varisat's format as it comes, and finds the steps that add a learnt clause.
+struct Steps {
+    part: Part,
+    /// The number at hand, as far as its bytes have come, and how many have.
+    number: u128,
+    bytes: u32,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self { part: Part::Code, number: 0, bytes: 0 }
+    }
+}
+
+impl Steps {
+    /// One more byte; whether it completes the code of a learnt clause.
+    fn byte(&mut self, byte: u8) -> bool {
+        self.number |= u128::from(byte) << (8 * self.bytes);
+        self.bytes += 1;
+        // At its low end a number of n bytes has n - 1 zeros and a one.
+        let total = self.number.trailing_zeros() + 1;
+        if self.number == 0 || self.bytes < total {
+            return false;
+        }
+        let value = self.number >> total;
+        (self.number, self.bytes) = (0, 0);
+        self.next(value as u64)
+    }
+
+    fn next(&mut self, number: u64) -> bool {
+        let list = |each, and_list| Part::Length { each, and_list };
+        let numbers = |left| Part::Numbers { left, and_list: false };
+        let before = self.part;
+        self.part = match before {
+            Part::Code => match number {
+                0 | 2 => numbers(2),
+                1 | 3..=6 | 13 => numbers(1),
+                7 | 8 | 17 => list(1, true),
+                9 => list(2, false),
+                10..=12 | 14..=16 => list(1, false),
+                _ => Part::Code,
+            },
+            Part::Length { each, and_list } => Part::Numbers { left: number * each, and_list },
+            Part::Numbers { left, and_list } => Part::Numbers { left: left - 1, and_list },
+        };
+        if let Part::Numbers { left: 0, and_list } = self.part {
+            self.part = if and_list { list(1, false) } else { Part::Code };
+        }
+        matches!((before, number), (Part::Code, 7 | 8))
+    }
+}
+
+/// Takes a proof in Varisat's format, counts the clauses that are learnt, and fails when a limit or the budget is reached.
 struct CountingSink {
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
-    at_line_start: bool,
-    proof: Box<dyn io::Write>,
+    steps: Steps,
 }
 
 impl io::Write for CountingSink {
@@ -113,12 +243,36 @@ impl io::Write for CountingSink {
         if self.limits.reached() || self.conflicts.get() > self.budget {
             return Err(io::Error::other("limit reached"));
         }
+        let learnt = bytes.iter().filter(|byte| self.steps.byte(**byte)).count();
+        self.conflicts.set(self.conflicts.get() + learnt as u64);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Passes a DRAT proof on, counts the clauses that it adds, and fails when a limit or the budget is reached.
+struct DratSink {
+    limits: Limits,
+    budget: u64,
+    conflicts: u64,
+    at_line_start: bool,
+    proof: Box<dyn io::Write>,
+}
+
+impl io::Write for DratSink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.limits.reached() || self.conflicts > self.budget {
+            return Err(io::Error::other("limit reached"));
+        }
         let mut added = 0;
         for byte in bytes {
             added += u64::from(self.at_line_start && *byte != b'd');
             self.at_line_start = *byte == b'\n';
         }
-        self.conflicts.set(self.conflicts.get() + added);
+        self.conflicts += added;
         self.proof.write_all(bytes)?;
         Ok(bytes.len())
     }

@@ -1,0 +1,98 @@
+//! The bounded reading of a metric that actions improve: fewest steps first, then the metric.
+
+use crate::bounds::Bounds;
+use crate::optimize::{Best, Config, Run, Tightened, optimize};
+use crate::plan::{GroundStep, decode, replay};
+use crate::quantity::Quantity;
+use crate::solution::{Improvement, Proof, Solution, Status, Unbounded};
+use crate::task::Task;
+
+impl Run<'_> {
+    /// For a metric that actions improve: fewest steps first, then the best metric among those plans.
+    pub(super) fn bounded_reading(self) -> Solution {
+        let lowest = self.task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or(0);
+        let by_steps = self.task.with_costs(|_| Quantity::constant(1));
+        let mut silent = |_: Improvement| {};
+        let shortest = optimize(&by_steps, self.config, &mut silent);
+        let steps = match (&shortest.plan, shortest.status) {
+            (Some(plan), Status::Optimal) => plan.steps.len(),
+            // The plan that there may be is measured by its steps, not by the metric: of no use to the user.
+            (Some(_), _) => {
+                return Solution {
+                    status: Status::Unknown,
+                    plan: None,
+                    ground: None,
+                    lower_bound: None,
+                    ..shortest
+                };
+            }
+            (None, _) => return Solution { lower_bound: None, ..shortest },
+        };
+        // Every plan of the task with this horizon has exactly this many steps, so a constant for each step
+        // changes nothing but the sign of the costs.
+        let shifted = self.task.with_costs(|operator| {
+            let mut cost = operator.cost.clone();
+            cost.constant -= lowest;
+            cost
+        });
+        let config = Config { horizon: Some(steps), ..self.config.clone() };
+        let mut run = Run {
+            task: &shifted,
+            config: &config,
+            report: &mut silent,
+            statistics: self.statistics,
+            bounds: None,
+        };
+        let bounds = Bounds::new(&shifted, &self.config.limits);
+        let plan = match run.first_plan(&bounds) {
+            Ok(plan) => plan,
+            Err(solution) => return *solution,
+        };
+        let mut best = Best { plan, lower: 0 };
+        let mut extent = run.extent(&bounds, best.plan.cost - 1, &best);
+        extent.allowed.truncate(steps);
+        let tightened = run.within(&bounds, &extent, &mut best, false);
+        let proof = matches!(tightened, Tightened::Exhausted).then_some(Proof::Sat { step_bound: steps });
+        let mut plan = best.plan;
+        let statistics = run.statistics;
+        plan.cost += lowest * steps as i64;
+        let unbounded =
+            if self.task.can_repeat_reward(&plan.steps) { Unbounded::Proved } else { Unbounded::Suspected };
+        Solution {
+            status: Status::Feasible,
+            plan: Some(decode(self.task, &plan)),
+            ground: Some(plan),
+            lower_bound: None,
+            horizon: steps,
+            proof,
+            unbounded: Some(unbounded),
+            statistics,
+        }
+    }
+}
+
+impl Task {
+    /// The same task with other costs, and a metric of their plain sum.
+    fn with_costs(&self, cost: impl Fn(&crate::task::Operator) -> Quantity<i64>) -> Self {
+        let mut task = self.clone();
+        for operator in &mut task.operators {
+            operator.cost = cost(operator);
+        }
+        task.objective = crate::task::Objective::sum();
+        task
+    }
+
+    /// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is.
+    fn can_repeat_reward(&self, plan: &[GroundStep]) -> bool {
+        let Some((states, _)) = replay(self, plan) else { return false };
+        states.iter().any(|state| {
+            self.operators.iter().filter(|operator| operator.cost.minimum() < 0).any(|operator| {
+                operator.choices().any(|choice| {
+                    operator.cost.at(&choice, &operator.sizes()) < 0
+                        && operator.applicable(state, &choice)
+                        && self.successor(operator, state, &choice) == *state
+                })
+            })
+        })
+    }
+}

@@ -1,0 +1,135 @@
+//! Strategies against an oracle that goes through all states, and what they say before the end.
+
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use crate::limits::Limits;
+use crate::optimize::{Config, Strategy, optimize};
+use crate::plan::{Exact, metric};
+use crate::sat::Backend;
+use crate::solution::{Solution, Status};
+use crate::task::Task;
+use crate::tests::{built_in, depot, fleet, ground_text, optimum};
+
+const STRATEGIES: [Strategy; 3] = [Strategy::Auto, Strategy::Tighten, Strategy::Cores];
+
+/// Fleets and depots that have a plan, with its least cost.
+fn tasks(seeds: std::ops::Range<u64>) -> impl Iterator<Item = (String, Task, i64)> {
+    seeds.flat_map(|seed| [fleet(seed), depot(seed)]).filter_map(|text| {
+        let problem = text.1.clone();
+        let task = ground_text(text);
+        let best = if task.unreachable.is_none() { optimum(&task) } else { None };
+        best.map(|best| (problem, task, best))
+    })
+}
+
+fn config(backend: &Backend, strategy: Strategy, limits: Limits) -> Config {
+    Config { quick_search: false, strategy, backend: backend.clone(), limits, ..Config::default() }
+}
+
+/// A plan, and what is claimed of it: a proof wherever plans have a step bound.
+fn check_optimum(context: &str, (task, best): (&Task, i64), config: &Config) -> bool {
+    let solution = optimize(task, config, &mut |_| {});
+    let best = metric(task, best);
+    let cost = solution.plan.as_ref().map(|plan| plan.cost);
+    let context = || format!("{config:?}: {context}: {solution:?}");
+    let proved = solution.status == Status::Optimal;
+    assert!(cost.is_some_and(|cost| cost == best || !proved && at_most(best, cost)), "{}", context());
+    assert!(solution.lower_bound.is_some_and(|bound| at_most(bound, best)), "{}", context());
+    let costly = task.operators.iter().all(|operator| operator.cost.minimum() > 0);
+    assert!(proved || !costly, "{}", context());
+    proved
+}
+
+fn at_most(a: Exact, b: Exact) -> bool {
+    i128::from(a.numerator) * i128::from(b.denominator) <= i128::from(b.numerator) * i128::from(a.denominator)
+}
+
+fn check_optima(seeds: std::ops::Range<u64>) {
+    let tasks: Vec<_> = tasks(seeds).collect();
+    for backend in built_in() {
+        for strategy in STRATEGIES {
+            let config = config(&backend, strategy, Limits::none());
+            let proved =
+                tasks.iter().filter(|(text, task, best)| check_optimum(text, (task, *best), &config));
+            assert!(2 * proved.count() > tasks.len(), "{config:?}");
+        }
+    }
+}
+
+#[test]
+fn every_strategy_finds_the_optimum() {
+    check_optima(0..6);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn every_strategy_finds_the_optimum_of_many() {
+    check_optima(6..1_100);
+}
+
+/// Every report and the answer hold the optimum between them, and reports only get better. The run is stopped after some of
+/// them; returns whether it had come further than that.
+fn check_reports(context: &str, (task, best): (&Task, i64), config: &Config, stop_after: usize) -> bool {
+    let interrupt = config.limits.interrupt();
+    let best = metric(task, best);
+    let mut last: Option<(Exact, Exact)> = None;
+    let mut reports = 0;
+    let context = |solution: Option<&Solution>| format!("{config:?}, {stop_after}: {context}: {solution:?}");
+    let solution = optimize(task, config, &mut |improvement| {
+        let (cost, bound) = (improvement.cost, improvement.lower_bound);
+        assert!(at_most(bound, best) && at_most(best, cost), "{bound} {best} {cost} {}", context(None));
+        if let Some((before, below)) = last {
+            assert!(at_most(cost, before) && at_most(below, bound), "{}", context(None));
+        }
+        assert_eq!(improvement.gap() == 0.0, cost == bound, "{}", context(None));
+        last = Some((cost, bound));
+        reports += 1;
+        if reports == stop_after {
+            interrupt.store(true, Ordering::Relaxed);
+        }
+    });
+    let cost = solution.plan.as_ref().map(|plan| plan.cost);
+    let (before, below) = last.unzip();
+    assert!(cost.is_none_or(|cost| at_most(best, cost)), "{}", context(Some(&solution)));
+    assert!(before.is_none_or(|before| cost.is_some_and(|cost| at_most(cost, before))));
+    let bound = solution.lower_bound;
+    assert!(bound.is_none_or(|bound| at_most(bound, best)), "{}", context(Some(&solution)));
+    assert!(below.is_none_or(|below| bound.is_some_and(|bound| at_most(below, bound))));
+    if solution.status == Status::Optimal {
+        assert_eq!((cost, bound), (Some(best), Some(best)), "{}", context(Some(&solution)));
+    }
+    reports >= stop_after
+}
+
+fn check_anytime(seeds: std::ops::Range<u64>) {
+    let tasks: Vec<_> = tasks(seeds).collect();
+    for backend in built_in() {
+        for strategy in STRATEGIES {
+            let mut stopped = 0;
+            for (text, task, best) in &tasks {
+                let further = (1..5).take_while(|stop_after| {
+                    let config = config(&backend, strategy, Limits::none());
+                    check_reports(text, (task, *best), &config, *stop_after)
+                });
+                stopped += further.count();
+                for microseconds in [0, 300, 2_000] {
+                    let limits = Limits::none().with_time(Duration::from_micros(microseconds));
+                    check_reports(text, (task, *best), &config(&backend, strategy, limits), usize::MAX);
+                }
+            }
+            assert!(stopped > tasks.len(), "{backend:?}, {strategy:?}: {stopped} of {}", tasks.len());
+        }
+    }
+}
+
+#[test]
+fn the_optimum_lies_between_bound_and_cost_at_any_time() {
+    check_anytime(0..5);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn the_optimum_of_many_lies_between_bound_and_cost_at_any_time() {
+    check_anytime(5..600);
+}

@@ -1,0 +1,81 @@
+//! Cheaper and cheaper plans from one solver, until there is none.
+
+use std::time::Instant;
+
+use crate::encode::Encoding;
+use crate::optimize::{Best, Run, Tightened};
+use crate::plan::{GroundPlan, GroundStep, replay};
+use crate::sat::{Answer, Lit, Solver};
+
+/// A solver that has the clauses of a formula, up to some position.
+pub(super) struct Live {
+    pub(super) solver: Box<dyn Solver>,
+    known: usize,
+    conflicts: u64,
+}
+
+impl Run<'_> {
+    /// A solver without clauses that gives up at a limit, or after learning `budget` clauses.
+    pub(super) fn live(&self, budget: u64) -> Live {
+        Live { solver: self.config.backend.start(&self.config.limits, budget), known: 0, conflicts: 0 }
+    }
+
+    /// Decides a formula under assumptions, by a solver that may know a part of it; a plan comes with the answer that it is
+    /// satisfiable.
+    pub(super) fn call(
+        &mut self,
+        live: &mut Live,
+        encoding: &Encoding<'_>,
+        assumptions: &[Lit],
+    ) -> (Answer, Option<GroundPlan>) {
+        let started = Instant::now();
+        let formula = &encoding.formula;
+        for (_, clause) in formula.clauses_from(live.known) {
+            live.solver.add_clause(clause);
+        }
+        live.known = formula.len();
+        if formula.variables() >= self.statistics.variables {
+            self.statistics.variables = formula.variables();
+            self.statistics.clauses = formula.len();
+            self.statistics.families = formula.counts();
+        }
+        let answer = live.solver.solve(assumptions);
+        self.statistics.calls += 1;
+        self.statistics.conflicts += live.solver.conflicts() - live.conflicts;
+        live.conflicts = live.solver.conflicts();
+        if let Some(reason) = live.solver.failure() {
+            self.statistics.failure = Some(reason.to_owned());
+        }
+        self.statistics.solve += started.elapsed();
+        let plan = if answer == Answer::Satisfiable {
+            self.check(encoding.decode(live.solver.as_ref()))
+        } else {
+            None
+        };
+        (answer, plan)
+    }
+
+    /// A plan of the solver, replayed. That it is applicable is what the encoding is for; that it is, is checked.
+    fn check(&self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
+        let replayed = replay(self.task, &steps);
+        debug_assert!(replayed.is_some(), "the encoding admits a sequence that is no plan");
+        let (_, cost) = replayed?;
+        Some(GroundPlan { steps, cost })
+    }
+
+    /// Asks for cheaper and cheaper plans of a formula until there is none. The solver keeps what it has learnt: a lower limit is
+    /// one more clause. It gives up after learning `budget` clauses.
+    pub(super) fn tighten(&mut self, mut encoding: Encoding<'_>, best: &mut Best, budget: u64) -> Tightened {
+        let mut live = self.live(budget);
+        loop {
+            let better = match self.call(&mut live, &encoding, &[]) {
+                (Answer::Unsatisfiable, _) => return Tightened::Exhausted,
+                (_, None) => return Tightened::Interrupted,
+                (_, Some(better)) => better,
+            };
+            best.plan = better;
+            self.announce(best, encoding.horizon());
+            encoding.tighten(best.plan.cost - 1);
+        }
+    }
+}
