@@ -10,6 +10,7 @@ The optimum: Pareto label setting over (waypoint, energy, time). Energy and time
 undominated sums are built function by function.
 """
 
+import functools
 import heapq
 import itertools
 import math
@@ -70,7 +71,10 @@ class Map:
 
     def domain(self, battery):
         each = lambda form: " ".join(form.format(i=i) for i in range(self.k))
-        product = lambda name: f"(* (distance ?from ?to) (+ 0 {each('(' + name + ' ?fd{i})')}))"
+        # Sums of two: not every planner reads more.
+        join = lambda left, right: f"(+ {left} {right})"
+        total = lambda name: functools.reduce(join, (f"({name} ?fd{i})" for i in range(self.k)))
+        product = lambda name: f"(* (distance ?from ?to) {total(name)})"
         functions = "(distance ?from ?to - waypoint) (energy ?fd - function_design) (time ?fd - function_design) (battery)"
         condition, effect = f"(>= (battery) {product('energy')})", f"(decrease (battery) {product('energy')})"
         time = product("time")
