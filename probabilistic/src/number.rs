@@ -11,6 +11,14 @@ use num_traits::{One, ToPrimitive, Zero};
 /// Relative difference of doubles below which one is not better than the other.
 const TOLERANCE: f64 = 1e-12;
 
+/// Whole doubles below are exact numbers of the model, or sums of such numbers.
+const WHOLE: f64 = 4e15;
+
+/// Whether a double is a sum of whole numbers that were not rounded.
+pub(crate) fn is_whole(value: f64) -> bool {
+    value.fract() == 0.0 && value < WHOLE
+}
+
 /// A field with an order; probabilities, rewards and values.
 pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     /// Whether arithmetic is exact.
@@ -20,7 +28,8 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     fn zero() -> Self;
     /// One.
     fn one() -> Self;
-    /// The nearest number of this kind.
+    /// The nearest number of this kind; where doubles are whole, they are exact: what would be rounded to a whole double
+    /// becomes the one beside it.
     fn from_rational(value: &BigRational) -> Self;
     /// The nearest double.
     fn to_f64(&self) -> f64;
@@ -46,6 +55,24 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     fn size(&self) -> u64;
 }
 
+/// What both kinds have operators for.
+macro_rules! arithmetic {
+    () => {
+        fn plus(&self, other: &Self) -> Self {
+            self + other
+        }
+        fn minus(&self, other: &Self) -> Self {
+            self - other
+        }
+        fn times(&self, other: &Self) -> Self {
+            self * other
+        }
+        fn over(&self, other: &Self) -> Self {
+            self / other
+        }
+    };
+}
+
 impl Number for f64 {
     const EXACT: bool = false;
 
@@ -56,7 +83,15 @@ impl Number for f64 {
         1.0
     }
     fn from_rational(value: &BigRational) -> Self {
-        ToPrimitive::to_f64(value).unwrap_or(f64::NAN)
+        let nearest = ToPrimitive::to_f64(value).unwrap_or(f64::NAN);
+        if nearest.fract() != 0.0 || nearest.abs() >= WHOLE {
+            return nearest;
+        }
+        match BigRational::from_float(nearest) {
+            Some(back) if back < *value => nearest.next_up(),
+            Some(back) if back > *value => nearest.next_down(),
+            _ => nearest,
+        }
     }
     fn to_f64(&self) -> f64 {
         *self
@@ -64,18 +99,7 @@ impl Number for f64 {
     fn to_rational(&self) -> Option<BigRational> {
         None
     }
-    fn plus(&self, other: &Self) -> Self {
-        self + other
-    }
-    fn minus(&self, other: &Self) -> Self {
-        self - other
-    }
-    fn times(&self, other: &Self) -> Self {
-        self * other
-    }
-    fn over(&self, other: &Self) -> Self {
-        self / other
-    }
+    arithmetic!();
     fn is_zero(&self) -> bool {
         *self == 0.0
     }
@@ -105,18 +129,7 @@ impl Number for BigRational {
     fn to_rational(&self) -> Option<BigRational> {
         Some(self.clone())
     }
-    fn plus(&self, other: &Self) -> Self {
-        self + other
-    }
-    fn minus(&self, other: &Self) -> Self {
-        self - other
-    }
-    fn times(&self, other: &Self) -> Self {
-        self * other
-    }
-    fn over(&self, other: &Self) -> Self {
-        self / other
-    }
+    arithmetic!();
     fn is_zero(&self) -> bool {
         Zero::is_zero(self)
     }

@@ -31,18 +31,34 @@ pub struct Objective<N> {
 pub struct Point<N> {
     /// The losses: expected cost, or probability of missing the target.
     pub losses: [N; 2],
+    /// How far each loss can be from what the policy loses; 0 where arithmetic is exact.
+    pub errors: [f64; 2],
     /// The choices until the first target.
     pub policy: Vec<u32>,
 }
 
 /// The least value of the first objective under a bound on the second.
+///
+/// In doubles the bound counts as kept where it is missed by no more than 10^-12 (relative to the bound, if that is
+/// above 1).
 #[derive(Debug, Clone)]
 pub struct Constrained<N> {
     /// By policies that may draw lots.
-    pub randomised: N,
+    pub randomised: Bounded<N>,
     /// By policies that may not (and that remember only which targets have been reached); with whether it is proved
     /// to be the least one. None where there is none.
-    pub deterministic: Option<(N, bool)>,
+    pub deterministic: Option<(Bounded<N>, bool)>,
+}
+
+/// A loss with bounds, which say nothing where arithmetic is exact.
+#[derive(Debug, Clone)]
+pub struct Bounded<N> {
+    /// The loss.
+    pub value: N,
+    /// It is at least this.
+    pub lower: f64,
+    /// It is at most this.
+    pub upper: f64,
 }
 
 /// How many vertices are looked for at most.
@@ -57,6 +73,8 @@ pub struct Pareto<'a, N> {
     objectives: &'a [Objective<N>; 2],
     /// What each objective is worth alone, as a loss; infinite states apart.
     alone: [Vec<N>; 2],
+    /// The greatest error of that.
+    alone_errors: [f64; 2],
     /// Both targets.
     terminal: FixedBitSet,
     /// States that leave no hope for a cost.
@@ -73,7 +91,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         let n = mdp.states();
         let mut terminal = FixedBitSet::with_capacity(n);
         let mut blocked = FixedBitSet::with_capacity(n);
-        let mut alone = [Vec::new(), Vec::new()];
+        let (mut alone, mut alone_errors) = ([Vec::new(), Vec::new()], [0.0, 0.0]);
         let has_costs = objectives.iter().any(|objective| objective.rewards.is_some());
         for (number, objective) in objectives.iter().enumerate() {
             terminal.union_with(&objective.target);
@@ -82,6 +100,7 @@ impl<'a, N: Number> Pareto<'a, N> {
                 Some(_) => solution.values,
                 None => solution.values.iter().map(|value| N::one().minus(value)).collect(),
             };
+            alone_errors[number] = solution.errors.iter().fold(0.0, |most: f64, error| most.max(*error));
             blocked.union_with(&solution.infinite);
         }
         // A state from which a cost is infinite must be avoided before its target, not after it.
@@ -91,7 +110,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             blocked.set(state, pending);
         }
         terminal.difference_with(&blocked);
-        Ok(Self { mdp, objectives, alone, terminal, blocked, has_costs })
+        Ok(Self { mdp, objectives, alone, alone_errors, terminal, blocked, has_costs })
     }
 
     /// The worth of the targets for one objective.
@@ -144,14 +163,17 @@ impl<'a, N: Number> Pareto<'a, N> {
     fn point(&self, policy: Vec<u32>) -> Result<Point<N>, Exhausted> {
         let allowed = choices_of(self.mdp, &policy);
         let unit = [[N::one(), N::zero()], [N::zero(), N::one()]];
-        let mut losses = Vec::new();
-        for weights in &unit {
+        let (mut losses, mut errors) = ([N::zero(), N::zero()], [0.0; 2]);
+        for (number, weights) in unit.iter().enumerate() {
             let (solution, _) = self.solve(weights, Some(&allowed))?;
             let value = solution.values[0].clone();
-            losses.push(if self.has_costs { value } else { N::one().minus(&value) });
+            losses[number] = if self.has_costs { value } else { N::one().minus(&value) };
+            if !N::EXACT {
+                // Values as complements of probabilities are rounded once more, at the start and at the end.
+                errors[number] = solution.errors[0] + self.alone_errors[number] + 2.0 * f64::EPSILON;
+            }
         }
-        let losses = <[N; 2]>::try_from(losses).map_err(|_| Exhausted)?;
-        Ok(Point { losses, policy })
+        Ok(Point { losses, errors, policy })
     }
 
     /// The best point for one objective, and for the other among those.
@@ -215,15 +237,45 @@ impl<'a, N: Number> Pareto<'a, N> {
     /// Exact arithmetic takes too long.
     pub fn constrained(&self, limit: &N) -> Result<Option<Constrained<N>>, Exhausted> {
         let vertices = self.vertices(None)?;
-        let Some((randomised, _)) = lower_hull(&vertices, limit) else { return Ok(None) };
+        let Some((value, segment)) = lower_hull(&vertices, limit) else { return Ok(None) };
+        let lower = self.below(&vertices, segment, limit, None)?;
+        let randomised = Bounded { value, lower, upper: above(&vertices, segment, limit) };
         let deterministic = self.deterministic(limit)?;
         Ok(Some(Constrained { randomised, deterministic }))
     }
 
+    /// What no mixture of policies gets below while it keeps the limit: each has a weighted sum of losses that is at least
+    /// the least one.
+    fn below(
+        &self,
+        vertices: &[Point<N>],
+        segment: Option<(usize, usize)>,
+        limit: &N,
+        allowed: Option<&FixedBitSet>,
+    ) -> Result<f64, Exhausted> {
+        if N::EXACT {
+            return Ok(0.0);
+        }
+        let weights = segment.map_or([N::one(), N::zero()], |(left, right)| {
+            let (a, b) = (&vertices[left].losses, &vertices[right].losses);
+            [a[1].minus(&b[1]), b[0].minus(&a[0])]
+        });
+        let (solution, _) = self.solve(&weights, allowed)?;
+        let [first, second] = weights.each_ref().map(Number::to_f64);
+        let value = solution.values[0].to_f64();
+        let least = if self.has_costs { value } else { first + second - value };
+        let error = solution.errors[0] + first * self.alone_errors[0] + second * self.alone_errors[1];
+        let spent = second * kept_limit(limit.to_f64());
+        let rounding = 16.0 * f64::EPSILON * (least.abs() + spent + first);
+        Ok(((least - spent - error - rounding) / first).next_down().max(0.0))
+    }
+
     /// Branch and bound over the choices at states where two neighbouring vertices differ; the randomised optimum of a
     /// restricted process bounds what is left.
-    fn deterministic(&self, limit: &N) -> Result<Option<(N, bool)>, Exhausted> {
-        let mut best: Option<N> = None;
+    fn deterministic(&self, limit: &N) -> Result<Option<(Bounded<N>, bool)>, Exhausted> {
+        let mut best: Option<Bounded<N>> = None;
+        // What has been given up is at least so much.
+        let mut lower = f64::INFINITY;
         let mut all = FixedBitSet::with_capacity(self.mdp.choice_count());
         all.insert_range(..);
         let mut open = vec![all];
@@ -231,21 +283,23 @@ impl<'a, N: Number> Pareto<'a, N> {
         while let Some(allowed) = open.pop() {
             tried += 1;
             if tried > BRANCHES {
-                return Ok(best.map(|best| (best, false)));
+                return Ok(best.map(|best| (Bounded { lower: 0.0, ..best }, false)));
             }
             let vertices = self.vertices(Some(&allowed))?;
             for vertex in &vertices {
-                let better = best.as_ref().is_none_or(|best| vertex.losses[0] < *best);
+                let better = best.as_ref().is_none_or(|best| vertex.losses[0] < best.value);
                 if keeps(&vertex.losses[1], limit) && better {
-                    best = Some(vertex.losses[0].clone());
+                    let upper = (vertex.losses[0].to_f64() + vertex.errors[0]).next_up();
+                    best = Some(Bounded { value: vertex.losses[0].clone(), lower: 0.0, upper });
                 }
             }
             let Some((bound, segment)) = lower_hull(&vertices, limit) else { continue };
-            if best.as_ref().is_some_and(|best| !bound.clearly_less(best)) {
-                continue;
-            }
-            let Some((left, right)) = segment else { continue };
-            let Some(state) = self.difference(&vertices[left].policy, &vertices[right].policy) else {
+            let improves = best.as_ref().is_none_or(|best| bound.clearly_less(&best.value));
+            let state = segment
+                .filter(|_| improves)
+                .and_then(|(left, right)| self.difference(&vertices[left].policy, &vertices[right].policy));
+            let Some(state) = state else {
+                lower = lower.min(self.below(&vertices, segment, limit, Some(&allowed))?);
                 continue;
             };
             for choice in self.mdp.choices(state).filter(|choice| allowed.contains(*choice)) {
@@ -256,7 +310,7 @@ impl<'a, N: Number> Pareto<'a, N> {
                 open.push(restricted);
             }
         }
-        Ok(best.map(|best| (best, true)))
+        Ok(best.map(|best| (Bounded { lower: lower.min(best.upper), ..best }, true)))
     }
 
     /// The first state on the way of a policy at which another one does something else.
@@ -285,15 +339,8 @@ impl<'a, N: Number> Pareto<'a, N> {
 }
 
 fn problem<'p, N: Number>(mdp: &'p Mdp<N>, objective: &'p Objective<N>) -> Problem<'p, N> {
-    Problem {
-        mdp,
-        direction: if objective.rewards.is_some() { Direction::Min } else { Direction::Max },
-        rewards: objective.rewards.as_deref(),
-        terminal: &objective.target,
-        terminal_values: None,
-        blocked: None,
-        allowed: None,
-    }
+    let direction = if objective.rewards.is_some() { Direction::Min } else { Direction::Max };
+    Problem::new(mdp, direction, objective.rewards.as_deref(), &objective.target)
 }
 
 fn clearly_positive<N: Number>(value: &N) -> bool {
@@ -301,7 +348,30 @@ fn clearly_positive<N: Number>(value: &N) -> bool {
 }
 
 fn keeps<N: Number>(loss: &N, limit: &N) -> bool {
-    if N::EXACT { loss <= limit } else { loss.to_f64() <= limit.to_f64() + 1e-12 }
+    if N::EXACT { loss <= limit } else { loss.to_f64() <= kept_limit(limit.to_f64()) }
+}
+
+/// What still counts as keeping a limit in doubles.
+fn kept_limit(limit: f64) -> f64 {
+    limit + 1e-12 * limit.max(1.0)
+}
+
+/// What a mixture of two vertices that keeps the limit loses at most.
+fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limit: &N) -> f64 {
+    let worst = |point: &Point<N>, number: usize| point.losses[number].to_f64() + point.errors[number];
+    let limit = limit.to_f64();
+    let (left, right) = segment.unwrap_or((0, 0));
+    let (a, b) = (&vertices[left], &vertices[right]);
+    // The limit itself may be rounded.
+    let strict = limit - 2.0 * f64::EPSILON * limit.max(1.0);
+    let limit = if worst(b, 1) <= strict { strict } else { kept_limit(limit) };
+    if worst(b, 1) > limit {
+        return f64::INFINITY;
+    }
+    let share = ((worst(a, 1) - limit) / (worst(a, 1) - worst(b, 1))).clamp(0.0, 1.0);
+    let share = if left == right { 1.0 } else { share };
+    let most = worst(a, 0) * (1.0 - share) + worst(b, 0) * share;
+    most + 16.0 * f64::EPSILON * (worst(a, 0) + worst(b, 0))
 }
 
 /// The least first loss of mixtures of vertices that keep the limit; with the two vertices that are mixed, if it takes two.

@@ -77,13 +77,9 @@ pub fn with_secondary<N: Number>(
         return None;
     }
     let second = Problem {
-        mdp: problem.mdp,
-        direction: Direction::Min,
-        rewards: Some(secondary),
-        terminal: &terminal,
-        terminal_values: None,
         blocked: problem.blocked,
         allowed: Some(&allowed),
+        ..Problem::new(problem.mdp, Direction::Min, Some(secondary), &terminal)
     };
     solve(second, None)
 }

@@ -65,6 +65,11 @@ impl Answer {
         Self::Finite(Quantity { value, lower: lower.max(0.0), upper, exact: None })
     }
 
+    /// From a rounded number and its bounds.
+    pub fn between(value: f64, [lower, upper]: [f64; 2]) -> Self {
+        Self::Finite(Quantity { value, lower, upper, exact: None })
+    }
+
     /// From an exact number.
     pub fn from_exact(exact: BigRational) -> Self {
         let (lower, upper) = enclosing(&exact);

@@ -1,6 +1,7 @@
 //! A property and an explored model to an outcome, in one kind of number.
 
 use fixedbitset::FixedBitSet;
+use num_rational::BigRational;
 
 use crate::check::answer::{Answer, Outcome};
 use crate::check::{Options, reaches, steps};
@@ -8,8 +9,8 @@ use crate::error::{Diagnostic, Error, Place};
 use crate::explore::{DEADLOCK, Explored};
 use crate::mdp::Mdp;
 use crate::number::Number;
-use crate::pareto::{Constrained, Objective, Pareto};
-use crate::policy::{evaluate, with_secondary};
+use crate::pareto::{Bounded, Constrained, Objective, Pareto};
+use crate::policy::{choices_of, evaluate, with_secondary};
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, ModelKind, Type};
 use crate::prism::{Code, Names, Packed, Program};
 use crate::property::{Path, Property, Question, RewardPath, Steps};
@@ -98,7 +99,7 @@ pub fn validate<N: Number>(program: &Program<N>, property: &Property) -> Result<
 }
 
 /// An expression of a property; `"init"` and `"deadlock"` are known without declaration.
-fn typed<N: Number>(names: &mut Names<N>, expression: &Expr, kind: Type) -> Result<Code<N>, Diagnostic> {
+fn typed(names: &mut Names, expression: &Expr, kind: Type) -> Result<Code, Diagnostic> {
     let built_in = |label: &str| ["init", "deadlock"].contains(&label);
     match &expression.kind {
         ExprKind::Label(label) if built_in(label) && !names.labels().contains(&label.as_str()) => {
@@ -116,6 +117,10 @@ impl<N: Number> Query<'_, N> {
     /// Answers a property.
     pub fn answer(&self, property: &Property, options: &Options<'_>) -> Result<Found, Error> {
         match property {
+            Property::Multi(_) if options.evaluate.is_some() => {
+                let text = "a policy is evaluated for one objective at a time";
+                Err(property_error("Q403", Place { line: 1, column: 1 }, text))
+            }
             Property::Multi(parts) => self.multi(parts),
             Property::Probability(question, path) => {
                 let direction = self.direction(question)?;
@@ -132,12 +137,9 @@ impl<N: Number> Query<'_, N> {
                         self.solved(problem, options, false)?
                     }
                     RewardPath::Steps(limit) => {
-                        let values = vec![N::zero(); self.mdp().states()];
                         let none = FixedBitSet::with_capacity(self.mdp().states());
-                        let limit = self.limit(limit)?;
-                        let (values, error) =
-                            steps::apply(self.mdp(), direction, Some(rewards), &none, values, limit);
-                        Some((Answer::from_number(&values[0], error), None))
+                        let problem = self.problem(direction, Some(rewards), &none);
+                        self.stepped(problem, vec![N::zero(); self.mdp().states()], limit, options)?
                     }
                 };
                 self.judge(found, question)
@@ -165,15 +167,16 @@ impl<N: Number> Query<'_, N> {
             return Ok(Some((Outcome::Value(answer), policy)));
         };
         let bound = self.constant(bound)?;
-        let exact = answer.quantity().and_then(|quantity| quantity.exact.clone()).zip(bound.to_rational());
-        let outcome = match (&answer, exact) {
-            (_, Some((value, limit))) => Outcome::Truth(compare(*op, value.cmp(&limit)), Some(answer)),
-            (Answer::Finite(quantity), None) => {
-                let holds = |value: f64| compare(*op, value.total_cmp(&bound.to_f64()));
-                let (low, high) = (holds(quantity.lower), holds(quantity.upper));
+        let holds = |value: Option<BigRational>| {
+            compare(*op, value.map_or(std::cmp::Ordering::Greater, |value| value.cmp(&bound)))
+        };
+        let outcome = match &answer {
+            Answer::Finite(quantity) => {
+                let end = |end: f64| quantity.exact.clone().or_else(|| BigRational::from_float(end));
+                let (low, high) = (holds(end(quantity.lower)), holds(end(quantity.upper)));
                 if low == high { Outcome::Truth(low, Some(answer)) } else { Outcome::Undecided(answer) }
             }
-            _ => Outcome::Truth(compare(*op, std::cmp::Ordering::Greater), Some(answer)),
+            _ => Outcome::Truth(holds(None), Some(answer)),
         };
         Ok(Some((outcome, policy)))
     }
@@ -182,17 +185,10 @@ impl<N: Number> Query<'_, N> {
         let opposite = if direction == Direction::Min { Direction::Max } else { Direction::Min };
         match path {
             Path::Next(goal) => {
-                let goal = self.states(goal)?;
+                let values = indicator(&self.states(goal)?, self.mdp().states());
                 let none = FixedBitSet::with_capacity(self.mdp().states());
-                let (values, error) = steps::apply(
-                    self.mdp(),
-                    direction,
-                    None,
-                    &none,
-                    indicator(&goal, self.mdp().states()),
-                    1,
-                );
-                Ok(Some((Answer::from_number(&values[0], error).probability(), None)))
+                let once = Steps { limit: Expr::int(1), strict: false };
+                self.stepped(self.problem(direction, None, &none), values, &once, options)
             }
             Path::Globally(goal, limit) => {
                 let not = Expr { kind: ExprKind::Not(Box::new(goal.clone())), place: goal.place };
@@ -208,12 +204,28 @@ impl<N: Number> Query<'_, N> {
             Path::Until(left, right, Some(limit)) => {
                 let (terminal, blocked) = self.until(left, right)?;
                 let values = indicator(&terminal, self.mdp().states());
-                let fixed = &terminal | &blocked;
-                let (values, error) =
-                    steps::apply(self.mdp(), direction, None, &fixed, values, self.limit(limit)?);
-                Ok(Some((Answer::from_number(&values[0], error).probability(), None)))
+                let problem = Problem { blocked: Some(&blocked), ..self.problem(direction, None, &terminal) };
+                self.stepped(problem, values, limit, options)
             }
         }
+    }
+
+    /// Values after so many steps, of the best policy or of the one that was given.
+    fn stepped(
+        &self,
+        problem: Problem<'_, N>,
+        values: Vec<N>,
+        limit: &Steps,
+        options: &Options<'_>,
+    ) -> Result<Valued, Error> {
+        let given = options.evaluate.as_ref().map(|table| table.choices(self.program, self.explored));
+        let allowed = given.transpose()?.map(|policy| choices_of(self.mdp(), &policy));
+        let problem = Problem { allowed: allowed.as_ref(), ..problem };
+        let found = steps::apply(problem, values, self.limit(limit)?);
+        Ok(found.map(|(values, error)| {
+            let answer = Answer::from_number(&values[0], error);
+            (if problem.rewards.is_none() { answer.probability() } else { answer }, None)
+        }))
     }
 
     /// The states at which an until-path ends well, and those at which it ends badly.
@@ -231,15 +243,7 @@ impl<N: Number> Query<'_, N> {
         rewards: Option<&'p [N]>,
         terminal: &'p FixedBitSet,
     ) -> Problem<'p, N> {
-        Problem {
-            mdp: self.mdp(),
-            direction,
-            rewards,
-            terminal,
-            terminal_values: None,
-            blocked: None,
-            allowed: None,
-        }
+        Problem::new(self.mdp(), direction, rewards, terminal)
     }
 
     /// Solves a problem, or evaluates the policy that was given; breaks the ties of the policy.
@@ -277,15 +281,7 @@ impl<N: Number> Query<'_, N> {
             let rewards: Option<Vec<f64>> =
                 problem.rewards.map(|rewards| rewards.iter().map(Number::to_f64).collect());
             let Problem { direction, terminal, blocked, .. } = problem;
-            let doubles = Problem {
-                mdp,
-                direction,
-                rewards: rewards.as_deref(),
-                terminal,
-                terminal_values: None,
-                blocked,
-                allowed: None,
-            };
+            let doubles = Problem { blocked, ..Problem::new(mdp, direction, rewards.as_deref(), terminal) };
             solve(doubles, None)
         });
         solve(problem, hint.as_ref().map(|hint| &hint.policy[..]))
@@ -298,7 +294,7 @@ impl<N: Number> Query<'_, N> {
         Ok(&self.explored.rewards[at])
     }
 
-    fn constant(&self, expression: &Expr) -> Result<N, Error> {
+    fn constant(&self, expression: &Expr) -> Result<BigRational, Error> {
         let mut names = self.program.names.clone();
         let code = names.constant(expression, Type::Double);
         let value = code.and_then(|code| {
@@ -308,7 +304,7 @@ impl<N: Number> Query<'_, N> {
     }
 
     fn limit(&self, steps: &Steps) -> Result<u64, Error> {
-        let value = self.constant(&steps.limit)?.to_f64() - f64::from(u8::from(steps.strict));
+        let value = Number::to_f64(&self.constant(&steps.limit)?) - f64::from(u8::from(steps.strict));
         if (0.0..1e9).contains(&value) {
             return Ok(value as u64);
         }
@@ -357,22 +353,30 @@ impl<N: Number> Query<'_, N> {
         }
         let objectives = [self.objective(first)?, self.objective(second)?];
         let Ok(pareto) = Pareto::new(self.mdp(), &objectives) else { return Ok(None) };
-        let shown = |number: usize, loss: &N| {
+        let shown = |number: usize, loss: &N, error: f64| {
             let value = match objectives[number].rewards {
                 Some(_) => loss.clone(),
                 None => N::one().minus(loss),
             };
-            Answer::from_number(&value, 1e-9 * value.to_f64().max(1e-9))
+            let answer = Answer::from_number(&value, error);
+            if objectives[number].rewards.is_none() { answer.probability() } else { answer }
         };
         if let Some((_, bound)) = bound_of(second) {
-            let bound = self.constant(bound)?;
+            let bound = N::from_rational(&self.constant(bound)?);
             let limit = if objectives[1].rewards.is_some() { bound } else { N::one().minus(&bound) };
             let Ok(found) = pareto.constrained(&limit) else { return Ok(None) };
-            return Ok(Some((constrained(found, |loss| shown(0, loss)), None)));
+            let shown = |found: Bounded<N>| {
+                if N::EXACT {
+                    return shown(0, &found.value, 0.0);
+                }
+                let answer = Answer::between(found.value.to_f64(), [found.lower, found.upper]);
+                if objectives[0].rewards.is_none() { answer.complement() } else { answer }
+            };
+            return Ok(Some((constrained(found, shown), None)));
         }
         let Ok(vertices) = pareto.vertices(None) else { return Ok(None) };
         let pairs = vertices.iter().map(|vertex| {
-            let pair = [shown(0, &vertex.losses[0]), shown(1, &vertex.losses[1])];
+            let pair = [0, 1].map(|number| shown(number, &vertex.losses[number], vertex.errors[number]));
             if swapped {
                 let [a, b] = pair;
                 [b, a]
@@ -427,7 +431,7 @@ fn bound_of(property: &Property) -> Option<&(BinaryOp, Expr)> {
     }
 }
 
-fn constrained<N: Number>(found: Option<Constrained<N>>, shown: impl Fn(&N) -> Answer) -> Outcome {
+fn constrained<N: Number>(found: Option<Constrained<N>>, shown: impl Fn(Bounded<N>) -> Answer) -> Outcome {
     match found {
         None => Outcome::Constrained {
             randomised: Answer::Undefined,
@@ -437,8 +441,8 @@ fn constrained<N: Number>(found: Option<Constrained<N>>, shown: impl Fn(&N) -> A
         Some(found) => {
             let proved = found.deterministic.as_ref().is_some_and(|(_, proved)| *proved);
             Outcome::Constrained {
-                randomised: shown(&found.randomised),
-                deterministic: found.deterministic.map_or(Answer::Undefined, |(value, _)| shown(&value)),
+                randomised: shown(found.randomised),
+                deterministic: found.deterministic.map_or(Answer::Undefined, |(value, _)| shown(value)),
                 proved,
             }
         }

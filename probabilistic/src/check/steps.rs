@@ -1,33 +1,26 @@
 //! Values after a bounded number of steps: repeated application of the equations.
 
-use fixedbitset::FixedBitSet;
-
-use crate::mdp::Mdp;
 use crate::number::Number;
-use crate::solve::Direction;
+use crate::solve::{Direction, EXACT_WORK, Problem};
 
-/// Applies the equations of all states so many times, starting with `values`. The values of states in `fixed` do not
-/// change. The second result bounds the rounding error.
-pub fn apply<N: Number>(
-    mdp: &Mdp<N>,
-    direction: Direction,
-    rewards: Option<&[N]>,
-    fixed: &FixedBitSet,
-    mut values: Vec<N>,
-    steps: u64,
-) -> (Vec<N>, f64) {
-    let (mut widest, mut taken) = (1, 0);
+/// Applies the equations of all states so many times, starting with `values`. Those of the states at which the problem ends
+/// do not change. The second result bounds the rounding error. None where exact arithmetic takes too long.
+pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u64) -> Option<(Vec<N>, f64)> {
+    let mdp = problem.mdp;
+    let (mut widest, mut work) = (1, 0);
     for _ in 0..steps {
         let mut next = values.clone();
-        for state in (0..mdp.states()).filter(|state| !fixed.contains(*state)) {
+        for state in (0..mdp.states()).filter(|state| !problem.is_sink(*state)) {
             let mut best: Option<N> = None;
-            for choice in mdp.choices(state) {
+            for choice in problem.choices(state) {
                 widest = widest.max(mdp.targets(choice).len());
-                let start = rewards.map_or_else(N::zero, |rewards| rewards[choice].clone());
+                let start = problem.reward(choice);
                 let value = mdp
                     .transitions(choice)
                     .fold(start, |sum, (target, p)| sum.plus(&p.times(&values[target])));
-                let better = best.as_ref().is_none_or(|best| match direction {
+                // Fractions are reduced, which takes the square of their length.
+                work += if N::EXACT { value.size() * (1 + value.size() / 64) } else { 0 };
+                let better = best.as_ref().is_none_or(|best| match problem.direction {
                     Direction::Min => value < *best,
                     Direction::Max => value > *best,
                 });
@@ -38,8 +31,10 @@ pub fn apply<N: Number>(
             if let Some(best) = best {
                 next[state] = best;
             }
+            if work > EXACT_WORK {
+                return None;
+            }
         }
-        taken += 1;
         let settled = next == values;
         values = next;
         if settled {
@@ -47,6 +42,7 @@ pub fn apply<N: Number>(
         }
     }
     let greatest = values.iter().map(Number::to_f64).fold(0.0, f64::max);
-    let error = if N::EXACT { 0.0 } else { (taken * (widest + 2)) as f64 * f64::EPSILON * greatest };
-    (values, error)
+    // Values that settle may do so because of rounding, so that all steps count.
+    let error = if N::EXACT { 0.0 } else { steps as f64 * (widest + 2) as f64 * f64::EPSILON * greatest };
+    Some((values, error))
 }

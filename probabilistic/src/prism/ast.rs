@@ -59,6 +59,11 @@ pub enum BinaryOp {
 }
 
 impl BinaryOp {
+    /// Whether it makes a number of two.
+    pub fn is_arithmetic(self) -> bool {
+        matches!(self, Self::Plus | Self::Minus | Self::Times | Self::Divide)
+    }
+
     /// How it is written, and how strongly it binds.
     pub fn sign(self) -> (&'static str, u8) {
         match self {

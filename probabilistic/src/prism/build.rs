@@ -1,18 +1,21 @@
 //! Declarations, commands and rewards of the syntax tree to those of a program.
 
-use crate::error::Diagnostic;
+use num_rational::BigRational;
+use num_traits::{One, Signed};
+
+use crate::error::{Diagnostic, Place};
 use crate::number::Number;
 use crate::prism::ast::{self, Type};
-use crate::prism::code::Code;
+use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::compile::Names;
 use crate::prism::guard::Guard;
 use crate::prism::model::{Command, RewardItem, Update, Variable};
 
 /// How far the sum of probabilities may be from one, as in PRISM; what is within is scaled to one.
-pub const SUM_TOLERANCE: f64 = 1e-5;
+const SUM_TOLERANCE: f64 = 1e-5;
 
-pub fn declare<N: Number>(names: &mut Names<N>, variable: &ast::Variable) -> Result<Variable, Diagnostic> {
-    let whole = |names: &mut Names<N>, expression: &ast::Expr, kind| match names.constant(expression, kind)? {
+pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, Diagnostic> {
+    let whole = |names: &mut Names, expression: &ast::Expr, kind| match names.constant(expression, kind)? {
         Code::Whole(value) => Ok(value),
         _ => Err(Diagnostic::new("Q203", expression.place, "a whole number is needed here")),
     };
@@ -39,11 +42,11 @@ pub fn declare<N: Number>(names: &mut Names<N>, variable: &ast::Variable) -> Res
 
 pub fn compile_command<N: Number>(
     command: &ast::Command,
-    names: &mut Names<N>,
+    names: &mut Names,
     writable: impl Fn(&str) -> bool,
 ) -> Result<Command<N>, Vec<Diagnostic>> {
     let mut problems = Vec::new();
-    let mut keep = |result: Result<Code<N>, Diagnostic>| {
+    let mut keep = |result: Result<Code, Diagnostic>| {
         result.unwrap_or_else(|problem| {
             problems.push(problem);
             Code::Whole(0)
@@ -84,27 +87,49 @@ pub fn compile_command<N: Number>(
     if !problems.is_empty() {
         return Err(problems);
     }
-    let certain = certain(&updates);
+    let constant = updates.iter().all(|update| update.probability.is_constant());
+    let certain = constant.then(|| probabilities(&updates, &[], command.place)).and_then(Result::ok);
     Ok(Command { guard: Guard::new(guard), updates, certain, place: command.place })
 }
 
-/// The probabilities of updates where nothing can be wrong with them.
-fn certain<N: Number>(updates: &[Update<N>]) -> Option<Vec<N>> {
-    let constant = |update: &Update<N>| {
-        let value = update.probability.is_constant().then(|| update.probability.number(&[]));
-        value.and_then(Result::ok).filter(|value| *value >= N::zero())
-    };
-    let all: Vec<N> = updates.iter().map(constant).collect::<Option<_>>()?;
-    let sum = all.iter().fold(N::zero(), |sum, value| sum.plus(value));
-    let off = (sum.to_f64() - 1.0).abs();
-    (sum == N::one() || !N::EXACT && off <= 1e-13).then_some(all)
+/// The probabilities of the updates of a command, which sum to one.
+pub fn probabilities<N: Number>(
+    updates: &[Update],
+    values: &[i64],
+    place: Place,
+) -> Result<Vec<N>, Diagnostic> {
+    let fault = |Fault(text)| Diagnostic::new("Q303", place, text);
+    let mut exact = Vec::with_capacity(updates.len());
+    for update in updates {
+        let probability = update.probability.number(values).map_err(fault)?;
+        if probability.is_negative() {
+            let text = format!("a negative probability, {}", Number::to_f64(&probability));
+            return Err(Diagnostic::new("Q302", place, text));
+        }
+        exact.push(probability);
+    }
+    let sum: BigRational = exact.iter().sum();
+    let off = (Number::to_f64(&sum) - 1.0).abs();
+    if off.is_nan() || off > SUM_TOLERANCE {
+        let text = format!("the probabilities sum to {}, not to 1", Number::to_f64(&sum));
+        return Err(Diagnostic::new("Q301", place, text));
+    }
+    if !sum.is_one() {
+        for probability in &mut exact {
+            *probability /= &sum;
+        }
+    }
+    exact.iter().map(|probability| rounded(probability).map_err(fault)).collect()
 }
 
 pub fn reward_item<N: Number>(
     item: &ast::RewardItem,
-    names: &mut Names<N>,
+    names: &mut Names,
 ) -> Result<RewardItem<N>, Diagnostic> {
     let guard = Guard::new(names.typed(&item.guard, Type::Bool)?);
     let reward = names.typed(&item.reward, Type::Double)?;
-    Ok(RewardItem { guard, reward, place: item.place })
+    let value = reward.is_constant().then(|| reward.number(&[]));
+    let value = value.and_then(Result::ok).filter(|value| !value.is_negative());
+    let certain = value.and_then(|value| rounded(&value).ok());
+    Ok(RewardItem { guard, reward, certain, place: item.place })
 }

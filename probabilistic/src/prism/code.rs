@@ -1,19 +1,20 @@
-//! Expressions with names resolved and types known, and their evaluation.
+//! Expressions with names resolved and types known, and their evaluation: exact, so that `1 - 0.7 - 0.3` is zero whatever
+//! kind of number the model is solved in.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::ToPrimitive;
+use num_traits::{ToPrimitive, Zero};
 
 use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Function, Type};
 
 /// An expression over the values of the variables; truth values are 0 and 1.
 #[derive(Debug, Clone)]
-pub enum Code<N> {
+pub enum Code {
     /// A whole number or a truth value.
     Whole(i64),
     /// Any other number.
-    Number(N),
+    Number(BigRational),
     /// A variable.
     Variable(u32),
     /// `!`.
@@ -42,9 +43,12 @@ pub struct Fault(pub &'static str);
 
 type Result<T> = std::result::Result<T, Fault>;
 
+/// Bits that the operands of an operation may have together.
+const BITS: u64 = 100_000;
+
 const OVERFLOW: Fault = Fault("an integer grows out of its range");
 
-impl<N: Number> Code<N> {
+impl Code {
     /// Its truth value.
     pub fn holds(&self, values: &[i64]) -> Result<bool> {
         Ok(match self {
@@ -113,19 +117,22 @@ impl<N: Number> Code<N> {
         })
     }
 
-    /// Its value as a number.
-    pub fn number(&self, values: &[i64]) -> Result<N> {
+    /// Its value as a number, exactly.
+    pub fn number(&self, values: &[i64]) -> Result<BigRational> {
         Ok(match self {
             Self::Number(value) => value.clone(),
-            Self::Negative(inner, Type::Double) => N::zero().minus(&inner.number(values)?),
+            Self::Negative(inner, Type::Double) => -inner.number(values)?,
             Self::Arithmetic(op, Type::Double, left, right) => {
                 let (left, right) = (left.number(values)?, right.number(values)?);
+                if left.size() + right.size() > BITS {
+                    return Err(Fault("a number with too many digits"));
+                }
                 match op {
-                    BinaryOp::Plus => left.plus(&right),
-                    BinaryOp::Minus => left.minus(&right),
-                    BinaryOp::Times => left.times(&right),
-                    _ if right.is_zero() => return Err(Fault("a division by zero")),
-                    _ => left.over(&right),
+                    BinaryOp::Plus => left + right,
+                    BinaryOp::Minus => left - right,
+                    BinaryOp::Times => left * right,
+                    _ if Zero::is_zero(&right) => return Err(Fault("a division by zero")),
+                    _ => left / right,
                 }
             }
             Self::If(condition, then, otherwise) => {
@@ -160,8 +167,19 @@ impl<N: Number> Code<N> {
 }
 
 /// A whole number as a number.
-pub fn from_whole<N: Number>(value: i64) -> N {
-    N::from_rational(&BigRational::from(BigInt::from(value)))
+pub fn from_whole(value: i64) -> BigRational {
+    BigRational::from(BigInt::from(value))
+}
+
+/// A probability or a reward in the kind of number that is solved in.
+pub fn rounded<N: Number>(value: &BigRational) -> Result<N> {
+    let number = N::from_rational(value);
+    let magnitude = number.to_f64().abs();
+    // Doubles beyond lose digits that the bounds on results count on.
+    if N::EXACT || Zero::is_zero(value) || (1e-250..=1e250).contains(&magnitude) {
+        return Ok(number);
+    }
+    Err(Fault("a number that is too large or too small for doubles"))
 }
 
 fn compare(op: BinaryOp, order: Option<std::cmp::Ordering>) -> bool {
@@ -176,7 +194,7 @@ fn compare(op: BinaryOp, order: Option<std::cmp::Ordering>) -> bool {
     }
 }
 
-fn whole_call<N: Number>(function: Function, arguments: &[Code<N>], values: &[i64]) -> Result<i64> {
+fn whole_call(function: Function, arguments: &[Code], values: &[i64]) -> Result<i64> {
     let whole = |at: usize| arguments[at].whole(values);
     match function {
         Function::Min | Function::Max => {
@@ -201,15 +219,12 @@ fn whole_call<N: Number>(function: Function, arguments: &[Code<N>], values: &[i6
         }
         Function::Floor | Function::Ceil | Function::Round => {
             let value = arguments[0].number(values)?;
-            let rounded = match (value.to_rational(), function) {
-                (Some(exact), Function::Floor) => exact.floor().to_i64(),
-                (Some(exact), Function::Ceil) => exact.ceil().to_i64(),
-                (Some(exact), _) => (exact + half()).floor().to_i64(),
-                (None, Function::Floor) => value.to_f64().floor().to_i64(),
-                (None, Function::Ceil) => value.to_f64().ceil().to_i64(),
-                (None, _) => (value.to_f64() + 0.5).floor().to_i64(),
+            let rounded = match function {
+                Function::Floor => value.floor(),
+                Function::Ceil => value.ceil(),
+                _ => (value + half()).floor(),
             };
-            rounded.ok_or(OVERFLOW)
+            rounded.to_i64().ok_or(OVERFLOW)
         }
         Function::Log => Err(Fault("a whole number is needed here")),
     }
@@ -219,7 +234,7 @@ fn half() -> BigRational {
     BigRational::new(BigInt::from(1), BigInt::from(2))
 }
 
-fn number_call<N: Number>(function: Function, arguments: &[Code<N>], values: &[i64]) -> Result<N> {
+fn number_call(function: Function, arguments: &[Code], values: &[i64]) -> Result<BigRational> {
     let number = |at: usize| arguments[at].number(values);
     match function {
         Function::Min | Function::Max => {
@@ -234,18 +249,16 @@ fn number_call<N: Number>(function: Function, arguments: &[Code<N>], values: &[i
         }
         Function::Pow => {
             let (base, exponent) = (number(0)?, number(1)?);
-            let whole = exponent.to_f64();
-            if whole.fract() == 0.0 && whole.abs() <= 1000.0 {
-                let power = (0..whole.abs() as u32).fold(N::one(), |power, _| power.times(&base));
-                return match whole < 0.0 {
-                    true if power.is_zero() => Err(Fault("a division by zero")),
-                    true => Ok(N::one().over(&power)),
-                    false => Ok(power),
-                };
+            let whole = exponent.is_integer().then(|| exponent.to_i32()).flatten();
+            match whole {
+                Some(whole) if whole < 0 && Zero::is_zero(&base) => Err(Fault("a division by zero")),
+                Some(whole) if base.size().saturating_mul(whole.unsigned_abs().into()) <= BITS => {
+                    Ok(base.pow(whole))
+                }
+                _ => irrational(Number::to_f64(&base).powf(Number::to_f64(&exponent))),
             }
-            irrational(base.to_f64().powf(whole))
         }
-        Function::Log => irrational(number(0)?.to_f64().log(number(1)?.to_f64())),
+        Function::Log => irrational(Number::to_f64(&number(0)?).log(Number::to_f64(&number(1)?))),
         Function::Floor | Function::Ceil | Function::Round | Function::Mod => {
             whole_call(function, arguments, values).map(from_whole)
         }
@@ -253,7 +266,6 @@ fn number_call<N: Number>(function: Function, arguments: &[Code<N>], values: &[i
 }
 
 /// The double nearest to a number that is not rational.
-fn irrational<N: Number>(value: f64) -> Result<N> {
-    let exact = BigRational::from_float(value).ok_or(Fault("a number that is not finite"))?;
-    Ok(N::from_rational(&exact))
+fn irrational(value: f64) -> Result<BigRational> {
+    BigRational::from_float(value).ok_or(Fault("a number that is not finite"))
 }

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use num_rational::BigRational;
 use rustc_hash::FxHashMap;
 
 use crate::error::{Diagnostic, Error, Place};
-use crate::number::{Number, parse_decimal};
+use crate::number::parse_decimal;
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Function, Model, Type};
 use crate::prism::code::{Code, Fault};
 use crate::prism::expression::Cursor;
@@ -13,8 +14,8 @@ use crate::prism::lexer::{Kind, tokens};
 
 /// What a name stands for.
 #[derive(Debug, Clone)]
-enum Meaning<N> {
-    Constant(Code<N>, Type),
+enum Meaning {
+    Constant(Code, Type),
     Variable(u32, Type),
     /// Its place in the list of formulas.
     Formula(usize),
@@ -22,18 +23,27 @@ enum Meaning<N> {
 
 /// All names of a model, with the values of its constants.
 #[derive(Debug, Clone)]
-pub struct Names<N> {
-    meanings: FxHashMap<String, Meaning<N>>,
+pub struct Names {
+    meanings: FxHashMap<String, Meaning>,
     formulas: Vec<Expr>,
     labels: FxHashMap<String, Expr>,
     /// Formulas and labels that are being written out.
     open: Vec<String>,
+    /// How deep the expression at hand is, formulas written out.
+    depth: usize,
+    /// How many parts of it have been written out, and how many in all.
+    parts: [usize; 2],
 }
+
+/// How deep an expression may be with its formulas written out.
+const DEPTH: usize = 250;
+/// How many parts it may have then, and how many all expressions together.
+const PARTS: [usize; 2] = [200_000, 5_000_000];
 
 /// Values of constants from outside, by name, as text.
 pub type Settings = BTreeMap<String, String>;
 
-impl<N: Number> Names<N> {
+impl Names {
     /// Names of constants, formulas and labels; variables come with [`Names::variable`].
     ///
     /// # Errors
@@ -44,6 +54,8 @@ impl<N: Number> Names<N> {
             formulas: model.formulas.iter().map(|formula| formula.expression.clone()).collect(),
             labels: FxHashMap::default(),
             open: Vec::new(),
+            depth: 0,
+            parts: [0; 2],
         };
         let mut problems = Vec::new();
         for label in &model.labels {
@@ -130,7 +142,7 @@ impl<N: Number> Names<N> {
         waits
     }
 
-    fn declare(&mut self, name: &str, meaning: Meaning<N>, place: Place, problems: &mut Vec<Diagnostic>) {
+    fn declare(&mut self, name: &str, meaning: Meaning, place: Place, problems: &mut Vec<Diagnostic>) {
         if self.meanings.insert(name.to_owned(), meaning).is_some() {
             problems.push(twice(&format!("name `{name}`"), place));
         }
@@ -164,7 +176,7 @@ impl<N: Number> Names<N> {
     }
 
     /// The value of an expression without variables.
-    pub fn constant(&mut self, value: &Expr, kind: Type) -> Result<Code<N>, Diagnostic> {
+    pub fn constant(&mut self, value: &Expr, kind: Type) -> Result<Code, Diagnostic> {
         let code = self.typed(value, kind)?;
         if !code.is_constant() {
             return Err(Diagnostic::new("Q205", value.place, "a value without variables is needed here"));
@@ -173,7 +185,7 @@ impl<N: Number> Names<N> {
     }
 
     /// An expression of a type; whole numbers serve as numbers, too.
-    pub fn typed(&mut self, expression: &Expr, wanted: Type) -> Result<Code<N>, Diagnostic> {
+    pub fn typed(&mut self, expression: &Expr, wanted: Type) -> Result<Code, Diagnostic> {
         let (code, found) = self.compile(expression)?;
         if found == wanted || wanted == Type::Double && found == Type::Int {
             return Ok(code);
@@ -183,11 +195,27 @@ impl<N: Number> Names<N> {
     }
 
     /// An expression as code, with its type.
-    pub fn compile(&mut self, expression: &Expr) -> Result<(Code<N>, Type), Diagnostic> {
+    pub fn compile(&mut self, expression: &Expr) -> Result<(Code, Type), Diagnostic> {
+        if self.depth == 0 {
+            self.parts[0] = 0;
+        }
+        self.depth += 1;
+        self.parts = self.parts.map(|parts| parts + 1);
+        if self.depth > DEPTH || self.parts.iter().zip(PARTS).any(|(parts, most)| *parts > most) {
+            self.depth -= 1;
+            let text = "with its formulas written out, this is nested too deeply or too large";
+            return Err(Diagnostic::new("Q104", expression.place, text));
+        }
+        let compiled = self.kind(expression);
+        self.depth -= 1;
+        compiled
+    }
+
+    fn kind(&mut self, expression: &Expr) -> Result<(Code, Type), Diagnostic> {
         Ok(match &expression.kind {
             ExprKind::Bool(value) => (Code::Whole(i64::from(*value)), Type::Bool),
             ExprKind::Int(value) => (Code::Whole(*value), Type::Int),
-            ExprKind::Number(value) => (Code::Number(N::from_rational(value)), Type::Double),
+            ExprKind::Number(value) => (Code::Number(value.clone()), Type::Double),
             ExprKind::Name(name) => self.name(name, expression.place)?,
             ExprKind::Label(label) => {
                 let Some(inner) = self.labels.get(label).cloned() else {
@@ -220,7 +248,7 @@ impl<N: Number> Names<N> {
         })
     }
 
-    fn name(&mut self, name: &str, place: Place) -> Result<(Code<N>, Type), Diagnostic> {
+    fn name(&mut self, name: &str, place: Place) -> Result<(Code, Type), Diagnostic> {
         match self.meanings.get(name) {
             Some(Meaning::Constant(code, kind)) => Ok((code.clone(), *kind)),
             Some(Meaning::Variable(number, kind)) => Ok((Code::Variable(*number), *kind)),
@@ -235,7 +263,7 @@ impl<N: Number> Names<N> {
         }
     }
 
-    fn nested(&mut self, name: &str, inner: &Expr, place: Place) -> Result<(Code<N>, Type), Diagnostic> {
+    fn nested(&mut self, name: &str, inner: &Expr, place: Place) -> Result<(Code, Type), Diagnostic> {
         if self.open.iter().any(|open| open == name) {
             return Err(Diagnostic::new(
                 "Q204",
@@ -249,7 +277,7 @@ impl<N: Number> Names<N> {
         result
     }
 
-    fn numeric(&mut self, expression: &Expr) -> Result<(Code<N>, Type), Diagnostic> {
+    fn numeric(&mut self, expression: &Expr) -> Result<(Code, Type), Diagnostic> {
         let (code, kind) = self.compile(expression)?;
         match kind {
             Type::Bool => {
@@ -265,7 +293,7 @@ impl<N: Number> Names<N> {
         left: &Expr,
         right: &Expr,
         place: Place,
-    ) -> Result<(Code<N>, Type), Diagnostic> {
+    ) -> Result<(Code, Type), Diagnostic> {
         match op {
             BinaryOp::And | BinaryOp::Or => {
                 let mut parts = Vec::new();
@@ -297,10 +325,22 @@ impl<N: Number> Names<N> {
                 Ok((Code::Compare(op, kind, Box::new(left), Box::new(right)), Type::Bool))
             }
             BinaryOp::Plus | BinaryOp::Minus | BinaryOp::Times | BinaryOp::Divide => {
-                let ((left, a), (right, b)) = (self.numeric(left)?, self.numeric(right)?);
-                let kind =
-                    if op == BinaryOp::Divide { Type::Double } else { common(a, b).unwrap_or(Type::Double) };
-                Ok((Code::Arithmetic(op, kind, Box::new(left), Box::new(right)), kind))
+                // Chains lean to the left.
+                let (mut chain, mut first) = (vec![(op, right)], left);
+                while let ExprKind::Binary(op, left, right) = &first.kind
+                    && op.is_arithmetic()
+                {
+                    chain.push((*op, right));
+                    first = left;
+                }
+                let (mut code, mut kind) = self.numeric(first)?;
+                for (op, right) in chain.into_iter().rev() {
+                    let (right, b) = self.numeric(right)?;
+                    let of_both = common(kind, b).unwrap_or(Type::Double);
+                    kind = if op == BinaryOp::Divide { Type::Double } else { of_both };
+                    code = Code::Arithmetic(op, kind, Box::new(code), Box::new(right));
+                }
+                Ok((code, kind))
             }
         }
     }
@@ -310,7 +350,7 @@ impl<N: Number> Names<N> {
         function: Function,
         arguments: &[Expr],
         place: Place,
-    ) -> Result<(Code<N>, Type), Diagnostic> {
+    ) -> Result<(Code, Type), Diagnostic> {
         let mut codes = Vec::new();
         let mut all = Type::Int;
         for argument in arguments {
@@ -357,11 +397,11 @@ fn common(a: Type, b: Type) -> Option<Type> {
     }
 }
 
-fn zero<N: Number>(kind: Type) -> Code<N> {
-    if kind == Type::Double { Code::Number(N::zero()) } else { Code::Whole(0) }
+fn zero(kind: Type) -> Code {
+    if kind == Type::Double { Code::Number(BigRational::default()) } else { Code::Whole(0) }
 }
 
-fn fold<N: Number>(code: &Code<N>, kind: Type) -> Result<Code<N>, Fault> {
+fn fold(code: &Code, kind: Type) -> Result<Code, Fault> {
     match kind {
         Type::Double => code.number(&[]).map(Code::Number),
         Type::Int => code.whole(&[]).map(Code::Whole),
@@ -370,12 +410,12 @@ fn fold<N: Number>(code: &Code<N>, kind: Type) -> Result<Code<N>, Fault> {
 }
 
 /// A value from outside: a number, a fraction, a truth value, or an expression of these.
-fn setting_code<N: Number>(text: &str, kind: Type, name: &str) -> Result<Code<N>, Error> {
+fn setting_code(text: &str, kind: Type, name: &str) -> Result<Code, Error> {
     let wrong = || Error::Constant(format!("`{text}` is no value of type `{}` for `{name}`", kind.name()));
     if kind == Type::Double
         && let Some(exact) = parse_decimal(text)
     {
-        return Ok(Code::Number(N::from_rational(&exact)));
+        return Ok(Code::Number(exact));
     }
     let tokens = tokens(text).map_err(|_| wrong())?;
     let mut cursor = Cursor::new(&tokens);
@@ -388,6 +428,8 @@ fn setting_code<N: Number>(text: &str, kind: Type, name: &str) -> Result<Code<N>
         formulas: Vec::new(),
         labels: FxHashMap::default(),
         open: Vec::new(),
+        depth: 0,
+        parts: [0; 2],
     };
     names.constant(&expression, kind).map_err(|_| wrong())
 }

@@ -7,8 +7,8 @@ use crate::prism::lexer::{Kind, Token};
 
 /// How deep expressions may be nested.
 const DEPTH: usize = 200;
-/// How many operators of one strength may follow each other.
-const LENGTH: usize = 10_000;
+/// How many operators of arithmetic (and of implication) an expression may have, and how many others.
+const OPERATORS: [usize; 2] = [500, 20_000];
 
 /// Tokens and how far they are read.
 #[derive(Debug)]
@@ -16,6 +16,8 @@ pub struct Cursor<'a> {
     tokens: &'a [Token],
     at: usize,
     depth: usize,
+    /// The operators of the expression at hand, as [`OPERATORS`] counts them.
+    operators: [usize; 2],
 }
 
 /// What reading returns.
@@ -24,7 +26,7 @@ pub type Read<T> = Result<T, Diagnostic>;
 impl<'a> Cursor<'a> {
     /// At the first token; the last one must be the end.
     pub fn new(tokens: &'a [Token]) -> Self {
-        Self { tokens, at: 0, depth: 0 }
+        Self { tokens, at: 0, depth: 0, operators: [0; 2] }
     }
 
     /// How many tokens are read.
@@ -128,6 +130,9 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// The first thing that is none.
     pub fn expression(&mut self) -> Read<Expr> {
+        if self.depth == 0 {
+            self.operators = [0; 2];
+        }
         self.depth += 1;
         if self.depth > DEPTH {
             return Err(Diagnostic::new("Q104", self.place(), "this expression is nested too deeply"));
@@ -159,10 +164,10 @@ impl<'a> Cursor<'a> {
 
     fn binary(&mut self, least: u8) -> Read<Expr> {
         let mut left = self.unary(least)?;
-        let mut length = 0;
         while let Some((op, strength)) = self.operator().filter(|(_, strength)| *strength >= least) {
-            length += 1;
-            if length > LENGTH {
+            let kind = usize::from(!op.is_arithmetic() && op != BinaryOp::Implies);
+            self.operators[kind] += 1;
+            if self.operators[kind] > OPERATORS[kind] {
                 return Err(Diagnostic::new("Q104", self.place(), "this expression is too long"));
             }
             self.advance();

@@ -1,16 +1,15 @@
 //! A condition to tests of single variables, which are quick, and the rest.
 
-use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Type};
 use crate::prism::code::{Code, Fault};
 
 /// A condition.
 #[derive(Debug, Clone)]
-pub struct Guard<N> {
+pub struct Guard {
     /// What it begins with; these cannot fail to have a value, and are evaluated in the order in which they stand.
     tests: Vec<Test>,
     /// What comes after them.
-    rest: Vec<Code<N>>,
+    rest: Vec<Code>,
     /// The variables that it fixes to one value, anywhere in it.
     fixed: Vec<(u32, i64)>,
 }
@@ -24,9 +23,9 @@ struct Test {
     inside: bool,
 }
 
-impl<N: Number> Guard<N> {
+impl Guard {
     /// Takes a condition to pieces.
-    pub fn new(code: Code<N>) -> Self {
+    pub fn new(code: Code) -> Self {
         let mut parts = Vec::new();
         flatten(code, &mut parts);
         let tests: Vec<Test> = parts.iter().map_while(test).collect();
@@ -57,14 +56,14 @@ impl<N: Number> Guard<N> {
     }
 }
 
-fn flatten<N>(code: Code<N>, parts: &mut Vec<Code<N>>) {
+fn flatten(code: Code, parts: &mut Vec<Code>) {
     match code {
         Code::All(inner) => inner.into_iter().for_each(|part| flatten(part, parts)),
         other => parts.push(other),
     }
 }
 
-fn test<N: Number>(code: &Code<N>) -> Option<Test> {
+fn test(code: &Code) -> Option<Test> {
     let flag = |variable: u32, inside| Test { variable, least: 0, greatest: 0, inside };
     match code {
         Code::Variable(variable) => Some(flag(*variable, false)),

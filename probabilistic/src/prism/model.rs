@@ -3,12 +3,14 @@
 //! Commands whose guards fix one variable (`l=5 & …`) are found by its value, and so are the actions that have such
 //! commands, so that the cost of a state does not grow with the number of commands for other states.
 
+use std::borrow::Cow;
+
 use rustc_hash::FxHashMap;
 
 use crate::error::{Diagnostic, Error, Place};
 use crate::number::Number;
 use crate::prism::ast::{self, Model, ModelKind, Type};
-use crate::prism::build::{compile_command, declare, reward_item};
+use crate::prism::build::{compile_command, declare, probabilities, reward_item};
 use crate::prism::code::Code;
 use crate::prism::compile::{Names, Settings};
 use crate::prism::guard::Guard;
@@ -30,18 +32,28 @@ pub struct Variable {
 }
 
 #[derive(Debug, Clone)]
-pub struct Update<N> {
-    pub probability: Code<N>,
-    pub assignments: Vec<(u32, Code<N>, Place)>,
+pub struct Update {
+    pub probability: Code,
+    pub assignments: Vec<(u32, Code, Place)>,
 }
 
 #[derive(Debug, Clone)]
 pub struct Command<N> {
-    pub guard: Guard<N>,
-    pub updates: Vec<Update<N>>,
+    pub guard: Guard,
+    pub updates: Vec<Update>,
     /// The probabilities of the updates, where no variable occurs in them and they sum to one.
     pub certain: Option<Vec<N>>,
     pub place: Place,
+}
+
+impl<N: Number> Command<N> {
+    /// The probabilities of its updates in a state.
+    pub fn probabilities(&self, values: &[i64]) -> Result<Cow<'_, [N]>, Error> {
+        Ok(match &self.certain {
+            Some(certain) => Cow::Borrowed(certain),
+            None => Cow::Owned(probabilities(&self.updates, values, self.place)?),
+        })
+    }
 }
 
 /// The commands of one module that bear one action.
@@ -73,8 +85,10 @@ pub(super) struct Structure<N> {
 
 #[derive(Debug, Clone)]
 pub struct RewardItem<N> {
-    pub guard: Guard<N>,
-    pub reward: Code<N>,
+    pub guard: Guard,
+    pub reward: Code,
+    /// The reward, where no variable occurs in it.
+    pub certain: Option<N>,
     pub place: Place,
 }
 
@@ -89,7 +103,7 @@ pub struct Program<N> {
     pub actions: Vec<String>,
     /// The names of its reward structures.
     pub reward_names: Vec<String>,
-    pub(crate) names: Names<N>,
+    pub(crate) names: Names,
     pub(super) layout: Layout,
     /// For each action the modules that take part, each with its commands.
     pub(super) synchronised: Vec<Vec<Group<N>>>,
@@ -212,7 +226,7 @@ impl<N: Number> Program<N> {
         &mut self,
         module: &ast::Module,
         model: &Model,
-        names: &mut Names<N>,
+        names: &mut Names,
         numbers: &FxHashMap<&str, u32>,
         problems: &mut Vec<Diagnostic>,
     ) {
@@ -256,7 +270,8 @@ impl<N: Number> Program<N> {
                 (0..variables.len() as u32).max_by_key(|variable| (count(*variable), u32::MAX - variable));
             let Some(best) = best.filter(|best| count(*best) > 0) else { continue };
             let Variable { least, greatest, .. } = variables[best as usize];
-            if greatest - least > 100_000 {
+            // The table must not outgrow the commands by much.
+            if greatest.wrapping_sub(least) as u64 > 1000 + 10 * group.commands.len() as u64 {
                 continue;
             }
             let mut table: Vec<Vec<u32>> = vec![Vec::new(); (greatest - least + 1) as usize];

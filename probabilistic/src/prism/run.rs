@@ -3,14 +3,14 @@
 //! Most commands stand alone, with probabilities that are constants: these write their successors straight into the packed
 //! state. Only commands of several modules that move together, and those of Markov chains, are combined first.
 
+use num_traits::Signed;
 use smallvec::SmallVec;
 
 use crate::error::{Diagnostic, Error, Place};
 use crate::explore::{Choices, Generator};
 use crate::number::Number;
 use crate::prism::ast::ModelKind;
-use crate::prism::build::SUM_TOLERANCE;
-use crate::prism::code::{Code, Fault};
+use crate::prism::code::{Code, Fault, from_whole, rounded};
 use crate::prism::model::{Command, Group, Program, RewardItem, UNNAMED, Variable};
 use crate::prism::state::{Packed, Valuation};
 
@@ -20,6 +20,9 @@ type Values = SmallVec<[i64; 16]>;
 type Sums<N> = SmallVec<[N; 4]>;
 
 type Outcome<N> = Vec<(Valuation, N)>;
+
+/// Ends of the combined commands of an action in one state, at most.
+const COMBINED: usize = 1_000_000;
 
 impl<N: Number> Program<N> {
     /// All combinations of what the enabled commands of some groups do together.
@@ -42,8 +45,15 @@ impl<N: Number> Program<N> {
                 return Ok(());
             }
             let mut next = Vec::new();
+            let (outcomes, mut ends) = (combined.iter().map(Vec::len).sum::<usize>(), 0);
             for command in enabled(group, values) {
-                let effects = self.effects(command?, values)?;
+                let command = command?;
+                let effects = self.effects(command, values)?;
+                ends += outcomes * effects.len();
+                if ends > COMBINED {
+                    let text = format!("more than {COMBINED} ways in which modules move together in a state");
+                    return Err(Diagnostic::new("Q306", command.place, text).into());
+                }
                 next.extend(combined.iter().map(|outcome| join(outcome, &effects)));
             }
             combined = next;
@@ -54,16 +64,8 @@ impl<N: Number> Program<N> {
 
     /// The updates of a command in a state: probability, and the new values.
     fn effects(&self, command: &Command<N>, values: &[i64]) -> Result<Vec<Effect<N>>, Error> {
-        let fault = |fault| at(fault, command.place);
         let mut effects = Vec::with_capacity(command.updates.len());
-        let mut sum = N::zero();
-        for update in &command.updates {
-            let probability = update.probability.number(values).map_err(fault)?;
-            if probability < N::zero() {
-                let text = format!("a negative probability, {}", probability.to_f64());
-                return Err(Diagnostic::new("Q302", command.place, text).into());
-            }
-            sum = sum.plus(&probability);
+        for (update, probability) in command.updates.iter().zip(&*command.probabilities(values)?) {
             if probability.is_zero() {
                 continue;
             }
@@ -72,26 +74,13 @@ impl<N: Number> Program<N> {
                 let value = self.assigned(*variable, code, *place, values)?;
                 changes.push((*variable, value));
             }
-            effects.push((probability, changes));
-        }
-        if sum == N::one() {
-            return Ok(effects);
-        }
-        let off = (sum.to_f64() - 1.0).abs();
-        if off.is_nan() || off > SUM_TOLERANCE {
-            let text = format!("the probabilities sum to {}, not to 1", sum.to_f64());
-            return Err(Diagnostic::new("Q301", command.place, text).into());
-        }
-        if N::EXACT || off > 1e-13 {
-            for (probability, _) in &mut effects {
-                *probability = probability.over(&sum);
-            }
+            effects.push((probability.clone(), changes));
         }
         Ok(effects)
     }
 
     /// What an assignment makes of a variable, which must be in its range.
-    fn assigned(&self, variable: u32, code: &Code<N>, place: Place, values: &[i64]) -> Result<i64, Error> {
+    fn assigned(&self, variable: u32, code: &Code, place: Place, values: &[i64]) -> Result<i64, Error> {
         let value = code.whole(values).map_err(|fault| at(fault, place))?;
         let Variable { name, least, greatest, .. } = &self.variables[variable as usize];
         if (*least..=*greatest).contains(&value) {
@@ -194,17 +183,7 @@ impl<N: Number> Program<N> {
         values: &[i64],
         choices: &mut Choices<Packed, N>,
     ) -> Result<(), Error> {
-        let Some(certain) = &command.certain else {
-            for (probability, changes) in self.effects(command, values)? {
-                let mut next = state.clone();
-                for (variable, value) in &changes {
-                    self.layout.set(&mut next, *variable, *value);
-                }
-                choices.to(next, probability);
-            }
-            return Ok(());
-        };
-        for (update, probability) in command.updates.iter().zip(certain) {
+        for (update, probability) in command.updates.iter().zip(&*command.probabilities(values)?) {
             if probability.is_zero() {
                 continue;
             }
@@ -265,7 +244,7 @@ impl<N: Number> Program<N> {
         if all.is_empty() {
             return Ok(());
         }
-        let count = crate::prism::code::from_whole::<N>(all.len() as i64);
+        let count = N::from_rational(&from_whole(all.len() as i64));
         let mut total = self.state_rewards(values)?;
         for (action, outcome) in &all {
             for (sum, more) in total.iter_mut().zip(self.action_rewards(*action, values)?) {
@@ -320,12 +299,16 @@ fn sum<N: Number>(items: &[RewardItem<N>], values: &[i64]) -> Result<N, Error> {
     for item in items {
         let fault = |fault| at(fault, item.place);
         if item.guard.holds(values).map_err(fault)? {
+            if let Some(reward) = &item.certain {
+                sum = sum.plus(reward);
+                continue;
+            }
             let reward = item.reward.number(values).map_err(fault)?;
-            if reward < N::zero() {
-                let text = format!("a negative reward, {}", reward.to_f64());
+            if reward.is_negative() {
+                let text = format!("a negative reward, {}", Number::to_f64(&reward));
                 return Err(Diagnostic::new("Q304", item.place, text).into());
             }
-            sum = sum.plus(&reward);
+            sum = sum.plus(&rounded(&reward).map_err(fault)?);
         }
     }
     Ok(sum)

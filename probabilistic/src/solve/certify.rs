@@ -27,7 +27,7 @@ pub fn certify<N: Number>(
     let rows: Vec<(f64, f64)> = (0..quotient.choices.len())
         .map(|row| {
             let value = quotient.rows.apply(row, values).to_f64();
-            (value, (64 + 3 * quotient.rows.range(row).len()) as f64 * f64::EPSILON * value)
+            (value, (64 + 3 * quotient.widest) as f64 * f64::EPSILON * value)
         })
         .collect();
     // How much worse a row is than the value that was found; negative where rounding makes it better.
@@ -36,8 +36,12 @@ pub fn certify<N: Number>(
         Direction::Max => v[block] - rows[row].0,
     };
     if blocks == 1 {
-        let scale = rows.iter().fold(v[0], |scale, (value, _)| scale.max(*value));
-        return vec![64.0 * f64::EPSILON * scale.min(v[0] * 2.0)];
+        // Each row is worth what it is worth alone; one that is better by less than rounding may not have been taken.
+        let (better, rounding) = (0..rows.len()).fold((0.0_f64, 0.0_f64), |(better, rounding), row| {
+            let near = loss(0, row) <= v[0];
+            (better.max(-loss(0, row)), if near { rounding.max(rows[row].1) } else { rounding })
+        });
+        return vec![better + rounding];
     }
     for threshold in [1e-8, 1e-12] {
         let near = |block: usize, row: usize| {

@@ -5,7 +5,7 @@ use crate::solve::certify::certify;
 use crate::solve::chain::{Rows, solve_chain};
 use crate::solve::interval::{self, Enclosed};
 use crate::solve::local::{EndComponents, Local, NONE, attractor, end_components};
-use crate::solve::{Direction, Run};
+use crate::solve::{Direction, Run, TINY};
 
 /// Rounds of policy iteration after which the best policy so far is taken; the certificate tells what it is worth.
 const ROUNDS: usize = 1000;
@@ -22,6 +22,8 @@ pub struct Quotient<N> {
     pub rows: Rows<N>,
     /// For each row its local choice.
     pub choices: Vec<u32>,
+    /// The most transitions that a row was made of.
+    pub widest: usize,
 }
 
 impl<N: Number> Quotient<N> {
@@ -148,7 +150,10 @@ impl<N: Number> Run<'_, N> {
                 for (target, probability) in self.problem.mdp.transitions(choice) {
                     let position = self.position[target];
                     if position == NONE {
-                        constant = constant.plus(&probability.times(&self.solution.values[target]));
+                        let value = &self.solution.values[target];
+                        let part = probability.times(value);
+                        local.tiny |= !N::EXACT && !value.is_zero() && part.to_f64() < TINY;
+                        constant = constant.plus(&part);
                         leaving = leaving.plus(probability);
                     } else {
                         local.rows.columns.push(position);
@@ -157,6 +162,7 @@ impl<N: Number> Run<'_, N> {
                 }
                 local.rows.end(constant, leaving);
                 local.choices.push(choice as u32);
+                local.widest = local.widest.max(self.problem.mdp.targets(choice).len());
             }
             local.first.push(local.choices.len() as u32);
         }
@@ -199,7 +205,9 @@ impl<N: Number> Run<'_, N> {
             self.unknown(local);
             return Some(());
         };
-        let outside = self.outside_error(local);
+        let small = |value: &N| !N::EXACT && !value.is_zero() && value.to_f64() < 1e-30;
+        let tiny = if local.tiny || values.iter().any(small) { TINY } else { 0.0 };
+        let outside = self.outside_error(local) + tiny;
         for (number, state) in local.states.iter().enumerate() {
             let (block, state) = (ends.block[number] as usize, *state as usize);
             self.solution.values[state] = values[block].clone();
@@ -430,7 +438,8 @@ fn quotient<N: Number>(local: &Local<N>, ends: &EndComponents) -> Quotient<N> {
     for (state, block) in ends.block.iter().enumerate() {
         members[*block as usize].push(state as u32);
     }
-    let mut result = Quotient { first: vec![0], rows: Rows::new(), choices: Vec::new() };
+    let mut result =
+        Quotient { first: vec![0], rows: Rows::new(), choices: Vec::new(), widest: local.widest };
     let mut entries: Vec<(u32, N)> = Vec::new();
     for (block, states) in members.iter().enumerate() {
         for state in states {

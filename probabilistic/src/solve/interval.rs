@@ -73,13 +73,12 @@ struct Rows<'a, N> {
 impl<'a, N: Number> Rows<'a, N> {
     fn new(quotient: &'a Quotient<N>, direction: Direction) -> Self {
         let rows = &quotient.rows;
-        let longest = (0..rows.len()).map(|row| rows.range(row).len()).max().unwrap_or(0);
         Self {
             quotient,
             direction,
             constants: rows.constants.iter().map(Number::to_f64).collect(),
             probabilities: rows.probabilities.iter().map(Number::to_f64).collect(),
-            rounding: (longest + 2) as f64 * f64::EPSILON,
+            rounding: (quotient.widest + 16) as f64 * f64::EPSILON,
         }
     }
 
@@ -118,7 +117,9 @@ impl<'a, N: Number> Rows<'a, N> {
     }
 
     fn enclosed(&self, lower: &[f64], upper: &[f64], rounded: f64) -> Enclosed<N> {
-        let policy = (0..lower.len()).map(|block| self.best(block, lower).0).collect();
+        // The choices that keep a bound from getting worse have values that are within it.
+        let kept = if self.direction == Direction::Min { upper } else { lower };
+        let policy = (0..lower.len()).map(|block| self.best(block, kept).0).collect();
         let (mut values, mut errors) = (Vec::new(), Vec::new());
         for (lower, upper) in lower.iter().map(|lower| lower * rounded).zip(upper) {
             let middle = f64::midpoint(lower, *upper);
@@ -138,7 +139,8 @@ mod tests {
 
     /// A walk over a square with two choices in each place, which is left with probability 1/50 at each step.
     fn square(side: u32) -> Quotient<f64> {
-        let mut quotient = Quotient { first: vec![0], rows: chain::Rows::new(), choices: Vec::new() };
+        let mut quotient =
+            Quotient { first: vec![0], rows: chain::Rows::new(), choices: Vec::new(), widest: 4 };
         for place in 0..side * side {
             let (x, y) = (place % side, place / side);
             for choice in 0..2_u32 {

@@ -21,12 +21,24 @@ pub struct Local<N> {
     pub rows: Rows<N>,
     /// Whether a choice has a positive reward.
     pub paid: Vec<bool>,
+    /// The most transitions of a choice, inside and outside.
+    pub widest: usize,
+    /// Whether products are so small that doubles lose their digits.
+    pub tiny: bool,
 }
 
 impl<N: Number> Local<N> {
     /// Nothing.
     pub fn new() -> Self {
-        Self { states: vec![], first: vec![0], choices: vec![], rows: Rows::new(), paid: vec![] }
+        Self {
+            states: vec![],
+            first: vec![0],
+            choices: vec![],
+            rows: Rows::new(),
+            paid: vec![],
+            widest: 0,
+            tiny: false,
+        }
     }
 
     /// Forgets everything, keeps the memory.
@@ -40,6 +52,7 @@ impl<N: Number> Local<N> {
         self.rows.probabilities.clear();
         self.rows.constants.clear();
         self.rows.leaving.clear();
+        (self.widest, self.tiny) = (0, false);
     }
 
     /// The local choices of a local state.

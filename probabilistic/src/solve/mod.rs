@@ -18,7 +18,7 @@ use fixedbitset::FixedBitSet;
 
 use crate::graph::visit_components;
 use crate::mdp::Mdp;
-use crate::number::Number;
+use crate::number::{Number, is_whole};
 
 pub use local::NONE;
 
@@ -60,6 +60,18 @@ impl<N> Clone for Problem<'_, N> {
 }
 
 impl<N> Copy for Problem<'_, N> {}
+
+impl<'a, N> Problem<'a, N> {
+    /// The plain question: terminal states are worth what they are without more being said, and every choice may be made.
+    pub const fn new(
+        mdp: &'a Mdp<N>,
+        direction: Direction,
+        rewards: Option<&'a [N]>,
+        terminal: &'a FixedBitSet,
+    ) -> Self {
+        Self { mdp, direction, rewards, terminal, terminal_values: None, blocked: None, allowed: None }
+    }
+}
 
 impl<N: Number> Problem<'_, N> {
     pub(crate) fn is_sink(&self, state: usize) -> bool {
@@ -116,7 +128,10 @@ impl<N: Number> Solution<N> {
 }
 
 /// How much exact arithmetic may cost, in bits touched, before it is given up.
-const EXACT_WORK: u64 = 3_000_000_000;
+pub(crate) const EXACT_WORK: u64 = 3_000_000_000;
+
+/// Products of positive doubles below lose digits; values that are made of them get this error on top.
+const TINY: f64 = 1e-280;
 
 /// Exact arithmetic takes too long.
 struct TooMuchWork;
@@ -211,25 +226,26 @@ impl<N: Number> Run<'_, N> {
             return;
         }
         let must_be_sure = by_choice && self.problem.rewards.is_some();
-        let mut best: Option<(N, u32)> = None;
+        let mut best: Option<(N, u32, f64)> = None;
         let mut error = 0.0_f64;
         let problem = self.problem;
         for choice in problem.choices(state) {
             if let Some((value, spread)) = self.single_choice(state, choice, must_be_sure) {
                 error = error.max(spread);
-                let better = best.as_ref().is_none_or(|(known, _)| match self.problem.direction {
+                let better = best.as_ref().is_none_or(|(known, ..)| match self.problem.direction {
                     Direction::Min => value < *known,
                     Direction::Max => value > *known,
                 });
                 if better {
-                    best = Some((value, choice as u32));
+                    best = Some((value, choice as u32, spread));
                 }
             }
         }
-        if let Some((value, choice)) = best {
+        if let Some((value, choice, own)) = best {
             self.work += value.size();
             if !N::EXACT {
-                self.solution.errors[state] = if value.is_zero() { 0.0 } else { error };
+                // Nothing is less than zero, so that only the error of what is zero counts there.
+                self.solution.errors[state] = if value.is_zero() { own } else { error };
             }
             self.solution.values[state] = value;
             self.solution.policy[state] = choice;
@@ -240,7 +256,8 @@ impl<N: Number> Run<'_, N> {
     fn single_choice(&mut self, state: usize, choice: usize, must_be_sure: bool) -> Option<(N, f64)> {
         let mdp = self.problem.mdp;
         let (mut sum, mut leaving, mut looping) = (self.problem.reward(choice), N::zero(), false);
-        let (mut error, mut terms) = (0.0_f64, 4.0);
+        let mut whole = !N::EXACT && is_whole(sum.to_f64());
+        let (mut error, mut terms, mut tiny) = (0.0_f64, 4.0, false);
         for (target, probability) in mdp.transitions(choice) {
             if target == state {
                 looping = true;
@@ -249,11 +266,14 @@ impl<N: Number> Run<'_, N> {
             if must_be_sure && !self.solution.sure.contains(target) {
                 return None;
             }
-            sum = sum.plus(&probability.times(&self.solution.values[target]));
+            let value = &self.solution.values[target];
+            sum = sum.plus(&probability.times(value));
             leaving = leaving.plus(probability);
             terms += 2.0;
             if !N::EXACT {
                 error = error.max(self.solution.errors[target]);
+                tiny |= !value.is_zero();
+                whole &= is_whole(value.to_f64());
             }
             self.work += if N::EXACT { sum.size() * 4 } else { 0 };
         }
@@ -265,8 +285,11 @@ impl<N: Number> Run<'_, N> {
             sum = sum.over(&leaving);
         }
         let size = sum.to_f64();
-        // Sums of a few exact products (deterministic choices with whole rewards) carry no error of their own.
-        let exact = error == 0.0 && terms < 7.0 && !looping && size.fract() == 0.0 && size < 9e15;
-        Some((sum, if exact { 0.0 } else { error + terms * f64::EPSILON * size }))
+        // Deterministic choices with whole rewards carry no error of their own.
+        if whole && error == 0.0 && terms < 7.0 && !looping && is_whole(size) {
+            return Some((sum, 0.0));
+        }
+        error += if tiny && size < TINY { TINY } else { 0.0 };
+        Some((sum, error + terms * f64::EPSILON * size))
     }
 }

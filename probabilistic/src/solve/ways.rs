@@ -4,7 +4,7 @@
 //! components of a co-adaptation process. The best value spreads from the choices that leave (Dijkstra 1959), so that no
 //! equations have to be solved, and the only errors are those of a few sums.
 
-use crate::number::Number;
+use crate::number::{Number, is_whole};
 use crate::solve::{Direction, NONE, Run};
 
 /// States up to which the next best state is looked for one by one.
@@ -21,6 +21,8 @@ pub struct Ways<N> {
     exits: Vec<(u32, u32, bool)>,
     /// The greatest error of what leaving choices are worth.
     error: f64,
+    /// The greatest one among those that are worth nothing.
+    zero_error: f64,
     /// Whether all sums are of whole numbers.
     whole: bool,
 }
@@ -31,6 +33,8 @@ struct Step<N> {
     to: u32,
     choice: u32,
     cost: N,
+    /// Whether the cost was divided, and so perhaps rounded.
+    divided: bool,
 }
 
 impl<N> Default for Ways<N> {
@@ -41,6 +45,7 @@ impl<N> Default for Ways<N> {
             steps: Vec::new(),
             exits: Vec::new(),
             error: 0.0,
+            zero_error: 0.0,
             whole: true,
         }
     }
@@ -104,8 +109,8 @@ impl<N: Number> Run<'_, N> {
                     (NONE, true) => ways.exits.push((from as u32, choice as u32, sure)),
                     (_, true) => return false,
                     (to, false) => {
-                        let cost = self.step_cost(*state, choice);
-                        ways.steps.push(Step { from: from as u32, to, choice: choice as u32, cost });
+                        let (cost, divided) = self.step_cost(*state, choice);
+                        ways.steps.push(Step { from: from as u32, to, choice: choice as u32, cost, divided });
                     }
                 }
             }
@@ -113,14 +118,14 @@ impl<N: Number> Run<'_, N> {
         true
     }
 
-    /// What it takes to get along a step that is tried until it works.
-    fn step_cost(&self, state: u32, choice: usize) -> N {
+    /// What it takes to get along a step that is tried until it works; whether that was divided.
+    fn step_cost(&self, state: u32, choice: usize) -> (N, bool) {
         let reward = self.problem.reward(choice);
         if reward.is_zero() || self.problem.mdp.targets(choice).len() == 1 {
-            return reward;
+            return (reward, false);
         }
         let works = self.problem.mdp.transitions(choice).find(|(target, _)| *target != state as usize);
-        works.map_or(reward.clone(), |(_, probability)| reward.over(probability))
+        (works.map_or(reward.clone(), |(_, probability)| reward.over(probability)), true)
     }
 
     fn greatest_probability(&mut self, component: &[u32], ways: &mut Ways<N>) {
@@ -178,10 +183,10 @@ impl<N: Number> Run<'_, N> {
             };
             self.work += value.size();
             ways.error = ways.error.max(error);
-            if !N::EXACT {
-                let size = value.to_f64();
-                ways.whole &= size.fract() == 0.0 && size < 9e15;
+            if value.is_zero() {
+                ways.zero_error = ways.zero_error.max(error);
             }
+            ways.whole &= !N::EXACT && is_whole(value.to_f64());
             let best = &mut ways.best[*from as usize];
             if best.as_ref().is_none_or(|(known, _)| better(self.problem.direction, &value, known)) {
                 *best = Some((value, *choice));
@@ -197,7 +202,8 @@ impl<N: Number> Run<'_, N> {
                 // Each step of the way adds once, and may divide and round its cost.
                 let sums = 3.0 * component.len() as f64 * f64::EPSILON * value.to_f64();
                 let rounding = if ways.whole { 0.0 } else { sums };
-                self.solution.errors[state] = if value.is_zero() { 0.0 } else { ways.error + rounding };
+                self.solution.errors[state] =
+                    if value.is_zero() { ways.zero_error } else { ways.error + rounding };
             }
             self.solution.values[state] = value.clone();
             self.solution.policy[state] = *choice;
@@ -218,12 +224,9 @@ impl<N: Number> Ways<N> {
         self.best.resize(states, None);
         self.settled.clear();
         self.settled.resize(states, false);
-        self.error = 0.0;
-        let whole = |cost: &N| {
-            let size = cost.to_f64();
-            size.fract() == 0.0 && size < 9e13
-        };
-        self.whole = !N::EXACT && self.steps.iter().all(|step| whole(&step.cost));
+        (self.error, self.zero_error) = (0.0, 0.0);
+        let whole = |step: &Step<N>| !step.divided && is_whole(step.cost.to_f64() * SMALL as f64);
+        self.whole = !N::EXACT && self.steps.iter().all(whole);
     }
 
     /// Lets the best values spread along the steps, best first.

@@ -1,0 +1,258 @@
+//! Bounds enclose the true value also where doubles round, and models that would take all memory or time are refused.
+
+use metaplan_probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Quantity, check};
+use metaplan_probabilistic::{Error, prism, property};
+use num_rational::BigRational;
+
+fn outcome(model: &str, question: &str, options: &Options<'_>) -> Result<Outcome, Error> {
+    let model = prism::parse(model).unwrap_or_else(|problems| panic!("{problems:?}"));
+    check(&model, &property::parse(question).expect("a property"), options).map(|report| report.outcome)
+}
+
+fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
+    let options = Options { exactness, ..Options::default() };
+    match outcome(model, question, &options).expect("an answer") {
+        Outcome::Value(Answer::Finite(quantity)) => quantity,
+        other => panic!("{question}: {other:?}"),
+    }
+}
+
+fn encloses(found: &Quantity, exact: &BigRational) -> bool {
+    let end = |end: f64| BigRational::from_float(end);
+    end(found.lower).is_some_and(|lower| lower <= *exact)
+        && end(found.upper).is_some_and(|upper| upper >= *exact)
+}
+
+/// The exact value, which the bounds of the doubles enclose.
+fn enclosed(model: &str, question: &str) -> BigRational {
+    let exact = value(model, question, Exactness::Always).exact.expect("a fraction");
+    let found = value(model, question, Exactness::Never);
+    assert!(encloses(&found, &exact), "{question}: {found:?}, exactly {exact}");
+    exact
+}
+
+/// The codes of what is wrong with a model.
+fn refused(model: &str, question: &str, exactness: Exactness) -> Vec<&'static str> {
+    match outcome(model, question, &Options { exactness, ..Options::default() }) {
+        Err(Error::Model(problems)) => problems.iter().map(|problem| problem.code).collect(),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn choices_that_differ_by_less_than_policy_iteration_sees() {
+    let model = "mdp
+        module m
+          s:[0..4] init 0;
+          [] s=0 -> 0.5:(s'=1) + 0.5:(s'=2);
+          [] s=1 | s=2 -> (s'=0);
+          [] s=1 -> 0.5:(s'=3) + 0.5:(s'=4);
+          [] s=2 -> 0.5000000000001:(s'=3) + 0.4999999999999:(s'=4);
+        endmodule
+        label \"goal\" = s=3;";
+    enclosed(model, "Pmax=? [ F \"goal\" ]");
+}
+
+#[test]
+fn sums_that_are_not_quite_one() {
+    let model = "dtmc
+        module m
+          s:[0..300] init 0;
+          [] s<300 -> 0.33333333333333:(s'=s+1) + 0.66666666666666:(s'=max(s-1,0));
+        endmodule
+        rewards s<300 : 1; endrewards
+        label \"goal\" = s=300;";
+    enclosed(&model.replace("max(s-1,0)", "s"), "R=? [ F \"goal\" ]");
+    enclosed(&model.replace("300", "12"), "R=? [ F \"goal\" ]");
+    let nearly = "dtmc
+        module m s:[0..2] init 0; [] s=0 -> 0.3333333333333:(s'=1) + 0.6666666666666:(s'=2); endmodule
+        label \"goal\" = s=1;";
+    enclosed(nearly, "P=? [ F \"goal\" ]");
+    let model = "dtmc
+        module m s:[0..3] init 0; [] s=0 -> 1/3:(s'=1) + 1/3:(s'=2) + 1/3:(s'=3); endmodule
+        label \"goal\" = s=2;";
+    assert_eq!(enclosed(model, "P=? [ F \"goal\" ]").to_string(), "1/3");
+    let decimals = model.replace("1/3", "0.333333");
+    assert_eq!(enclosed(&decimals, "P=? [ F \"goal\" ]").to_string(), "1/3");
+}
+
+#[test]
+fn constants_are_exact() {
+    let model = "const double p = 0.7;
+        dtmc
+        module m s:[0..1] init 0; [] s=0 -> 1-p-0.3:(s'=1) + p+0.3:(s'=0); endmodule
+        label \"goal\" = s=1;";
+    assert_eq!(enclosed(model, "P=? [ F \"goal\" ]").to_string(), "0");
+    // In doubles this would be less than zero.
+    enclosed(&model.replace("1-p-0.3", "0.3-0.2-0.1").replace("p+0.3", "1"), "P=? [ F \"goal\" ]");
+    let guard = "dtmc
+        module m s:[0..3] init 0; [] s*0.1!=0.3 -> (s'=min(s+1,3)); endmodule
+        label \"goal\" = s=3 & s*0.1=0.3;";
+    assert_eq!(enclosed(guard, "P=? [ F \"goal\" ]").to_string(), "1");
+}
+
+#[test]
+fn values_below_the_least_double() {
+    let model = "dtmc
+        module m s:[0..400] init 0; d:bool init false;
+          [] s<400 & !d -> 0.1:(s'=s+1) + 0.9:(d'=true);
+        endmodule
+        label \"goal\" = s=400;";
+    enclosed(model, "P=? [ F \"goal\" ]");
+    enclosed(&model.replace("0.9:(d'=true)", "0.5:(d'=true) + 0.4:(s'=max(s-1,0))"), "P=? [ F \"goal\" ]");
+    let rare = model.replace("0.1:", "1e-300:").replace("0.9:", "1-1e-300:");
+    assert_eq!(refused(&rare, "P=? [ F \"goal\" ]", Exactness::Never), ["Q303"]);
+}
+
+#[test]
+fn rewards_that_are_nearly_whole() {
+    let model = "dtmc
+        module m s:[0..2] init 0; [] s<2 -> (s'=s+1); endmodule
+        rewards s=0 : 0.99999999999999999999; s=1 : 3; endrewards
+        label \"goal\" = s=2;";
+    enclosed(model, "R=? [ F \"goal\" ]");
+    let whole = value(&model.replace("0.99999999999999999999", "4"), "R=? [ F \"goal\" ]", Exactness::Never);
+    assert_eq!([whole.lower, whole.upper].map(f64::to_bits), [7.0, 7.0].map(f64::to_bits));
+}
+
+#[test]
+fn bounded_steps() {
+    let model = "dtmc
+        module m s:[0..2] init 0;
+          [] s=0 -> 0.5:(s'=1) + 0.5:(s'=2);
+          [] s=1 -> 1/7:(s'=0) + 1/3:(s'=2) + 11/21:(s'=1);
+        endmodule
+        label \"goal\" = s=2;";
+    enclosed(model, "P=? [ F<=50 \"goal\" ]");
+    // In fractions this takes too long, so that doubles answer.
+    let found = value(model, "P=? [ F<=1000000 \"goal\" ]", Exactness::Auto);
+    assert!(found.exact.is_none() && found.lower <= 1.0 && found.upper >= 1.0, "{found:?}");
+}
+
+#[test]
+fn a_policy_is_evaluated_over_bounded_steps() {
+    let model = "mdp
+        module m s:[0..2] init 0; [slow] s=0 -> 0.1:(s'=1) + 0.9:(s'=0); [fast] s=0 -> 0.5:(s'=1) + 0.5:(s'=2); endmodule
+        rewards \"cost\" [slow] true : 1; [fast] true : 5; endrewards
+        label \"goal\" = s=1;";
+    let policy = "{\"format\": \"metaplan-policy/1\", \"states\": [{\"state\": {\"s\": 0}, \"action\": \"slow\", \"choice\": 0}]}";
+    let cases = [
+        ("Pmax=? [ X \"goal\" ]", "1/10"),
+        ("Pmax=? [ F<=2 \"goal\" ]", "19/100"),
+        ("R{\"cost\"}max=? [ C<=2 ]", "19/10"),
+        ("Pmin=? [ G<=2 !\"goal\" ]", "81/100"),
+    ];
+    for (question, expected) in cases {
+        let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
+        let found = outcome(model, question, &Options { evaluate, ..Options::default() }).expect("an answer");
+        let Outcome::Value(Answer::Finite(found)) = found else { panic!("{found:?}") };
+        assert_eq!(found.exact.map(|exact| exact.to_string()).as_deref(), Some(expected), "{question}");
+    }
+    let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
+    let both = "multi(R{\"cost\"}min=? [ F \"goal\" ], Pmax=? [ F \"goal\" ])";
+    assert!(outcome(model, both, &Options { evaluate, ..Options::default() }).is_err());
+}
+
+#[test]
+fn two_objectives_in_doubles_have_the_bounds_of_their_policies() {
+    let model = "mdp
+        module m s:[0..2] init 0; r:[0..7] init 0;
+          [risk] s=0 & r<7 -> 1/3:(s'=1) + 1/7:(s'=2) + 11/21:(r'=r+1);
+          [care] s=0 -> (s'=1);
+        endmodule
+        rewards \"cost\" [risk] true : 0.1; [care] true : 1+r/7; endrewards
+        label \"end\" = s>0; label \"good\" = s=1;";
+    let question = "multi(R{\"cost\"}min=? [ F \"end\" ], Pmax=? [ F \"good\" ])";
+    let [exact, rounded] = [Exactness::Always, Exactness::Never].map(|exactness| {
+        let found = outcome(model, question, &Options { exactness, ..Options::default() });
+        let Ok(Outcome::Front(front)) = found else { panic!("{found:?}") };
+        front
+    });
+    assert!(exact.len() > 1 && exact.len() == rounded.len(), "{exact:?} {rounded:?}");
+    for (exact, rounded) in exact.iter().flatten().zip(rounded.iter().flatten()) {
+        let (exact, rounded) = (exact.quantity().expect("finite"), rounded.quantity().expect("finite"));
+        assert!(encloses(rounded, exact.exact.as_ref().expect("a fraction")), "{exact:?} {rounded:?}");
+        assert!(rounded.upper - rounded.lower < 1e-12, "{rounded:?}");
+    }
+    for bounded in [
+        "multi(R{\"cost\"}min=? [ F \"end\" ], P>=0.9 [ F \"good\" ])",
+        "multi(R{\"cost\"}min=? [ F \"end\" ], P>=0.71 [ F \"good\" ])",
+        "multi(Pmax=? [ F \"good\" ], R{\"cost\"}<=0.9 [ F \"end\" ])",
+        "multi(Pmax=? [ F \"good\" ], R{\"cost\"}<=2 [ F \"end\" ])",
+    ] {
+        let [exact, rounded] = [Exactness::Always, Exactness::Never].map(|exactness| {
+            match outcome(model, bounded, &Options { exactness, ..Options::default() }) {
+                Ok(Outcome::Constrained { randomised, deterministic, proved: true }) => {
+                    [randomised, deterministic]
+                }
+                other => panic!("{bounded}: {other:?}"),
+            }
+        });
+        for (exact, rounded) in exact.iter().zip(&rounded) {
+            let (exact, rounded) = (exact.quantity().expect("finite"), rounded.quantity().expect("finite"));
+            let fraction = exact.exact.as_ref().expect("a fraction");
+            assert!(encloses(rounded, fraction), "{bounded}: {exact:?} {rounded:?}");
+            assert!(rounded.upper - rounded.lower < 1e-9, "{bounded}: {rounded:?}");
+        }
+    }
+}
+
+#[test]
+fn extreme_models_are_refused_or_answered() {
+    let wide =
+        "mdp module m x:[-5000000000000000000..5000000000000000000] init 0; [] x=0 -> (x'=1); endmodule
+        label \"goal\" = x=1;";
+    assert_eq!(enclosed(wide, "Pmax=? [ F \"goal\" ]").to_string(), "1");
+    let module = |number: usize| {
+        let command = format!("[a] x{number}=0 -> 0.5:(x{number}'=1) + 0.5:(x{number}'=0);\n");
+        format!("module m{number} x{number}:[0..1] init 0;\n{}endmodule\n", command.repeat(20))
+    };
+    let modules: Vec<String> = (0..12).map(module).collect();
+    let many = format!("mdp\n{}label \"goal\" = x0=1;", modules.concat());
+    assert_eq!(refused(&many, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q306"]);
+    let growing = "const double p = pow(pow(pow(1.5,900),900),900);
+        mdp module m x:[0..1] init 0; [] x=0 -> p:(x'=1); endmodule label \"goal\" = x=1;";
+    assert_eq!(refused(growing, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q303"]);
+    let square = |n: usize| format!("const double c{} = c{n}*c{n};\n", n + 1);
+    let squares = (0..60).map(square).collect::<Vec<_>>().concat();
+    let growing = format!(
+        "const double c0 = 0.9;\n{squares} mdp module m x:[0..1] init 0; [] x=0 -> c60:(x'=1) + 1-c60:(x'=0); endmodule
+        label \"goal\" = x=1;"
+    );
+    assert_eq!(refused(&growing, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q303"]);
+    for update in ["1/x:(x'=1)", "1:(x'=1/0)", "0.5:(x'=1)", "-1:(x'=1) + 2:(x'=0)", "(x'=2)"] {
+        let model =
+            format!("mdp module m x:[0..1] init 0; [] x=0 -> {update}; endmodule label \"goal\" = x=1;");
+        assert_eq!(refused(&model, "Pmax=? [ F \"goal\" ]", Exactness::Auto).len(), 1, "{update}");
+    }
+    let empty = "mdp module m x:[3..2]; endmodule label \"goal\" = x=1;";
+    assert_eq!(refused(empty, "Pmax=? [ F \"goal\" ]", Exactness::Auto), ["Q207"]);
+}
+
+/// Without optimisation the frames of functions are large.
+#[test]
+fn deep_and_large_expressions_are_refused() {
+    let deep = || {
+        let sum = |terms: usize| format!("x=0{}", "+0".repeat(terms));
+        let chain = |link: &str, length: usize| {
+            let next = |n: usize| format!("formula f{} = {};\n", n + 1, link.replace('f', &format!("f{n}")));
+            format!("formula f0 = x=0;\n{}", (0..length).map(next).collect::<Vec<_>>().concat())
+        };
+        let model = |formulas: &str, guard: &str| {
+            format!(
+                "mdp {formulas} module m x:[0..1] init 0; [] {guard} -> (x'=1); endmodule label \"goal\" = x=1;"
+            )
+        };
+        assert_eq!(enclosed(&model("", &sum(450)), "Pmax=? [ F \"goal\" ]").to_string(), "1");
+        let many = format!("(x=0{})", "|x=0".repeat(9000));
+        assert_eq!(enclosed(&model("", &many), "Pmax=? [ F \"goal\" ]").to_string(), "1");
+        let long = prism::parse(&model("", &sum(9000))).expect_err("too long");
+        assert_eq!(long[0].code, "Q104");
+        for (link, length) in [("f & x>=0", 5000), ("f & f", 60)] {
+            let model = model(&chain(link, length), &format!("f{length}"));
+            assert_eq!(refused(&model, "Pmax=? [ F \"goal\" ]", Exactness::Auto)[0], "Q104", "{link}");
+        }
+    };
+    let thread = std::thread::Builder::new().stack_size(16 << 20).spawn(deep);
+    thread.expect("a thread").join().expect("no panic");
+}
