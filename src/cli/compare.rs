@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long, value_name = "COMPONENT=RATE", value_parser = loss)]
     loss: Option<(String, f64)>,
     /// The time that a mission costs which does not get to its goal; ten times our plan's by default.
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", value_parser = penalty)]
     penalty: Option<f64>,
     /// What the published procedure puts first.
     #[arg(long, value_enum, default_value_t = Priority::Time)]
@@ -73,6 +73,11 @@ fn loss(text: &str) -> Result<(String, f64), String> {
     if (0.0..=1.0).contains(&rate) { Ok((component.to_owned(), rate)) } else { Err(wrong()) }
 }
 
+fn penalty(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| *value >= 0.0 && value.is_finite());
+    value.ok_or_else(|| format!("`{text}` is no time that is at least 0"))
+}
+
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mission = arguments.situation.mission(&arguments.inputs)?;
@@ -107,8 +112,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => Vec::new(),
     };
     let mut comparisons = Vec::new();
-    let progress = bar(arguments, common);
-    for (pair, mission, coadaptation) in missions(arguments, &mission, coadaptation, &roles)? {
+    let missions = missions(arguments, &mission, coadaptation, &roles)?;
+    let progress = bar(missions.len(), common);
+    for (pair, mission, coadaptation) in missions {
         comparisons.push((pair, one(arguments, &mission, &coadaptation, &roles, tasked.as_ref())?));
         progress.set_position(comparisons.len() as u64);
     }
@@ -132,10 +138,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn bar(arguments: &Arguments, common: &Common) -> ProgressBar {
+fn bar(missions: usize, common: &Common) -> ProgressBar {
     let shown = !common.quiet && std::io::stderr().is_terminal();
     let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-    ProgressBar::with_draw_target(arguments.pairs.map(|pairs| pairs as u64), target)
+    ProgressBar::with_draw_target(Some(missions as u64), target)
 }
 
 /// The mission itself, or the same mission between other places.

@@ -102,6 +102,11 @@ pub struct Arc {
     pub by: Vec<Option<Traversal>>,
 }
 
+/// As many places fit into the number of a state.
+const PLACES: usize = 1 << 16;
+/// As many configurations do.
+const CONFIGURATIONS: usize = 1 << 12;
+
 /// A configuration: a design of the function that moving requires.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Configuration {
@@ -192,6 +197,7 @@ impl Coadaptation {
         designs.extend(facts.of(&roles.available).iter().filter_map(|arguments| arguments.first().cloned()));
         natural(&mut places);
         natural(&mut designs);
+        fits(places.len(), designs.len())?;
         let place = |name: &str| places.iter().position(|known| known == name).unwrap_or_default();
         let design = |name: &str| designs.iter().position(|known| known == name).unwrap_or_default();
         let view = mission.knowledge().map(crate::knowledge::Knowledge::view);
@@ -229,7 +235,7 @@ impl Coadaptation {
             rate: probabilistic::number::from_shortest_decimal(roles.loss_rate)
                 .unwrap_or_else(BigRational::zero),
         });
-        Ok(Self {
+        Self {
             start: place(&start),
             goal: place(&goal),
             initial: design(&configured),
@@ -239,7 +245,8 @@ impl Coadaptation {
             switches,
             battery,
             loss,
-        })
+        }
+        .checked()
     }
 
     /// Whether a problem spells out places and configurations, as [`Coadaptation::new`] reads them; otherwise the states
@@ -256,6 +263,55 @@ impl Coadaptation {
             .is_some_and(|loss| self.configurations[configuration].components.contains(&loss.component))
     }
 
+    /// The levels of the battery that an amount of energy takes, rounded up.
+    pub(super) fn levels(&self, energy: &BigRational) -> u32 {
+        let unit = self.battery.map_or(1, |battery| battery.unit);
+        (energy / BigRational::from(BigInt::from(unit))).ceil().to_integer().to_u32().unwrap_or(u32::MAX)
+    }
+
+    /// The process, if it is one: probabilities from 0 to 1, and nothing less than zero.
+    ///
+    /// # Errors
+    /// Everything that is not so.
+    pub(super) fn checked(self) -> Result<Self, Vec<Message>> {
+        let (zero, one) = (BigRational::zero(), BigRational::one());
+        let mut problems = Vec::new();
+        let mut check = |what: &str, spent: [&BigRational; 2], probabilities: [&BigRational; 2]| {
+            if let Some(value) = spent.into_iter().find(|value| **value < zero) {
+                let text = format!("{what} takes {value}; time and energy must not be less than zero");
+                problems.push(Message::error("M122", text));
+            }
+            if let Some(value) = probabilities.into_iter().find(|value| **value < zero || **value > one) {
+                problems.push(Message::error("M122", format!("{what} has a probability of {value}")));
+            }
+        };
+        for arc in &self.arcs {
+            for (traversal, design) in arc.by.iter().zip(&self.configurations) {
+                let Some(Traversal { time, energy, success, hit }) = traversal else { continue };
+                let (from, to) = (&self.places[arc.from], &self.places[arc.to]);
+                check(
+                    &format!("the move from {from} to {to} with {}", design.name),
+                    [time, energy],
+                    [success, hit],
+                );
+            }
+        }
+        for (old, switches) in self.configurations.iter().zip(&self.switches) {
+            for (switch, new) in switches.iter().zip(&self.configurations) {
+                let Some(Switch { time, energy, success }) = switch else { continue };
+                check(
+                    &format!("the change from {} to {}", old.name, new.name),
+                    [time, energy],
+                    [success, &one],
+                );
+            }
+        }
+        if let Some(loss) = &self.loss {
+            check("the loss of the component", [&zero, &zero], [&loss.rate, &one]);
+        }
+        if problems.is_empty() { Ok(self) } else { Err(problems) }
+    }
+
     /// The same without one component, and what needs it.
     #[must_use]
     pub fn without(&self, component: &str) -> Self {
@@ -265,6 +321,17 @@ impl Coadaptation {
         }
         result
     }
+}
+
+/// Whether the number of a state has room for so many places and configurations.
+pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Vec<Message>> {
+    if places <= PLACES && configurations <= CONFIGURATIONS {
+        return Ok(());
+    }
+    let text = format!(
+        "a process has at most {PLACES} places and {CONFIGURATIONS} configurations, not {places} and {configurations}"
+    );
+    Err(vec![Message::error("M127", text)])
 }
 
 /// Numbers in names count as numbers: `l2` before `l10`.
@@ -331,12 +398,6 @@ impl Facts {
                 success: value(&roles.success).unwrap_or_else(BigRational::one),
                 hit: value(&roles.hit).unwrap_or_else(BigRational::zero),
             };
-            for (role, probability) in [(&roles.success, &traversal.success), (&roles.hit, &traversal.hit)] {
-                if *probability < BigRational::zero() || *probability > BigRational::one() {
-                    let text = format!("`({role} {from} {to} {name})` is no probability: {probability}");
-                    problems.push(Message::error("M122", text));
-                }
-            }
             let key = (place(from), place(to));
             let arc = arcs.entry(key).or_insert_with(|| Arc {
                 from: key.0,

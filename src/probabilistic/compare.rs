@@ -211,15 +211,13 @@ pub fn compare(
     };
     let hindsight = [(Spent::Time, penalty), (Spent::Energy, f64::INFINITY)]
         .map(|(spent, penalty)| loss::hindsight(mission, config.risk, penalty, spent));
-    Ok(Comparison {
-        candidates,
-        front,
-        hindsight,
-        penalty,
-        no_price: referee.no_price(),
-        loss,
-        costs: memo.costs,
-    })
+    let no_price = referee.no_price();
+    let mut comparison =
+        Comparison { candidates, front, hindsight, penalty, no_price, loss, costs: memo.costs };
+    // A plan that is best by another metric, or too dear for the rounded battery, has a price all the same.
+    let price = comparison.price_of_determinism();
+    comparison.no_price = no_price.filter(|_| price.is_some_and(|price| price.abs() <= 1e-9 * penalty));
+    Ok(comparison)
 }
 
 /// Why a comparison has no result.
@@ -346,9 +344,7 @@ fn follow(
 
 /// The state after an action on which nothing goes wrong.
 pub(super) fn after(mission: &Coadaptation, at: Situation, action: Action, risk: Risk) -> Situation {
-    use probabilistic::Number;
-    let unit = mission.battery.map_or(1.0, |battery| f64::from(battery.unit));
-    let levels = |energy: &BigRational| if risk.battery { (energy.to_f64() / unit).ceil() as u32 } else { 0 };
+    let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
     match action {
         Action::Change(new) => {
             let energy = mission.switches[at.configuration][new].as_ref().map_or(0, |s| levels(&s.energy));

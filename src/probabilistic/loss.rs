@@ -119,19 +119,8 @@ fn solved_again(referee: &Referee<'_>, from: Situation, spent: f64) -> Result<Op
     let process =
         Process::<f64>::new(referee.mission, Risk { loss: true, ..risk }, &["time"]).starting(from.into());
     let explored = explore(&process, &Bounds::default())?;
-    let mut goal = fixedbitset::FixedBitSet::with_capacity(explored.mdp.states());
-    for (number, state) in explored.states.iter().enumerate() {
-        goal.set(number, process.is_goal(*state));
-    }
-    let problem = Problem {
-        mdp: &explored.mdp,
-        direction: Direction::Min,
-        rewards: Some(&explored.rewards[0]),
-        terminal: &goal,
-        terminal_values: None,
-        blocked: None,
-        allowed: None,
-    };
+    let goal = process.goals(&explored.states);
+    let problem = Problem::new(&explored.mdp, Direction::Min, Some(&explored.rewards[0]), &goal);
     let solution = solve(problem, None);
     Ok(solution.filter(|s| !s.infinite.contains(0)).map(|s| spent + s.values[0]))
 }

@@ -120,16 +120,7 @@ fn measure<N: Number>(
         end.set(state, stays);
     }
     let value = |mdp: &Mdp<N>, rewards: Option<&[N]>, terminal: &FixedBitSet| {
-        let problem = Problem {
-            mdp,
-            direction: Direction::Max,
-            rewards,
-            terminal,
-            terminal_values: None,
-            blocked: None,
-            allowed: None,
-        };
-        solve(problem, None)
+        solve(Problem::new(mdp, Direction::Max, rewards, terminal), None)
     };
     let first = |rewards: Option<&[N]>, terminal: &FixedBitSet| {
         let solution = value(&chain.mdp, rewards, terminal)?;

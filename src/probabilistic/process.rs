@@ -3,7 +3,10 @@
 //! This is the corrected reading of the approach: every route, reconfiguration anywhere, a collision that is not
 //! forgotten, and a move only where the battery stays above the reserve.
 
+use fixedbitset::FixedBitSet;
+use num_rational::BigRational;
 use probabilistic::explore::{Choices, Generator};
+use probabilistic::states::States;
 use probabilistic::{Error, Number};
 
 use crate::probabilistic::coadaptation::Coadaptation;
@@ -131,17 +134,14 @@ pub struct Process<N> {
 impl<N: Number> Process<N> {
     /// The process with some risks, and with some of the [`REWARDS`].
     pub fn new(mission: &Coadaptation, risk: Risk, rewards: &[&str]) -> Self {
-        let number = |value| N::from_rational(value);
+        let number = |value: &BigRational| N::from_rational(value);
         let wanted: Vec<usize> =
             rewards.iter().filter_map(|name| REWARDS.iter().position(|known| known == name)).collect();
         let rewards_of = |all: [N; 5]| wanted.iter().map(|index| all[*index].clone()).collect::<Vec<N>>();
-        let unit = mission.battery.map_or(1, |battery| battery.unit);
-        let levels = |energy: &num_rational::BigRational| {
-            let levels = (N::from_rational(energy).to_f64() / f64::from(unit)).ceil();
-            if risk.battery { levels as u32 } else { 0 }
-        };
-        let rate =
-            mission.loss.as_ref().filter(|_| risk.loss).map_or_else(N::zero, |loss| number(&loss.rate));
+        let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
+        // Complements are exact before they are rounded.
+        let (zero, one): (BigRational, BigRational) = (Number::zero(), Number::one());
+        let rate = mission.loss.as_ref().filter(|_| risk.loss).map_or(&zero, |loss| &loss.rate);
         let designs = mission.configurations.len();
         let mut moves: Vec<Vec<Vec<Move<N>>>> = vec![vec![Vec::new(); designs]; mission.places.len()];
         for (index, arc) in mission.arcs.iter().enumerate() {
@@ -150,11 +150,10 @@ impl<N: Number> Process<N> {
                 else {
                     continue;
                 };
-                let hit = if risk.collisions { number(&traversal.hit) } else { N::zero() };
-                let success = if risk.failures { number(&traversal.success) } else { N::one() };
-                let ends =
-                    [success.times(&N::one().minus(&hit)), success.times(&hit), N::one().minus(&success)];
-                let keep = N::one().minus(&rate);
+                let hit = if risk.collisions { &traversal.hit } else { &zero };
+                let success = if risk.failures { &traversal.success } else { &one };
+                let ends = [success * (&one - hit), success * hit, &one - success];
+                let share = |rate: &BigRational| ends.each_ref().map(|end| number(&(end * rate)));
                 moves[arc.from][design].push(Move {
                     action: Action::Move(index).number(),
                     to: arc.to,
@@ -162,21 +161,17 @@ impl<N: Number> Process<N> {
                     rewards: rewards_of([
                         number(&traversal.time),
                         number(&traversal.energy),
-                        ends[1].clone(),
+                        number(&ends[1]),
                         N::zero(),
                         N::one(),
                     ]),
-                    outcomes: [
-                        ends.each_ref().map(|p| p.times(&keep)),
-                        ends.each_ref().map(|p| p.times(&rate)),
-                    ],
+                    outcomes: [share(&(&one - rate)), share(rate)],
                 });
             }
         }
         let change = |old: usize, new: usize| {
             let switch =
                 mission.switches[old][new].as_ref().filter(|_| mission.configurations[new].available)?;
-            let success = number(&switch.success);
             Some(Change {
                 action: Action::Change(new).number(),
                 to: new,
@@ -188,8 +183,8 @@ impl<N: Number> Process<N> {
                     N::one(),
                     N::zero(),
                 ]),
-                failure: N::one().minus(&success),
-                success,
+                failure: number(&(&one - &switch.success)),
+                success: number(&switch.success),
             })
         };
         let changes =
@@ -215,6 +210,15 @@ impl<N: Number> Process<N> {
     pub fn starting(mut self, state: State) -> Self {
         self.initial = state;
         self
+    }
+
+    /// The states at the goal, by number.
+    pub fn goals(&self, states: &States<State>) -> FixedBitSet {
+        let mut goals = FixedBitSet::with_capacity(states.len());
+        for (number, state) in states.iter().enumerate() {
+            goals.set(number, self.is_goal(*state));
+        }
+        goals
     }
 
     /// Whether a state is at the goal.

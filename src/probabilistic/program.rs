@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::{One, ToPrimitive, Zero};
+use num_traits::{One, Zero};
 use probabilistic::Place;
 use probabilistic::prism::ast::{
-    BinaryOp, Command, Expr, ExprKind, Model, ModelKind, Module, Named, RewardItem, Rewards, Update, Variable,
+    BinaryOp, Command, Constant, Expr, ExprKind, Model, ModelKind, Module, Named, RewardItem, Rewards,
+    Update, Variable,
 };
 use probabilistic::prism::identifier;
 
@@ -17,21 +17,49 @@ use crate::probabilistic::process::Risk;
 /// The mission as a model: `l` is the place, `c` the configuration, `b` the battery; `hit`, `failed` and `lost` are flags.
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
     let writer = Writer { mission, risk };
+    model(
+        writer.remark(),
+        Vec::new(),
+        (writer.variables(), writer.commands()),
+        writer.rewards(),
+        writer.labels(),
+    )
+}
+
+/// A model of one module, with its variables and commands.
+pub(super) fn model(
+    remark: String,
+    constants: Vec<Constant>,
+    (variables, commands): (Vec<Variable>, Vec<Command>),
+    rewards: Vec<Rewards>,
+    labels: Vec<Named>,
+) -> Model {
+    let robot = Module { name: "robot".to_owned(), variables, commands, place: Place::default() };
     Model {
         kind: ModelKind::Mdp,
-        remark: writer.remark(),
-        constants: Vec::new(),
+        remark,
+        constants,
         formulas: Vec::new(),
         globals: Vec::new(),
-        modules: vec![Module {
-            name: "robot".to_owned(),
-            variables: writer.variables(),
-            commands: writer.commands(),
-            place: Place::default(),
-        }],
-        rewards: writer.rewards(),
-        labels: writer.labels(),
+        modules: vec![robot],
+        rewards,
+        labels,
     }
+}
+
+/// A variable from 0 to the greatest value.
+pub(super) fn range(name: &str, greatest: usize, initial: usize) -> Variable {
+    Variable {
+        name: name.to_owned(),
+        range: Some((Expr::int(0), Expr::int(greatest as i64))),
+        initial: Some(Expr::int(initial as i64)),
+        place: Place::default(),
+    }
+}
+
+/// A truth value, false at first.
+pub(super) fn flag(name: &str) -> Variable {
+    Variable { range: None, initial: Some(Expr::bool(false)), ..range(name, 0, 0) }
 }
 
 struct Writer<'a> {
@@ -78,18 +106,6 @@ impl Writer<'_> {
     }
 
     fn variables(&self) -> Vec<Variable> {
-        let range = |name: &str, greatest: usize, initial: usize| Variable {
-            name: name.to_owned(),
-            range: Some((Expr::int(0), Expr::int(greatest as i64))),
-            initial: Some(Expr::int(initial as i64)),
-            place: Place::default(),
-        };
-        let flag = |name: &str| Variable {
-            name: name.to_owned(),
-            range: None,
-            initial: Some(Expr::bool(false)),
-            place: Place::default(),
-        };
         let mission = self.mission;
         let mut variables = vec![
             range("l", mission.places.len() - 1, mission.start),
@@ -109,15 +125,10 @@ impl Writer<'_> {
         all(std::iter::once(away).chain(self.risk.failures.then(|| not(Expr::name("failed")))))
     }
 
-    fn levels(&self, energy: &BigRational) -> i64 {
-        let unit = self.mission.battery.map_or(1, |battery| battery.unit);
-        (energy / BigRational::from(BigInt::from(unit))).ceil().to_i64().unwrap_or(i64::MAX)
-    }
-
     /// That there is battery for something, and the battery after it.
     fn spend(&self, energy: &BigRational) -> (Option<Expr>, Assignments) {
         let Some(battery) = self.battery() else { return (None, Vec::new()) };
-        let levels = self.levels(energy);
+        let levels = i64::from(self.mission.levels(energy));
         if levels == 0 {
             return (None, Vec::new());
         }

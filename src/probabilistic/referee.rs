@@ -47,15 +47,8 @@ impl Referee<'_> {
         reward: Option<usize>,
         terminal: &'p FixedBitSet,
     ) -> Problem<'p, f64> {
-        Problem {
-            mdp: &self.explored.mdp,
-            direction,
-            rewards: reward.map(|reward| &self.explored.rewards[reward][..]),
-            terminal,
-            terminal_values: None,
-            blocked: None,
-            allowed: None,
-        }
+        let rewards = reward.map(|reward| &self.explored.rewards[reward][..]);
+        Problem::new(&self.explored.mdp, direction, rewards, terminal)
     }
 
     /// The best policies by single objectives; the first one is best by penalised time.

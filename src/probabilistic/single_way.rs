@@ -5,17 +5,18 @@
 //! can collide, a move never fails, and a battery that is empty ends nothing. Their models are one for each route; here
 //! the route is the first choice, so that one question finds the best of them, and a constant fixes it.
 
-use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::{One, ToPrimitive, Zero};
+use num_traits::{One, Zero};
 use probabilistic::Place;
 use probabilistic::prism::ast::{
-    BinaryOp, Constant, Expr, ExprKind, Function, Model, ModelKind, Module, Named, Rewards, Type, Variable,
+    BinaryOp, Constant, Expr, ExprKind, Function, Model, Named, Rewards, Type, Variable,
 };
 use probabilistic::prism::identifier;
 
 use crate::probabilistic::coadaptation::Coadaptation;
-use crate::probabilistic::program::{all, assign, command, equals, item, not, number, updates};
+use crate::probabilistic::program::{
+    all, assign, command, equals, flag, item, model, not, number, range, updates,
+};
 use crate::probabilistic::published::{ROUTES, shortest_routes};
 
 /// The mission as a model of the published setting: `r` is the route (0 before it is chosen), `p` how many of its arcs are
@@ -23,26 +24,9 @@ use crate::probabilistic::published::{ROUTES, shortest_routes};
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
     let writer = Writer { mission, routes };
-    Model {
-        kind: ModelKind::Mdp,
-        remark: writer.remark(),
-        constants: vec![Constant {
-            name: "ROUTE".to_owned(),
-            kind: Type::Int,
-            value: None,
-            place: Place::default(),
-        }],
-        formulas: Vec::new(),
-        globals: Vec::new(),
-        modules: vec![Module {
-            name: "robot".to_owned(),
-            variables: writer.variables(),
-            commands: writer.commands(),
-            place: Place::default(),
-        }],
-        rewards: writer.rewards(),
-        labels: writer.labels(),
-    }
+    let route = Constant { name: "ROUTE".to_owned(), kind: Type::Int, value: None, place: Place::default() };
+    let parts = (writer.variables(), writer.commands());
+    model(writer.remark(), vec![route], parts, writer.rewards(), writer.labels())
 }
 
 struct Writer<'a> {
@@ -74,18 +58,6 @@ impl Writer<'_> {
     }
 
     fn variables(&self) -> Vec<Variable> {
-        let range = |name: &str, greatest: usize, initial: usize| Variable {
-            name: name.to_owned(),
-            range: Some((Expr::int(0), Expr::int(greatest as i64))),
-            initial: Some(Expr::int(initial as i64)),
-            place: Place::default(),
-        };
-        let flag = |name: &str| Variable {
-            name: name.to_owned(),
-            range: None,
-            initial: Some(Expr::bool(false)),
-            place: Place::default(),
-        };
         let longest = self.routes.iter().map(Vec::len).max().unwrap_or(0).max(1);
         let designs = self.mission.configurations.len();
         let mut variables = vec![
@@ -103,9 +75,10 @@ impl Writer<'_> {
 
     /// What is left of the battery, at least nothing.
     fn spent(&self, energy: &BigRational) -> Vec<(String, Expr, Place)> {
-        let Some(battery) = self.mission.battery else { return Vec::new() };
-        let levels =
-            (energy / BigRational::from(BigInt::from(battery.unit))).ceil().to_i64().unwrap_or(i64::MAX);
+        if self.mission.battery.is_none() {
+            return Vec::new();
+        }
+        let levels = i64::from(self.mission.levels(energy));
         if levels == 0 {
             return Vec::new();
         }

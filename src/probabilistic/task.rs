@@ -17,7 +17,7 @@ use num_traits::{One, Zero};
 use crate::message::Message;
 use crate::mission::Mission;
 use crate::probabilistic::coadaptation::{
-    Arc, Coadaptation, Configuration, Facts, Loss, Roles, Switch, Traversal, components,
+    Arc, Coadaptation, Configuration, Facts, Loss, Roles, Switch, Traversal, components, fits,
 };
 use crate::probabilistic::process::{Action, Situation};
 
@@ -72,7 +72,7 @@ impl Tasked {
             let of = |design: &str| view.as_ref().map(|view| components(view, design)).unwrap_or_default();
             name.split('+').flat_map(of).collect()
         };
-        Ok(explorer.finish(parts))
+        explorer.finish(parts)
     }
 
     /// The problem that is left in a situation: the actions that lead to its place have taken place.
@@ -228,7 +228,7 @@ impl Explorer<'_> {
             .unwrap_or_else(|| (0..self.places.len()).map(|number| format!("s{number}")).collect())
     }
 
-    fn finish(mut self, components: impl Fn(&String) -> Vec<String>) -> Tasked {
+    fn finish(mut self, components: impl Fn(&String) -> Vec<String>) -> Result<Tasked, Vec<Message>> {
         let goals: Vec<bool> = self.places.iter().map(|place| self.task.reaches_goal(place)).collect();
         // All states of the goal become one place, the last one.
         let goal = self.places.len();
@@ -238,6 +238,7 @@ impl Explorer<'_> {
             self.configurations.push("none".to_owned());
         }
         let designs = self.configurations.len();
+        fits(goal + 1, designs)?;
         let mut merged: BTreeMap<(usize, usize), Vec<Option<Traversal>>> = BTreeMap::new();
         for ((from, to), by) in self.arcs {
             let to = if goals[to] { goal } else { to };
@@ -282,6 +283,7 @@ impl Explorer<'_> {
             battery: None,
             loss,
         };
-        Tasked { coadaptation, origins: self.origins, moves: moves.collect() }
+        let coadaptation = coadaptation.checked()?;
+        Ok(Tasked { coadaptation, origins: self.origins, moves: moves.collect() })
     }
 }

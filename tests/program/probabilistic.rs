@@ -2,7 +2,7 @@
 
 #![allow(clippy::print_stdout)]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use metaplan::mission::Mission;
 use metaplan::probabilistic::{
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use crate::common::{metaplan, metaplan_in, root};
 
-fn shared(path: &str) -> Option<PathBuf> {
+pub fn shared(path: &str) -> Option<PathBuf> {
     let path = root().join("../shared").join(path);
     if !path.exists() {
         println!("skipped: {} is not there", path.display());
@@ -117,19 +117,8 @@ fn known_results(map: &str, speeds: bool, configurations: usize) {
 fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
     let process = Process::<BigRational>::new(mission, risk, &["time"]);
     let explored = explore(&process, &Bounds::default()).expect("explored");
-    let mut goal = fixedbitset::FixedBitSet::with_capacity(explored.mdp.states());
-    for (number, state) in explored.states.iter().enumerate() {
-        goal.set(number, process.is_goal(*state));
-    }
-    let problem = Problem {
-        mdp: &explored.mdp,
-        direction: Direction::Min,
-        rewards: Some(&explored.rewards[0]),
-        terminal: &goal,
-        terminal_values: None,
-        blocked: None,
-        allowed: None,
-    };
+    let goal = process.goals(&explored.states);
+    let problem = Problem::new(&explored.mdp, Direction::Min, Some(&explored.rewards[0]), &goal);
     let solution = solve(problem, None).expect("small enough");
     (!solution.infinite.contains(0)).then(|| solution.values[0].clone())
 }
@@ -366,6 +355,41 @@ fn a_mission_without_places_is_compared() {
     assert_eq!(first["replanned"], first["solved_again"], "{answer:#}");
 }
 
+/// Values that no process can have, and more configurations than the number of a state has room for.
+#[test]
+fn what_is_no_process_is_refused() {
+    use encodings::pddl::ast::{InitialElement, Name, Problem as Pddl, Term};
+    let (mission, _) = Mission::read(&root().join("missions/camara_like.toml")).expect("a mission");
+    let (problem, _) = mission.filled().expect("filled");
+    let codes = |problem: &Pddl| match Coadaptation::new(&mission, problem, mission.roles()) {
+        Ok(_) => Vec::new(),
+        Err(messages) => messages.iter().map(|message| message.code.clone()).collect::<Vec<_>>(),
+    };
+    assert!(codes(&problem).is_empty());
+    for (symbol, value) in [("time", -1), ("energy", -5), ("hit", 2), ("success", -1), ("switch_time", -1)] {
+        let mut changed = problem.clone();
+        let element = changed.init.iter_mut().find_map(|element| match element {
+            InitialElement::Value(atom, value, _) if atom.predicate.name.as_str() == symbol => Some(value),
+            _ => None,
+        });
+        *element.unwrap_or_else(|| panic!("no {symbol}")) = BigRational::from_integer(value.into());
+        assert_eq!(codes(&changed), ["M122"], "{symbol}");
+    }
+    let mut many = problem.clone();
+    let fact = problem.init.iter().find_map(|element| match element {
+        InitialElement::Fact(atom) if atom.predicate.name.as_str() == "fd_available" => Some(atom),
+        _ => None,
+    });
+    let fact = fact.expect("an available design");
+    for number in 0..5000 {
+        let mut fact = fact.clone();
+        let (Term::Constant(design) | Term::Variable(design)) = &mut fact.arguments[0];
+        design.name = Name::new(&format!("fd_more_{number}"));
+        many.init.push(InitialElement::Fact(fact));
+    }
+    assert_eq!(codes(&many), ["M127"]);
+}
+
 #[test]
 fn the_published_setting_is_exported_as_it_is_carried_out() {
     let (mission, _) = Mission::read(&root().join("missions/camara_like.toml")).expect("a mission");
@@ -422,59 +446,4 @@ fn what_is_exported_is_the_process_itself() {
     assert_eq!(found, sizes.map(|size| size as u64));
     let jani = metaplan(&["export", "missions/camara_like.toml", "--to", "jani"]);
     assert_eq!(jani.json()["jani-version"], 1);
-}
-
-const MODEL: &str =
-    "mdp\nmodule m\n  s:[0..2] init 0;\n  [a] s=0 -> PROBABILITIES;\nendmodule\nlabel \"goal\" = s=1;\n";
-
-#[test]
-fn bad_models_and_properties_are_refused_with_their_place() {
-    let good = "0.5:(s'=1) + 0.5:(s'=2)";
-    // What the updates say, the property; status, and what is said.
-    let cases = [
-        (good, "Pmax=? [ F \"goal\" ]", 0, "0.5"),
-        ("0.5:(s'=1) + 0.4:(s'=2)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:3: error[Q301]"),
-        ("(s'=3)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:15: error[Q305]"),
-        ("(t'=1)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:15: error[Q201]"),
-        ("(s'=1", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:19: error[Q102]"),
-        (good, "Pmax=? [ F \"nowhere\" ]", 3, "property:1:12: error[Q202]"),
-        (good, "S=? [ \"goal\" ]", 3, "property:1:1: error[Q403]"),
-        (good, "R{\"time\"}min=? [ F \"goal\" ]", 3, "error[Q202]"),
-    ];
-    for (updates, property, status, said) in cases {
-        let model = MODEL.replace("PROBABILITIES", updates);
-        let outcome = metaplan_in(&root(), &["check", "-", property], &model);
-        let all = format!("{}{}", outcome.stdout, outcome.stderr);
-        // Standard input goes by the name that was given for it.
-        let all = all.replace("-:", "<stdin>:");
-        assert_eq!(outcome.status, status, "{updates} {property}: {outcome:#?}");
-        assert!(all.contains(said), "{said} in {all}");
-    }
-    let limited = metaplan_in(
-        &root(),
-        &["check", "-", "Pmax=? [ F \"goal\" ]", "--state-limit", "2"],
-        &MODEL.replace("PROBABILITIES", good),
-    );
-    assert_eq!(limited.status, 12, "{limited:#?}");
-    let continuous =
-        metaplan_in(&root(), &["check", "-", "Pmax=? [ F \"goal\" ]"], "ctmc\nmodule m endmodule\n");
-    assert_eq!(continuous.status, 3, "{continuous:#?}");
-    assert!(continuous.stderr.contains(":1:1: error[Q401]"), "{continuous:#?}");
-}
-
-#[test]
-fn a_policy_is_written_and_evaluated() {
-    let Some(folder) = shared("reference/prism_cases") else { return };
-    let model = folder.join("c12_det_plan_vs_policy.prism");
-    let directory = tempfile::tempdir().expect("a directory");
-    let policy = directory.path().join("policy.json");
-    let (model, policy): (&Path, &Path) = (&model, &policy);
-    let (model, policy) = (model.to_str().expect("UTF-8"), policy.to_str().expect("UTF-8"));
-    let question = "R{\"time\"}min=? [ F \"goal\" ]";
-    let open = metaplan(&["check", model, question, "--const", "FIXED=false", "--policy", policy]);
-    assert_eq!((open.status, open.stdout.as_str()), (0, "3\n"), "{open:#?}");
-    let again = metaplan(&["check", model, question, "--const", "FIXED=false", "--evaluate", policy]);
-    assert_eq!((again.status, again.stdout.as_str()), (0, "3\n"), "{again:#?}");
-    let fixed = metaplan(&["check", model, question, "--const", "FIXED=true", "--evaluate", policy]);
-    assert_eq!(fixed.status, 3, "the policy is about another model: {fixed:#?}");
 }

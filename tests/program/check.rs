@@ -1,0 +1,61 @@
+//! `metaplan check`: what is refused, and policies in files.
+
+use std::path::Path;
+
+use crate::common::{metaplan, metaplan_in, root};
+use crate::probabilistic::shared;
+
+const MODEL: &str =
+    "mdp\nmodule m\n  s:[0..2] init 0;\n  [a] s=0 -> PROBABILITIES;\nendmodule\nlabel \"goal\" = s=1;\n";
+
+#[test]
+fn bad_models_and_properties_are_refused_with_their_place() {
+    let good = "0.5:(s'=1) + 0.5:(s'=2)";
+    // What the updates say, the property; status, and what is said.
+    let cases = [
+        (good, "Pmax=? [ F \"goal\" ]", 0, "0.5"),
+        ("0.5:(s'=1) + 0.4:(s'=2)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:3: error[Q301]"),
+        ("(s'=3)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:15: error[Q305]"),
+        ("(t'=1)", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:15: error[Q201]"),
+        ("(s'=1", "Pmax=? [ F \"goal\" ]", 3, "<stdin>:4:19: error[Q102]"),
+        (good, "Pmax=? [ F \"nowhere\" ]", 3, "property:1:12: error[Q202]"),
+        (good, "S=? [ \"goal\" ]", 3, "property:1:1: error[Q403]"),
+        (good, "R{\"time\"}min=? [ F \"goal\" ]", 3, "error[Q202]"),
+    ];
+    for (updates, property, status, said) in cases {
+        let model = MODEL.replace("PROBABILITIES", updates);
+        let outcome = metaplan_in(&root(), &["check", "-", property], &model);
+        let all = format!("{}{}", outcome.stdout, outcome.stderr);
+        // Standard input goes by the name that was given for it.
+        let all = all.replace("-:", "<stdin>:");
+        assert_eq!(outcome.status, status, "{updates} {property}: {outcome:#?}");
+        assert!(all.contains(said), "{said} in {all}");
+    }
+    let limited = metaplan_in(
+        &root(),
+        &["check", "-", "Pmax=? [ F \"goal\" ]", "--state-limit", "2"],
+        &MODEL.replace("PROBABILITIES", good),
+    );
+    assert_eq!(limited.status, 12, "{limited:#?}");
+    let continuous =
+        metaplan_in(&root(), &["check", "-", "Pmax=? [ F \"goal\" ]"], "ctmc\nmodule m endmodule\n");
+    assert_eq!(continuous.status, 3, "{continuous:#?}");
+    assert!(continuous.stderr.contains(":1:1: error[Q401]"), "{continuous:#?}");
+}
+
+#[test]
+fn a_policy_is_written_and_evaluated() {
+    let Some(folder) = shared("reference/prism_cases") else { return };
+    let model = folder.join("c12_det_plan_vs_policy.prism");
+    let directory = tempfile::tempdir().expect("a directory");
+    let policy = directory.path().join("policy.json");
+    let (model, policy): (&Path, &Path) = (&model, &policy);
+    let (model, policy) = (model.to_str().expect("UTF-8"), policy.to_str().expect("UTF-8"));
+    let question = "R{\"time\"}min=? [ F \"goal\" ]";
+    let open = metaplan(&["check", model, question, "--const", "FIXED=false", "--policy", policy]);
+    assert_eq!((open.status, open.stdout.as_str()), (0, "3\n"), "{open:#?}");
+    let again = metaplan(&["check", model, question, "--const", "FIXED=false", "--evaluate", policy]);
+    assert_eq!((again.status, again.stdout.as_str()), (0, "3\n"), "{again:#?}");
+    let fixed = metaplan(&["check", model, question, "--const", "FIXED=true", "--evaluate", policy]);
+    assert_eq!(fixed.status, 3, "the policy is about another model: {fixed:#?}");
+}
