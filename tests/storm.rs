@@ -1,7 +1,8 @@
 //! The model checker beside Storm: values on random models and on our mission, JANI, and speed on co-adaptation models.
 //!
 //! `python3 -m venv storm && storm/bin/pip install stormpy==2.0.0`, then
-//! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`.
+//! `STORM_PYTHON=storm/bin/python cargo test --release --test storm -- --ignored --nocapture`; `SEED` and `MODELS` change the
+//! random models and how many there are.
 
 #![allow(clippy::print_stdout)]
 
@@ -229,10 +230,11 @@ fn file(folder: &Path, name: &str, text: &str) -> String {
 #[ignore = "needs Storm"]
 fn random_models() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut random = Random(3);
+    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    let mut random = Random(number("SEED").unwrap_or(3));
     let (mut asked, mut expected) = (Vec::new(), Vec::new());
     let mut infinite = 0;
-    for number in 0..200 {
+    for number in 0..number("MODELS").unwrap_or(200) {
         let model = random_model(&mut random);
         let text = prism::write(&model);
         let read = prism::parse(&text).unwrap_or_else(|problems| panic!("{problems:?}\n{text}"));
@@ -320,15 +322,9 @@ fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
     for (number, state) in explored.states.iter().enumerate() {
         goal.set(number, process.is_goal(*state) && !(case.reward.is_none() && state.situation().hit));
     }
-    let problem = Problem {
-        mdp: &explored.mdp,
-        direction: if case.reward.is_some() { Direction::Min } else { Direction::Max },
-        rewards: case.reward.map(|_| &explored.rewards[0][..]),
-        terminal: &goal,
-        terminal_values: None,
-        blocked: None,
-        allowed: None,
-    };
+    let direction = if case.reward.is_some() { Direction::Min } else { Direction::Max };
+    let rewards = case.reward.map(|_| &explored.rewards[0][..]);
+    let problem = Problem::new(&explored.mdp, direction, rewards, &goal);
     let solution = solve(problem, None).expect("solved");
     let value = if solution.infinite.contains(0) { f64::INFINITY } else { solution.values[0] };
     let solve = processor() - started - build;
