@@ -41,8 +41,7 @@ pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -
                 sum.plus(&probability.times(&solution.values[target]))
             });
             let difference = (worth.to_f64() - value.to_f64()).abs();
-            let keeps =
-                if N::EXACT { worth == *value } else { difference <= 1e-9 * value.to_f64().max(1e-3) };
+            let keeps = if N::EXACT { worth == *value } else { difference <= 1e-9 * value.to_f64() };
             if keeps || solution.policy[state] == choice as u32 {
                 kept.insert(choice);
             }

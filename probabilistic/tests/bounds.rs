@@ -154,6 +154,26 @@ fn a_policy_is_evaluated_over_bounded_steps() {
 }
 
 #[test]
+fn ties_of_small_values_are_ties() {
+    let model = "mdp
+        module m s:[0..40] init 0; d:bool init false; h:bool init false;
+          [slow] s<40 & !d & !h -> (h'=true);
+          [on] s<40 & !d & h -> (s'=s+1) & (h'=false);
+          [quick] s<40 & !d & !h -> 0.99999:(s'=s+1) + 0.00001:(d'=true);
+          [end] s=40 & !d & !h -> 0.00000001:(h'=true) + 0.99999999:(d'=true);
+        endmodule
+        label \"goal\" = s=40 & h;";
+    let model = prism::parse(model).expect("a model");
+    let question = property::parse("Pmax=? [ F \"goal\" ]").expect("a property");
+    let options = Options { exactness: Exactness::Never, policy: true, ..Options::default() };
+    let report = check(&model, &question, &options).expect("an answer");
+    let options = Options { exactness: Exactness::Always, evaluate: report.policy, ..Options::default() };
+    let again = check(&model, &question, &options).expect("an answer").outcome;
+    let Outcome::Value(Answer::Finite(found)) = again else { panic!("{again:?}") };
+    assert_eq!(found.exact.map(|exact| exact.to_string()).as_deref(), Some("1/100000000"));
+}
+
+#[test]
 fn two_objectives_in_doubles_have_the_bounds_of_their_policies() {
     let model = "mdp
         module m s:[0..2] init 0; r:[0..7] init 0;
