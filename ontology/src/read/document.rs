@@ -123,11 +123,7 @@ fn parse_turtle(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<
         match result {
             Ok(triple) => triples.push(triple),
             Err(error) => {
-                let start = error.location().start;
-                let position =
-                    Position { file: name.to_owned(), line: start.line + 1, column: start.column + 1 };
-                let message = shortened(error.message());
-                errors.push(Error::Malformed { position, syntax: Syntax::Turtle, message });
+                errors.push(malformed_turtle(&error, name));
                 if errors.len() == MOST_ERRORS {
                     break;
                 }
@@ -135,6 +131,20 @@ fn parse_turtle(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<
         }
     }
     if errors.is_empty() { Ok(triples) } else { Err(errors) }
+}
+
+/// Refuses what is not N-Triples: entities and prefixes can make much of a short text.
+pub(crate) fn require_ntriples(text: &[u8], name: &str) -> Result<(), Vec<Error>> {
+    match oxttl::NTriplesParser::new().for_slice(text).find_map(Result::err) {
+        Some(error) => Err(vec![malformed_turtle(&error, name)]),
+        None => Ok(()),
+    }
+}
+
+fn malformed_turtle(error: &oxttl::TurtleSyntaxError, name: &str) -> Error {
+    let start = error.location().start;
+    let position = Position { file: name.to_owned(), line: start.line + 1, column: start.column + 1 };
+    Error::Malformed { position, syntax: Syntax::Turtle, message: shortened(error.message()) }
 }
 
 fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<Error>> {

@@ -35,6 +35,9 @@ pub struct ReadOptions {
     pub directories: Vec<PathBuf>,
     /// Whether an import that is found nowhere is a warning instead of an error.
     pub allow_missing_imports: bool,
+    /// Whether documents are N-Triples that import nothing, as for those that nobody vouches for: no file is opened but those
+    /// that are named, and no text is larger when it has been read.
+    pub closed: bool,
 }
 
 /// Reads documents and all that they import into one ontology. The file `-` is standard input.
@@ -128,7 +131,7 @@ fn closure(
     let mut next = 0;
     loop {
         while let Some(item) = pending.pop_front() {
-            match load(item, documents.len(), &mut seen) {
+            match load(item, documents.len(), &mut seen, options) {
                 Ok(Some((document, path, text))) => {
                     texts.push((document.name.clone(), text));
                     warnings.extend(twice(&document, &documents));
@@ -141,7 +144,12 @@ fn closure(
         }
         let Some(importer) = documents.get(next) else { break };
         for (import, position) in &importer.imports {
-            match resolver.resolve(import, paths[next].as_deref(), &documents) {
+            let found = if options.closed {
+                Ok(None)
+            } else {
+                resolver.resolve(import, paths[next].as_deref(), &documents)
+            };
+            match found {
                 Ok(Some(Resolution::Loaded)) => {}
                 Ok(Some(Resolution::File(path))) => pending.push_back(Pending::File(path)),
                 Ok(Some(Resolution::Embedded(name, text))) => {
@@ -166,7 +174,12 @@ fn closure(
 type Loaded = Option<(Document, Option<PathBuf>, Arc<[u8]>)>;
 
 /// Reads and parses one document; `None` if the same file, or the same text, has been read already.
-fn load(item: Pending, index: usize, seen: &mut HashSet<Arc<[u8]>>) -> Result<Loaded, Vec<Error>> {
+fn load(
+    item: Pending,
+    index: usize,
+    seen: &mut HashSet<Arc<[u8]>>,
+    options: &ReadOptions,
+) -> Result<Loaded, Vec<Error>> {
     let (name, text, path) = match item {
         Pending::Text(name, text) => (name, text, None),
         Pending::File(file) if file.as_os_str() == "-" => ("-".to_owned(), standard_input()?, None),
@@ -184,6 +197,9 @@ fn load(item: Pending, index: usize, seen: &mut HashSet<Arc<[u8]>>) -> Result<Lo
     };
     let base =
         path.as_ref().map_or_else(|| "file:///".to_owned(), |path| format!("file://{}", path.display()));
+    if options.closed {
+        document::require_ntriples(&text, &name)?;
+    }
     let document = document::parse(&text, &name, &base, &format!("d{index}"))?;
     let text: Arc<[u8]> = text.into();
     Ok(if seen.insert(Arc::clone(&text)) { Some((document, path, text)) } else { None })
