@@ -13,6 +13,9 @@ use crate::replay::names::Names;
 use crate::rule::{Aggregate, Atom, Rule, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
 
+/// With more matches of one body, none is looked at.
+const MATCH_LIMIT: usize = 1 << 21;
+
 /// The value of each variable of a rule, where it has one.
 pub(super) type Values = Vec<Option<Symbol>>;
 
@@ -32,6 +35,8 @@ pub(super) struct Matcher<'m> {
     pub equality: bool,
     /// Whether names that may be one were asked to differ: then there is no telling by what holds alone.
     pub names_differ: bool,
+    /// Whether a body has more matches than there is room for.
+    pub too_many: bool,
 }
 
 /// The variables that an aggregate takes from the other atoms of a body.
@@ -58,6 +63,10 @@ impl Matcher<'_> {
 
     /// Adds all matches of the open atoms of a body that extend some values.
     fn extend(&mut self, body: &[Atom], open: &[usize], values: Values, found: &mut Vec<Values>) {
+        self.too_many |= found.len() >= MATCH_LIMIT;
+        if self.too_many {
+            return;
+        }
         if open.is_empty() {
             found.push(values);
             return;

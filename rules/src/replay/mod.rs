@@ -78,6 +78,9 @@ pub enum Fault {
     /// Names that may be one are compared by a rule, not by what is known to differ.
     #[error("a rule asks whether names differ that may be one")]
     Difference,
+    /// A rule, or an aggregate in it, has more matches than are gone through.
+    #[error("rule {0} has too many matches")]
+    TooMany(RuleIdentity),
     /// The facts contradict each other.
     #[error("the knowledge is inconsistent: {0}")]
     Inconsistent(String),
@@ -104,8 +107,14 @@ pub fn replay(
         }
     }
     let facts = Facts::new(derivation.steps.iter().map(|step| names.normal(&step.fact)));
-    let matcher =
-        Matcher { symbols, facts: &facts, names: &names, equality: program.equality, names_differ: false };
+    let matcher = Matcher {
+        symbols,
+        facts: &facts,
+        names: &names,
+        equality: program.equality,
+        names_differ: false,
+        too_many: false,
+    };
     let mut replayer = Replayer { program, same, different, matcher };
     replayer.consistent(derivation)?;
     replayer.founded(stated, derivation)?;
@@ -254,6 +263,9 @@ impl Replayer<'_> {
         let mut count = 0;
         for rule in &self.program.rules {
             let all = self.matcher.all(rule);
+            if self.matcher.too_many {
+                return Err(Fault::TooMany(rule.identity.clone()));
+            }
             count += all.len();
             for values in all {
                 if rule.head.is_empty() {
