@@ -136,6 +136,77 @@ fn changed_arguments_prove_nothing_that_is_false() {
     (200..230).for_each(|seed| withstands(seed, 40));
 }
 
+/// What can be read in two ways proves nothing: a number that an operator changes twice, a number with two factors, a design that
+/// is not there.
+#[test]
+fn tasks_that_can_be_read_in_two_ways_are_refused() {
+    let (mut twice, mut factors, mut designs) = (0, 0, 0);
+    let refused = |seed: u64, task: &Value, certificate: &Certificate, cost: &BigRational| {
+        let (domain, problem) = files(seed);
+        let written = task.to_string();
+        assert!(matches!(faithful(&domain, &problem, &written), Faithful::No(_)), "seed {seed}: {written}");
+        let accepted = check_certificate(&written, &certificate.argument, Some(cost));
+        assert!(accepted.is_err(), "seed {seed}: {written}");
+    };
+    for seed in 0..20 {
+        let (_, certificate, cost) = certified(seed);
+        let Some(cost) = cost else { continue };
+        let task: Value = serde_json::from_str(&certificate.task).expect("JSON");
+        let operators = task["operators"].as_array().expect("operators");
+        if let Some(at) = operators.iter().position(|own| own["changes"][0][1]["factors"].is_array()) {
+            let mut mutant = task.clone();
+            let changes = mutant["operators"][at]["changes"].as_array_mut().expect("changes");
+            changes.push(json!([changes[0][0], { "quantity": { "constant": 0 } }]));
+            refused(seed, &mutant, &certificate, &cost);
+            twice += 1;
+            let mut mutant = task.clone();
+            let own = mutant["operators"][at]["changes"][0][1]["factors"].as_array_mut().expect("factors");
+            own.insert(0, json!([own[0][0], -5]));
+            refused(seed, &mutant, &certificate, &cost);
+            factors += 1;
+        }
+        if operators
+            .iter()
+            .any(|own| !task["uses"][own["uses"].as_u64().expect("uses") as usize][0].is_null())
+        {
+            for combination in [json!([60_000]), json!([0, 0])] {
+                let mut mutant = task.clone();
+                for exclusions in mutant["exclusions"].as_array_mut().expect("exclusions") {
+                    *exclusions = json!([{ "slots": [0], "combinations": [combination] }]);
+                }
+                refused(seed, &mutant, &certificate, &cost);
+                designs += 1;
+            }
+        }
+    }
+    assert!(twice > 0 && factors > 0 && designs > 0, "{twice}, {factors}, {designs}");
+}
+
+/// An instance that leaves everything as it is has no operator, and needs none.
+#[test]
+fn what_changes_nothing_needs_no_operator() {
+    let domain = "(define (domain d) (:requirements :typing :action-costs)
+      (:types design place - object) (:constants slow fast - design)
+      (:predicates (at ?p - place) (mode ?d - design) (suits ?d - design))
+      (:functions (total-cost))
+      (:action reconfigure :parameters (?from ?to - design)
+        :precondition (and (mode ?from) (suits ?to))
+        :effect (and (not (mode ?from)) (mode ?to) (increase (total-cost) 1)))
+      (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (mode fast))
+        :effect (and (not (at ?a)) (at ?b) (increase (total-cost) 2))))";
+    let problem = "(define (problem p) (:domain d) (:objects a b - place)
+      (:init (at a) (mode slow) (suits slow) (suits fast) (= (total-cost) 0))
+      (:goal (at b)) (:metric minimize (total-cost)))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("a mission");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let solution = optimize(&task, &Config::default(), &mut |_| {});
+    let certificate = certify(&task, &solution, &Limits::none()).expect("a certificate");
+    let found = faithful(&domain, &problem, &certificate.task);
+    // Two designs to themselves, two places to themselves.
+    assert!(matches!(found, Faithful::Yes { instances: 8, idle: 4, .. }), "{found:?}");
+}
+
 /// What the SMT solver answers to the verification conditions of a claim.
 fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>) -> Vec<String> {
     let conditions = verification_conditions(&certificate.task, &certificate.argument, claim);

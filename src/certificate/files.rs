@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    ARGUMENT, Claim, DOMAIN, FORMAT, File, Manifest, PLAN, PROBLEM, PROOF, PROOF_LIMIT, Refutation,
-    SIZE_LIMIT, STREAMED, TASK, derivations, knowledge,
+    ARGUMENT, Claim, DOMAIN, FORMAT, File, HINTS, Manifest, PLAN, PROBLEM, PROOF, PROOF_LIMIT, Refutation,
+    SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, derivations, knowledge,
 };
 
 /// The text of a file among several.
@@ -57,15 +57,21 @@ pub(super) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
     let mut names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
     names.sort_unstable();
     if names != expected {
+        // However many there are, the first show what is wrong.
+        names.truncate(expected.len() + 1);
         return Err(format!(
             "manifest.json: lists {}, where {} are expected",
             names.join(", "),
             expected.join(", ")
         ));
     }
-    let total = manifest.files.iter().try_fold(0_u64, |sum, file| sum.checked_add(file.bytes));
-    if total.is_none_or(|total| total > SIZE_LIMIT) {
-        return Err(format!("manifest.json: the files are larger than {SIZE_LIMIT} bytes"));
+    let is_streamed = |file: &&File| STREAMED.contains(&file.name.as_str());
+    let (streamed, whole): (Vec<&File>, Vec<&File>) = manifest.files.iter().partition(is_streamed);
+    for (files, limit) in [(whole, TEXT_LIMIT), (streamed, SIZE_LIMIT)] {
+        let total = files.iter().try_fold(0_u64, |sum, file| sum.checked_add(file.bytes));
+        if total.is_none_or(|total| total > limit) {
+            return Err(format!("manifest.json: the files are larger than {limit} bytes"));
+        }
     }
     let mut contents = Vec::new();
     for file in &manifest.files {
@@ -95,7 +101,7 @@ pub(super) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
 fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {
     let File { name, bytes, sha256 } = file;
     let wrong = |what: String| format!("{name}: {what}");
-    let most = if name == PROOF { PROOF_LIMIT.min(*bytes) } else { *bytes };
+    let most = if [PROOF, HINTS].contains(&name.as_str()) { PROOF_LIMIT.min(*bytes) } else { *bytes };
     let path = plain_file(directory, name, most)?;
     let (found, digest) =
         digest_of(&path).map_err(|error| wrong(format!("cannot be read: {}", error.kind())))?;

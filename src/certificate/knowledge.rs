@@ -100,7 +100,9 @@ fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     let rules = rules
         .map(|((_, text), number)| Ok(write(&format!("rules-{number}.swrl"), text)?.display().to_string()));
     let rules = rules.collect::<Result<Vec<_>, String>>()?;
-    let sources = Sources { documents, rules, options: ReadOptions::default() };
+    // What the document imports would lie outside of the certificate.
+    let options = ReadOptions { closed: true, ..ReadOptions::default() };
+    let sources = Sources { documents, rules, options };
     let mut stated = Stated::read(&sources, Equality::Owl).map_err(|messages| said_first(&messages))?;
     for rule in &mut stated.program.rules {
         let file = sources.rules.iter().position(|file| **file == *rule.identity.source);
@@ -142,6 +144,7 @@ fn filled(
     let mission = Mission::new("", Some(Ok(knowledge)), bindings, own_domain, own_problem);
     let mission = mission.map_err(|messages| said_first(&messages))?;
     let (mut filled, _) = mission.filled().map_err(|messages| said_first(&messages))?;
+    let own = print_problem(&filled);
     filled.metric.clone_from(&problem.metric);
     if print_domain(mission.domain()) != print_domain(domain) {
         return Err("the mission's domain is another one".to_owned());
@@ -155,5 +158,7 @@ fn filled(
     if found != expected {
         return Err("the knowledge says more or less than the problem".to_owned());
     }
-    Ok("the problem is what follows".to_owned())
+    // The metric is the only thing that a user chooses with each plan.
+    let metric = if own == expected { "" } else { ", with another metric than the mission's" };
+    Ok(format!("the problem is what follows{metric}"))
 }

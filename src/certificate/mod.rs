@@ -8,7 +8,7 @@
 //! | `knowledge.nt`, `origin.json` | the knowledge base, rules, bindings, and what has changed since they were read; missing if there is no knowledge base |
 //! | `derivations.json` | everything that follows from them, with the rule, its bindings and what it rests on; missing likewise |
 //! | `task.json` | the ground task |
-//! | `formula.cnf`, `legend.txt`, `proof.drat` | for small tasks: "a cheaper plan has at most so many steps" in DIMACS, what its variables mean, its refutation |
+//! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: "a cheaper plan has at most so many steps" in DIMACS, what its variables mean, its refutation, what each line of that follows from |
 //! | `argument.json` | why no plan is cheaper: labels, potentials, needs (see `encodings::check_certificate`) |
 
 mod derivations;
@@ -17,7 +17,7 @@ mod knowledge;
 mod verify;
 
 use std::fs;
-use std::io::BufWriter;
+use std::io::{BufRead, BufReader, BufWriter};
 use std::path::Path;
 
 use encodings::pddl::ast::Problem;
@@ -33,9 +33,11 @@ use files::{digest_of, text};
 use crate::message::Message;
 use crate::mission::Mission;
 
-const FORMAT: &str = "metaplan-certificate/1";
-/// All files together are at most this large, in bytes.
+const FORMAT: &str = "metaplan-certificate/2";
+/// All files that are never in memory as a whole are together at most this large, in bytes.
 const SIZE_LIMIT: u64 = 1 << 30;
+/// All files that are in memory as a whole are together at most this large, in bytes.
+const TEXT_LIMIT: u64 = 1 << 28;
 const DOMAIN: &str = "domain.pddl";
 const PROBLEM: &str = "problem.pddl";
 const PLAN: &str = "plan.txt";
@@ -44,9 +46,12 @@ const ARGUMENT: &str = "argument.json";
 const FORMULA: &str = "formula.cnf";
 const LEGEND: &str = "legend.txt";
 const PROOF: &str = "proof.drat";
+const HINTS: &str = "hints.txt";
+/// What the solver writes, before it is shortened.
+const DRAFT: &str = "draft.drat";
 /// These may be large, and are never in memory as a whole.
-const STREAMED: [&str; 3] = [FORMULA, LEGEND, PROOF];
-/// A proof is at most this large, in bytes.
+const STREAMED: [&str; 4] = [FORMULA, LEGEND, PROOF, HINTS];
+/// A proof and its hints are at most this large each, in bytes.
 const PROOF_LIMIT: u64 = 1 << 28;
 
 /// What a certificate claims, and of which files it consists.
@@ -174,6 +179,9 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         }
         None => Claim::Unsolvable,
     };
+    if files.iter().map(|(_, text)| text.len() as u64).sum::<u64>() > TEXT_LIMIT {
+        return Err(wrong(&format_args!("its files have more than {TEXT_LIMIT} bytes")));
+    }
     let parent = directory.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let failed = |error: std::io::Error| {
         Message::at("M109", &name, None, format!("cannot be written: {}", error.kind()))
@@ -209,22 +217,33 @@ fn refutation(
     limits: &Limits,
 ) -> std::io::Result<Refutation> {
     let create = |name: &str| fs::File::create(directory.join(name)).map(BufWriter::new);
+    let written_draft = || {
+        let file = fs::File::open(directory.join(DRAFT))?;
+        Ok(Box::new(BufReader::new(file)) as Box<dyn BufRead>)
+    };
+    let remove = |names: &[&str]| names.iter().try_for_each(|name| fs::remove_file(directory.join(name)));
+    let size = |name: &str| fs::metadata(directory.join(name)).map(|file| file.len());
     let mut reasons = Vec::new();
     for by in [StepBound::Spent, StepBound::Potential] {
         let outputs = RefutationOutputs {
             formula: &mut create(FORMULA)?,
             legend: &mut create(LEGEND)?,
-            proof: Box::new(create(PROOF)?),
+            draft: Box::new(create(DRAFT)?),
+            written_draft: &written_draft,
+            proof: &mut create(PROOF)?,
+            hints: &mut create(HINTS)?,
         };
-        match refute(documents, metric, by, outputs, limits) {
-            Ok(_) if fs::metadata(directory.join(PROOF))?.len() > PROOF_LIMIT => {
+        let refuted = refute(documents, metric, by, outputs, limits);
+        remove(&[DRAFT])?;
+        match refuted {
+            Ok(_) if size(PROOF)?.max(size(HINTS)?) > PROOF_LIMIT => {
                 reasons.push(format!("the proof has more than {PROOF_LIMIT} bytes"));
             }
             Ok(steps) => return Ok(Refutation::Steps(steps)),
             Err(reason) => reasons.push(reason),
         }
     }
-    STREAMED.iter().try_for_each(|name| fs::remove_file(directory.join(name)))?;
+    remove(&STREAMED)?;
     reasons.dedup();
     Ok(Refutation::None(reasons.join("; ")))
 }

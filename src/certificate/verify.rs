@@ -8,8 +8,8 @@ use encodings::pddl::ast::{Domain, Name, Problem};
 use encodings::pddl::{self, Source};
 use encodings::validate::{Options, PlanText, validate};
 use encodings::{
-    Checked, Faithful, GroundConfig, RefutationInputs, check_certificate, check_refutation, describes,
-    faithful, ground, verification_conditions,
+    Checked, Faithful, GroundConfig, Limits, RefutationInputs, check_certificate, check_refutation,
+    describes, faithful, ground, verification_conditions,
 };
 use num_rational::BigRational;
 
@@ -21,8 +21,9 @@ use super::{
 use crate::measure::measure;
 use crate::message::Message;
 
-/// Checks a certificate without trusting what wrote it.
-pub fn verify(directory: &Path) -> Report {
+/// Checks a certificate without trusting what wrote it. Where the files have to be grounded again, `limits` is asked when that
+/// has to end.
+pub fn verify(directory: &Path, limits: &dyn Fn() -> Limits) -> Report {
     let mut report = Report { claim: None, parts: Vec::new() };
     match read(directory) {
         Ok((manifest, contents)) => {
@@ -30,7 +31,7 @@ pub fn verify(directory: &Path) -> Report {
             let bytes: u64 = manifest.files.iter().map(|file| file.bytes).sum();
             let files = format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());
             report.parts.push(Part { part: "files", result: Ok(files) });
-            report.parts.extend(parts(directory, &manifest, &contents));
+            report.parts.extend(parts(directory, &manifest, &contents, limits));
         }
         Err(reason) => report.parts.push(Part { part: "files", result: Err(reason) }),
     }
@@ -41,7 +42,7 @@ pub fn verify(directory: &Path) -> Report {
 ///
 /// # Errors
 /// The certificate cannot be read, or its task has derived variables, for which there are no such conditions.
-pub fn conditions(directory: &Path) -> Result<String, Message> {
+pub fn conditions(directory: &Path, limits: &dyn Fn() -> Limits) -> Result<String, Message> {
     let wrong = |reason: String| Message::at("M121", &directory.display().to_string(), None, reason);
     let (Manifest { claim, solves, .. }, contents) = read(directory).map_err(wrong)?;
     let text = |name: &str| text(&contents, name);
@@ -49,7 +50,7 @@ pub fn conditions(directory: &Path) -> Result<String, Message> {
         Claim::Unsolvable => None,
         Claim::Optimal { metric } => {
             let (domain, problem) = read_pddl(text(DOMAIN), text(PROBLEM)).map_err(wrong)?;
-            let (_, timed) = same_task(&domain, &problem, &solves, text(TASK)).map_err(wrong)?;
+            let (_, timed) = same_task(&domain, &problem, &solves, text(TASK), limits).map_err(wrong)?;
             Some(plan(&domain, &problem, timed, text(PLAN), metric).map_err(wrong)?.1)
         }
     };
@@ -58,7 +59,12 @@ pub fn conditions(directory: &Path) -> Result<String, Message> {
         .ok_or_else(|| wrong("a task with derived predicates has no verification conditions".to_owned()))
 }
 
-fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)]) -> Vec<Part> {
+fn parts(
+    directory: &Path,
+    manifest: &Manifest,
+    contents: &[(String, String)],
+    limits: &dyn Fn() -> Limits,
+) -> Vec<Part> {
     let Manifest { claim, solves, refutation, .. } = manifest;
     let text = |name: &str| text(contents, name);
     let (domain, problem) = match read_pddl(text(DOMAIN), text(PROBLEM)) {
@@ -76,7 +82,7 @@ fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)]) -
         parts.push(Part { part: "derivations", result: derivations });
         parts.push(Part { part: "knowledge", result: filled });
     }
-    let (same, timed) = match same_task(&domain, &problem, solves, text(TASK)) {
+    let (same, timed) = match same_task(&domain, &problem, solves, text(TASK), limits) {
         Ok((said, timed)) => (Ok(said), timed),
         // Whatever it is, it is not verified.
         Err(reason) => (Err(reason), false),
@@ -121,10 +127,11 @@ fn refuted(
 ) -> Vec<Part> {
     let open = |name: &str| fs::File::open(directory.join(name)).map(BufReader::new);
     let opened = STREAMED.map(open);
-    let [Ok(mut formula), Ok(mut legend), Ok(mut proof)] = opened else {
+    let [Ok(mut formula), Ok(mut legend), Ok(mut proof), Ok(mut hints)] = opened else {
         return vec![Part { part: "formula", result: Err("it cannot be read".to_owned()) }];
     };
-    let inputs = RefutationInputs { formula: &mut formula, legend: &mut legend, proof: &mut proof };
+    let inputs =
+        RefutationInputs { formula: &mut formula, legend: &mut legend, proof: &mut proof, hints: &mut hints };
     let checked = check_refutation(documents, metric, steps, inputs).into_iter();
     checked.map(|(part, result)| Part { part, result }).collect()
 }
@@ -153,7 +160,9 @@ pub(super) fn plan(
     }
     let steps = plan.steps.len();
     let value = measure(problem, &verdict, steps, timed).ok_or("the metric has no value after the plan")?;
-    if value.to_string() != claimed && rules::Decimal::from_rational(&value).to_string() != claimed {
+    let decimal = rules::Decimal::from_rational(&value);
+    let is_decimal = decimal.to_rational() == value && decimal.to_string() == claimed;
+    if value.to_string() != claimed && !is_decimal {
         return Err(format!("its metric is {value}, where {claimed} is claimed"));
     }
     Ok((format!("{steps} steps, valid, metric {claimed}"), value))
@@ -166,6 +175,7 @@ fn same_task(
     problem: &Problem,
     solves: &[String],
     written: &str,
+    limits: &dyn Fn() -> Limits,
 ) -> Result<(String, bool), String> {
     let reason = match faithful(domain, problem, written) {
         Faithful::Yes { instances, idle, timed } => {
@@ -179,7 +189,7 @@ fn same_task(
         _ => "another construct".to_owned(),
     };
     let solves = solves.iter().map(|name| Name::new(name)).collect();
-    let config = GroundConfig { solves, ..GroundConfig::default() };
+    let config = GroundConfig { solves, limits: limits(), ..GroundConfig::default() };
     let task = ground(domain, problem, &config)
         .map_err(|errors| errors.first().map_or_else(String::new, ToString::to_string))?;
     if describes(written, &task) {

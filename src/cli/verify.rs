@@ -4,10 +4,14 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use encodings::Limits;
 use metaplan::certificate::{Claim, Report, conditions, verify};
 use serde_json::json;
 
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::{Common, Exit, Failure, Format, memory, output};
+
+/// Grounding ends when the process takes more, in megabytes of 2^20 bytes: a certificate may come from anybody.
+const MEMORY_LIMIT: u64 = 4096;
 
 /// Arguments of `verify`.
 #[derive(Debug, Args)]
@@ -19,12 +23,19 @@ pub struct Arguments {
     smt: Option<PathBuf>,
 }
 
+fn limits() -> Limits {
+    let limits = Limits::none();
+    // Where the platform does not tell how much memory is taken, there is no limit on it.
+    let _ = memory::watch(MEMORY_LIMIT, limits.interrupt());
+    limits
+}
+
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(file) = &arguments.smt {
-        output::write_file(file, &conditions(&arguments.directory)?)?;
+        output::write_file(file, &conditions(&arguments.directory, &limits)?)?;
     }
-    let report = verify(&arguments.directory);
+    let report = verify(&arguments.directory, &limits);
     match common.format {
         Format::Json => output::json_answer(&json!({
             "format": "metaplan-verification/1",

@@ -51,6 +51,23 @@ pub fn metaplan_in(directory: &Path, arguments: &[&str], input: &str) -> Outcome
     }
 }
 
+/// The processor time of a run of the program in seconds, user's and system's, the median of three. Needs python3.
+pub fn processor_time(directory: &Path, arguments: &[&str]) -> f64 {
+    let script = "import resource as r, subprocess as s, sys\n\
+        def once():\n \
+        u = lambda: sum(r.getrusage(r.RUSAGE_CHILDREN)[:2])\n \
+        t = u()\n \
+        s.run(sys.argv[1:], stdout=s.DEVNULL, stderr=s.DEVNULL)\n \
+        return u() - t\n\
+        print(sorted(once() for _ in range(3))[1])";
+    let mut python = Command::new("python3");
+    let program = env!("CARGO_BIN_EXE_metaplan");
+    let output = python.args(["-c", script, program]).args(arguments).current_dir(directory).output();
+    let output = output.expect("python3 runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.trim().parse().unwrap_or_else(|error| panic!("{error}: {output:?}"))
+}
+
 /// A copy of the files of a mission in a directory of its own, to be edited.
 pub fn copy_of_mission(name: &str) -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("a temporary directory");

@@ -1,14 +1,16 @@
 //! Exact optima of generated instances, known from several planners and an exact oracle.
 //!
-//! `cargo test --release --test program reference -- --ignored --nocapture` prints one line for each instance: its name, the cost,
-//! what proves it, and the time of the whole program; then how long the same takes with a certificate, and verifying that. Needs python3 (its standard library only) for the generators.
+//! `cargo test --release --test program reference -- --ignored --nocapture --test-threads 1` prints one line for each instance: its
+//! name, the cost, what proves it, and the processor time of the whole program; then how long the same takes with a certificate,
+//! and verifying that, which must be at most ten times as long as planning. Needs python3 (its standard library only) for the
+//! generators and for the times.
 
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use crate::common::metaplan_in;
+use crate::common::{metaplan_in, processor_time, root};
 use crate::real::shared;
 
 /// The rows of a table with a header, each as a look-up by column name.
@@ -28,56 +30,109 @@ fn generate(script: &Path, arguments: &[&str]) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Plans an instance; the cost, or the status where there is no plan, and a line about it.
-fn plan(directory: &Path, name: &str) -> (String, String) {
-    let started = Instant::now();
-    let (domain, problem) = (format!("{name}.domain.pddl"), format!("{name}.problem.pddl"));
-    let outcome = metaplan_in(
-        directory,
-        &["plan", &domain, &problem, "--format", "json", "--quiet", "--time-limit", "60"],
-        "",
-    );
-    let answer = outcome.json();
+/// What came of an instance.
+#[derive(Debug)]
+struct Row {
+    /// The cost, or the status where there is no plan.
+    found: String,
+    expected: String,
+    line: String,
+    /// Processor time in seconds.
+    planning: f64,
+    verifying: f64,
+}
+
+/// Plans an instance, then once more with a certificate, and verifies that.
+fn row(directory: &Path, name: &str, expected: &str) -> Row {
+    let files = [format!("{name}.domain.pddl"), format!("{name}.problem.pddl")];
+    let arguments = ["plan", &files[0], &files[1], "--quiet"];
+    let answer = metaplan_in(directory, &[&arguments[..], &["--format", "json"]].concat(), "").json();
     let status = answer["status"].as_str().expect("a status").to_owned();
-    let result = if status == "optimal" { answer["cost"].to_string() } else { status };
-    let seconds = started.elapsed().as_secs_f64();
-    let line = format!(
-        "{name} {result} by {} in {seconds:.2} s, {}",
-        answer["proof"]["by"].as_str().unwrap_or("nothing"),
-        verified(directory, name)
-    );
-    (result, line)
+    let found = if status == "optimal" { answer["cost"].to_string() } else { status };
+    let by = answer["proof"]["by"].as_str().unwrap_or("nothing");
+    let name = format!("{name} {found} by {by}");
+    let certificate = directory.join("certificate");
+    let mut row = timed(directory, &name, &arguments, &certificate.display().to_string());
+    std::fs::remove_dir_all(certificate).expect("a certificate");
+    row.found = found;
+    expected.clone_into(&mut row.expected);
+    row
 }
 
-/// Plans once more with a certificate, and verifies it; what that takes.
-fn verified(directory: &Path, name: &str) -> String {
-    let (domain, problem) = (format!("{name}.domain.pddl"), format!("{name}.problem.pddl"));
-    let certificate = format!("{name}.certificate");
+/// The times of planning, of doing so with a certificate, and of verifying that.
+fn timed(directory: &Path, name: &str, arguments: &[&str], certificate: &str) -> Row {
+    let planning = processor_time(directory, arguments);
     let started = Instant::now();
-    let arguments = ["plan", &domain, &problem, "--quiet", "--certificate", &certificate];
-    let planned = metaplan_in(directory, &arguments, "");
-    let planning = started.elapsed().as_secs_f64();
-    assert!(directory.join(&certificate).exists(), "{name}: no certificate: {planned:#?}");
-    let started = Instant::now();
-    let outcome = metaplan_in(directory, &["verify", &certificate], "");
-    let verifying = started.elapsed().as_secs_f64();
+    let planned = metaplan_in(directory, &[arguments, &["--certificate", certificate]].concat(), "");
+    let certifying = started.elapsed().as_secs_f64();
+    assert!(Path::new(certificate).exists(), "{name}: no certificate: {planned:#?}");
+    let outcome = metaplan_in(directory, &["verify", certificate], "");
     assert_eq!(outcome.status, 0, "{name}: {outcome:#?}");
-    let argument = outcome.stdout.lines().find(|line| line.starts_with("argument")).unwrap_or_default();
-    format!(
-        "certified in {planning:.2} s, verified in {verifying:.2} s ({:.1}): {argument}",
-        verifying / planning
-    )
+    let verifying = processor_time(directory, &["verify", certificate]);
+    let said = outcome
+        .stdout
+        .lines()
+        .filter(|line| ["argument", "formula"].iter().any(|part| line.starts_with(part)));
+    let line = format!(
+        "{name} in {planning:.4} s, certified in {certifying:.2} s, verified in {verifying:.4} s ({:.1}): {}",
+        verifying / planning,
+        said.collect::<Vec<_>>().join("; ")
+    );
+    Row { found: String::new(), expected: String::new(), line, planning, verifying }
 }
 
+/// Prints what came of instances; the costs have to be right, and verifying may not take more than ten times as long as planning.
 #[allow(clippy::print_stdout)]
-fn report(lines: &[(String, String, String)]) {
+fn report(rows: &[Row]) {
     let mut text = String::new();
-    for (_, _, line) in lines {
-        let _ = writeln!(text, "{line}");
+    for row in rows {
+        let _ = writeln!(text, "{}", row.line);
     }
+    let mut ratios: Vec<f64> = rows.iter().map(|row| row.verifying / row.planning).collect();
+    ratios.sort_by(f64::total_cmp);
+    let sum = |time: fn(&Row) -> f64| rows.iter().map(time).sum::<f64>();
+    let _ = writeln!(
+        text,
+        "{} instances: planning {:.2} s, verifying {:.2} s; verifying takes {:.1} times as long in the median, {:.1} at worst",
+        rows.len(),
+        sum(|row| row.planning),
+        sum(|row| row.verifying),
+        ratios[ratios.len() / 2],
+        ratios[ratios.len() - 1]
+    );
     println!("{text}");
-    let wrong: Vec<_> = lines.iter().filter(|(found, expected, _)| found != expected).collect();
+    let wrong: Vec<_> = rows.iter().filter(|row| row.found != row.expected).collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
+    let slow: Vec<_> = rows.iter().filter(|row| row.verifying > 10.0 * row.planning).collect();
+    assert!(cfg!(debug_assertions) || slow.is_empty(), "{slow:#?}");
+}
+
+#[test]
+#[ignore = "measures times, in a release build; needs python3"]
+fn shipped_missions() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let certificate = directory.path().join("certificate");
+    let missions: [&[&str]; 12] = [
+        &["missions/camara_like.toml"],
+        &["missions/camara_like.toml", "--scenario", "kinect_failure"],
+        &["missions/ugv.toml"],
+        &["missions/ugv.toml", "--scenario", "kinect_failure"],
+        &["missions/ugv.toml", "--scenario", "bright_sun"],
+        &["missions/ugv_plain.toml"],
+        &["missions/ugv_plain.toml", "--scenario", "kinect_failure"],
+        &["missions/uuv.toml"],
+        &["missions/uuv.toml", "--scenario", "battery_drop"],
+        &["missions/uuv.toml", "--scenario", "murky_water"],
+        &["missions/uuv_plain.toml"],
+        &["missions/uuv.toml", "--set", "battery=3"],
+    ];
+    let measured = missions.map(|mission| {
+        let arguments = [&["plan", "--quiet"], mission].concat();
+        let row = timed(&root(), &mission.join(" "), &arguments, &certificate.display().to_string());
+        std::fs::remove_dir_all(&certificate).expect("a certificate");
+        row
+    });
+    report(&measured);
 }
 
 #[test]
@@ -86,12 +141,12 @@ fn generated_missions() {
     let Some(shared) = shared() else { return };
     let directory = tempfile::tempdir().expect("a directory");
     let out = directory.path().display().to_string();
-    let mut lines = Vec::new();
-    for row in table(&shared.join("reference/optimal_costs.csv")) {
-        let name = cell(&row, "name");
+    let mut rows = Vec::new();
+    for line in table(&shared.join("reference/optimal_costs.csv")) {
+        let name = cell(&line, "name");
         let mut arguments = vec!["--enc", "c,n", "--out", &out, "--name", name];
         for option in ["family", "n", "m", "k", "seed", "goals", "reconf", "metric"] {
-            let value = cell(&row, option);
+            let value = cell(&line, option);
             if !value.is_empty() {
                 let flag = ["--family", "--n", "--m", "--k", "--seed", "--goals", "--reconf", "--metric"];
                 arguments
@@ -100,11 +155,10 @@ fn generated_missions() {
         }
         generate(&shared.join("tools/gen_ratpa.py"), &arguments);
         for (encoding, column) in [("c", "optimal_cost_c"), ("n", "optimal_cost_bnfo")] {
-            let (found, line) = plan(directory.path(), &format!("{name}.{encoding}"));
-            lines.push((found, cell(&row, column).to_owned(), line));
+            rows.push(row(directory.path(), &format!("{name}.{encoding}"), cell(&line, column)));
         }
     }
-    report(&lines);
+    report(&rows);
 }
 
 #[test]
@@ -114,16 +168,16 @@ fn missions_with_a_battery_that_binds() {
     let directory = tempfile::tempdir().expect("a directory");
     let out = directory.path().display().to_string();
     let summary = shared.join("reference/p2cp3_summary.json").display().to_string();
-    let mut lines = Vec::new();
-    for row in table(&shared.join("reference/camara_pairs.csv")) {
+    let mut rows = Vec::new();
+    for line in table(&shared.join("reference/camara_pairs.csv")) {
         let (start, goal, battery, fail) =
-            (cell(&row, "start"), cell(&row, "goal"), cell(&row, "battery_mj"), cell(&row, "fail"));
+            (cell(&line, "start"), cell(&line, "goal"), cell(&line, "battery_mj"), cell(&line, "fail"));
         let mut arguments = vec![summary.as_str(), "--start", start, "--goal", goal, "--battery", battery];
         arguments.extend(["--fail", fail, "--out", &out, "--no-oracle"]);
         generate(&shared.join("tools/gen_camara.py"), &arguments);
         let suffix = if fail.is_empty() { String::new() } else { format!("_no_{}", fail.replace(' ', "_")) };
-        let (found, line) = plan(directory.path(), &format!("camara_{start}_{goal}_b{battery}{suffix}"));
-        lines.push((found, cell(&row, "optimal_time_ms").to_owned(), line));
+        let name = format!("camara_{start}_{goal}_b{battery}{suffix}");
+        rows.push(row(directory.path(), &name, cell(&line, "optimal_time_ms")));
     }
-    report(&lines);
+    report(&rows);
 }

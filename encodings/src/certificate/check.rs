@@ -1,5 +1,7 @@
 //! Checks the argument of a certificate against the written task, by arithmetic alone.
 
+use std::rc::Rc;
+
 use num_rational::BigRational;
 use num_traits::ToPrimitive;
 use rustc_hash::FxHashMap;
@@ -11,6 +13,9 @@ use crate::certificate::semantics::{State, holds_without_numbers};
 use crate::certificate::shape;
 use crate::certificate::table::{Table, check_need, check_potential};
 use crate::certificate::write::{ARGUMENT_FORMAT, TASK_FORMAT};
+
+/// Combinations of designs that matter, of all operators together, are not more than this.
+const CHOICE_LIMIT: usize = 1 << 20;
 
 /// What was checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,7 +101,7 @@ pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<
     }
     let monotone = model.more_never_hurts();
     let checker = Checker {
-        choices: choices(&model, monotone),
+        choices: choices(&model, monotone)?,
         model: &model,
         cost,
         potentials,
@@ -120,7 +125,6 @@ pub(super) fn parse(
 ) -> Result<(Model, Argument, Option<i128>), Fault> {
     let model: Model = read("the task", task)?;
     let argument: Argument = read("the argument", argument)?;
-    let form = |document, reason| Fault::Form { document, reason };
     for (document, found, expected) in
         [("the task", &model.format, TASK_FORMAT), ("the argument", &argument.format, ARGUMENT_FORMAT)]
     {
@@ -134,8 +138,12 @@ pub(super) fn parse(
     Ok((model, argument, cost))
 }
 
+fn form(document: &'static str, reason: String) -> Fault {
+    Fault::Form { document, reason }
+}
+
 fn read<T: DeserializeOwned>(document: &'static str, text: &str) -> Result<T, Fault> {
-    serde_json::from_str(text).map_err(|error| Fault::Form { document, reason: error.to_string() })
+    serde_json::from_str(text).map_err(|error| form(document, error.to_string()))
 }
 
 /// The sum of operator costs that a metric stands for.
@@ -158,7 +166,7 @@ struct Checker<'c> {
     labels: FxHashMap<&'c [u32], Vec<(&'c [i64], i64)>>,
     monotone: bool,
     /// For each operator.
-    choices: Vec<Vec<Choice>>,
+    choices: Vec<Rc<[Choice]>>,
 }
 
 impl Checker<'_> {
@@ -228,8 +236,9 @@ impl Checker<'_> {
 /// For each operator the combinations that no other one makes superfluous: one that costs no more, and with which every condition
 /// holds as soon and every number ends as high (exactly so where more may hurt). What covers the successor by the
 /// latter covers the successor by the former.
-fn choices(model: &Model, monotone: bool) -> Vec<Vec<Choice>> {
-    let mut known: FxHashMap<_, Vec<Choice>> = FxHashMap::default();
+fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
+    let mut known: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
+    let mut count = 0;
     let all = model.operators.iter().map(|operator| {
         let quantities: Vec<_> = quantities(operator).collect();
         let key = (operator.uses, operator.exclusions, &operator.cost, quantities.clone());
@@ -251,9 +260,14 @@ fn choices(model: &Model, monotone: bool) -> Vec<Vec<Choice>> {
                     front.push(new);
                 }
             }
+            count += front.len();
             front.into_iter().map(|(choice, _)| choice).collect()
         });
-        own.clone()
+        let own = Rc::clone(own);
+        if count > CHOICE_LIMIT {
+            return Err(form("the task", "too many combinations of designs".into()));
+        }
+        Ok(own)
     });
     all.collect()
 }

@@ -1,7 +1,9 @@
 //! Whether the parts of a certificate that refer to each other exist: after this, no index is out of range.
 
 use crate::certificate::argument::Argument;
-use crate::certificate::model::{self, Condition, Fact, Linear, Literal, Model, Operator, Quantity};
+use crate::certificate::model::{
+    self, Condition, Exclusion, Fact, Linear, Literal, Model, Operator, Quantity,
+};
 use crate::certificate::semantics::in_range;
 
 type Found = Result<(), String>;
@@ -18,6 +20,14 @@ const TABLE_LIMIT: usize = 1 << 22;
 
 fn require(holds: bool, message: impl FnOnce() -> String) -> Found {
     if holds { Ok(()) } else { Err(message()) }
+}
+
+fn are_distinct(numbers: impl Iterator<Item = u32>) -> bool {
+    let mut all: Vec<u32> = numbers.collect();
+    let count = all.len();
+    all.sort_unstable();
+    all.dedup();
+    all.len() == count
 }
 
 fn is_small(number: i64) -> bool {
@@ -67,10 +77,7 @@ pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
     let potentials = argument.potentials.iter().map(|potential| (&potential.pattern, &potential.values));
     let needs = argument.needs.iter().map(|need| (&need.pattern, &need.values));
     for (pattern, values) in potentials.chain(needs) {
-        let mut sorted = pattern.clone();
-        sorted.sort_unstable();
-        sorted.dedup();
-        require(sorted.len() == pattern.len(), || "a pattern with a variable twice".into())?;
+        require(are_distinct(pattern.iter().copied()), || "a pattern with a variable twice".into())?;
         require(pattern.iter().all(|variable| (*variable as usize) < model.basic), || {
             "no such variable".into()
         })?;
@@ -110,6 +117,13 @@ impl Model {
         require(exclusions.iter().all(|exclusion| exclusion.slots.iter().all(exists)), || {
             "no such slot".into()
         })?;
+        for Exclusion { slots, combinations } in exclusions {
+            let suits = |(slot, design): (&u16, &u16)| (*design as usize) < sizes[*slot as usize];
+            let fits = |combination: &Vec<u16>| {
+                combination.len() == slots.len() && slots.iter().zip(combination).all(suits)
+            };
+            require(combinations.iter().all(fits), || "no such combination of designs".into())?;
+        }
         let slots = operator.arguments.iter().filter_map(|argument| match argument {
             model::Argument::Slot(slot) => Some(slot),
             model::Argument::Object(_) => None,
@@ -127,6 +141,8 @@ impl Model {
             require((*number as usize) < self.numbers.len(), || "no such number".into())?;
             self.check_linear(value, &sizes)?;
         }
+        let changed = operator.changes.iter().map(|(number, _)| *number);
+        require(are_distinct(changed), || "a number that changes twice".into())?;
         self.check_quantity(&operator.cost, &sizes)?;
         self.check_quantity(&operator.duration, &sizes)
     }
@@ -140,6 +156,9 @@ impl Model {
     fn check_linear(&self, linear: &Linear, sizes: &[usize]) -> Found {
         let exists = |(number, _): &(u32, i64)| (*number as usize) < self.numbers.len();
         require(linear.factors.iter().all(exists), || "no such number".into())?;
+        require(are_distinct(linear.factors.iter().map(|(number, _)| *number)), || {
+            "a number with two factors".into()
+        })?;
         let small =
             linear.factors.iter().all(|(_, factor)| is_small(*factor)) && linear.factors.len() < SUMMANDS;
         require(small, || "a factor that is too large".into())?;

@@ -5,8 +5,10 @@
 //! before was made by an operator. Sums are in [`super::sums`].
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, Write};
+use std::fmt::Write as _;
+use std::io::{BufRead, Read, Write};
 
+use crate::certificate::clausal::lines;
 use crate::certificate::clausal::sums::Sums;
 use crate::certificate::model::{Argument, Fact, Literal, Model, Operator};
 
@@ -17,6 +19,8 @@ pub(super) type Var = i32;
 pub(super) struct Formula {
     /// Each ends with 0.
     literals: Vec<Var>,
+    /// How many clauses there are.
+    count: usize,
     names: Vec<String>,
     limit: usize,
 }
@@ -33,7 +37,7 @@ impl Formula {
         if cost < 1 {
             return Err("no plan costs less than nothing".into());
         }
-        let mut formula = Self { literals: Vec::new(), names: Vec::new(), limit };
+        let mut formula = Self { literals: Vec::new(), count: 0, names: Vec::new(), limit };
         let truth = formula.variable(|| "true".to_owned());
         formula.clause(&[truth]);
         let mut timeline = Timeline::new(model, &mut formula);
@@ -69,8 +73,12 @@ impl Formula {
     }
 
     pub(super) fn clause(&mut self, clause: &[Var]) {
-        self.literals.extend(clause);
-        self.literals.push(0);
+        // What is beyond the limit is refused in any case.
+        if self.literals.len() <= self.limit {
+            self.literals.extend(clause);
+            self.literals.push(0);
+            self.count += 1;
+        }
     }
 
     /// At most one of some variables: with "one of the first so many" where there are many.
@@ -100,65 +108,86 @@ impl Formula {
     }
 
     pub(super) fn clauses(&self) -> impl Iterator<Item = &[Var]> {
-        let all = self.literals.split(|literal| *literal == 0);
         // The last clause ends with 0, too.
-        all.take(self.literals.iter().filter(|literal| **literal == 0).count())
+        self.literals.split(|literal| *literal == 0).take(self.count)
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.count
     }
 
     pub(super) fn write_dimacs(&self, output: &mut dyn Write) -> std::io::Result<()> {
-        for line in self.dimacs() {
-            writeln!(output, "{line}")?;
-        }
+        self.dimacs(&mut |line| output.write_all(line))?;
         output.flush()
     }
 
     pub(super) fn write_legend(&self, output: &mut dyn Write) -> std::io::Result<()> {
-        for line in self.legend() {
-            writeln!(output, "{line}")?;
-        }
+        self.legend(&mut |line| output.write_all(line))?;
         output.flush()
     }
 
-    fn dimacs(&self) -> impl Iterator<Item = String> {
-        let head = format!("p cnf {} {}", self.variables(), self.clauses().count());
-        let line = |clause: &[Var]| {
-            let literals = clause.iter().chain([&0]).map(ToString::to_string);
-            literals.collect::<Vec<_>>().join(" ")
-        };
-        std::iter::once(head).chain(self.clauses().map(line))
+    /// Calls `visit` with each line of the formula.
+    fn dimacs<E>(&self, visit: &mut dyn FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
+        visit(format!("p cnf {} {}\n", self.variables(), self.count).as_bytes())?;
+        let mut line = Vec::new();
+        self.clauses().try_for_each(|clause| {
+            lines::format(&mut line, clause);
+            visit(&line)
+        })
     }
 
-    fn legend(&self) -> impl Iterator<Item = String> {
-        (1..).zip(&self.names).map(|(number, name): (usize, _)| format!("{number} {name}"))
+    /// Calls `visit` with each line of the legend.
+    fn legend<E>(&self, visit: &mut dyn FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
+        let mut line = String::new();
+        (1..).zip(&self.names).try_for_each(|(number, name): (usize, _)| {
+            line.clear();
+            let _ = writeln!(line, "{number} {name}");
+            visit(line.as_bytes())
+        })
     }
 
     /// Whether a written formula and its legend are these: every clause, by the names of its variables.
     pub(super) fn compare(&self, formula: &mut dyn BufRead, legend: &mut dyn BufRead) -> Result<(), String> {
-        compare("legend", legend, self.legend())?;
-        compare("formula", formula, self.dimacs())
+        let mut legend = Written { what: "legend", text: legend, line: Vec::new(), number: 0 };
+        self.legend(&mut |line| legend.compare(line))?;
+        legend.end()?;
+        let mut formula = Written { what: "formula", text: formula, line: Vec::new(), number: 0 };
+        self.dimacs(&mut |line| formula.compare(line))?;
+        formula.end()
     }
 }
 
-fn compare(
-    what: &str,
-    written: &mut dyn BufRead,
-    expected: impl Iterator<Item = String>,
-) -> Result<(), String> {
-    let mut line = Vec::new();
-    let unreadable = |error: std::io::Error| format!("the {what} cannot be read: {error}");
-    for (number, expected) in (1..).zip(expected) {
-        line.clear();
+/// A text that is compared line by line with what is expected.
+struct Written<'w> {
+    what: &'static str,
+    text: &'w mut dyn BufRead,
+    line: Vec<u8>,
+    /// Lines so far.
+    number: usize,
+}
+
+impl Written<'_> {
+    fn compare(&mut self, expected: &[u8]) -> Result<(), String> {
+        self.number += 1;
+        self.line.clear();
         // A line that is longer than expected is wrong, however long it is.
-        let most = expected.len() as u64 + 1;
-        std::io::Read::take(&mut *written, most).read_until(b'\n', &mut line).map_err(unreadable)?;
-        if line.strip_suffix(b"\n") != Some(expected.as_bytes()) {
-            return Err(format!("line {number} of the {what} is another one, `{expected}` is expected"));
+        let mut line = Read::take(&mut *self.text, expected.len() as u64);
+        line.read_until(b'\n', &mut self.line)
+            .map_err(|error| format!("the {} cannot be read: {error}", self.what))?;
+        if self.line == expected {
+            return Ok(());
         }
+        let (number, what) = (self.number, self.what);
+        let expected = String::from_utf8_lossy(expected.trim_ascii_end());
+        Err(format!("line {number} of the {what} is another one, `{expected}` is expected"))
     }
-    if written.fill_buf().map_err(unreadable)?.is_empty() {
-        Ok(())
-    } else {
-        Err(format!("the {what} has more lines"))
+
+    fn end(&mut self) -> Result<(), String> {
+        match self.text.fill_buf() {
+            Ok([]) => Ok(()),
+            Ok(_) => Err(format!("the {} has more lines", self.what)),
+            Err(error) => Err(format!("the {} cannot be read: {error}", self.what)),
+        }
     }
 }
 

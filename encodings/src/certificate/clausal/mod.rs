@@ -3,8 +3,9 @@
 //!
 //! [`formula`] is plain: one operator at each step, all states written out, sums in binary. It knows no windows, no reduced
 //! costs and no symmetries, and shares nothing with `crate::encode`. It is this formula that a SAT solver refutes for the
-//! certificate, not the one that the plan was found with. [`proof`] checks the refutation [1], clause by clause, by unit
-//! propagation; it is no solver and shares nothing with one. [`steps`] bounds the number of steps by arithmetic on a potential.
+//! certificate, not the one that the plan was found with. [`trim`] keeps of the refutation [1] what matters, and notes what each
+//! clause follows from. [`proof`] checks that, clause by clause, by going through these notes; it is no solver and
+//! shares nothing with one, nor with [`trim`]. [`steps`] bounds the number of steps by arithmetic on a potential.
 //!
 //! The formula of a task is made again to check it, and compared with the written one.
 //!
@@ -12,9 +13,11 @@
 
 mod binary;
 mod formula;
+mod lines;
 mod proof;
 mod steps;
 mod sums;
+mod trim;
 
 use std::io::{BufRead, Write};
 
@@ -38,8 +41,14 @@ pub struct Outputs<'o> {
     pub formula: &'o mut dyn Write,
     /// A line for each variable: its number and what it stands for.
     pub legend: &'o mut dyn Write,
-    /// The refutation, in DRAT.
-    pub proof: Box<dyn Write>,
+    /// For the refutation as the solver writes it.
+    pub draft: Box<dyn Write>,
+    /// Opens what was written to `draft`.
+    pub written_draft: &'o dyn Fn() -> std::io::Result<Box<dyn BufRead>>,
+    /// What matters of the refutation, in DRAT: clauses that follow by unit propagation, and no deletions.
+    pub proof: &'o mut dyn Write,
+    /// For each line of the proof the numbers of the clauses that it follows from: the formula's from 1, then the proof's.
+    pub hints: &'o mut dyn Write,
 }
 
 /// Where the parts of a refutation come from.
@@ -50,6 +59,8 @@ pub struct Inputs<'i> {
     pub legend: &'i mut dyn BufRead,
     /// As in [`Outputs`].
     pub proof: &'i mut dyn BufRead,
+    /// As in [`Outputs`].
+    pub hints: &'i mut dyn BufRead,
 }
 
 /// By what a cheaper plan has only so many steps.
@@ -80,11 +91,17 @@ pub fn refute(
     let failed = |error: std::io::Error| format!("it cannot be written: {error}");
     formula.write_dimacs(outputs.formula).map_err(failed)?;
     formula.write_legend(outputs.legend).map_err(failed)?;
-    match refute_with_proof(formula.clauses(), outputs.proof, limits, CONFLICT_LIMIT) {
-        Answer::Unsatisfiable => Ok(steps),
-        Answer::Satisfiable => Err("the formula has a model".to_owned()),
-        Answer::Interrupted => Err(format!("not refuted within the limits ({CONFLICT_LIMIT} conflicts)")),
+    match refute_with_proof(formula.clauses(), outputs.draft, limits, CONFLICT_LIMIT) {
+        Answer::Unsatisfiable => {}
+        Answer::Satisfiable => return Err("the formula has a model".to_owned()),
+        Answer::Interrupted => {
+            return Err(format!("not refuted within the limits ({CONFLICT_LIMIT} conflicts)"));
+        }
     }
+    let mut draft = (outputs.written_draft)().map_err(failed)?;
+    let files = (outputs.proof, outputs.hints);
+    trim::trim(formula.clauses(), formula.variables(), &mut draft, files, limits)?;
+    Ok(steps)
 }
 
 /// Checks a refutation: that the formula is the one of the task, that the proof refutes it, and that no plan of more steps is
@@ -93,7 +110,7 @@ pub fn check_refutation(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,
     steps: usize,
-    Inputs { formula: written, legend, proof }: Inputs<'_>,
+    Inputs { formula: written, legend, proof, hints }: Inputs<'_>,
 ) -> [(&'static str, Result<String, String>); 3] {
     let prepared = parse(task, argument, claim).and_then(|(model, argument, cost)| {
         let reason = || Fault::Form { document: "the manifest", reason: "a formula without a cost".into() };
@@ -115,10 +132,10 @@ pub fn check_refutation(
                 format!(
                     "what the task comes to for {steps} steps: {} variables, {} clauses",
                     formula.variables(),
-                    formula.clauses().count()
+                    formula.count()
                 )
             });
-            let refuted = proof::check(formula.clauses(), formula.variables(), proof)
+            let refuted = proof::check(formula.clauses(), formula.variables(), proof, hints)
                 .map(|count| format!("it has no model: {count} clauses follow, the last is empty"));
             (same, refuted)
         }

@@ -1,17 +1,15 @@
-//! A checker of DRAT proofs: each clause that a proof adds has to follow from the clauses so far by unit propagation (RUP), and
-//! the last one is empty.
+//! A checker of clausal proofs with hints: each clause that a proof adds has to follow from the clauses so far by unit
+//! propagation (RUP) through the clauses that its hints name, in their order, and the last one is empty.
 //!
-//! Every clause that was added follows from the formula. So forgetting one is always admissible, and a clause that was
-//! a reason for something that is settled may be taken away without unsettling it. Clauses that follow in the weaker sense
-//! of resolution asymmetric tautologies are refused: the solvers that write for us add none.
+//! A clause follows if its negation leads to a contradiction. Each hint names a clause of which at most one literal is not false
+//! by then: that literal is settled, or there is the contradiction. So nothing is searched for, and each hint is looked at
+//! once. The formula's clauses are numbered from 1, those of the proof go on from there.
 
 use std::io::BufRead;
 
-use rustc_hash::FxHashMap;
+use crate::certificate::clausal::lines;
 
-/// A line of a proof is not longer than this, in bytes.
-const LINE_LIMIT: u64 = 1 << 22;
-/// So many literals may be in use at a time.
+/// All clauses together have at most so many literals.
 const LITERAL_LIMIT: usize = 1 << 26;
 
 /// Checks that a proof refutes clauses over variables numbered from 1; returns how many clauses it adds.
@@ -22,59 +20,38 @@ pub(super) fn check<'c>(
     clauses: impl Iterator<Item = &'c [i32]>,
     variables: usize,
     proof: &mut dyn BufRead,
+    hints: &mut dyn BufRead,
 ) -> Result<usize, String> {
-    let mut checker = Checker::new(variables);
-    for clause in clauses {
-        checker.add(clause.to_vec());
-    }
-    if checker.contradiction {
-        return Ok(0);
-    }
-    let mut count = 0;
-    let mut line = String::new();
+    let mut checker = Checker {
+        literals: Vec::new(),
+        ends: vec![0],
+        is_true: vec![false; 2 * variables + 2],
+        settled: Vec::new(),
+    };
+    clauses.for_each(|clause| checker.add(clause));
+    let (mut line, mut clause, mut named) = (Vec::new(), Vec::new(), Vec::new());
     for number in 1.. {
         let wrong = |reason: &str| format!("line {number} of the proof {reason}");
-        line.clear();
-        let read = std::io::Read::take(&mut *proof, LINE_LIMIT).read_line(&mut line);
-        if read.map_err(|error| wrong(&format!("cannot be read: {error}")))? == 0 {
-            return Err("the proof ends before the empty clause".to_owned());
+        let unreadable = |error: std::io::Error| wrong(&format!("cannot be read: {error}"));
+        let text = lines::read(proof, &mut line).map_err(unreadable)?;
+        let text = text.ok_or("the proof ends before the empty clause")?;
+        lines::numbers(text, variables, &mut clause)
+            .ok_or_else(|| wrong("is no clause of the formula's variables"))?;
+        let text = lines::read(hints, &mut line).map_err(unreadable)?.unwrap_or_default();
+        lines::numbers(text, checker.ends.len() - 1, &mut named)
+            .ok_or_else(|| wrong("has hints that name no clauses before it"))?;
+        if !checker.follows(&clause, &named) {
+            return Err(wrong("does not follow by its hints"));
         }
-        let text = line.trim();
-        let (deletes, text) = text.strip_prefix("d ").map_or((false, text), |rest| (true, rest));
-        let clause =
-            literals(text, variables).ok_or_else(|| wrong("is no clause of the formula's variables"))?;
-        if deletes {
-            checker.forget(&clause);
-            continue;
+        if clause.is_empty() {
+            return Ok(number);
         }
-        count += 1;
-        if !checker.follows(&clause) {
-            return Err(wrong("does not follow by unit propagation"));
-        }
-        if clause.is_empty() || checker.add(clause) {
-            return Ok(count);
-        }
-        if checker.literals > LITERAL_LIMIT {
-            return Err(wrong("has too many literals in use"));
+        checker.add(&clause);
+        if checker.literals.len() > LITERAL_LIMIT {
+            return Err(wrong("is one too many"));
         }
     }
     Err("the proof does not end".to_owned())
-}
-
-/// The literals of a line, sorted, each once; the line ends with 0.
-fn literals(text: &str, variables: usize) -> Option<Vec<i32>> {
-    let mut words: Vec<&str> = text.split_ascii_whitespace().collect();
-    if words.pop() != Some("0") {
-        return None;
-    }
-    let literal = |word: &str| {
-        let literal: i32 = word.parse().ok()?;
-        (literal != 0 && literal.unsigned_abs() as usize <= variables).then_some(literal)
-    };
-    let mut clause = words.into_iter().map(literal).collect::<Option<Vec<i32>>>()?;
-    clause.sort_unstable();
-    clause.dedup();
-    Some(clause)
 }
 
 /// The place of a literal in lists.
@@ -83,177 +60,118 @@ fn index(literal: i32) -> usize {
 }
 
 struct Checker {
-    /// The first two literals of each clause are watched; forgotten ones are empty.
-    clauses: Vec<Vec<i32>>,
-    watches: Vec<Vec<u32>>,
-    /// By sorted literals.
-    positions: FxHashMap<Vec<i32>, Vec<u32>>,
+    /// Of all clauses, one after the other.
+    literals: Vec<i32>,
+    /// Where each clause begins, and the last one ends.
+    ends: Vec<usize>,
     /// Whether a literal is true.
     is_true: Vec<bool>,
-    /// Literals that are true, in the order in which they became so.
-    trail: Vec<i32>,
-    /// How many of them have been propagated.
-    done: usize,
-    literals: usize,
-    contradiction: bool,
+    /// Literals that are true.
+    settled: Vec<i32>,
 }
 
 impl Checker {
-    fn new(variables: usize) -> Self {
-        let size = 2 * variables + 2;
-        Self {
-            clauses: Vec::new(),
-            watches: vec![Vec::new(); size],
-            positions: FxHashMap::default(),
-            is_true: vec![false; size],
-            trail: Vec::new(),
-            done: 0,
-            literals: 0,
-            contradiction: false,
-        }
-    }
-
-    fn is_false(&self, literal: i32) -> bool {
-        self.is_true[index(-literal)]
+    fn add(&mut self, clause: &[i32]) {
+        self.literals.extend(clause);
+        self.ends.push(self.literals.len());
     }
 
     fn settle(&mut self, literal: i32) {
-        if !self.is_true[index(literal)] {
-            self.is_true[index(literal)] = true;
-            self.trail.push(literal);
-        }
+        self.is_true[index(literal)] = true;
+        self.settled.push(literal);
     }
 
-    /// Adds a clause that holds; whether a contradiction is settled now.
-    fn add(&mut self, mut clause: Vec<i32>) -> bool {
-        clause.sort_unstable();
-        clause.dedup();
-        let tautology = clause.iter().any(|literal| clause.binary_search(&-literal).is_ok());
-        if self.contradiction || tautology {
-            return self.contradiction;
-        }
-        self.literals += clause.len();
-        let position = self.clauses.len() as u32;
-        self.positions.entry(clause.clone()).or_default().push(position);
-        // Literals that are not false first.
-        clause.sort_by_key(|literal| self.is_false(*literal));
-        let open = clause.iter().filter(|literal| !self.is_false(**literal)).count();
-        if clause.len() >= 2 {
-            for literal in &clause[..2] {
-                self.watches[index(*literal)].push(position);
-            }
-        }
-        match open {
-            0 => self.contradiction = true,
-            1 => {
-                self.settle(clause[0]);
-                self.clauses.push(clause);
-                self.contradiction = self.propagate();
-                return self.contradiction;
-            }
-            _ => {}
-        }
-        self.clauses.push(clause);
-        self.contradiction
-    }
-
-    /// Takes a clause away, if it is there.
-    fn forget(&mut self, clause: &[i32]) {
-        let Some(positions) = self.positions.get_mut(clause) else { return };
-        if let Some(position) = positions.pop() {
-            self.literals -= clause.len();
-            self.clauses[position as usize] = Vec::new();
-        }
-        if positions.is_empty() {
-            self.positions.remove(clause);
-        }
-    }
-
-    /// Whether a clause follows: whether its negation leads to a contradiction.
-    fn follows(&mut self, clause: &[i32]) -> bool {
-        if self.contradiction || clause.iter().any(|literal| self.is_true[index(*literal)]) {
-            return true;
-        }
-        let (settled, done) = (self.trail.len(), self.done);
+    /// Whether the hints lead from the negation of a clause to a contradiction.
+    fn follows(&mut self, clause: &[i32], hints: &[i32]) -> bool {
         for literal in clause {
             self.settle(-literal);
         }
-        let tautology = clause.iter().any(|literal| self.is_true[index(*literal)]);
-        let follows = tautology || self.propagate();
-        for literal in self.trail.drain(settled..) {
+        let contradiction = self.contradiction(hints);
+        for literal in self.settled.drain(..) {
             self.is_true[index(literal)] = false;
         }
-        self.done = done;
-        follows
+        contradiction
     }
 
-    /// Whether a contradiction is met.
-    fn propagate(&mut self) -> bool {
-        while let Some(literal) = self.trail.get(self.done).copied() {
-            self.done += 1;
-            let falsified = -literal;
-            let mut watching = std::mem::take(&mut self.watches[index(falsified)]);
-            let mut kept = 0;
-            let mut contradiction = false;
-            for at in 0..watching.len() {
-                let position = watching[at];
-                let next = if contradiction { Next::Keep } else { self.visit(position, falsified) };
-                match next {
-                    Next::Forget => continue,
-                    Next::Watch(other) => {
-                        self.watches[index(other)].push(position);
-                        continue;
-                    }
-                    Next::Settle(unit) => self.settle(unit),
-                    Next::Contradiction => contradiction = true,
-                    Next::Keep => {}
-                }
-                watching[kept] = position;
-                kept += 1;
-            }
-            watching.truncate(kept);
-            self.watches[index(falsified)] = watching;
-            if contradiction {
-                return true;
+    fn contradiction(&mut self, hints: &[i32]) -> bool {
+        for hint in hints {
+            let Some(number) = hint.checked_sub(1).and_then(|number| usize::try_from(number).ok()) else {
+                return false;
+            };
+            let clause = &self.literals[self.ends[number]..self.ends[number + 1]];
+            let mut open = clause.iter().filter(|literal| !self.is_true[index(-**literal)]);
+            match (open.next().copied(), open.next()) {
+                (None, _) => return true,
+                (Some(literal), None) => self.settle(literal),
+                _ => return false,
             }
         }
         false
     }
-
-    /// Looks at a clause one of whose watched literals has become false.
-    fn visit(&mut self, position: u32, falsified: i32) -> Next {
-        let is_true = &self.is_true;
-        let clause = &mut self.clauses[position as usize];
-        if clause.is_empty() {
-            return Next::Forget;
-        }
-        if clause[0] == falsified {
-            clause.swap(0, 1);
-        }
-        if is_true[index(clause[0])] {
-            return Next::Keep;
-        }
-        match (2..clause.len()).find(|at| !is_true[index(-clause[*at])]) {
-            Some(at) => {
-                clause.swap(1, at);
-                Next::Watch(clause[1])
-            }
-            None if is_true[index(-clause[0])] => Next::Contradiction,
-            None => Next::Settle(clause[0]),
-        }
-    }
 }
 
-/// What becomes of a clause whose watched literal is false.
-enum Next {
-    /// It has been taken away.
-    Forget,
-    /// It is true, or nothing is left to watch.
-    Keep,
-    /// Another literal is watched.
-    Watch(i32),
-    /// Only one literal is left.
-    Settle(i32),
-    /// None is left.
-    Contradiction,
+#[cfg(test)]
+mod tests {
+    use super::check;
+    use crate::certificate::clausal::lines;
+
+    /// Numbers, the same in every run.
+    struct Random(u64);
+
+    impl Random {
+        fn below(&mut self, limit: u64) -> u64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 33) % limit
+        }
+
+        fn clause(&mut self) -> Vec<i32> {
+            let literal = |random: &mut Self| {
+                let variable = random.below(4) as i32 + 1;
+                if random.below(2) == 0 { variable } else { -variable }
+            };
+            (0..=self.below(3)).map(|_| literal(self)).collect()
+        }
+    }
+
+    fn has_a_model(clauses: &[Vec<i32>]) -> bool {
+        let holds = |model: u32, literal: &i32| (model >> literal.unsigned_abs() & 1 == 1) == (*literal > 0);
+        (0..32).any(|model| clauses.iter().all(|clause| clause.iter().any(|own| holds(model, own))))
+    }
+
+    fn text(all: &[Vec<i32>]) -> Vec<u8> {
+        let mut text = Vec::new();
+        let mut line = Vec::new();
+        for numbers in all {
+            lines::format(&mut line, numbers);
+            text.extend(&line);
+        }
+        text
+    }
+
+    /// Whatever proofs and hints say, clauses that have a model are not refuted; some of the others are.
+    #[test]
+    fn only_what_has_no_model_is_refuted() {
+        let mut refuted = 0;
+        for seed in 0..20_000 {
+            let mut random = Random(seed);
+            let count = 6 + random.below(10);
+            let clauses: Vec<Vec<i32>> = (0..count).map(|_| random.clause()).collect();
+            let length = random.below(3);
+            let mut proof: Vec<Vec<i32>> = (0..length).map(|_| random.clause()).collect();
+            proof.push(Vec::new());
+            let hints = |line: u64, random: &mut Random| {
+                (0..=random.below(8)).map(|_| 1 + random.below(count + line) as i32).collect()
+            };
+            let hints: Vec<Vec<i32>> = (0..=length).map(|line| hints(line, &mut random)).collect();
+            let (proof, hints) = (text(&proof), text(&hints));
+            let borrowed = clauses.iter().map(Vec::as_slice);
+            let found = check(borrowed, 4, &mut proof.as_slice(), &mut hints.as_slice());
+            assert!(
+                found.is_err() || !has_a_model(&clauses),
+                "seed {seed}: {clauses:?}\n{proof:?}\n{hints:?}"
+            );
+            refuted += u32::from(found.is_ok());
+        }
+        assert!(refuted > 100, "{refuted}");
+    }
 }

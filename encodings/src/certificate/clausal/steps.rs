@@ -11,12 +11,14 @@ use crate::certificate::table::Table;
 
 /// No formula has more steps.
 const STEP_LIMIT: usize = 64;
+/// A potential between whose rows operators lead in more ways bounds nothing.
+const EDGE_LIMIT: usize = 1 << 22;
 
 /// The least bound that a potential gives.
 pub(super) fn bound(model: &Model, argument: &Argument, cost: i128, by: StepBound) -> Result<usize, String> {
     let bounds = argument.potentials.iter().filter_map(|potential| {
         let table = Table::new(model, &potential.pattern, &potential.values);
-        let mut layers = Layers::new(model, &table);
+        let mut layers = Layers::new(model, &table)?;
         (0..=STEP_LIMIT).find(|_| {
             layers.advance();
             let least = if by == StepBound::Spent { layers.spent() } else { layers.least() };
@@ -33,7 +35,7 @@ pub(super) fn check(model: &Model, argument: &Argument, cost: i128, steps: usize
     }
     let serves = |(position, potential): (usize, &crate::certificate::argument::Potential)| {
         let table = Table::new(model, &potential.pattern, &potential.values);
-        let mut layers = Layers::new(model, &table);
+        let mut layers = Layers::new(model, &table)?;
         (0..=steps).for_each(|_| layers.advance());
         layers.least().is_none_or(|least| least >= cost).then_some(position)
     };
@@ -50,7 +52,7 @@ struct Layers<'l> {
 }
 
 impl<'l> Layers<'l> {
-    fn new(model: &Model, table: &'l Table<'l>) -> Self {
+    fn new(model: &Model, table: &'l Table<'l>) -> Option<Self> {
         let mut edges = Vec::new();
         let mut idle: Option<i128> = None;
         for operator in &model.operators {
@@ -63,6 +65,9 @@ impl<'l> Layers<'l> {
                 let targets = table.targets(operator, &values);
                 let row = table.row(&values);
                 edges.extend(targets.iter().map(|target| (row, table.row(target), cost)));
+                if edges.len() > EDGE_LIMIT {
+                    return None;
+                }
             }
         }
         let rows = table.rows();
@@ -72,7 +77,7 @@ impl<'l> Layers<'l> {
         edges.dedup_by_key(|edge| (edge.0, edge.1));
         let mut costs = vec![None; rows];
         costs[table.row_of(&model.initial())] = Some(0);
-        Self { table, edges, costs }
+        Some(Self { table, edges, costs })
     }
 
     fn advance(&mut self) {

@@ -23,6 +23,7 @@ mod linear;
 mod meaning;
 mod world;
 
+use num_traits::Zero;
 use rustc_hash::FxHashSet;
 
 use crate::certificate::model::Model;
@@ -35,6 +36,8 @@ use world::{Key, World};
 
 /// With more instances, nothing is checked.
 const INSTANCE_LIMIT: usize = 400_000;
+/// Of so many instances the meaning is kept once it is known.
+const KEPT: usize = 20_000;
 
 /// What came of the comparison of a task with its files.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -88,6 +91,9 @@ struct Instance {
     arguments: Vec<u32>,
     requires: Vec<Key>,
     adds: Vec<Key>,
+    takes_time: bool,
+    /// Worked out again where there are many instances.
+    meaning: Option<Meaning>,
 }
 
 fn simulates(domain: &Domain, problem: &Problem, model: &Model) -> Result<(usize, usize, bool), Obstacle> {
@@ -99,7 +105,9 @@ fn simulates(domain: &Domain, problem: &Problem, model: &Model) -> Result<(usize
             if let Some(meaning) = Meaning::of(&world, schema, &arguments).map_err(Obstacle::Unknown)? {
                 let adds = meaning.truths.iter().filter(|(_, holds)| **holds).map(|(key, _)| key.clone());
                 let (adds, requires) = (adds.collect(), meaning.positive.iter().cloned().collect());
-                all.push(Instance { action, arguments, requires, adds });
+                let takes_time = meaning.duration.as_ref().is_some_and(|duration| !duration.is_zero());
+                let meaning = (all.len() < KEPT).then_some(meaning);
+                all.push(Instance { action, arguments, requires, adds, takes_time, meaning });
             }
             if all.len() > INSTANCE_LIMIT {
                 return Err(Obstacle::Unknown(format!("more than {INSTANCE_LIMIT} instances of actions")));
@@ -107,12 +115,20 @@ fn simulates(domain: &Domain, problem: &Problem, model: &Model) -> Result<(usize
         }
     }
     let reached = reach(&world, &mut all);
+    // Without a metric, this is what says what plans are measured by.
+    if problem.metric.is_none() && comparison.timed != all.iter().any(|instance| instance.takes_time) {
+        return Err(Obstacle::Unknown("whether plans are measured by time or by length".into()));
+    }
     comparison.initial()?;
     comparison.goal(&reached)?;
     let mut idle = 0;
-    for Instance { action, arguments, .. } in &all {
+    for Instance { action, arguments, meaning, .. } in &mut all {
         let schema = &domain.actions[*action];
-        if let Some(meaning) = Meaning::of(&world, schema, arguments).map_err(Obstacle::Unknown)? {
+        let meaning = match meaning.take() {
+            Some(kept) => Some(kept),
+            None => Meaning::of(&world, schema, arguments).map_err(Obstacle::Unknown)?,
+        };
+        if let Some(meaning) = meaning {
             idle += usize::from(!comparison.instance(schema, arguments, &meaning)?);
         }
     }
