@@ -12,6 +12,7 @@ mod probabilistic;
 mod real;
 mod reason;
 mod reference;
+mod routes;
 mod run;
 mod simulate;
 mod ugv;

@@ -26,7 +26,7 @@ pub fn shared(path: &str) -> Option<PathBuf> {
 }
 
 /// The mission that an imported map becomes, in a directory of its own.
-fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Mission) {
+pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Mission) {
     let files = import_map("map", map, options).expect("a map");
     let directory = tempfile::tempdir().expect("a directory");
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("written");
@@ -38,17 +38,17 @@ fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Mission) {
     (directory, mission)
 }
 
-fn coadaptation(mission: &Mission) -> Coadaptation {
+pub fn coadaptation(mission: &Mission) -> Coadaptation {
     let (problem, _) = mission.filled().expect("filled");
     Coadaptation::new(mission, &problem, mission.roles()).expect("a process")
 }
 
-fn places(start: &str, goal: &str) -> MapOptions {
+pub fn places(start: &str, goal: &str) -> MapOptions {
     let (start, goal) = (start.to_owned(), goal.to_owned());
     MapOptions { start, goal, battery: None, speeds: false, ..MapOptions::default() }
 }
 
-fn dark() -> Vec<(String, String)> {
+pub fn dark() -> Vec<(String, String)> {
     let pairs = [("l18", "l19"), ("l3", "l4"), ("l11", "l12")];
     pairs.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect()
 }
