@@ -2,16 +2,23 @@
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use clap::Args;
 use encodings::Limits;
-use metaplan::certificate::{Claim, Report, conditions, verify};
+use metaplan::certificate::{Claim, Part, Report, conditions, verify};
 use serde_json::json;
 
+use crate::cli::plan::seconds;
 use crate::cli::{Common, Exit, Failure, Format, memory, output};
 
-/// Grounding ends when the process takes more, in megabytes of 2^20 bytes: a certificate may come from anybody.
+/// Where files are grounded again, the process may take so much, in megabytes of 2^20 bytes: a certificate may come from anybody.
 const MEMORY_LIMIT: u64 = 4096;
+/// So long after a limit has been reached the verification is given up from outside.
+const GRACE: Duration = Duration::from_secs(2);
+const INTERVAL: Duration = Duration::from_millis(50);
 
 /// Arguments of `verify`.
 #[derive(Debug, Args)]
@@ -21,22 +28,49 @@ pub struct Arguments {
     /// Write the argument as verification conditions in SMT-LIB 2, too: an SMT solver has to answer `unsat` to each.
     #[arg(long, value_name = "FILE")]
     smt: Option<PathBuf>,
-}
-
-fn limits() -> Limits {
-    let limits = Limits::none();
-    // Where the platform does not tell how much memory is taken, there is no limit on it.
-    let _ = memory::watch(MEMORY_LIMIT, limits.interrupt());
-    limits
+    /// The verification fails if it takes more seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true, default_value = "600")]
+    time_limit: Duration,
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let limits = Limits::none().with_time(arguments.time_limit);
+    let answered = Arc::new(AtomicBool::new(false));
+    give_up_late(limits.clone(), Arc::clone(&answered), common.format);
+    let grounding = || {
+        // Where the platform does not tell how much memory is taken, there is no limit on it.
+        let _ = memory::watch(MEMORY_LIMIT, limits.interrupt());
+        limits.clone()
+    };
     if let Some(file) = &arguments.smt {
-        output::write_file(file, &conditions(&arguments.directory, &limits)?)?;
+        output::write_file(file, &conditions(&arguments.directory, &grounding)?)?;
     }
-    let report = verify(&arguments.directory, &limits);
-    match common.format {
+    let report = verify(&arguments.directory, &grounding);
+    while answered.swap(true, Ordering::Relaxed) {
+        std::thread::park();
+    }
+    Ok(show(&report, common.format))
+}
+
+/// Not all that is done looks at the limits, so that a thread of its own ends the program.
+fn give_up_late(limits: Limits, answered: Arc<AtomicBool>, format: Format) {
+    std::thread::spawn(move || {
+        while !limits.reached() {
+            std::thread::sleep(INTERVAL);
+        }
+        std::thread::sleep(GRACE);
+        if !answered.swap(true, Ordering::Relaxed) {
+            let reason =
+                format!("it takes longer than `--time-limit` allows, or more than {MEMORY_LIMIT} MB");
+            let report = Report { claim: None, parts: vec![Part { part: "limits", result: Err(reason) }] };
+            std::process::exit(show(&report, format) as i32);
+        }
+    });
+}
+
+fn show(report: &Report, format: Format) -> Exit {
+    match format {
         Format::Json => output::json_answer(&json!({
             "format": "metaplan-verification/1",
             "verified": report.verified(),
@@ -47,9 +81,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
                 "message": part.result.as_ref().unwrap_or_else(|reason| reason),
             })).collect::<Vec<_>>(),
         })),
-        _ => output::answer(&text(&report)),
+        _ => output::answer(&text(report)),
     }
-    Ok(if report.verified() { Exit::Done } else { Exit::Invalid })
+    if report.verified() { Exit::Done } else { Exit::Invalid }
 }
 
 fn text(report: &Report) -> String {

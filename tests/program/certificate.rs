@@ -378,3 +378,32 @@ fn plans_are_measured_as_the_files_have_it() {
     assert_eq!(outcome.status, 30, "{outcome:#?}");
     assert!(outcome.stdout.contains("task        failed"), "{outcome:#?}");
 }
+
+/// A certificate may ask for more than anybody can wait for.
+#[test]
+fn a_verification_has_a_time_limit() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let objects: Vec<String> = (0..200).map(|number| format!("o{number}")).collect();
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects {}) (:init) (:goal (met o1 o2)))",
+        objects.join(" ")
+    );
+    let domain = "(define (domain d) (:predicates (met ?a ?b) (far ?a ?b))
+      (:action meet :parameters () :precondition () :effect (met o1 o2)))";
+    let domain = domain.replace("(:predicates", "(:constants o1 o2) (:predicates");
+    std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+    std::fs::write(directory.path().join("p.pddl"), problem.replace(" o1 o2 o3", " o3")).expect("a file");
+    let arguments = ["plan", "d.pddl", "p.pddl", "--certificate", "c"];
+    let outcome = metaplan_in(directory.path(), &arguments, "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let certificate = directory.path().join("c").display().to_string();
+    let action = "(:action wait :parameters (?a ?b ?c ?d ?e ?f ?g ?h)
+      :precondition (not (and (far ?a ?b) (far ?c ?d) (far ?e ?f) (far ?g ?h))) :effect (far ?a ?h)))";
+    change(&certificate, "domain.pddl", &|text| {
+        let text = text.trim_end();
+        format!("{} {action}", &text[..text.len() - 1])
+    });
+    let outcome = metaplan(&["verify", &certificate, "--time-limit", "1"]);
+    assert_eq!(outcome.status, 30, "{outcome:#?}");
+    assert!(outcome.stdout.contains("limits      failed: it takes longer"), "{outcome:#?}");
+}
