@@ -311,7 +311,7 @@ impl Numbers {
             denominator.number(number);
         }
         if let Some(precision) = generality.numbers {
-            denominator.number(&Rational::new(1, i128::from(precision)));
+            denominator.number(&Rational::new(1, precision));
         }
         let names = used.iter().map(|variable| numeric_name(lifted, task, *variable)).collect();
         let integers = denominator.integers()?;

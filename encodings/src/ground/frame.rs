@@ -11,7 +11,7 @@ use crate::configuration::{
 };
 use crate::ground::effects::possible;
 use crate::ground::evaluate::{Binding, Failure, Row, Slots, World};
-use crate::ground::instantiate::{Build, GroundSlots, admit_some};
+use crate::ground::instantiate::{Apart, Build, GroundSlots, admit_some};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::quantity::{Linear, Quantity, SlotSet};
@@ -205,8 +205,8 @@ impl Build<'_, '_> {
             operands.push(match open_operand(effect, self.slots.parameters) {
                 None => Operand::Closed,
                 Some(expression) => {
-                    let (operand, undefined) = if conjuncts(&effect.condition).is_empty() {
-                        (possible(self.open(expression))?, [].into())
+                    let Apart { operand, undefined } = if conjuncts(&effect.condition).is_empty() {
+                        Apart { operand: possible(self.open(expression))?, undefined: [].into() }
                     } else {
                         self.open_apart(expression)?
                     };

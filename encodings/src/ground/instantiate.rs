@@ -267,6 +267,14 @@ fn configuration(
         .collect()
 }
 
+/// An expression of a conditional effect.
+pub(super) struct Apart {
+    /// None where it is undefined.
+    pub(super) operand: Option<Linear<Rational>>,
+    /// The combinations of designs for which it is undefined.
+    pub(super) undefined: Arc<[Forbidden]>,
+}
+
 /// An instance under construction.
 pub(super) struct Build<'w, 'a> {
     pub(super) world: &'w mut World<'a>,
@@ -305,14 +313,11 @@ impl Build<'_, '_> {
     }
 
     /// The expression, or nothing where it is undefined, and apart the combinations of designs for which it is.
-    pub(super) fn open_apart(
-        &mut self,
-        expression: &Expression,
-    ) -> Result<(Option<Linear<Rational>>, Arc<[Forbidden]>), Failure> {
+    pub(super) fn open_apart(&mut self, expression: &Expression) -> Result<Apart, Failure> {
         let own = std::mem::take(&mut self.forbidden);
         let operand = possible(self.open(expression));
         let undefined = std::mem::replace(&mut self.forbidden, own);
-        Ok((operand?, undefined.into()))
+        Ok(Apart { operand: operand?, undefined: undefined.into() })
     }
 
     pub(super) fn open(&mut self, expression: &Expression) -> Result<Linear<Rational>, Failure> {
