@@ -34,9 +34,21 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Whether it changes a number in two ways at once, which cannot be done.
-    pub(super) fn conflicts(&self) -> bool {
-        self.numbers.windows(2).any(|pair| pair[0].0 == pair[1].0)
+    /// Whether the order of two happenings would matter: one writes what the other reads, or both write in ways that do not commute.
+    pub(super) fn interferes(&self, other: &Self) -> bool {
+        let clash = |(number, way): &(NumericId, Way)| {
+            let mut others = other.numbers.iter().filter(|(other, _)| other == number);
+            others.any(|(_, other)| other != way || *way == Way::Assign)
+        };
+        self.disturbs(other) || other.disturbs(self) || self.numbers.iter().any(clash)
+    }
+
+    /// Whether this writes what the other one reads, or adds what it deletes.
+    fn disturbs(&self, other: &Self) -> bool {
+        let mut written = self.added.iter().chain(&self.deleted);
+        written.any(|atom| other.reads.binary_search(atom).is_ok())
+            || self.added.iter().any(|atom| other.deleted.binary_search(atom).is_ok())
+            || self.numbers.iter().any(|(number, _)| other.reads_numbers.binary_search(number).is_ok())
     }
 }
 
@@ -93,7 +105,8 @@ impl<'a> Footprints<'a> {
             atoms.dedup();
         }
         numbers.sort_unstable();
-        numbers.dedup_by(|a, b| a == b && a.1 != Way::Assign);
+        // The ground operator exists, so its changes of one number go together.
+        numbers.dedup();
         Ok(footprint)
     }
 
