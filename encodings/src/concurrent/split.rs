@@ -55,7 +55,8 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
     let (mut origins, mut designs) = (Vec::new(), Vec::new());
     for (index, schema) in schemas.iter().enumerate() {
         let own = design_parameters(&lifted, schema, solves);
-        for (half, part) in parts(&mut lifted, schema) {
+        for (half, mut part) in parts(&mut lifted, schema) {
+            part.action = lifted.schemas.len() as u32;
             lifted.schemas.push(part);
             origins.push(Origin { schema: index, half });
             designs.push(own.clone());
@@ -177,6 +178,9 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
         at_end: Formula::truth(),
         end_effects: effects,
         duration: None,
+        is_chosen: false,
+        joint: None,
+        action: lifted.schemas.len() as u32,
         place: Place { file: File::Problem, span: Span::default() },
     }
 }
