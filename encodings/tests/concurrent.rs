@@ -299,9 +299,9 @@ fn sample(random: &mut Random) -> Sample {
             let _ = write!(init, " {atom}");
         }
     }
-    if random.below(3) == 0 {
+    if random.below(2) == 0 {
         for _ in 0..=random.below(3) {
-            let _ = write!(init, " (at {} {})", 1 + random.below(5), literal(random));
+            let _ = write!(init, " (at {} {})", random.below(6), literal(random));
         }
     }
     let metric = [

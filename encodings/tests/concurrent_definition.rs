@@ -95,6 +95,33 @@ fn events_that_interfere_lie_apart() {
 }
 
 #[test]
+fn a_quantifier_reads_the_objects_of_its_type() {
+    let proved_with = |condition: &str, event: &str| {
+        let domain = format!(
+            "(define (domain d) (:types part tool) (:predicates (on ?x) (pair ?x ?y) (g) (done))
+               (:durative-action a :parameters (?t - tool) :duration (= ?duration 2)
+                 :condition (at end (or (g) {condition})) :effect (at end (done))))"
+        );
+        let problem = format!(
+            "(define (problem p) (:domain d) (:objects o u - part t - tool) (:init (g) (at 2 {event})) (:goal (done)))"
+        );
+        proved(&domain, &problem)
+    };
+    for (condition, event, expected) in [
+        ("(exists (?x - part) (on ?x))", "(on o)", "2.001"),
+        ("(exists (?x - part) (on ?x))", "(on t)", "2"),
+        ("(forall (?x - part) (not (on ?x)))", "(on t)", "2"),
+        ("(exists (?x - part) (pair ?x ?x))", "(pair o o)", "2.001"),
+        ("(exists (?x - part) (pair ?x ?x))", "(pair o u)", "2"),
+        ("(exists (?x ?y - part) (pair ?x ?y))", "(pair o u)", "2.001"),
+        ("(exists (?x - part) (pair ?x ?t))", "(pair o t)", "2.001"),
+        ("(exists (?x - part) (pair ?x ?t))", "(pair o u)", "2"),
+    ] {
+        assert_eq!(proved_with(condition, event), expected, "{condition} {event}");
+    }
+}
+
+#[test]
 fn a_plan_ends_with_its_last_action() {
     let a = || durative("a", "5", "", "(at end (g))");
     check(&[a()], "(at 0 (q))", "(q)", "0");

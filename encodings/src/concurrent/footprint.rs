@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::ground::evaluate::{AtomId, Binding, Failure, World};
-use crate::ground::reads::Reads;
+use crate::ground::reads::{Reads, Slot, fits};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId, Schema};
 use crate::pddl::ast::Assignment;
@@ -172,8 +172,9 @@ impl Written {
     pub(super) fn look_up(&self, reads: &Reads) -> (Vec<AtomId>, Vec<NumericId>) {
         let (mut atoms, mut numbers) = (Vec::new(), Vec::new());
         for (predicate, pattern) in &reads.atoms {
+            let object = |slot: &Slot| if let Slot::Object(object) = slot { Some(*object) } else { None };
             let whole =
-                pattern.as_ref().and_then(|pattern| pattern.iter().copied().collect::<Option<Vec<_>>>());
+                pattern.as_ref().and_then(|pattern| pattern.iter().map(object).collect::<Option<Vec<_>>>());
             match whole {
                 Some(arguments) => atoms.extend(self.exact.get(&(*predicate, arguments))),
                 None => matching(self.atoms.get(predicate), pattern.as_deref(), &mut atoms),
@@ -190,11 +191,7 @@ impl Written {
     }
 }
 
-fn matching<V: Copy>(rows: Option<&Rows<V>>, pattern: Option<&[Option<ObjectId>]>, into: &mut Vec<V>) {
-    let fits = |arguments: &[ObjectId]| {
-        pattern.is_none_or(|pattern| {
-            pattern.iter().zip(arguments).all(|(wanted, given)| wanted.is_none_or(|wanted| wanted == *given))
-        })
-    };
+fn matching<V: Copy>(rows: Option<&Rows<V>>, pattern: Option<&[Slot]>, into: &mut Vec<V>) {
+    let fits = |arguments: &[ObjectId]| pattern.is_none_or(|pattern| fits(pattern, arguments));
     into.extend(rows.into_iter().flatten().filter(|(arguments, _)| fits(arguments)).map(|(_, value)| *value));
 }
