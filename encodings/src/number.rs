@@ -161,7 +161,7 @@ impl Add<&Self> for Rational {
     type Output = Self;
 
     fn add(self, other: &Self) -> Self {
-        self.combine(other, |a, b| a.checked_add(b), |a, b| a + b)
+        self.combine(other, CheckedAdd::checked_add, |a, b| a + b)
     }
 }
 
@@ -183,7 +183,7 @@ impl Sub<&Self> for Rational {
     type Output = Self;
 
     fn sub(self, other: &Self) -> Self {
-        self.combine(other, |a, b| a.checked_sub(b), |a, b| a - b)
+        self.combine(other, CheckedSub::checked_sub, |a, b| a - b)
     }
 }
 
@@ -199,7 +199,7 @@ impl Mul<&Self> for Rational {
     type Output = Self;
 
     fn mul(self, other: &Self) -> Self {
-        self.combine(other, |a, b| a.checked_mul(b), |a, b| a * b)
+        self.combine(other, CheckedMul::checked_mul, |a, b| a * b)
     }
 }
 
@@ -216,7 +216,7 @@ impl Div for Rational {
     type Output = Self;
 
     fn div(self, other: Self) -> Self {
-        self.combine(&other, |a, b| a.checked_div(b), |a, b| a / b)
+        self.combine(&other, CheckedDiv::checked_div, |a, b| a / b)
     }
 }
 

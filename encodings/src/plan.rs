@@ -3,6 +3,7 @@
 use num_rational::{BigRational, Ratio};
 use num_traits::ToPrimitive;
 
+use crate::earliest::{earliest, starts};
 use crate::lifted::ObjectId;
 use crate::number::Int;
 use crate::pddl::number::to_decimal;
@@ -88,23 +89,19 @@ pub struct Plan {
 
 /// The plan in the names of the task.
 pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
+    let plan = earliest(task, plan);
     let mut steps = Vec::new();
-    let mut clock = 0;
     let mut current: Vec<(String, String)> = Vec::new();
     let sign = if task.objective.maximize { -1 } else { 1 };
-    for step in &plan.steps {
+    let actions = plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none());
+    for (step, start) in actions.zip(starts(task, &plan.steps)) {
         let operator = &task.operators[step.operator.index()];
-        if let Some(time) = operator.wait {
-            clock = time;
-            continue;
-        }
         let sizes = operator.sizes();
         let duration = operator.duration.at(&step.choice, &sizes);
         let cost = sign * operator.cost.at(&step.choice, &sizes);
-        let mut step = Step::new(task, operator, &step.choice, (clock, duration, cost));
+        let mut step = Step::new(task, operator, &step.choice, (start, duration, cost));
         step.note_reconfigured(&mut current);
         steps.push(step);
-        clock += duration;
     }
     Plan { steps, cost: metric(task, plan.cost) }
 }

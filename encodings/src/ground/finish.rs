@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::ground::Generality;
 use crate::ground::derived::components;
 use crate::ground::evaluate::AtomId;
+use crate::ground::events::Timing;
 use crate::ground::instantiate::{GroundOperator, GroundSlots, GroundTask};
 use crate::ground::integers::{Denominator, Integers};
 use crate::ground::metric::initial_value;
@@ -44,7 +45,8 @@ pub(crate) fn finish(
     for operator in limits.watch(&task.operators) {
         let operator = operator?;
         durations.quantity(&operator.duration);
-        operator.wait.iter().for_each(|time| durations.number(time));
+        let bounds = [&operator.timing.start, &operator.timing.end].into_iter().flatten();
+        operator.wait.iter().chain(bounds.map(|(time, _)| time)).for_each(|time| durations.number(time));
     }
     let mut durations = durations.integers()?;
     let mut slots = Slots::new(&task.operators);
@@ -72,6 +74,10 @@ pub(crate) fn finish(
             configuration: ground.configuration,
             forbidden: ground.forbidden,
             wait: ground.wait.map(|time| durations.number(&time)).transpose()?,
+            timing: Timing {
+                start: ground.timing.start.map(|(time, _)| durations.number(&time)).transpose()?,
+                end: ground.timing.end.map(|(time, _)| durations.number(&time)).transpose()?,
+            },
         });
     }
     let goal = match &task.goal {
@@ -323,7 +329,7 @@ impl Numbers {
             denominator.number(number);
         }
         if let Some(precision) = generality.numbers {
-            denominator.number(&Rational::new(1, i128::from(precision)));
+            denominator.number(&Rational::new(1, precision));
         }
         let names = used.iter().map(|variable| numeric_name(lifted, task, *variable)).collect();
         let integers = denominator.integers()?;

@@ -146,6 +146,12 @@ enum Tightened {
 }
 
 impl<'a> Run<'a> {
+    /// Notes that two parts of the planner contradict each other. It fails loudly where that is tested.
+    fn contradicted(&mut self, what: &str) {
+        debug_assert!(false, "{what}");
+        self.statistics.contradiction = Some(what.to_owned());
+    }
+
     fn finish(
         self,
         status: Status,
@@ -154,6 +160,13 @@ impl<'a> Run<'a> {
         horizon: usize,
         proof: Option<Proof>,
     ) -> Solution {
+        let doubtful = self.statistics.contradiction.is_some();
+        let status = match status {
+            Status::Optimal if doubtful => Status::Feasible,
+            Status::Unsolvable if doubtful => Status::Unknown,
+            other => other,
+        };
+        let (lower, proof) = if doubtful { (None, None) } else { (lower, proof) };
         Solution {
             status,
             plan: plan.map(|plan| decode(self.task, plan)),
@@ -230,7 +243,11 @@ impl<'a> Run<'a> {
             if extent.size() > if exact { CONFIRM_SIZE } else { FORMULA_LIMIT } {
                 return self.conclude(&best, horizon, unproved);
             }
-            match (self.within(&bounds, &extent, &mut best, exact), extent.step_bound) {
+            let tightened = self.within(&bounds, &extent, &mut best, exact);
+            if exact && best.plan.cost <= limit {
+                self.contradicted("a formula has a cheaper plan than the one that the search calls cheapest");
+            }
+            match (tightened, extent.step_bound) {
                 (Tightened::Exhausted, Some(step_bound)) => {
                     best.lower = best.plan.cost.min(limit + 1);
                     if best.lower == best.plan.cost {
@@ -305,7 +322,9 @@ impl<'a> Run<'a> {
         self.statistics.encode += started.elapsed();
         let mut live = self.live(u64::MAX);
         let (answer, _) = self.call(&mut live, &encoding?, &[]);
-        debug_assert_ne!(answer, Answer::Satisfiable, "a plan is cheaper than the lower bound");
+        if answer == Answer::Satisfiable {
+            self.contradicted("a formula has a plan that is cheaper than the lower bound");
+        }
         (answer == Answer::Unsatisfiable).then_some(Proof::Sat { step_bound: steps })
     }
 
