@@ -125,6 +125,11 @@ impl Rational {
     }
 }
 
+/// An index as a number of 32 bits: of operators, atoms, values, designs or steps, of which there are fewer than fit into memory.
+pub(crate) fn dense(index: usize) -> u32 {
+    u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
+}
+
 /// A number in words, for keys.
 pub(crate) fn words(number: Int) -> [u32; 4] {
     let bytes = number.to_le_bytes();

@@ -30,7 +30,8 @@ impl Run<'_> {
     ) -> (Answer, Option<GroundPlan>) {
         let started = Instant::now();
         let formula = &encoding.formula;
-        for (_, clause) in formula.clauses_from(live.known) {
+        for item in self.config.limits.watch(formula.clauses_from(live.known)) {
+            let Ok((_, clause)) = item else { return (Answer::Interrupted, None) };
             live.solver.add_clause(clause);
         }
         live.known = formula.len();
