@@ -153,7 +153,7 @@ fn windows_of_timed_initial_literals() {
     check("closes at the end", domain, &closes("7"), (1, 1000), Some(("7", &["3: (work) [4]"])));
     check("closes before the end", domain, &closes("6.999"), (1, 1000), None);
     let late = "(at 2 (open)) (at 5 (not (open))) (at 9 (open))";
-    // To tell may begin anywhere from 3 on: it has ended in time.
+    // It reads at its end what the event at 9 changes.
     let plan = ["3.001: (tell) [6]", "9: (work) [4]"];
     check("the second window", domain, &problem(late, both), (1, 1000), Some(("13", &plan)));
     // A plan lasts until its last action ends, and what comes after that does not happen.

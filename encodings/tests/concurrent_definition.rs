@@ -129,6 +129,12 @@ fn a_plan_ends_with_its_last_action() {
     check(&[a()], "(p) (at 0 (not (p)))", "(p)", NONE);
     check(&[a()], "(at 7 (q))", "(q)", "7");
     check(&[], "(at 7 (q))", "(q)", NONE);
+    // An action that changes nothing that matters, or nothing at all, ends a plan as well.
+    let instantaneous = |effect: &str| format!("(:action a :parameters () :effect {effect})");
+    for effect in ["(r)", "(and)", "(when (p) (p))", "(not (p))"] {
+        check(&[instantaneous(effect)], "(at 7 (q))", "(q)", "7");
+        check(&[durative("a", "0", "", &format!("(at end {effect})"))], "(at 7 (q))", "(q)", "7");
+    }
 }
 
 #[test]

@@ -374,3 +374,25 @@ fn a_single_step_changes_what_it_changes_in_a_plan() {
         assert_eq!(single(duration, condition, effect, forced), expected, "{duration} {condition} {effect}");
     }
 }
+
+#[test]
+fn a_step_that_fits_two_schemas_is_the_better_one() {
+    let domain = "(define (domain d) (:predicates (p) (g)) (:functions (total-cost))
+      (:action go :parameters () :effect (and (g) (increase (total-cost) 10)))
+      (:action go :parameters () :precondition (p) :effect (and (g) (increase (total-cost) 1)))
+      (:action go :parameters () :effect (and (not (g)))))";
+    let metric = |init: &str, plan: &str| {
+        let problem = format!(
+            "(define (problem n) (:domain d) (:init {init} (= (total-cost) 0)) (:goal (g)) (:metric minimize (total-cost)))"
+        );
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("a task");
+        let plan = PlanText::parse(&Source::new("plan", plan)).expect("the plan can be read");
+        validate(&domain, &problem, &plan, &Options::default()).metric.map(|value| value.to_string())
+    };
+    assert_eq!(metric("(p)", "(go)"), Some("1".to_owned()));
+    assert_eq!(metric("", "(go)"), Some("10".to_owned()));
+    // The first of them may be the one that undoes.
+    assert_eq!(metric("(p)", "(go)\n(go)"), Some("1".to_owned()));
+    assert_eq!(metric("", ""), None);
+}

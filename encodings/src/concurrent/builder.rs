@@ -86,13 +86,14 @@ impl<'a> Builder<'a> {
             let mut binding: Binding = arguments.iter().map(|object| Some(*object)).collect();
             binding.resize(schema.variables, None);
             let effects = if origin.half == Half::OverAll { &[] } else { &schema.end_effects[..] };
-            // What is under way, and how many events there were, has no place in the files.
-            let phase = (!self.split.events.is_empty()).then_some(self.split.lifted.time.phase);
+            // What is under way, how many events there were and whether they were waited for has no place in the files.
+            let time = (!self.split.events.is_empty()).then_some(self.split.lifted.time);
+            let own = |predicate| time.is_some_and(|time| [time.phase, time.waited].contains(&predicate));
             let effects: Vec<Effect> = effects
                 .iter()
                 .filter(|effect| match effect.change {
                     Change::Add(predicate, _) | Change::Delete(predicate, _) => {
-                        Some(predicate) != phase && !self.split.lifted.predicates[predicate.index()].running
+                        !own(predicate) && !self.split.lifted.predicates[predicate.index()].running
                     }
                     Change::Assign { .. } => true,
                 })

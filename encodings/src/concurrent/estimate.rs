@@ -97,14 +97,14 @@ fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
     let operators = || task.operators.iter().zip(&concurrent.happenings);
     let of = |facts: &[Fact]| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
     let apart = concurrent.separation;
-    let setters = |value: u32| {
-        let sets = move |operator: &Operator| {
-            let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
-            let mut effects = operator.effects.iter().chain(conditional);
-            effects.any(|fact| fact.variable == variable && fact.value == value)
-        };
-        task.operators.iter().filter(move |operator| sets(operator)).count()
-    };
+    let mut setters = vec![0_u32; task.variables[variable.index()].values.len()];
+    for operator in &task.operators {
+        let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+        let effects = operator.effects.iter().chain(conditional);
+        for fact in effects.filter(|fact| fact.variable == variable) {
+            setters[fact.value as usize] += 1;
+        }
+    }
     let mut edges = Vec::new();
     for (operator, happening) in operators() {
         let Some(to) = of(&operator.effects) else { continue };
@@ -120,7 +120,9 @@ fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
                 let kept = held.and_then(|over_all| of(&over_all.condition.facts));
                 edges.push(match (of(&start.effects), from) {
                     // The value that the start has set stays until the end: it is required all along, or nothing else sets it.
-                    (Some(set), Some(from)) if set == from && (kept == Some(set) || setters(set) == 1) => {
+                    (Some(set), Some(from))
+                        if set == from && (kept == Some(set) || setters[set as usize] == 1) =>
+                    {
                         (Some(from), to, instance.duration)
                     }
                     // The value stays from before the start to the end.

@@ -1,14 +1,10 @@
 //! A PDDL task to a plan whose actions overlap, with the least makespan or the best weighted sum of makespan and costs.
 //!
-//! The semantics is that of PDDL 2.1 [1]: starts and ends of actions are *happenings*; what happens at one time reads the state before
-//! it; happenings that interfere lie apart by the *separation* (epsilon); conditions over all hold from after the start until
-//! before the end. Timed initial literals come first at their time. No instance of an action overlaps with itself. At any time, each function that the running actions
-//! require has one design.
+//! What a plan is, the definition at the head of [`validate`](crate::validate) says. Besides, at any time each function that the
+//! running actions require has one design, and no duration is above 0 and below the *separation* (epsilon).
 //!
 //! `split` makes two schemas of a durative action, `compile` finds what each happening waits for, and `search` goes
 //! through all sequences of happenings that matter, with what is left of their simple temporal network in `clocks`.
-//!
-//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003.
 
 mod builder;
 mod clocks;

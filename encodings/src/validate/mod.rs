@@ -27,7 +27,7 @@ use num_rational::BigRational;
 use num_traits::Zero;
 use rustc_hash::FxHashSet;
 
-use crate::pddl::ast::{Action, ActionBody, Domain, Effect, Name, Problem};
+use crate::pddl::ast::{Action, ActionBody, Direction, Domain, Effect, Name, Problem};
 use crate::pddl::number::to_decimal;
 
 pub use advance::{Advance, ValueChange, advance, advance_each, metric_after};
@@ -37,6 +37,7 @@ pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
 use evaluate::{Bindings, Evaluator};
 use execute::Execution;
 use explain::unmet;
+use step::Step;
 use world::{State, World};
 
 /// How a plan is to be read.
@@ -66,23 +67,54 @@ impl Default for Options {
     }
 }
 
+/// How many ways to read a plan are tried where schemas share a name.
+const READINGS: usize = 4096;
+
 /// Executes a plan. Domain and problem must have passed [`check`](crate::pddl::check()); names that are declared
 /// nowhere hold for nothing.
+///
+/// A step whose name and objects fit several schemas stands for any of them: a plan is valid if some reading of it is, and
+/// the best one counts. Beyond 4,096 readings each such step is the first schema that can start.
 pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &Options) -> Verdict {
     let world = World::new(domain, problem);
     let steps: Vec<_> =
         plan.steps.iter().enumerate().map(|(index, step)| step::resolve(&world, index + 1, step)).collect();
-    let mut execution = Execution::new(&world, options);
+    let first = judge(&world, &steps, options);
+    step::readings(&steps, READINGS).into_iter().map(|steps| judge(&world, &steps, options)).fold(
+        first,
+        |best, verdict| {
+            if is_better(problem, &verdict, &best) { verdict } else { best }
+        },
+    )
+}
+
+fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdict {
+    let mut execution = Execution::new(world, options);
     let mut total_time = BigRational::zero();
     let result = if options.concurrent {
-        concurrent::run(&mut execution, &steps, &mut total_time)
+        concurrent::run(&mut execution, steps, &mut total_time)
     } else {
-        sequential::run(&mut execution, &steps, &mut total_time)
+        sequential::run(&mut execution, steps, &mut total_time)
     };
-    let violation = result.and_then(|()| goal_holds(&world, &execution.state, &total_time)).err();
-    let metric = violation.is_none().then(|| metric_value(&world, &execution.state, &total_time)).flatten();
-    let values = changeable_values(&world, &execution.state);
+    let violation = result.and_then(|()| goal_holds(world, &execution.state, &total_time)).err();
+    let metric = violation.is_none().then(|| metric_value(world, &execution.state, &total_time)).flatten();
+    let values = changeable_values(world, &execution.state);
     Verdict { valid: violation.is_none(), total_time, metric, values, violation }
+}
+
+/// Whether one reading of a plan is better than another: valid, and by the metric, or by time without one.
+fn is_better(problem: &Problem, own: &Verdict, other: &Verdict) -> bool {
+    if !own.valid || !other.valid {
+        return own.valid && !other.valid;
+    }
+    match (&problem.metric, &own.metric, &other.metric) {
+        (Some(metric), Some(own), Some(other)) => match metric.direction {
+            Direction::Minimize => own < other,
+            Direction::Maximize => own > other,
+        },
+        (Some(_), own, other) => own.is_some() && other.is_none(),
+        (None, ..) => own.total_time < other.total_time,
+    }
 }
 
 fn goal_holds(world: &World<'_>, state: &State, time: &BigRational) -> Result<(), Box<Violation>> {

@@ -11,7 +11,7 @@ use super::verdict::{Violation, ViolationKind};
 use super::world::{Symbol, World};
 
 /// A step with the schemas that it can be an instance of.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Step<'p> {
     /// Its place in the plan's text, from 1.
     pub(super) number: usize,
@@ -66,6 +66,23 @@ pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) 
     let named = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
     let instances = named.filter_map(|action| instantiate(world, action, objects.as_deref()?)).collect();
     Step { number, text, instances }
+}
+
+/// All ways to choose one schema for each step that fits several; none if there is one way, or if there are more than `most`.
+pub(super) fn readings<'p>(steps: &[Step<'p>], most: usize) -> Vec<Vec<Step<'p>>> {
+    let ways = |step: &Step<'p>| step.instances.len().max(1);
+    let count = steps.iter().try_fold(1_usize, |count, step| count.checked_mul(ways(step)));
+    let Some(count) = count.filter(|count| (2..=most).contains(count)) else { return Vec::new() };
+    let reading = |mut number: usize| {
+        let chosen = steps.iter().map(|step| {
+            let own = number % ways(step);
+            number /= ways(step);
+            let instances = step.instances.get(own).cloned().into_iter().collect();
+            Step { number: step.number, text: step.text, instances }
+        });
+        chosen.collect()
+    };
+    (0..count).map(reading).collect()
 }
 
 fn instantiate<'p>(world: &World<'p>, action: &'p Action, objects: &[Symbol]) -> Option<Instance<'p>> {
