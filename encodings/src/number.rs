@@ -102,6 +102,12 @@ impl Rational {
         !self.is_positive() && !self.is_zero()
     }
 
+    /// The result if both are small integers, which most are: no common divisor has to be found.
+    fn integers(&self, other: &Self, operation: impl Fn(i128, i128) -> Option<i128>) -> Option<Self> {
+        let (a, b) = (self.to_int()?, other.to_int()?);
+        operation(a, b).filter(|result| *result > i128::MIN).map(Self::from_integer)
+    }
+
     fn combine(
         &self,
         other: &Self,
@@ -161,7 +167,8 @@ impl Add<&Self> for Rational {
     type Output = Self;
 
     fn add(self, other: &Self) -> Self {
-        self.combine(other, CheckedAdd::checked_add, |a, b| a + b)
+        self.integers(other, i128::checked_add)
+            .unwrap_or_else(|| self.combine(other, CheckedAdd::checked_add, |a, b| a + b))
     }
 }
 
@@ -183,7 +190,8 @@ impl Sub<&Self> for Rational {
     type Output = Self;
 
     fn sub(self, other: &Self) -> Self {
-        self.combine(other, CheckedSub::checked_sub, |a, b| a - b)
+        self.integers(other, i128::checked_sub)
+            .unwrap_or_else(|| self.combine(other, CheckedSub::checked_sub, |a, b| a - b))
     }
 }
 
@@ -199,7 +207,8 @@ impl Mul<&Self> for Rational {
     type Output = Self;
 
     fn mul(self, other: &Self) -> Self {
-        self.combine(other, CheckedMul::checked_mul, |a, b| a * b)
+        self.integers(other, i128::checked_mul)
+            .unwrap_or_else(|| self.combine(other, CheckedMul::checked_mul, |a, b| a * b))
     }
 }
 
@@ -246,6 +255,7 @@ impl PartialOrd for Rational {
 impl Ord for Rational {
     fn cmp(&self, other: &Self) -> Ordering {
         match (&self.0, &other.0) {
+            (Repr::Small(a), Repr::Small(b)) if a.denom() == b.denom() => a.numer().cmp(b.numer()),
             (Repr::Small(a), Repr::Small(b)) => a.cmp(b),
             _ => self.to_big().cmp(&other.to_big()),
         }
