@@ -5,15 +5,17 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::error::{Error, Place};
+use crate::ground::admit::admit_some;
 use crate::ground::evaluate::{AtomId, Failure, World};
 use crate::ground::events::{Interference, Passage};
 use crate::ground::frame::Operand;
-use crate::ground::instantiate::{Apart, Build, GroundConditional, GroundOperator, admit_some, forbid};
+use crate::ground::instantiate::{Apart, Build, GroundConditional, GroundOperator, forbid};
 use crate::ground::join::guards_of_exists;
 use crate::ground::numbers::{Numbers, numbers, substitute, way_of};
 use crate::ground::reads::{Reads, matches};
 use crate::ground::residual::{Residual, constant_comparison};
 use crate::lifted::{Change, Effect, Rational, Schema};
+use crate::limits::Limits;
 use crate::pddl::ast::Assignment;
 use crate::quantity::{Linear, NumericId};
 use crate::task::Forbidden;
@@ -346,7 +348,7 @@ fn split<'r>(
 
 impl Case {
     /// The combinations of designs that the case cannot run with; `Failure::Undefined` if there is no other.
-    fn forbidden(&self, template: &GroundOperator) -> Result<Arc<[Forbidden]>, Failure> {
+    fn forbidden(&self, template: &GroundOperator, limits: &Limits) -> Result<Arc<[Forbidden]>, Failure> {
         let end = self.end.iter().filter(|(condition, _)| *condition == Residual::True);
         let rules = end.flat_map(|(_, change)| change.undefined()).chain(&self.start.undefined);
         let mut rules = rules.peekable();
@@ -360,7 +362,7 @@ impl Case {
             }
         }
         let sizes: Vec<_> = template.slots.iter().map(|(_, designs)| designs.len()).collect();
-        if admit_some(&all, &sizes) { Ok(all.into()) } else { Err(Failure::Undefined) }
+        if admit_some(&all, &sizes, limits)? { Ok(all.into()) } else { Err(Failure::Undefined) }
     }
 
     /// The operator of this case; everything but conditions and effects is that of the template.
@@ -369,7 +371,7 @@ impl Case {
         world: &mut World<'_>,
         template: GroundOperator,
     ) -> Result<GroundOperator, Failure> {
-        let forbidden = self.forbidden(&template)?;
+        let forbidden = self.forbidden(&template, &world.limits)?;
         let start = self.start;
         let certain = || self.end.iter().filter(|(condition, _)| *condition == Residual::True);
         let (end_adds, end_deletes) = atoms(certain().map(|(_, change)| change));

@@ -16,6 +16,7 @@ use crate::ground::residual::Residual;
 use crate::lifted::{
     Arguments, Bound, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term,
 };
+use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::dense;
 use crate::pddl::ast::Name;
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet, Table};
@@ -60,6 +61,7 @@ pub(crate) struct World<'a> {
     pub(crate) definitions: Definitions,
     /// Whether the condition of an effect is evaluated, which must be defined.
     pub(crate) in_effect: bool,
+    pub(crate) limits: Limits,
 }
 
 /// Why an expression has no value here.
@@ -69,6 +71,12 @@ pub(crate) enum Failure {
     Undefined,
     /// The planner cannot handle it.
     Error(Error),
+}
+
+impl From<Interrupted> for Failure {
+    fn from(interrupted: Interrupted) -> Self {
+        Self::Error(interrupted.into())
+    }
 }
 
 /// The objects that the parameters stand for; slots are open.
@@ -103,6 +111,7 @@ impl<'a> World<'a> {
             joins: JoinIndex::default(),
             definitions: Definitions::default(),
             in_effect: false,
+            limits: Limits::none(),
         }
     }
 
@@ -289,54 +298,63 @@ impl<'a> World<'a> {
         undefined: &mut dyn FnMut(&SlotSet, SlotSet),
     ) -> Result<Linear<Rational>, Failure> {
         let mut values = Vec::new();
-        let mut failure = None;
-        for_each_combination(&mentioned, slots, binding, &mut |binding, combination| match self
-            .ground(expression, binding)
-        {
-            Ok(linear) => values.push(linear.quantity.constant),
-            Err(Failure::Undefined) => {
-                values.push(Rational::from_integer(0));
-                undefined(&mentioned, SlotSet::from_slice(combination));
+        let limits = self.limits.clone();
+        for_each_combination(&mentioned, slots, binding, &limits, &mut |binding, combination| {
+            match self.ground(expression, binding) {
+                Ok(linear) => {
+                    // What a slot stands beside in a product or quotient is static: else it would be no slot.
+                    assert!(linear.coefficients.is_empty(), "invariant: a table has no fluents");
+                    values.push(linear.quantity.constant);
+                }
+                Err(Failure::Undefined) => {
+                    values.push(Rational::from_integer(0));
+                    undefined(&mentioned, SlotSet::from_slice(combination));
+                }
+                Err(other) => return Err(other),
             }
-            Err(other) => failure = Some(other),
-        });
-        if let Some(failure) = failure {
-            return Err(failure);
-        }
+            Ok(())
+        })?;
         let mut quantity = Quantity::constant(Rational::from_integer(0));
         quantity.add_table(Table { slots: mentioned, values: values.into() });
         Ok(Linear { coefficients: Vec::new(), quantity })
     }
 }
 
+/// What is done with the combinations of designs.
+type Visit<'v> = dyn FnMut(&Binding, &[u32]) -> Result<(), Failure> + 'v;
+
 /// Binds the mentioned slots to every combination of their designs, the last one fastest.
 pub(crate) fn for_each_combination(
     mentioned: &[u32],
     slots: &Slots<'_>,
     binding: &mut Binding,
-    visit: &mut dyn FnMut(&Binding, &[u32]),
-) {
+    limits: &Limits,
+    visit: &mut Visit<'_>,
+) -> Result<(), Failure> {
     fn go(
         mentioned: &[u32],
         slots: &Slots<'_>,
         binding: &mut Binding,
         chosen: &mut Vec<u32>,
-        visit: &mut dyn FnMut(&Binding, &[u32]),
-    ) {
+        pulse: &mut Pulse<'_>,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), Failure> {
         let Some((slot, rest)) = mentioned.split_first() else {
-            visit(binding, chosen);
-            return;
+            pulse.beat()?;
+            return visit(binding, chosen);
         };
         let parameter = slots.parameters[*slot as usize].parameter as usize;
         for (design, index) in slots.designs[*slot as usize].iter().zip(0..) {
             binding[parameter] = Some(*design);
             chosen.push(index);
-            go(rest, slots, binding, chosen, visit);
+            let visited = go(rest, slots, binding, chosen, pulse, visit);
             chosen.pop();
+            binding[parameter] = None;
+            visited?;
         }
-        binding[parameter] = None;
+        Ok(())
     }
-    go(mentioned, slots, binding, &mut Vec::new(), visit);
+    go(mentioned, slots, binding, &mut Vec::new(), &mut limits.pulse(), visit)
 }
 
 fn multiply(

@@ -9,9 +9,10 @@ use std::sync::Arc;
 use crate::configuration::{
     SlotParameter, conjuncts, expression_terms, formula_terms, slots_of_expression, slots_of_formula,
 };
+use crate::ground::admit::admit_some;
 use crate::ground::effects::possible;
 use crate::ground::evaluate::{Binding, Failure, Row, Slots, World};
-use crate::ground::instantiate::{Apart, Build, GroundSlots, admit_some};
+use crate::ground::instantiate::{Apart, Build, GroundSlots};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::quantity::{Linear, Quantity, SlotSet};
@@ -174,9 +175,9 @@ impl<'a> Frame<'a> {
             Some(duration) => build.static_quantity(duration, outline.schema)?,
             None => Quantity::constant(Rational::from_integer(0)),
         };
-        build.forbid_negative(&duration);
+        build.forbid_negative(&duration)?;
         let forbidden = build.forbidden;
-        if !admit_some(&forbidden, &designs.sizes()) {
+        if !admit_some(&forbidden, &designs.sizes(), &world.limits)? {
             return Ok(None);
         }
         let function = |slot: &SlotParameter| World::arguments(&[slot.function], core).first().copied();

@@ -15,6 +15,7 @@ use rustc_hash::FxHashMap;
 
 use crate::configuration::{SlotParameter, depends_on_own_start};
 use crate::error::{Error, File, Place};
+use crate::ground::admit::admit_some;
 use crate::ground::derived;
 use crate::ground::effects::{Middle, Moment, cases, clashes, possible};
 use crate::ground::evaluate::{AtomId, Binding, Failure, Row, Slots, World, for_each_combination};
@@ -88,6 +89,7 @@ pub(crate) fn instantiate<'a>(
     limits: &Limits,
 ) -> Result<GroundTask<'a>, Vec<Error>> {
     let mut world = World::new(lifted, reached);
+    world.limits = limits.clone();
     let timeline = Timeline::new(&mut world, &lifted.events);
     // Growing would move operators that are large and many; most instances become one.
     let mut operators = Vec::with_capacity(reached.instances.iter().map(Vec::len).sum());
@@ -108,10 +110,8 @@ pub(crate) fn instantiate<'a>(
         }
         let outline = Outline::new(lifted, schema, slots);
         let mut frames: FxHashMap<Row, Option<Arc<Frame>>> = FxHashMap::default();
-        for binding in instances {
-            if operators.len().is_multiple_of(256) && limits.reached() {
-                return Err(vec![Error::Interrupted]);
-            }
+        for binding in limits.watch(instances) {
+            let binding = binding.map_err(|interrupted| vec![interrupted.into()])?;
             let frame = match frames.entry(outline.key(binding)) {
                 Entry::Occupied(known) => Ok(known.get().clone()),
                 Entry::Vacant(new) => match Frame::new(&mut world, &outline, binding) {
@@ -182,7 +182,7 @@ fn instance(
                 forbid(&mut all, &rule.slots, combination.clone());
             }
         }
-        if !admit_some(&all, &frame.designs.sizes()) {
+        if !admit_some(&all, &frame.designs.sizes(), &build.world.limits)? {
             return Ok(Vec::new());
         }
         forbidden = all.into();
@@ -302,7 +302,7 @@ impl Build<'_, '_> {
                 let (left, right) = (self.open(left)?, self.open(right)?);
                 let static_part = left.coefficients.is_empty() && right.coefficients.is_empty();
                 match compare(*comparison, left, right) {
-                    residual if static_part => self.forbid(mentioned, &residual),
+                    residual if static_part => self.forbid(mentioned, &residual)?,
                     residual => parts.push(residual),
                 }
             } else if mentioned.len() > 1 {
@@ -327,62 +327,65 @@ impl Build<'_, '_> {
     }
 
     /// Forbids the combinations of designs for which a static comparison fails.
-    fn forbid(&mut self, mentioned: &SlotSet, residual: &Residual) {
+    fn forbid(&mut self, mentioned: &SlotSet, residual: &Residual) -> Result<(), Failure> {
         match residual {
-            Residual::And(parts) => parts.iter().for_each(|part| self.forbid(mentioned, part)),
+            Residual::And(parts) => parts.iter().try_for_each(|part| self.forbid(mentioned, part)),
             Residual::False => self.forbid_where(mentioned, &|_| true),
             Residual::Compare { linear, strict } => {
                 let sizes = self.slots.sizes();
                 self.forbid_where(mentioned, &|choice| {
                     let value = linear.quantity.at(choice, &sizes);
                     value < Rational::from_integer(0) || (*strict && value == Rational::from_integer(0))
-                });
+                })
             }
-            _ => {}
+            _ => Ok(()),
         }
     }
 
-    fn forbid_where(&mut self, mentioned: &SlotSet, fails: &dyn Fn(&[u32]) -> bool) {
+    fn forbid_where(&mut self, mentioned: &SlotSet, fails: &dyn Fn(&[u32]) -> bool) -> Result<(), Failure> {
         let mut choice = vec![0; self.slots.designs.len()];
         let forbidden = &mut self.forbidden;
-        for_each_combination(mentioned, self.slots, &mut self.binding, &mut |_, combination| {
+        let limits = &self.world.limits;
+        for_each_combination(mentioned, self.slots, &mut self.binding, limits, &mut |_, combination| {
             for (slot, design) in mentioned.iter().zip(combination) {
                 choice[*slot as usize] = *design;
             }
             if fails(&choice) {
                 forbid(forbidden, mentioned, SlotSet::from_slice(combination));
             }
-        });
+            Ok(())
+        })
     }
 
     /// Forbids the combinations of designs with which the action would end before it begins.
-    pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) {
+    pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) -> Result<(), Failure> {
         let zero = Rational::from_integer(0);
         let least = duration.tables.iter().filter_map(|table| table.values.iter().min());
         if least.fold(duration.constant.clone(), |sum, value| sum + value) >= zero {
-            return;
+            return Ok(());
         }
         let slots: BTreeSet<u32> =
             duration.tables.iter().flat_map(|table| table.slots.iter().copied()).collect();
         let sizes = self.slots.sizes();
-        self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero);
+        self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero)
     }
 
     /// Forbids the combinations of designs for which a static condition over several slots fails.
     fn forbid_unless(&mut self, conjunct: &Formula, mentioned: &SlotSet) -> Result<(), Failure> {
         let (world, forbidden) = (&mut *self.world, &mut self.forbidden);
-        let mut failure = None;
+        let limits = world.limits.clone();
         for_each_combination(
             mentioned,
             self.slots,
             &mut self.binding,
-            &mut |binding, combination| match world.residual(conjunct, &mut binding.clone()) {
-                Ok(Residual::False) => forbid(forbidden, mentioned, SlotSet::from_slice(combination)),
-                Ok(_) => {}
-                Err(error) => failure = Some(error),
+            &limits,
+            &mut |binding, combination| {
+                if matches!(world.residual(conjunct, &mut binding.clone())?, Residual::False) {
+                    forbid(forbidden, mentioned, SlotSet::from_slice(combination));
+                }
+                Ok(())
             },
-        );
-        failure.map_or(Ok(()), Err)
+        )
     }
 
     pub(super) fn static_quantity(
@@ -412,23 +415,6 @@ impl Build<'_, '_> {
                 None => slot(parameter).map(|position| Argument::Slot(position as u32)),
             })
             .collect()
-    }
-}
-
-/// Whether some combination of designs is not forbidden.
-pub(super) fn admit_some(forbidden: &[Forbidden], sizes: &[usize]) -> bool {
-    let mut choice = vec![0_u32; sizes.len()];
-    loop {
-        let hits = |rule: &Forbidden, bad: &SlotSet| {
-            rule.slots.iter().zip(bad).all(|(slot, design)| choice[*slot as usize] == *design)
-        };
-        if forbidden.iter().all(|rule| !rule.combinations.iter().any(|bad| hits(rule, bad))) {
-            return true;
-        }
-        let can_grow = |position: &usize| choice[*position] as usize + 1 < sizes[*position];
-        let Some(position) = (0..sizes.len()).rev().find(can_grow) else { return false };
-        choice[position] += 1;
-        choice[position + 1..].fill(0);
     }
 }
 

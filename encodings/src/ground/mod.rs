@@ -6,6 +6,7 @@
 //!
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
+mod admit;
 mod derived;
 mod effects;
 pub(crate) mod evaluate;
