@@ -120,7 +120,7 @@ fn what_the_planner_does_not_handle_is_refused_with_its_place() {
 fn what_happens_by_itself_is_waited_for() {
     let timed = PROBLEM.replace("(way b c)", "(at 5 (way b c))");
     let outcome = plan(DOMAIN, &timed, &["--plan-format", "ipc"]);
-    assert_eq!(outcome.stdout, "0.000: (go a b)  [0.000]\n5.000: (go b c)  [0.000]\n");
+    assert_eq!(outcome.stdout, "0.000: (go a b)  [0.000]\n5.001: (go b c)  [0.000]\n");
 }
 
 #[test]

@@ -285,7 +285,8 @@ impl Timeline {
             tables.chain([&operator.duration.constant])
         });
         let mut times = self.events.iter().map(|(time, _)| time).chain(durations);
-        let unit = times.try_fold(1, |unit, time| checked_lcm(unit, time.denominator()?));
+        // At most the separation that validators take for granted, so that nobody waits longer than need be.
+        let unit = times.try_fold(500, |unit, time| checked_lcm(unit, time.denominator()?));
         let unit = unit.and_then(|unit: Int| unit.checked_mul(2)).ok_or_else(overflow)?;
         drop(times);
         let moment = Rational::new(1, unit);
