@@ -14,7 +14,7 @@ use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 pub(crate) struct GroundStep {
     pub(crate) operator: OperatorId,
     /// An index into `SlotUse::designs` for each slot of the operator.
-    pub(crate) choice: Vec<u16>,
+    pub(crate) choice: Vec<u32>,
 }
 
 /// A plan and the sum of its operators' costs, in the task's integer unit.
@@ -123,7 +123,7 @@ impl Step {
     pub(crate) fn new(
         task: &Task,
         operator: &Operator,
-        choice: &[u16],
+        choice: &[u32],
         (start, duration, cost): (Int, Int, Int),
     ) -> Self {
         Self {
@@ -166,7 +166,7 @@ impl Objective {
 }
 
 /// The object that an argument stands for, with a combination of designs.
-pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u16], argument: Argument) -> ObjectId {
+pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u32], argument: Argument) -> ObjectId {
     match argument {
         Argument::Object(object) => object,
         Argument::Slot(position) => {
@@ -177,15 +177,15 @@ pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u16], argument
     }
 }
 
-fn argument(task: &Task, operator: &Operator, choice: &[u16], argument: Argument) -> String {
+fn argument(task: &Task, operator: &Operator, choice: &[u32], argument: Argument) -> String {
     task.object_names[resolve(task, operator, choice, argument).index()].clone()
 }
 
-fn arguments(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<String> {
+fn arguments(task: &Task, operator: &Operator, choice: &[u32]) -> Vec<String> {
     operator.arguments.iter().map(|a| argument(task, operator, choice, *a)).collect()
 }
 
-fn configuration(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<(String, String)> {
+fn configuration(task: &Task, operator: &Operator, choice: &[u32]) -> Vec<(String, String)> {
     let name = |function: ObjectId| task.object_names[function.index()].clone();
     let pairs = operator.configuration.iter();
     pairs.map(|(function, design)| (name(*function), argument(task, operator, choice, *design))).collect()

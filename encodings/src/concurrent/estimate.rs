@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 use crate::concurrent::clocks::Clocks;
 use crate::concurrent::compile::{Concurrent, Role};
 use crate::number::Int;
-use crate::task::{Fact, Operator, State, VariableId};
+use crate::task::{Fact, State, VariableId};
 
 /// The time to the goal for each value of a variable; none if there is no way.
 struct Path {

@@ -86,7 +86,7 @@ pub fn ground_concurrent(
     let none = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
     let (task, reached) = ground_lifted(lifted, designs, &none, &Generality::default(), &config.limits)?;
-    compile::compile(task, &split, &reached, separation, weight)
+    compile::compile(task, &split, &reached, &separation, weight)
 }
 
 /// Durations that the planner would have to choose.
@@ -135,7 +135,8 @@ pub fn optimize_concurrent(
         return solution(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())));
     }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
-    let bounds = (costs || !task.initial.numbers.is_empty()).then(|| Bounds::new(task, limits));
+    let bounds =
+        (costs || !task.initial.numbers.is_empty()).then(|| Bounds::new(task, limits).ok()).flatten();
     let estimate = Estimate::new(concurrent);
     let mut hear = |sequence: &Sequence, lower: Int| {
         report(Improvement {

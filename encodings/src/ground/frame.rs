@@ -123,7 +123,7 @@ impl<'a> Outline<'a> {
     }
 
     /// The conditions and expressions that mention one slot and no other.
-    fn about(&self, position: u16) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
+    fn about(&self, position: u32) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
         let only = SlotSet::from_slice(&[position]);
         let open = self.start.open.iter().chain(&self.over_all.open).chain(&self.at_end.open);
         let conditions = open.filter(|(_, mentioned)| *mentioned == only).map(|(conjunct, _)| *conjunct);
@@ -158,7 +158,7 @@ impl<'a> Frame<'a> {
         let mut binding = core.clone();
         let mut designs = Slots { parameters: outline.parameters, designs: Vec::new() };
         for position in 0..outline.parameters.len() {
-            let suitable = suitable_designs(world, outline, position as u16, &mut binding)?;
+            let suitable = suitable_designs(world, outline, position as u32, &mut binding)?;
             if suitable.is_empty() {
                 return Ok(None);
             }
@@ -222,7 +222,7 @@ impl Build<'_, '_> {
 fn suitable_designs(
     world: &mut World<'_>,
     outline: &Outline<'_>,
-    position: u16,
+    position: u32,
     binding: &mut Binding,
 ) -> Result<Vec<ObjectId>, Failure> {
     let parameter = outline.parameters[position as usize].parameter as usize;

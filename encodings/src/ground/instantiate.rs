@@ -342,7 +342,7 @@ impl Build<'_, '_> {
         }
     }
 
-    fn forbid_where(&mut self, mentioned: &SlotSet, fails: &dyn Fn(&[u16]) -> bool) {
+    fn forbid_where(&mut self, mentioned: &SlotSet, fails: &dyn Fn(&[u32]) -> bool) {
         let mut choice = vec![0; self.slots.designs.len()];
         let forbidden = &mut self.forbidden;
         for_each_combination(mentioned, self.slots, &mut self.binding, &mut |_, combination| {
@@ -362,7 +362,7 @@ impl Build<'_, '_> {
         if least.fold(duration.constant.clone(), |sum, value| sum + value) >= zero {
             return;
         }
-        let slots: BTreeSet<u16> =
+        let slots: BTreeSet<u32> =
             duration.tables.iter().flat_map(|table| table.slots.iter().copied()).collect();
         let sizes = self.slots.sizes();
         self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero);
@@ -409,7 +409,7 @@ impl Build<'_, '_> {
             .enumerate()
             .filter_map(|(parameter, object)| match object {
                 Some(object) => Some(Argument::Object(*object)),
-                None => slot(parameter).map(|position| Argument::Slot(position as u16)),
+                None => slot(parameter).map(|position| Argument::Slot(position as u32)),
             })
             .collect()
     }
@@ -417,7 +417,7 @@ impl Build<'_, '_> {
 
 /// Whether some combination of designs is not forbidden.
 pub(super) fn admit_some(forbidden: &[Forbidden], sizes: &[usize]) -> bool {
-    let mut choice = vec![0_u16; sizes.len()];
+    let mut choice = vec![0_u32; sizes.len()];
     loop {
         let hits = |rule: &Forbidden, bad: &SlotSet| {
             rule.slots.iter().zip(bad).all(|(slot, design)| choice[*slot as usize] == *design)
