@@ -26,7 +26,7 @@ fn proved(domain: &str, problem: &str) -> String {
     };
     assert_eq!(solution.status, Status::Optimal);
     let lines = plan.steps.iter().map(|step| {
-        let words = [&[step.action.clone()], &step.arguments[..]].concat().join(" ");
+        let words = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
         format!("{}: ({words}) [{}]\n", step.start, step.duration)
     });
     let text: String = lines.collect();

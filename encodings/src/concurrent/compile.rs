@@ -107,12 +107,12 @@ pub(super) fn compile(
     mut task: Task,
     split: &Split,
     reached: &Reached,
-    separation: Rational,
+    separation: &Rational,
     time_weight: Rational,
 ) -> Result<Concurrent, Vec<Error>> {
     let one = |error| vec![error];
-    let unit = Unit::new(&task, split, &separation).map_err(one)?;
-    let separation = unit.of(&separation).map_err(one)?;
+    let unit = Unit::new(&task, split, separation).map_err(one)?;
+    let separation = unit.of(separation).map_err(one)?;
     refuse_rewards(&task, split).map_err(one)?;
     let mut builder = Builder::new(split, reached, separation);
     builder.collect(&task)?;

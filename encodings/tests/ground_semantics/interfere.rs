@@ -36,7 +36,9 @@ impl Touch {
             }
             Formula::Not(inner) => self.reads_of_formula(task, inner, scope),
             Formula::And(parts) | Formula::Or(parts) => {
-                parts.iter().for_each(|part| self.reads_of_formula(task, part, scope));
+                for part in parts {
+                    self.reads_of_formula(task, part, scope);
+                }
             }
             Formula::Imply(left, right) => {
                 self.reads_of_formula(task, left, scope);
@@ -52,7 +54,11 @@ impl Touch {
 
     pub fn reads_of_effect(&mut self, task: &Task, effect: &Effect, scope: &[usize]) {
         match effect {
-            Effect::And(parts) => parts.iter().for_each(|part| self.reads_of_effect(task, part, scope)),
+            Effect::And(parts) => {
+                for part in parts {
+                    self.reads_of_effect(task, part, scope);
+                }
+            }
             Effect::Add(..) | Effect::Delete(..) => {}
             Effect::Change(.., value) => self.reads_of_expression(value, scope),
             Effect::When(condition, body) => {
@@ -73,7 +79,11 @@ impl Touch {
             Expression::Function(function, terms) => {
                 self.values.insert((*function, objects(terms, scope)));
             }
-            Expression::Sum(parts) => parts.iter().for_each(|part| self.reads_of_expression(part, scope)),
+            Expression::Sum(parts) => {
+                for part in parts {
+                    self.reads_of_expression(part, scope);
+                }
+            }
             Expression::Negative(inner) => self.reads_of_expression(inner, scope),
             Expression::Difference(left, right)
             | Expression::Product(left, right)

@@ -301,7 +301,9 @@ impl State {
         for (condition, effects, bounds) in halves {
             let mut touch = Touch::default();
             touch.reads_of_formula(task, condition, scope);
-            bounds.iter().for_each(|value| touch.reads_of_expression(value, scope));
+            for value in bounds {
+                touch.reads_of_expression(value, scope);
+            }
             for effect in *effects {
                 touch.reads_of_effect(task, effect, scope);
             }
