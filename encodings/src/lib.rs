@@ -7,6 +7,10 @@
 //! What is absent: OWL. Availability of designs arrives as facts of the problem.
 
 #![warn(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
+#![cfg_attr(
+    test,
+    allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)
+)]
 
 #[expect(
     clippy::cast_possible_truncation,
