@@ -6,7 +6,19 @@
 //!
 //! What is absent: OWL. Availability of designs arrives as facts of the problem.
 
+#![warn(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
+#![cfg_attr(
+    test,
+    allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)
+)]
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "positions in texts below 4 GiB"
+)]
 pub mod pddl;
+#[expect(clippy::cast_possible_truncation, reason = "positions in lists that are held in memory")]
 pub mod validate;
 
 mod error;
@@ -21,7 +33,13 @@ mod task;
 
 mod alternatives;
 mod bounds;
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "positions in lists that are held in memory, and DIMACS variables of formulas below a size limit"
+)]
 mod certificate;
+#[expect(clippy::cast_possible_truncation, reason = "positions in lists that are held in memory")]
 mod concurrent;
 mod earliest;
 mod encode;

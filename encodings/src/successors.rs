@@ -169,16 +169,7 @@ fn best(
     let mut pulse = limits.pulse();
     for new in all_of_them {
         let is_equal = |cost: Int, profile: &[Int]| all && cost == new.cost && profile == new.profile;
-        let is_dominated = if !monotone {
-            pulse.beat()?;
-            match cheapest.entry(new.profile.clone()) {
-                Entry::Occupied(known) => !is_equal(*known.get(), known.key()),
-                Entry::Vacant(entry) => {
-                    entry.insert(new.cost);
-                    false
-                }
-            }
-        } else {
+        let is_dominated = if monotone {
             // In one dimension the last one has the most of all that are as cheap.
             let candidates = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
             let mut is_dominated = false;
@@ -191,6 +182,15 @@ fn best(
                 }
             }
             is_dominated
+        } else {
+            pulse.beat()?;
+            match cheapest.entry(new.profile.clone()) {
+                Entry::Occupied(known) => !is_equal(*known.get(), known.key()),
+                Entry::Vacant(entry) => {
+                    entry.insert(new.cost);
+                    false
+                }
+            }
         };
         if !is_dominated {
             front.push(new);

@@ -107,16 +107,16 @@ fn witnesses<'t>(task: &'t Task, slot: SlotId, limits: &Limits) -> Result<Vec<Wi
         for rule in operator.forbidden.iter() {
             let Some(own) = rule.slots.iter().position(|slot| *slot as usize == position) else { continue };
             if is_new(rule.combinations.as_ptr().cast(), &rule.slots) {
-                let mut others = vec![Vec::new(); designs.len()];
+                let mut others: Vec<Vec<SlotSet>> = vec![Vec::new(); designs.len()];
                 for combination in limits.watch(&rule.combinations) {
                     let mut rest = combination?.clone();
                     let design = rest.remove(own);
                     others[design as usize].push(rest);
                 }
-                others.iter_mut().for_each(|rests: &mut Vec<SlotSet>| {
+                for rests in &mut others {
                     rests.sort_unstable();
                     rests.dedup();
-                });
+                }
                 found.push(Witness { designs, says: Says::Forbidden(others) });
             }
         }

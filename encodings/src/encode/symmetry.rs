@@ -33,7 +33,7 @@ pub(crate) struct Symmetry {
     /// Designs of a slot that are equal to an earlier one.
     designs: Vec<(SlotId, u32)>,
     /// For pairs of equal objects: the operators that use the first, and those that use only the second.
-    objects: Vec<(Vec<OperatorId>, Vec<OperatorId>)>,
+    objects: Pairs,
 }
 
 impl Symmetry {
@@ -46,11 +46,11 @@ impl Symmetry {
     }
 }
 
+/// Two lists of operators for each of some pairs of objects.
+type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
+
 /// Pairs of neighbours in classes of equal objects.
-fn equal_objects(
-    task: &Task,
-    limits: &Limits,
-) -> Result<Vec<(Vec<OperatorId>, Vec<OperatorId>)>, Interrupted> {
+fn equal_objects(task: &Task, limits: &Limits) -> Result<Pairs, Interrupted> {
     if !task.axioms.is_empty() {
         return Ok(Vec::new());
     }

@@ -27,7 +27,7 @@ use crate::ground::numbers::Numbers;
 use crate::ground::reads::{Reads, matches};
 use crate::ground::residual::{Residual, constant_comparison};
 use crate::lifted::{Arguments, Event, Lifted, ObjectId, Rational};
-use crate::number::{Int, checked_lcm};
+use crate::number::{Int, checked_lcm, dense};
 use crate::quantity::{Linear, NumericId, Quantity};
 
 /// The atoms and the numeric variables that stand for time; none of them has a name in the files.
@@ -162,7 +162,7 @@ impl Timeline {
         let own = &world.lifted.time;
         let (clock, moment, phase, waited) = (own.clock, own.moment, own.phase, own.waited);
         let first = own.first_phase;
-        let phases = (0..=events.len() as u32)
+        let phases = (0..=dense(events.len()))
             .map(|number| world.atom(phase, &[ObjectId(first.0 + number)]))
             .collect();
         let waited = world.atom(waited, &[]);

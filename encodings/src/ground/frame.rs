@@ -15,6 +15,7 @@ use crate::ground::evaluate::{Binding, Failure, Row, Slots, World};
 use crate::ground::instantiate::{Apart, Build, GroundSlots};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
+use crate::number::dense;
 use crate::quantity::{Linear, Quantity, SlotSet};
 use crate::task::Forbidden;
 
@@ -159,7 +160,7 @@ impl<'a> Frame<'a> {
         let mut binding = core.clone();
         let mut designs = Slots { parameters: outline.parameters, designs: Vec::new() };
         for position in 0..outline.parameters.len() {
-            let suitable = suitable_designs(world, outline, position as u32, &mut binding)?;
+            let suitable = suitable_designs(world, outline, dense(position), &mut binding)?;
             if suitable.is_empty() {
                 return Ok(None);
             }

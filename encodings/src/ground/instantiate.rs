@@ -29,6 +29,7 @@ use crate::ground::reads::Reads;
 use crate::ground::residual::{Residual, compare};
 use crate::lifted::{Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::limits::Limits;
+use crate::number::dense;
 use crate::pddl::ast::Span;
 use crate::quantity::{Linear, Quantity, SlotSet};
 use crate::task::{Argument, Forbidden};
@@ -150,7 +151,7 @@ pub(crate) fn instantiate<'a>(
     if !errors.is_empty() {
         return Err(errors);
     }
-    operators.extend(timeline.iter().flat_map(|timeline| timeline.waits(lifted.schemas.len() as u32)));
+    operators.extend(timeline.iter().flat_map(|timeline| timeline.waits(dense(lifted.schemas.len()))));
     if let Some(timeline) = &timeline {
         timeline.settle(&mut operators).map_err(|error| vec![error])?;
     }
@@ -412,7 +413,7 @@ impl Build<'_, '_> {
             .enumerate()
             .filter_map(|(parameter, object)| match object {
                 Some(object) => Some(Argument::Object(*object)),
-                None => slot(parameter).map(|position| Argument::Slot(position as u32)),
+                None => slot(parameter).map(|position| Argument::Slot(dense(position))),
             })
             .collect()
     }

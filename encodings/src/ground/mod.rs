@@ -107,7 +107,7 @@ pub(crate) fn ground_lifted(
     generality: &Generality,
     limits: &Limits,
 ) -> Result<(Task, Reached), Vec<Error>> {
-    let reached = reach::reach(lifted, slots).map_err(|error| vec![error])?;
+    let reached = reach::reach(lifted, slots, limits).map_err(|error| vec![error])?;
     let mut ground = instantiate::instantiate(lifted, designs, slots, &reached, limits)?;
     metric::attach_costs(lifted, &mut ground)?;
     if limits.reached() {

@@ -19,6 +19,7 @@ use crate::ground::relaxed::{Builder, Candidates};
 use crate::lifted::{
     Arguments, Axiom, Bound, Change, Effect, Formula, Lifted, ObjectId, PredicateId, Schema, Term,
 };
+use crate::limits::Limits;
 use crate::number::dense;
 
 /// What relaxed reachability finds.
@@ -35,8 +36,18 @@ pub(crate) struct Reached {
 /// Runs the relaxed task to its fixpoint.
 ///
 /// # Errors
-/// `Error::Rules` if the rule engine refuses the program.
-pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Reached, Error> {
+/// `Error::Rules` if the rule engine refuses the program, `Error::Interrupted` at a limit, which the engine itself does not look at.
+pub(crate) fn reach(
+    lifted: &Lifted,
+    slots: &[Vec<SlotParameter>],
+    limits: &Limits,
+) -> Result<Reached, Error> {
+    limits.check()?;
+    let variables = lifted.schemas.iter().map(|schema| schema.variables);
+    let mut variables = variables.chain(lifted.axioms.iter().map(|axiom| axiom.variables));
+    if variables.any(|count| u16::try_from(count).is_err()) {
+        return Err(Error::Rules("an action or axiom with more than 65,535 variables".into()));
+    }
     let mut builder = Builder::new(lifted);
     for axiom in &lifted.axioms {
         builder.axiom(axiom);
@@ -50,6 +61,7 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
         Engine::new(symbols.table, Program { rules, ..Program::default() }, facts).map_err(|errors| {
             Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
+    limits.check()?;
     let read = |row: &[Symbol]| -> Arguments {
         row.iter().filter_map(|symbol| objects.get(symbol)).copied().collect()
     };
@@ -66,6 +78,7 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
     }
     let mut instances = Vec::new();
     for ((schema, slots), (symbol, core)) in lifted.schemas.iter().zip(slots).zip(applicable) {
+        limits.check()?;
         debug_assert_eq!(core.len() + slots.len(), schema.parameters.len());
         let any = vec![None; core.len()];
         let mut bindings: Vec<Binding> = engine

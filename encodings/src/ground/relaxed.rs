@@ -92,7 +92,7 @@ impl<'a> Builder<'a> {
 
     fn term(&self, term: Term) -> RuleTerm {
         match term {
-            Term::Parameter(parameter) => RuleTerm::Variable(Variable(parameter as u16)),
+            Term::Parameter(parameter) => variable(parameter),
             Term::Object(object) => RuleTerm::Constant(self.names.objects[object.index()]),
         }
     }
@@ -103,7 +103,7 @@ impl<'a> Builder<'a> {
     }
 
     pub(super) fn relation(predicate: Symbol, parameters: &[u32]) -> Atom {
-        let arguments = parameters.iter().map(|p| RuleTerm::Variable(Variable(*p as u16))).collect();
+        let arguments = parameters.iter().map(|p| variable(*p)).collect();
         Atom::Relation { predicate, arguments }
     }
 
@@ -150,7 +150,7 @@ impl<'a> Builder<'a> {
             Formula::ForAll(..) => {
                 if exact || (is_static(self.lifted, formula) && !has_numbers(formula)) {
                     let relation = self.auxiliary(formula, &[formula.negated()], candidates, true);
-                    let arguments = free(formula).into_iter().map(|v| RuleTerm::Variable(Variable(v as u16)));
+                    let arguments = free(formula).into_iter().map(variable);
                     out.push(Atom::Not { predicate: relation, arguments: arguments.collect() });
                 }
             }
@@ -207,4 +207,9 @@ impl<'a> Builder<'a> {
         }
         relation
     }
+}
+
+/// The variable of a rule for a parameter or bound variable.
+fn variable(number: u32) -> RuleTerm {
+    RuleTerm::Variable(Variable(u16::try_from(number).expect("invariant: `reach` refuses more variables")))
 }

@@ -166,9 +166,8 @@ fn rows(table: &Table<Int>, kept: &Kept, sizes: &[usize]) -> Arc<[Int]> {
 
 /// The combinations of a rule that are still possible.
 fn exclusions(rule: &Forbidden, kept: &Kept) -> Forbidden {
-    let moved = |(slot, index): (&u32, &u32)| {
-        kept[*slot as usize].iter().position(|known| known == index).map(|position| dense(position))
-    };
+    let moved =
+        |(slot, index): (&u32, &u32)| kept[*slot as usize].iter().position(|known| known == index).map(dense);
     let combination = |bad: &SlotSet| rule.slots.iter().zip(bad).map(moved).collect::<Option<SlotSet>>();
     Forbidden {
         slots: rule.slots.clone(),

@@ -50,7 +50,7 @@ impl Lit {
 
     /// As in DIMACS files: variables count from 1, negation is the sign.
     pub(crate) fn dimacs(self) -> i32 {
-        let number = self.variable() as i32 + 1;
+        let number = i32::try_from(self.variable()).expect("invariant: fewer than 2^31 variables") + 1;
         if self.is_positive() { number } else { -number }
     }
 }

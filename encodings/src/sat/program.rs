@@ -67,7 +67,7 @@ impl Program {
     fn keep(&mut self, literals: &[i32]) -> Result<(), String> {
         self.assignment = vec![false; self.variables as usize];
         for literal in literals.iter().filter(|literal| **literal > 0) {
-            if let Some(value) = self.assignment.get_mut(*literal as usize - 1) {
+            if let Some(value) = self.assignment.get_mut(literal.unsigned_abs() as usize - 1) {
                 *value = true;
             }
         }

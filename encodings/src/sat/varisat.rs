@@ -205,7 +205,8 @@ impl Steps {
         }
         let value = self.number >> total;
         (self.number, self.bytes) = (0, 0);
-        self.next(value as u64)
+        // A number that is too long is none of the codes that count.
+        self.next(u64::try_from(value).unwrap_or(u64::MAX))
     }
 
     fn next(&mut self, number: u64) -> bool {
