@@ -323,3 +323,43 @@ fn what_is_not_covered_is_named() {
     let construct = "timed initial literals".to_owned();
     assert_eq!(found, Err(Faithful::Undecided(ComparisonCause::Unsupported { construct })));
 }
+
+/// Whatever numbers a certificate has, the checker neither panics nor takes one for another.
+#[test]
+fn hostile_numbers_prove_nothing() {
+    let hostile = [i128::MAX, i128::MIN, 1 << 107, -(1 << 107), 1 << 63];
+    let hostile = hostile.map(|number| serde_json::from_str::<Value>(&number.to_string()).expect("JSON"));
+    let mut tried = 0;
+    for example in TASKS.iter().filter(|example| ["battery", "bounds", "durative"].contains(&example.name)) {
+        let files = files(example);
+        let (certificate, witness) = certified(example);
+        let claim = example.optimum.map(fraction);
+        let dearer = claim.clone().map(|cost| cost + fraction("1"));
+        let documents = [&certificate.task, &certificate.argument];
+        for place in 0..2 {
+            let document: Value = serde_json::from_str(documents[place]).expect("JSON");
+            let mut all = Vec::new();
+            changes(&document, "", &mut all);
+            let mut paths: Vec<String> = all
+                .into_iter()
+                .filter(|(_, new)| new.as_ref().is_some_and(Value::is_number))
+                .map(|own| own.0)
+                .collect();
+            paths.dedup();
+            for path in paths {
+                for number in &hostile {
+                    let mutant = changed(&document, &(path.clone(), Some(number.clone()))).to_string();
+                    let (task, argument) = match place {
+                        0 => (&mutant, &certificate.argument),
+                        _ => (&certificate.task, &mutant),
+                    };
+                    let stands = matches!(compared_with(&files, task, &witness), Faithful::Yes { .. });
+                    let proves = check_certificate(task, argument, dearer.as_ref()).is_ok();
+                    assert!(!(stands && proves), "{}: {path} {number}", example.name);
+                    tried += 1;
+                }
+            }
+        }
+    }
+    assert!(tried >= 500, "{tried}");
+}
