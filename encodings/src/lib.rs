@@ -60,9 +60,9 @@ mod tests;
 
 pub use alternatives::{Alternatives, Forced, alternatives};
 pub use certificate::{
-    Certificate, Checked, Faithful, Fault, Inputs as RefutationInputs, Outputs as RefutationOutputs,
-    StepBound, certify, check as check_certificate, check_refutation, describes, faithful, refute,
-    verification_conditions,
+    Cause as ComparisonCause, Certificate, Checked, Difference, Faithful, Fault, Inputs as RefutationInputs,
+    Outputs as RefutationOutputs, StepBound, certify, check as check_certificate, check_refutation, faithful,
+    refute, verification_conditions, witness,
 };
 pub use concurrent::{Concurrent, ground_concurrent, optimize_concurrent};
 pub use encode::Semantics;

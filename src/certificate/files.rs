@@ -9,7 +9,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::{
     ARGUMENT, Claim, DOMAIN, FORMAT, File, HINTS, Manifest, PLAN, PROBLEM, PROOF, PROOF_LIMIT, Refutation,
-    SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, derivations, knowledge,
+    SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, WITNESS, derivations, knowledge,
 };
 
 /// The text of a file among several.
@@ -43,7 +43,7 @@ pub(super) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>)
     if manifest.format != FORMAT {
         return Err(format!("manifest.json: format `{}`, where `{FORMAT}` is expected", manifest.format));
     }
-    let mut expected = vec![ARGUMENT, DOMAIN, PROBLEM, TASK];
+    let mut expected = vec![ARGUMENT, DOMAIN, PROBLEM, TASK, WITNESS];
     if manifest.claim != Claim::Unsolvable {
         expected.push(PLAN);
     }

@@ -8,6 +8,7 @@
 //! | `knowledge.nt`, `origin.json` | the knowledge base, rules, bindings, and what has changed since they were read; missing if there is no knowledge base |
 //! | `derivations.json` | everything that follows from them, with the rule, its bindings and what it rests on; missing likewise |
 //! | `task.json` | the ground task |
+//! | `witness.json` | the atoms that may ever hold, and the values that numbers may have: why other instances of actions need no operator |
 //! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: "a cheaper plan has at most so many steps" in DIMACS, what its variables mean, its refutation, what each line of that follows from |
 //! | `argument.json` | why no plan is cheaper: labels, potentials, needs (see `encodings::check_certificate`) |
 
@@ -22,7 +23,9 @@ use std::path::Path;
 
 use encodings::pddl::ast::Problem;
 use encodings::pddl::{print_domain, print_problem};
-use encodings::{Limits, RefutationOutputs, Solution, Status, StepBound, Task, certify, refute};
+use encodings::{
+    Faithful, Limits, RefutationOutputs, Solution, Status, StepBound, Task, certify, refute, witness,
+};
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
 
@@ -33,7 +36,7 @@ use files::{digest_of, text};
 use crate::message::Message;
 use crate::mission::Mission;
 
-const FORMAT: &str = "metaplan-certificate/2";
+const FORMAT: &str = "metaplan-certificate/3";
 /// All files that are never in memory as a whole are together at most this large, in bytes.
 const SIZE_LIMIT: u64 = 1 << 30;
 /// All files that are in memory as a whole are together at most this large, in bytes.
@@ -42,6 +45,7 @@ const DOMAIN: &str = "domain.pddl";
 const PROBLEM: &str = "problem.pddl";
 const PLAN: &str = "plan.txt";
 const TASK: &str = "task.json";
+const WITNESS: &str = "witness.json";
 const ARGUMENT: &str = "argument.json";
 const FORMULA: &str = "formula.cnf";
 const LEGEND: &str = "legend.txt";
@@ -60,8 +64,6 @@ const PROOF_LIMIT: u64 = 1 << 28;
 struct Manifest {
     format: String,
     claim: Claim,
-    /// Predicates that say which design solves which function: the slots of the ground task come from them.
-    solves: Vec<String>,
     refutation: Refutation,
     files: Vec<File>,
 }
@@ -166,10 +168,14 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         };
         return Err(Message::error("M120", format!("no certificate: {reason}")));
     };
+    let (domain_text, problem_text) = (print_domain(mission.domain()), print_problem(problem));
+    let witness = compared((&domain_text, &problem_text), &certificate.task, limits)
+        .map_err(|reason| wrong(&reason))?;
     let mut files = vec![
-        (DOMAIN, print_domain(mission.domain())),
-        (PROBLEM, print_problem(problem)),
+        (DOMAIN, domain_text),
+        (PROBLEM, problem_text),
         (TASK, certificate.task),
+        (WITNESS, witness),
         (ARGUMENT, certificate.argument),
     ];
     files.extend(knowledge::files(mission)?.into_iter().flatten());
@@ -201,13 +207,24 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         let (bytes, sha256) = digest_of(&whole.path().join(name)).map_err(failed)?;
         listed.push(File { name: (*name).to_owned(), bytes, sha256 });
     }
-    let solves = mission.solves().iter().map(ToString::to_string).collect();
-    let manifest = Manifest { format: FORMAT.to_owned(), claim, solves, refutation, files: listed };
+    let manifest = Manifest { format: FORMAT.to_owned(), claim, refutation, files: listed };
     let mut text = serde_json::to_string_pretty(&manifest).map_err(|error| wrong(&error))?;
     text.push('\n');
     fs::write(whole.path().join("manifest.json"), text).map_err(failed)?;
     // Only an empty directory is replaced.
     fs::rename(whole.path(), directory).map_err(failed)
+}
+
+/// Makes the witness, and compares the task with the files as `verify` will: what cannot be compared gets no certificate.
+fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
+    let (domain, problem) = verify::read_pddl(domain, problem)?;
+    let witness = witness(&domain, &problem, task, limits).map_err(|verdict| match verdict {
+        Faithful::No(difference) => difference.to_string(),
+        Faithful::Undecided(cause) => cause.to_string(),
+        Faithful::Yes { .. } => "no witness".to_owned(),
+    })?;
+    verify::same_task(&domain, &problem, (task, &witness), limits)?;
+    Ok(witness)
 }
 
 /// Writes a formula and its refutation, or nothing where there is none.

@@ -4,26 +4,26 @@ use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 
-use encodings::pddl::ast::{Domain, Name, Problem};
+use encodings::pddl::ast::{Domain, Problem};
 use encodings::pddl::{self, Source};
 use encodings::validate::{Options, PlanText, validate};
 use encodings::{
-    Checked, Faithful, GroundConfig, Limits, RefutationInputs, check_certificate, check_refutation,
-    describes, faithful, ground, verification_conditions,
+    Checked, Faithful, Limits, RefutationInputs, check_certificate, check_refutation, faithful,
+    verification_conditions,
 };
 use num_rational::BigRational;
+use num_traits::Zero;
 
 use super::files::{read, text};
 use super::{
-    ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Part, Refutation, Report, STREAMED, TASK, derivations,
-    knowledge,
+    ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Part, Refutation, Report, STREAMED, TASK, WITNESS,
+    derivations, knowledge,
 };
 use crate::measure::measure;
 use crate::message::Message;
 
-/// Checks a certificate without trusting what wrote it. Where the files have to be grounded again, `limits` is asked when that
-/// has to end.
-pub fn verify(directory: &Path, limits: &dyn Fn() -> Limits) -> Report {
+/// Checks a certificate without trusting what wrote it. The comparison of the task with the files ends when the limits say so.
+pub fn verify(directory: &Path, limits: &Limits) -> Report {
     let mut report = Report { claim: None, parts: Vec::new() };
     match read(directory) {
         Ok((manifest, contents)) => {
@@ -42,15 +42,16 @@ pub fn verify(directory: &Path, limits: &dyn Fn() -> Limits) -> Report {
 ///
 /// # Errors
 /// The certificate cannot be read, or its task has derived variables, for which there are no such conditions.
-pub fn conditions(directory: &Path, limits: &dyn Fn() -> Limits) -> Result<String, Message> {
+pub fn conditions(directory: &Path, limits: &Limits) -> Result<String, Message> {
     let wrong = |reason: String| Message::at("M121", &directory.display().to_string(), None, reason);
-    let (Manifest { claim, solves, .. }, contents) = read(directory).map_err(wrong)?;
+    let (Manifest { claim, .. }, contents) = read(directory).map_err(wrong)?;
     let text = |name: &str| text(&contents, name);
     let metric = match &claim {
         Claim::Unsolvable => None,
         Claim::Optimal { metric } => {
             let (domain, problem) = read_pddl(text(DOMAIN), text(PROBLEM)).map_err(wrong)?;
-            let (_, timed) = same_task(&domain, &problem, &solves, text(TASK), limits).map_err(wrong)?;
+            let (_, timed) =
+                same_task(&domain, &problem, (text(TASK), text(WITNESS)), limits).map_err(wrong)?;
             Some(plan(&domain, &problem, timed, text(PLAN), metric).map_err(wrong)?.1)
         }
     };
@@ -59,13 +60,8 @@ pub fn conditions(directory: &Path, limits: &dyn Fn() -> Limits) -> Result<Strin
         .ok_or_else(|| wrong("a task with derived predicates has no verification conditions".to_owned()))
 }
 
-fn parts(
-    directory: &Path,
-    manifest: &Manifest,
-    contents: &[(String, String)],
-    limits: &dyn Fn() -> Limits,
-) -> Vec<Part> {
-    let Manifest { claim, solves, refutation, .. } = manifest;
+fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)], limits: &Limits) -> Vec<Part> {
+    let Manifest { claim, refutation, .. } = manifest;
     let text = |name: &str| text(contents, name);
     let (domain, problem) = match read_pddl(text(DOMAIN), text(PROBLEM)) {
         Ok(read) => read,
@@ -82,7 +78,7 @@ fn parts(
         parts.push(Part { part: "derivations", result: derivations });
         parts.push(Part { part: "knowledge", result: filled });
     }
-    let (same, timed) = match same_task(&domain, &problem, solves, text(TASK), limits) {
+    let (same, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), limits) {
         Ok((said, timed)) => (Ok(said), timed),
         // Whatever it is, it is not verified.
         Err(reason) => (Err(reason), false),
@@ -136,7 +132,7 @@ fn refuted(
     checked.map(|(part, result)| Part { part, result }).collect()
 }
 
-fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), String> {
+pub(super) fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), String> {
     let read = pddl::read(&Source::new(DOMAIN, domain), &Source::new(PROBLEM, problem));
     let first = |found: Vec<pddl::Diagnostic>| {
         found.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone())
@@ -152,9 +148,17 @@ pub(super) fn plan(
     text: &str,
     claimed: &str,
 ) -> Result<(String, BigRational), String> {
-    let plan = PlanText::parse(&Source::new(PLAN, text))
+    let mut plan = PlanText::parse(&Source::new(PLAN, text))
         .map_err(|found| found.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone()))?;
-    let verdict = validate(domain, problem, &plan, &Options::default());
+    if plan.steps.iter().all(|step| step.start.is_some()) {
+        plan.steps.sort_by(|left, right| left.start.cmp(&right.start));
+    }
+    // One step after the other, each as long as the files say: what is written may be rounded.
+    for step in &mut plan.steps {
+        (step.start, step.duration) = (None, None);
+    }
+    let options = Options { tolerance: BigRational::zero(), ..Options::default() };
+    let verdict = validate(domain, problem, &plan, &options);
     if let Some(violation) = verdict.violation {
         return Err(violation.message);
     }
@@ -168,37 +172,22 @@ pub(super) fn plan(
     Ok((format!("{steps} steps, valid, metric {claimed}"), value))
 }
 
-/// Whether the task stands for the files, and whether its operators take time: instance by instance, or else by grounding
-/// the files again.
-fn same_task(
+/// Whether the task stands for the files, and whether plans are measured by time where there is no metric.
+pub(super) fn same_task(
     domain: &Domain,
     problem: &Problem,
-    solves: &[String],
-    written: &str,
-    limits: &dyn Fn() -> Limits,
+    (task, witness): (&str, &str),
+    limits: &Limits,
 ) -> Result<(String, bool), String> {
-    let reason = match faithful(domain, problem, written) {
+    match faithful(domain, problem, task, witness, limits) {
         Faithful::Yes { instances, idle, timed } => {
             let said = format!(
-                "it stands for the files: {instances} instances of actions, {idle} of which change nothing that it knows"
+                "it stands for the files: {instances} instances of actions can be executed, {idle} of which change nothing \
+                 that it knows"
             );
-            return Ok((said, timed));
+            Ok((said, timed))
         }
-        Faithful::Unknown(reason) => reason,
-        Faithful::No(reason) => return Err(reason),
-        _ => "another construct".to_owned(),
-    };
-    let solves = solves.iter().map(|name| Name::new(name)).collect();
-    let config = GroundConfig { solves, limits: limits(), ..GroundConfig::default() };
-    let task = ground(domain, problem, &config)
-        .map_err(|errors| errors.first().map_or_else(String::new, ToString::to_string))?;
-    if describes(written, &task) {
-        let said = format!(
-            "what the files ground to: {} operators; not compared instance by instance: {reason}",
-            task.operator_count()
-        );
-        Ok((said, task.is_timed()))
-    } else {
-        Err(format!("the files ground to another task ({reason})"))
+        Faithful::No(difference) => Err(difference.to_string()),
+        Faithful::Undecided(cause) => Err(cause.to_string()),
     }
 }

@@ -14,7 +14,7 @@ use serde_json::json;
 use crate::cli::plan::seconds;
 use crate::cli::{Common, Exit, Failure, Format, memory, output};
 
-/// Where files are grounded again, the process may take so much, in megabytes of 2^20 bytes: a certificate may come from anybody.
+/// The process may take so much, in megabytes of 2^20 bytes: a certificate may come from anybody.
 const MEMORY_LIMIT: u64 = 4096;
 /// So long after a limit has been reached the verification is given up from outside.
 const GRACE: Duration = Duration::from_secs(2);
@@ -38,15 +38,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let limits = Limits::none().with_time(arguments.time_limit);
     let answered = Arc::new(AtomicBool::new(false));
     give_up_late(limits.clone(), Arc::clone(&answered), common.format);
-    let grounding = || {
-        // Where the platform does not tell how much memory is taken, there is no limit on it.
-        let _ = memory::watch(MEMORY_LIMIT, limits.interrupt());
-        limits.clone()
-    };
+    // Where the platform does not tell how much memory is taken, there is no limit on it.
+    let _ = memory::watch(MEMORY_LIMIT, limits.interrupt());
     if let Some(file) = &arguments.smt {
-        output::write_file(file, &conditions(&arguments.directory, &grounding)?)?;
+        output::write_file(file, &conditions(&arguments.directory, &limits)?)?;
     }
-    let report = verify(&arguments.directory, &grounding);
+    let report = verify(&arguments.directory, &limits);
     while answered.swap(true, Ordering::Relaxed) {
         std::thread::park();
     }

@@ -265,7 +265,7 @@ fn certificates_that_are_none_are_rejected() {
     );
     check(&manifest(|text| text.replacen("\"bytes\": ", "\"bytes\": 99999999999", 1)), "larger than");
     check(
-        &manifest(|text| text.replace("certificate/2", "certificate/9")),
+        &manifest(|text| text.replace("certificate/3", "certificate/9")),
         "format `metaplan-certificate/9`",
     );
     check(&manifest(|_| "[".repeat(500_000)), "manifest.json: ");
@@ -381,7 +381,7 @@ fn plans_are_measured_as_the_files_have_it() {
 
 /// A certificate may ask for more than anybody can wait for.
 #[test]
-fn a_verification_has_a_time_limit() {
+fn a_verification_comes_to_an_end() {
     let directory = tempfile::tempdir().expect("a directory");
     let objects: Vec<String> = (0..200).map(|number| format!("o{number}")).collect();
     let problem = format!(
@@ -405,5 +405,43 @@ fn a_verification_has_a_time_limit() {
     });
     let outcome = metaplan(&["verify", &certificate, "--time-limit", "1"]);
     assert_eq!(outcome.status, 30, "{outcome:#?}");
-    assert!(outcome.stdout.contains("limits      failed: it takes longer"), "{outcome:#?}");
+    assert!(outcome.stdout.contains("ends at 400000 instances of wait"), "{outcome:#?}");
+}
+
+/// What is not compared gets no certificate, and the message says what it is.
+#[test]
+fn what_cannot_be_compared_gets_no_certificate() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let domain = "(define (domain d) (:predicates (p) (q))
+      (:durative-action a :parameters () :duration (= ?duration 2) :condition (at start (p)) :effect (at end (q))))";
+    let problem = "(define (problem p) (:domain d) (:init (p) (at 5 (not (p)))) (:goal (q)))";
+    std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+    std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
+    let outcome = metaplan_in(directory.path(), &["plan", "d.pddl", "p.pddl", "--certificate", "c"], "");
+    assert!(outcome.stderr.contains("M120"), "{outcome:#?}");
+    assert!(outcome.stderr.contains("does not cover timed initial literals"), "{outcome:#?}");
+    assert!(!directory.path().join("c").exists());
+}
+
+/// A start effect under a condition that contradicts another one takes that case away, and nothing else. A grounder that
+/// loses the whole action gets no certificate.
+#[test]
+fn a_lost_action_is_never_certified() {
+    let action = "(:durative-action a :parameters () :duration (= ?duration 2) :condition (and)
+      :effect (and (at start (q)) (at start (p)) (at start (increase (f) 5)) (at start (when (p) (assign (f) 0)))))";
+    let dear = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (q)))";
+    for more in ["", dear] {
+        let directory = tempfile::tempdir().expect("a directory");
+        let domain = format!("(define (domain d) (:predicates (p) (q)) (:functions (f)) {action} {more})");
+        let problem = "(define (problem p) (:domain d) (:init (= (f) 2)) (:goal (q)))";
+        std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+        std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
+        let outcome = metaplan_in(directory.path(), &["plan", "d.pddl", "p.pddl", "--certificate", "c"], "");
+        if directory.path().join("c").exists() {
+            let verified = metaplan_in(directory.path(), &["verify", "c"], "");
+            assert!(verified.stdout.contains("verified: the plan is optimal, metric 2\n"), "{verified:#?}");
+        } else {
+            assert!(outcome.stderr.contains("M120") && outcome.stderr.contains("(a)"), "{outcome:#?}");
+        }
+    }
 }

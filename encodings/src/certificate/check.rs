@@ -124,7 +124,7 @@ pub(super) fn parse(
     argument: &str,
     claim: Option<&BigRational>,
 ) -> Result<(Model, Argument, Option<i128>), Fault> {
-    let model: Model = read("the task", task)?;
+    let mut model: Model = read("the task", task)?;
     let argument: Argument = read("the argument", argument)?;
     for (document, found, expected) in
         [("the task", &model.format, TASK_FORMAT), ("the argument", &argument.format, ARGUMENT_FORMAT)]
@@ -133,7 +133,7 @@ pub(super) fn parse(
             return Err(form(document, format!("format `{found}`, where `{expected}` is expected")));
         }
     }
-    shape::task(&model).map_err(|reason| form("the task", reason))?;
+    shape::task(&mut model).map_err(|reason| form("the task", reason))?;
     shape::argument(&model, &argument).map_err(|reason| form("the argument", reason))?;
     let cost = claim.map(|claim| cost(&model, claim)).transpose()?;
     Ok((model, argument, cost))
@@ -153,6 +153,8 @@ fn cost(model: &Model, metric: &BigRational) -> Result<i128, Fault> {
     let scaled = if model.objective.maximize { -scaled } else { scaled };
     let cost = if scaled.is_integer() { scaled.to_integer().to_i128() } else { None };
     let cost = cost.and_then(|cost| cost.checked_sub(model.objective.offset.into()));
+    // A claim is as large as other costs, so that sums with it are integers.
+    let cost = cost.filter(|cost| shape::is_small(*cost));
     cost.ok_or_else(|| Fault::Cost(metric.to_string()))
 }
 

@@ -30,6 +30,6 @@ mod write;
 
 pub use check::{Checked, Fault, check};
 pub use clausal::{Inputs, Outputs, StepBound, check_refutation, refute};
-pub use faithful::{Faithful, faithful};
+pub use faithful::{Cause, Difference, Faithful, faithful, witness};
 pub use smt::verification_conditions;
-pub use write::{Certificate, certify, describes};
+pub use write::{Certificate, certify};

@@ -35,6 +35,9 @@ pub(super) struct Model {
     pub(super) objective: Objective,
     /// Durations are this many times the values of the files.
     pub(super) time_scale: Int,
+    /// Numbers stay below this in magnitude, so that no sum outgrows an integer; not written, but worked out.
+    #[serde(skip)]
+    pub(super) number_limit: Int,
 }
 
 /// Combinations of designs (positions in lists of suitable designs) that are not admitted for some slots of an operator.

@@ -10,12 +10,12 @@ pub(super) struct State {
     pub(super) numbers: Vec<i128>,
 }
 
-/// Whether the value of a number is small enough to calculate with.
-pub(super) fn in_range(number: i128) -> bool {
-    number.abs() < 1 << 62
-}
-
 impl Model {
+    /// Whether the value of a number is small enough to calculate with.
+    pub(super) fn in_range(&self, number: Int) -> bool {
+        number.unsigned_abs() < self.number_limit.unsigned_abs()
+    }
+
     /// A state with these basic values; the derived ones follow.
     pub(super) fn state(&self, basic: &[u32], numbers: &[Int]) -> State {
         let mut values = basic.to_vec();
@@ -140,7 +140,7 @@ impl Model {
         }
         for (number, value) in &operator.changes {
             let value = self.linear(value, state, choice, sizes);
-            if !in_range(value) {
+            if !self.in_range(value) {
                 return None;
             }
             next.numbers[*number as usize] = value;

@@ -4,13 +4,12 @@ use crate::certificate::argument::Argument;
 use crate::certificate::model::{
     self, Condition, Exclusion, Fact, Linear, Literal, Model, Operator, Quantity,
 };
-use crate::certificate::semantics::in_range;
 use crate::number::Int;
 
 type Found = Result<(), String>;
 
-/// Factors, constants and entries of tables are smaller, so that sums of products with numbers fit 128 bits.
-const SMALL: Int = 1 << 50;
+/// Constants, entries of tables, products of factors with numbers, and costs are smaller, so that their sums fit 128 bits.
+const LARGE: Int = 1 << 108;
 /// As many summands, and fewer, are added up.
 const SUMMANDS: usize = 1 << 10;
 
@@ -31,12 +30,28 @@ fn are_distinct(numbers: impl Iterator<Item = u32>) -> bool {
     all.len() == count
 }
 
-fn is_small(number: Int) -> bool {
-    number.unsigned_abs() < SMALL.unsigned_abs()
+pub(super) fn is_small(number: Int) -> bool {
+    number.unsigned_abs() < LARGE.unsigned_abs()
 }
 
-/// Checks a task.
-pub(super) fn task(model: &Model) -> Found {
+/// Checks a task, and works out how large numbers may become.
+pub(super) fn task(model: &mut Model) -> Found {
+    let factor = linears(model).flat_map(|linear| &linear.factors).map(|(_, factor)| factor.unsigned_abs());
+    let factor = factor.max().unwrap_or(1).max(1);
+    model.number_limit = Int::try_from(LARGE.unsigned_abs() / factor).unwrap_or(0);
+    well_formed(model)
+}
+
+/// All linear expressions of a task.
+fn linears(model: &Model) -> impl Iterator<Item = &Linear> {
+    let operators = model.operators.iter().map(|operator| &operator.condition);
+    let bodies = model.axioms.iter().flat_map(|layer| &layer.rules).map(|(_, body)| body);
+    let changes = model.operators.iter().flat_map(|operator| &operator.changes).map(|(_, value)| value);
+    let conditions = operators.chain(bodies).chain([&model.goal]);
+    conditions.flat_map(|condition| &condition.comparisons).chain(changes)
+}
+
+fn well_formed(model: &Model) -> Found {
     let count = model.variables.len();
     require(model.basic <= count, || "more basic variables than variables".into())?;
     require(model.values.len() == count, || "the initial state has not one value for each variable".into())?;
@@ -45,7 +60,7 @@ pub(super) fn task(model: &Model) -> Found {
         model.check_fact(fact)?;
     }
     let small = model.tables.iter().flatten().all(|value| is_small(*value));
-    require(small && model.numbers.iter().all(|number| in_range((*number).into())), || {
+    require(small && model.numbers.iter().all(|number| model.in_range(*number)), || {
         "a number is too large".into()
     })?;
     require(model.fluents.len() == model.numbers.len(), || "not one fluent for each number".into())?;
@@ -86,6 +101,7 @@ pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
         let size =
             sizes.into_iter().try_fold(1_usize, usize::checked_mul).filter(|size| *size <= TABLE_LIMIT);
         require(size == Some(values.len()), || "a table of the wrong size".into())?;
+        require(values.iter().flatten().all(|value| is_small(*value)), || "a bound is too large".into())?;
     }
     let numbers = model.numbers.len();
     require(argument.needs.iter().all(|need| (need.number as usize) < numbers), || "no such number".into())?;
@@ -93,7 +109,8 @@ pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
         let sizes = model.variables[..model.basic].iter().map(Vec::len);
         let fits = label.0.len() == model.basic
             && label.1.len() == numbers
-            && label.1.iter().all(|number| in_range((*number).into()))
+            && label.1.iter().all(|number| model.in_range(*number))
+            && is_small(label.2)
             && label.0.iter().zip(sizes).all(|(value, size)| (*value as usize) < size);
         require(fits, || format!("label {position} is no state"))?;
     }
@@ -160,9 +177,7 @@ impl Model {
         require(are_distinct(linear.factors.iter().map(|(number, _)| *number)), || {
             "a number with two factors".into()
         })?;
-        let small =
-            linear.factors.iter().all(|(_, factor)| is_small(*factor)) && linear.factors.len() < SUMMANDS;
-        require(small, || "a factor that is too large".into())?;
+        require(linear.factors.len() < SUMMANDS, || "too many factors".into())?;
         self.check_quantity(&linear.quantity, sizes)
     }
 

@@ -71,11 +71,6 @@ fn written(task: &Model, argument: &Argument) -> Option<Certificate> {
     Some(Certificate { task, argument: serde_json::to_string(argument).ok()? })
 }
 
-/// Whether a written task is this one.
-pub fn describes(written: &str, task: &Task) -> bool {
-    serde_json::from_str::<Model>(written).is_ok_and(|written| written == model(task))
-}
-
 /// Lists things once.
 struct Pool<K, V> {
     positions: FxHashMap<K, u32>,
@@ -145,6 +140,7 @@ fn model(task: &Task) -> Model {
             maximize: task.objective.maximize,
         },
         time_scale: task.time_scale,
+        number_limit: 0,
     }
 }
 

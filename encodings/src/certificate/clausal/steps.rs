@@ -84,7 +84,8 @@ impl<'l> Layers<'l> {
         let mut next: Vec<Option<i128>> = vec![None; self.costs.len()];
         for (from, to, cost) in &self.edges {
             if let Some(before) = self.costs[*from] {
-                let after = before + cost;
+                // What outgrows an integer is dearer than any claim.
+                let after = before.saturating_add(*cost);
                 next[*to] = Some(next[*to].map_or(after, |known| known.min(after)));
             }
         }
@@ -99,6 +100,6 @@ impl<'l> Layers<'l> {
     /// The least that a plan costs that is still under way.
     fn least(&self) -> Option<i128> {
         let rows = self.costs.iter().enumerate();
-        rows.filter_map(|(row, cost)| Some((*cost)? + self.table.at_row(row)?)).min()
+        rows.filter_map(|(row, cost)| Some((*cost)?.saturating_add(self.table.at_row(row)?))).min()
     }
 }

@@ -60,16 +60,18 @@ fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, Strin
             None => {}
         }
     }
-    let steps = steps as i128;
-    least += steps * falls;
-    most += steps * rises;
+    let large = || "numbers that may become too large are not covered".to_owned();
+    let after = |end: i128, each: i128| end.checked_add(each.checked_mul(steps as i128)?);
+    least = after(least, falls).ok_or_else(large)?;
+    most = after(most, rises).ok_or_else(large)?;
     let own = comparisons(model).filter(|linear| linear.factors.iter().any(|(own, _)| *own == number));
     let sizes = own.map(|linear| {
         let quantity = &linear.quantity;
         model.least(quantity).abs().max(model.most(quantity).abs()) + 1
     });
     let beside = sizes.max().unwrap_or(0);
-    Ok(width(least - beside, most + beside))
+    let ends = least.checked_sub(beside).zip(most.checked_add(beside));
+    ends.map(|(least, most)| width(least, most)).ok_or_else(large)
 }
 
 impl Sums {
@@ -79,12 +81,15 @@ impl Sums {
         cost: i128,
         steps: usize,
     ) -> Result<Self, String> {
-        let limit = cost - 1;
+        let limit = cost.checked_sub(1).ok_or("a cost that is too small is not covered")?;
         let dearest = model.operators.iter().map(|operator| model.most(&operator.cost)).max().unwrap_or(0);
         if model.operators.iter().any(|operator| model.least(&operator.cost) < 0) {
             return Err("operators that cost less than nothing are not covered".into());
         }
-        let spent = formula.constant(0, width(0, limit + dearest));
+        let spent = formula.constant(
+            0,
+            width(0, limit.checked_add(dearest).ok_or("costs that are too large are not covered")?),
+        );
         let mut numbers = Vec::new();
         for (number, initial) in (0..).zip(&model.numbers) {
             let width = number_width(model, number, steps)?;

@@ -4,14 +4,16 @@
 use rustc_hash::FxHashMap;
 
 use crate::certificate::faithful::INSTANCE_LIMIT;
+use crate::certificate::faithful::verdict::Cause;
 use crate::certificate::faithful::world::World;
+use crate::limits::Limits;
 use crate::pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
 
 /// Values of parameters so far.
 type Binding<'b> = FxHashMap<&'b Name, u32>;
 
 /// The arguments of all instances.
-pub(super) fn of(world: &World<'_>, action: &Action) -> Result<Vec<Vec<u32>>, String> {
+pub(super) fn of(world: &World<'_>, action: &Action, limits: &Limits) -> Result<Vec<Vec<u32>>, Cause> {
     let mut atoms = Vec::new();
     match &action.body {
         ActionBody::Instantaneous { precondition, .. } => conjuncts(precondition, &mut atoms),
@@ -21,8 +23,10 @@ pub(super) fn of(world: &World<'_>, action: &Action) -> Result<Vec<Vec<u32>>, St
             }
         }
     }
-    let is_static =
-        |atom: &&Atom| world.symbol(&atom.predicate.name).is_ok_and(|symbol| !world.changes(symbol));
+    let is_static = |atom: &&Atom| {
+        let symbol = world.symbol(&atom.predicate.name);
+        symbol.is_ok_and(|symbol| !world.changes(symbol) && world.rules(symbol).is_none())
+    };
     let mut open: Vec<&Atom> = atoms.into_iter().filter(is_static).collect();
     let mut partial: Vec<Binding<'_>> = vec![Binding::default()];
     while !open.is_empty() {
@@ -43,8 +47,11 @@ pub(super) fn of(world: &World<'_>, action: &Action) -> Result<Vec<Vec<u32>>, St
         let mut longer = Vec::new();
         for binding in &partial {
             extend(world, atom, binding, &mut longer)?;
+            if limits.reached() {
+                return Err(Cause::Stopped);
+            }
             if longer.len() > INSTANCE_LIMIT {
-                return Err(format!("more than {INSTANCE_LIMIT} instances of {}", action.identifier.name));
+                return Err(too_many(action.identifier.name.as_str()));
             }
         }
         partial = longer;
@@ -58,7 +65,7 @@ pub(super) fn of(world: &World<'_>, action: &Action) -> Result<Vec<Vec<u32>>, St
     Ok(instances)
 }
 
-fn conjuncts<'c>(condition: &'c Condition, atoms: &mut Vec<&'c Atom>) {
+pub(super) fn conjuncts<'c>(condition: &'c Condition, atoms: &mut Vec<&'c Atom>) {
     match condition {
         Condition::And(parts) => parts.iter().for_each(|part| conjuncts(part, atoms)),
         Condition::Atom(atom) => atoms.push(atom),
@@ -66,12 +73,17 @@ fn conjuncts<'c>(condition: &'c Condition, atoms: &mut Vec<&'c Atom>) {
     }
 }
 
+/// Says that there are too many instances of what is named.
+pub(super) fn too_many(name: &str) -> Cause {
+    Cause::TooMany { what: format!("instances of {name}"), limit: INSTANCE_LIMIT }
+}
+
 fn extend<'b>(
     world: &World<'_>,
     atom: &'b Atom,
     binding: &Binding<'b>,
     longer: &mut Vec<Binding<'b>>,
-) -> Result<(), String> {
+) -> Result<(), Cause> {
     let predicate = world.symbol(&atom.predicate.name)?;
     let known = |term: &Term| world.object(term, binding).ok();
     let place = atom.arguments.iter().enumerate().find_map(|(place, term)| Some((place, known(term)?)));
@@ -101,9 +113,9 @@ fn complete(
     binding: &Binding<'_>,
     arguments: &mut Vec<u32>,
     instances: &mut Vec<Vec<u32>>,
-) -> Result<(), String> {
+) -> Result<(), Cause> {
     if instances.len() > INSTANCE_LIMIT {
-        return Err(format!("more than {INSTANCE_LIMIT} instances of {}", action.identifier.name));
+        return Err(too_many(action.identifier.name.as_str()));
     }
     let Some(parameter) = action.parameters.get(arguments.len()) else {
         instances.push(arguments.clone());

@@ -1,297 +1,310 @@
-//! What an instance of an action requires and does, in terms of the state before it. A durative action is one step: its start
-//! effects take place before the conditions of its middle and end are looked at, and before its end effects.
+//! What an instance of an action requires and does, case by case, in terms of the state before it. A durative action is one step:
+//! its start effects take place before the conditions of its middle and end are looked at, and before its end effects. One without
+//! duration is one happening.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
-use rustc_hash::FxHashMap;
 
+use crate::certificate::faithful::formula::{Formula, Known, Structure};
+use crate::certificate::faithful::happening;
 use crate::certificate::faithful::linear::Linear;
-use crate::certificate::faithful::world::{Key, World};
+use crate::certificate::faithful::reader::{Applied, Reader};
+use crate::certificate::faithful::verdict::Cause;
+use crate::certificate::faithful::world::Key;
 use crate::pddl::ast::{
-    Action, ActionBody, Arithmetic, Assignment, Comparison, Condition, ConditionTime, Effect, EffectTime,
-    Expression, Name,
+    Action, ActionBody, Assignment, Comparison, Condition, ConditionTime, DurationConstraint, Effect,
+    EffectTime,
 };
 
-/// What is not covered.
-type Unknown = String;
-
-#[derive(Debug, Default)]
-pub(super) struct Meaning {
-    pub(super) positive: BTreeSet<Key>,
-    pub(super) negative: BTreeSet<Key>,
-    /// Each is greater than 0 (if strict) or at least 0.
-    pub(super) comparisons: Vec<(Linear, bool)>,
-    /// Atoms that have this value afterwards.
+/// One way in which the conditions of an instance can turn out. Cases may overlap; together they are all.
+#[derive(Debug)]
+pub(super) struct Case {
+    /// What holds before.
+    pub(super) known: Known,
+    /// What has become of atoms at the start.
     pub(super) truths: BTreeMap<Key, bool>,
+    /// What becomes of atoms at the end, each under a condition; what is both added and deleted holds.
+    pub(super) effects: Vec<(Formula, Key, bool)>,
     /// Fluents that have these values afterwards.
     pub(super) changes: BTreeMap<Key, Linear>,
     pub(super) duration: Option<BigRational>,
 }
 
-impl Meaning {
-    /// The meaning of an instance; none if it can never be executed.
-    pub(super) fn of(world: &World<'_>, action: &Action, arguments: &[u32]) -> Result<Option<Self>, Unknown> {
-        let names = action.parameters.iter().map(|parameter| &parameter.identifier.name);
-        let binding = names.zip(arguments.iter().copied()).collect();
-        let mut reader = Reader { binding, ..Reader::new(world) };
-        let possible = match &action.body {
-            ActionBody::Instantaneous { precondition, effect } => {
-                reader.require(precondition)? && reader.cause(&[effect])?
+/// Effects that take place at once, each under a condition.
+#[derive(Default)]
+pub(super) struct Moment {
+    pub(super) atoms: Vec<(Formula, Key, bool)>,
+    /// A value is missing where it is undefined.
+    pub(super) numbers: Vec<(Formula, Assignment, Key, Option<Linear>)>,
+}
+
+/// The cases in which an instance can be executed; the reader has its arguments.
+pub(super) fn cases<'r>(
+    mut reader: Reader<'r>,
+    structure: &Structure,
+    action: &'r Action,
+) -> Result<Vec<Case>, Cause> {
+    let known = Known::default();
+    match &action.body {
+        ActionBody::Instantaneous { precondition, effect } => {
+            let condition = reader.formula(precondition, true)?;
+            let mut all = Vec::new();
+            if condition.is(false) {
+                return Ok(all);
             }
-            ActionBody::Durative { duration, conditions, effects } => {
-                let [constraint] = &duration[..] else { return Err("durations that are chosen".into()) };
-                if constraint.operator != Comparison::Equal {
-                    return Err("durations that are chosen".into());
-                }
-                let Some(length) = reader.expression(&constraint.expression)? else { return Ok(None) };
-                let length = length.value().cloned().ok_or("durations that depend on the state")?;
-                if length.is_negative() {
-                    return Err("negative durations".into());
-                }
-                reader.meaning.duration = Some(length);
-                let at = |wanted: &[ConditionTime]| -> Vec<&Condition> {
-                    conditions.iter().filter(|(time, _)| wanted.contains(time)).map(|(_, own)| own).collect()
-                };
-                let effects = |wanted: EffectTime| -> Vec<&Effect> {
-                    effects.iter().filter(|(time, _)| *time == wanted).map(|(_, own)| own).collect()
-                };
-                reader.all(&at(&[ConditionTime::AtStart]))?
-                    && reader.cause(&effects(EffectTime::AtStart))?
-                    && reader.all(&at(&[ConditionTime::OverAll, ConditionTime::AtEnd]))?
-                    && reader.cause(&effects(EffectTime::AtEnd))?
+            let moment = reader.moment([effect])?;
+            for known in known.assume(structure, &condition)? {
+                all.extend(moment.last(structure, known, &Applied::default(), None)?);
             }
+            Ok(all)
+        }
+        ActionBody::Durative { duration, conditions, effects } => {
+            let Some(length) = reader.length(duration)? else { return Ok(Vec::new()) };
+            if length.is_negative() {
+                return Ok(Vec::new());
+            }
+            let at_once = length.is_zero();
+            reader.duration = Some(length);
+            let durative = Durative { conditions, effects };
+            if at_once { durative.at_once(reader, structure) } else { durative.cases(reader, structure) }
+        }
+    }
+}
+
+struct Durative<'r> {
+    conditions: &'r [(ConditionTime, Condition)],
+    effects: &'r [(EffectTime, Effect)],
+}
+
+impl<'r> Durative<'r> {
+    fn condition(&self, reader: &mut Reader<'r>, times: &[ConditionTime]) -> Result<Formula, Cause> {
+        let own = self.conditions.iter().filter(|(time, _)| times.contains(time));
+        let own: Result<Vec<_>, _> = own.map(|(_, condition)| reader.formula(condition, true)).collect();
+        Ok(Formula::junction(own?, true))
+    }
+
+    fn effects(&self, wanted: EffectTime) -> impl Iterator<Item = &'r Effect> {
+        self.effects.iter().filter(move |(time, _)| *time == wanted).map(|(_, effect)| effect)
+    }
+
+    /// Without duration, start and end are one happening, and nothing lies between them.
+    fn at_once(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
+        let mut ends = Vec::new();
+        for (condition, effect) in
+            [(ConditionTime::AtStart, EffectTime::AtStart), (ConditionTime::AtEnd, EffectTime::AtEnd)]
+        {
+            let condition = self.condition(&mut reader, &[condition])?;
+            if condition.is(false) {
+                return Ok(Vec::new());
+            }
+            ends.push((condition, reader.moment(self.effects(effect))?));
+        }
+        let [(condition, start), (at_end, end)] = &ends[..] else { return Ok(Vec::new()) };
+        if happening::interfere((condition, start), (at_end, end)) {
+            return Ok(Vec::new());
+        }
+        let condition = Formula::junction([condition.clone(), at_end.clone()], true);
+        let both = Moment {
+            atoms: [&start.atoms[..], &end.atoms[..]].concat(),
+            numbers: [&start.numbers[..], &end.numbers[..]].concat(),
         };
-        Ok((possible && reader.meaning.positive.is_disjoint(&reader.meaning.negative))
-            .then_some(reader.meaning))
+        let mut all = Vec::new();
+        for known in Known::default().assume(structure, &condition)? {
+            all.extend(both.last(structure, known, &Applied::default(), reader.duration.as_ref())?);
+        }
+        Ok(all)
     }
 
-    /// A goal as what an action without effects requires; none if it never holds.
-    pub(super) fn of_goal(world: &World<'_>, goal: &Condition) -> Result<Option<Self>, Unknown> {
-        let mut reader = Reader::new(world);
-        let possible = reader.require(goal)?;
-        Ok((possible && reader.meaning.positive.is_disjoint(&reader.meaning.negative))
-            .then_some(reader.meaning))
+    fn cases(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
+        let condition = self.condition(&mut reader, &[ConditionTime::AtStart])?;
+        let mut all = Vec::new();
+        if condition.is(false) {
+            return Ok(all);
+        }
+        let start = reader.moment(self.effects(EffectTime::AtStart))?;
+        for known in Known::default().assume(structure, &condition)? {
+            let guards = start.atoms.iter().map(|(guard, ..)| guard);
+            let guards = guards.chain(start.numbers.iter().map(|(guard, ..)| guard));
+            for known in known.split(structure, guards)? {
+                let truths = start.truths(structure, &known);
+                for (known, changes) in start.numbers(structure, known, &Applied::default())? {
+                    reader.applied = Applied { truths: truths.clone(), changes };
+                    let later =
+                        self.condition(&mut reader, &[ConditionTime::OverAll, ConditionTime::AtEnd])?;
+                    if later.is(false) {
+                        continue;
+                    }
+                    let end = reader.moment(self.effects(EffectTime::AtEnd))?;
+                    for known in known.assume(structure, &later)? {
+                        all.extend(end.last(structure, known, &reader.applied, reader.duration.as_ref())?);
+                    }
+                }
+                reader.applied = Applied::default();
+            }
+        }
+        Ok(all)
     }
-}
-
-/// Stands for `total-time` in metrics.
-pub(super) const TOTAL_TIME: Key = (u32::MAX, Vec::new());
-
-/// A metric over fluents and [`TOTAL_TIME`]; none if it has no value.
-pub(super) fn metric(world: &World<'_>, expression: &Expression) -> Result<Option<Linear>, Unknown> {
-    Reader { is_metric: true, ..Reader::new(world) }.expression(expression)
-}
-
-struct Reader<'r> {
-    world: &'r World<'r>,
-    binding: FxHashMap<&'r Name, u32>,
-    meaning: Meaning,
-    is_metric: bool,
 }
 
 impl<'r> Reader<'r> {
-    fn new(world: &'r World<'r>) -> Self {
-        Self { world, binding: FxHashMap::default(), meaning: Meaning::default(), is_metric: false }
-    }
-
-    fn all(&mut self, conditions: &[&Condition]) -> Result<bool, Unknown> {
-        for condition in conditions {
-            if !self.require(condition)? {
-                return Ok(false);
-            }
+    /// The duration; none if it has no value.
+    fn length(&mut self, duration: &'r [DurationConstraint]) -> Result<Option<BigRational>, Cause> {
+        let [constraint] = duration else { return Err(Cause::unsupported("durations that are chosen")) };
+        if constraint.operator != Comparison::Equal {
+            return Err(Cause::unsupported("durations that are chosen"));
         }
-        Ok(true)
+        let Some(length) = self.expression(&constraint.expression)? else { return Ok(None) };
+        match length.value() {
+            Some(length) => Ok(Some(length.clone())),
+            None => Err(Cause::unsupported("durations that depend on the state")),
+        }
     }
 
-    /// Adds a condition on the state after the effects so far; `false` if it cannot hold.
-    fn require(&mut self, condition: &Condition) -> Result<bool, Unknown> {
-        match condition {
-            Condition::And(parts) => self.all(&parts.iter().collect::<Vec<_>>()),
-            Condition::Atom(atom) => {
+    fn moment(&mut self, effects: impl IntoIterator<Item = &'r Effect>) -> Result<Moment, Cause> {
+        let mut moment = Moment::default();
+        for effect in effects {
+            self.collect(effect, &Formula::truth(true), &mut moment)?;
+        }
+        Ok(moment)
+    }
+
+    fn collect(&mut self, effect: &'r Effect, guard: &Formula, moment: &mut Moment) -> Result<(), Cause> {
+        match effect {
+            Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, guard, moment)),
+            Effect::Add(atom) | Effect::Delete(atom) => {
                 let key = self.world.key(atom, &self.binding)?;
-                Ok(self.literal(key, true))
+                moment.atoms.push((guard.clone(), key, matches!(effect, Effect::Add(_))));
+                Ok(())
             }
-            Condition::Equal(left, right, _) => self.equal(left, right),
-            Condition::Not(inner) => match &**inner {
-                Condition::Atom(atom) => {
-                    let key = self.world.key(atom, &self.binding)?;
-                    Ok(self.literal(key, false))
-                }
-                Condition::Equal(left, right, _) => Ok(!self.equal(left, right)?),
-                _ => Err("negations of more than atoms".into()),
-            },
-            Condition::Compare(operator, left, right, _) => self.compare(*operator, left, right),
-            Condition::Or(parts) => self.disjunction(parts),
-            Condition::Imply(..) => Err("implications".into()),
-            Condition::Exists(..) | Condition::ForAll(..) => Err("quantifiers".into()),
+            Effect::ForAll(bound, inner) => {
+                self.each(bound, &mut |own| own.collect(inner, guard, moment).map(|()| true)).map(|_| ())
+            }
+            Effect::When(condition, inner) => {
+                self.in_when = true;
+                let condition = self.formula(condition, true);
+                self.in_when = false;
+                let guard = Formula::junction([guard.clone(), condition?], true);
+                if guard.is(false) { Ok(()) } else { self.collect(inner, &guard, moment) }
+            }
+            Effect::Assign(kind, atom, expression, _) => {
+                let key = self.world.key(atom, &self.binding)?;
+                let value = self.expression(expression)?;
+                moment.numbers.push((guard.clone(), *kind, key, value));
+                Ok(())
+            }
         }
     }
+}
 
-    /// Adds the only part of a disjunction that can hold; nothing if one holds whatever the state.
-    fn disjunction(&mut self, parts: &[Condition]) -> Result<bool, Unknown> {
-        let mut possible = Vec::new();
-        for part in parts {
-            let meaning = Meaning {
-                truths: self.meaning.truths.clone(),
-                changes: self.meaning.changes.clone(),
-                duration: self.meaning.duration.clone(),
-                ..Meaning::default()
+impl Moment {
+    /// What becomes of atoms where all conditions are decided.
+    fn truths(&self, structure: &Structure, known: &Known) -> BTreeMap<Key, bool> {
+        let active = |guard: &Formula| known.decide(structure, guard) == Some(true);
+        let mut truths = BTreeMap::new();
+        for (guard, key, holds) in &self.atoms {
+            if active(guard) {
+                let own = truths.entry(key.clone()).or_insert(*holds);
+                *own |= *holds;
+            }
+        }
+        truths
+    }
+
+    /// The cases of the end of an instance, after what its start has made.
+    fn last(
+        &self,
+        structure: &Structure,
+        known: Known,
+        applied: &Applied,
+        duration: Option<&BigRational>,
+    ) -> Result<Vec<Case>, Cause> {
+        let mut all = Vec::new();
+        for known in known.split(structure, self.numbers.iter().map(|(guard, ..)| guard))? {
+            for (known, own) in self.numbers(structure, known, applied)? {
+                let mut changes = applied.changes.clone();
+                changes.extend(own);
+                let (truths, effects) = (applied.truths.clone(), self.atoms.clone());
+                all.push(Case { known, truths, effects, changes, duration: duration.cloned() });
+            }
+        }
+        Ok(all)
+    }
+
+    /// What numbers become where the conditions of all their effects are decided; nothing where active effects contradict each
+    /// other or have no value.
+    fn numbers(
+        &self,
+        structure: &Structure,
+        known: Known,
+        applied: &Applied,
+    ) -> Result<Vec<(Known, BTreeMap<Key, Linear>)>, Cause> {
+        let mut by_fluent: BTreeMap<&Key, Vec<(Assignment, &Linear)>> = BTreeMap::new();
+        for (guard, kind, key, value) in &self.numbers {
+            if known.decide(structure, guard) == Some(true) {
+                let Some(value) = value else { return Ok(Vec::new()) };
+                by_fluent.entry(key).or_default().push((*kind, value));
+            }
+        }
+        let mut changes = BTreeMap::new();
+        let mut equations = Vec::new();
+        for (key, effects) in by_fluent {
+            let before = applied.changes.get(key).cloned().unwrap_or_else(|| Linear::fluent(key.clone()));
+            match together(before, &effects, &mut equations)? {
+                Some(after) => changes.insert(key.clone(), after),
+                None => return Ok(Vec::new()),
             };
-            let mut own = Self { binding: self.binding.clone(), meaning, ..*self };
-            if own.require(part)? {
-                let Meaning { positive, negative, comparisons, .. } = own.meaning;
-                if positive.is_empty() && negative.is_empty() && comparisons.is_empty() {
-                    return Ok(true);
-                }
-                possible.push(part);
-            }
         }
-        match possible[..] {
-            [] => Ok(false),
-            [part] => self.require(part),
-            _ => Err("disjunctions".into()),
-        }
+        let equations = known.assume(structure, &Formula::junction(equations, true))?;
+        Ok(equations.into_iter().map(|known| (known, changes.clone())).collect())
     }
+}
 
-    fn equal(&self, left: &crate::pddl::ast::Term, right: &crate::pddl::ast::Term) -> Result<bool, Unknown> {
-        Ok(self.world.object(left, &self.binding)? == self.world.object(right, &self.binding)?)
+/// What effects at one time make of a number; none if they contradict each other. Different values that are assigned to it have to
+/// be equal.
+fn together(
+    before: Linear,
+    effects: &[(Assignment, &Linear)],
+    equations: &mut Vec<Formula>,
+) -> Result<Option<Linear>, Cause> {
+    let way = |kind: Assignment| match kind {
+        Assignment::Assign => 0,
+        Assignment::Increase | Assignment::Decrease => 1,
+        Assignment::ScaleUp | Assignment::ScaleDown => 2,
+    };
+    if effects.windows(2).any(|pair| way(pair[0].0) != way(pair[1].0)) {
+        return Ok(None);
     }
-
-    fn literal(&mut self, key: Key, holds: bool) -> bool {
-        if let Some(known) = self.meaning.truths.get(&key) {
-            return *known == holds;
-        }
-        if !self.world.changes(key.0) {
-            return self.world.holds_initially(&key) == holds;
-        }
-        if holds {
-            self.meaning.positive.insert(key)
-        } else {
-            self.meaning.negative.insert(key)
-        };
-        true
-    }
-
-    fn compare(
-        &mut self,
-        operator: Comparison,
-        left: &Expression,
-        right: &Expression,
-    ) -> Result<bool, Unknown> {
-        let (Some(left), Some(right)) = (self.expression(left)?, self.expression(right)?) else {
-            return Ok(false);
-        };
-        let minus = BigRational::from_integer((-1).into());
-        let difference = left.plus(&right, &minus);
-        let opposite = difference.times(&minus);
-        let all = match operator {
-            Comparison::GreaterOrEqual => vec![(difference, false)],
-            Comparison::Greater => vec![(difference, true)],
-            Comparison::LessOrEqual => vec![(opposite, false)],
-            Comparison::Less => vec![(opposite, true)],
-            Comparison::Equal => vec![(difference, false), (opposite, false)],
-        };
-        for (linear, strict) in all {
-            match linear.value() {
-                Some(value) if value.is_negative() || strict && value.is_zero() => return Ok(false),
-                Some(_) => {}
-                None => self.meaning.comparisons.push((linear, strict)),
-            }
-        }
-        Ok(true)
-    }
-
-    /// The value of an expression after the effects so far; none if it has none.
-    fn expression(&self, expression: &Expression) -> Result<Option<Linear>, Unknown> {
-        let one = BigRational::from_integer(1.into());
-        Ok(match expression {
-            Expression::Number(number, _) => Some(Linear::constant(number.clone())),
-            Expression::Fluent(atom) => {
-                let key = self.world.key(atom, &self.binding)?;
-                match self.meaning.changes.get(&key) {
-                    Some(known) => Some(known.clone()),
-                    None if self.world.changes(key.0) => {
-                        if self.world.initial_value(&key).is_none() && self.world.name(key.0) != "total-cost"
-                        {
-                            return Err("numeric fluents without an initial value".into());
-                        }
-                        Some(Linear::fluent(key))
+    let mut after = before;
+    for (position, (kind, value)) in effects.iter().enumerate() {
+        after = match kind {
+            Assignment::Increase => after.plus(value, &BigRational::from_integer(1.into())),
+            Assignment::Decrease => after.minus(value),
+            Assignment::Assign if position == 0 => (*value).clone(),
+            Assignment::Assign => {
+                let difference = after.clone().minus(value);
+                match difference.value() {
+                    Some(number) if number.is_zero() => {}
+                    Some(_) => return Ok(None),
+                    None => {
+                        equations.push(Formula::Compare(difference.clone(), false));
+                        equations.push(Formula::Compare(difference.negated(), false));
                     }
-                    None => self.world.initial_value(&key).cloned().map(Linear::constant),
+                }
+                after
+            }
+            Assignment::ScaleUp | Assignment::ScaleDown => {
+                let Some(factor) = value.value() else {
+                    return Err(Cause::unsupported("numbers that are scaled by numbers that change"));
+                };
+                match (kind, factor.is_zero()) {
+                    (Assignment::ScaleDown, true) => return Ok(None),
+                    (Assignment::ScaleDown, false) => after.times(&factor.recip()),
+                    _ => after.times(factor),
                 }
             }
-            Expression::Duration(_) => self.meaning.duration.clone().map(Linear::constant),
-            Expression::TotalTime(_) if self.is_metric => Some(Linear::fluent(TOTAL_TIME)),
-            Expression::TotalTime(_) => return Err("total-time outside of the metric".into()),
-            Expression::Operation(operation, parts, _) => {
-                let parts =
-                    parts.iter().map(|part| self.expression(part)).collect::<Result<Option<Vec<_>>, _>>()?;
-                let Some(parts) = parts else { return Ok(None) };
-                let mut parts = parts.into_iter();
-                let Some(first) = parts.next() else { return Err("an operation without operands".into()) };
-                let rest: Vec<Linear> = parts.collect();
-                if *operation == Arithmetic::Subtract && rest.is_empty() {
-                    return Ok(Some(first.times(&-one)));
-                }
-                let mut result = first;
-                for next in rest {
-                    result = match operation {
-                        Arithmetic::Add => result.plus(&next, &one),
-                        Arithmetic::Subtract => result.plus(&next, &-one.clone()),
-                        Arithmetic::Multiply => match (result.value().cloned(), next.value()) {
-                            (_, Some(factor)) => result.times(factor),
-                            (Some(factor), None) => next.times(&factor),
-                            (None, None) => return Err("products of numeric fluents".into()),
-                        },
-                        Arithmetic::Divide => match next.value() {
-                            Some(divisor) if divisor.is_zero() => return Ok(None),
-                            Some(divisor) => result.times(&divisor.recip()),
-                            None => return Err("quotients of numeric fluents".into()),
-                        },
-                    };
-                }
-                Some(result)
-            }
-        })
+        };
     }
-
-    /// Adds effects that take place at one time; `false` if they cannot.
-    fn cause(&mut self, effects: &[&Effect]) -> Result<bool, Unknown> {
-        let (mut adds, mut deletes, mut changes) = (BTreeSet::new(), BTreeSet::new(), BTreeMap::new());
-        let mut open: Vec<&Effect> = effects.to_vec();
-        while let Some(effect) = open.pop() {
-            match effect {
-                Effect::And(parts) => open.extend(parts),
-                Effect::Add(atom) => {
-                    adds.insert(self.world.key(atom, &self.binding)?);
-                }
-                Effect::Delete(atom) => {
-                    deletes.insert(self.world.key(atom, &self.binding)?);
-                }
-                Effect::ForAll(..) | Effect::When(..) => return Err("conditional effects".into()),
-                Effect::Assign(kind, atom, expression, _) => {
-                    let key = self.world.key(atom, &self.binding)?;
-                    let Some(value) = self.expression(expression)? else { return Ok(false) };
-                    let before = || self.meaning.changes.get(&key).cloned();
-                    let before = changes.get(&key).cloned().or_else(before);
-                    let before = before.unwrap_or_else(|| Linear::fluent(key.clone()));
-                    let one = BigRational::from_integer(1.into());
-                    let after = match kind {
-                        Assignment::Increase => before.plus(&value, &one),
-                        Assignment::Decrease => before.plus(&value, &-one),
-                        Assignment::Assign if !changes.contains_key(&key) => value,
-                        _ => return Err("numbers that are scaled, or assigned twice".into()),
-                    };
-                    changes.insert(key, after);
-                }
-            }
-        }
-        // What is both added and deleted holds.
-        self.meaning.truths.extend(deletes.into_iter().map(|key| (key, false)));
-        self.meaning.truths.extend(adds.into_iter().map(|key| (key, true)));
-        self.meaning.changes.extend(changes);
-        Ok(true)
-    }
+    Ok(Some(after))
 }

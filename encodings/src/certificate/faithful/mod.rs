@@ -5,154 +5,257 @@
 //! implies that of the task. Then no plan of the files is cheaper than what the argument says of plans of the task. The
 //! task may allow more than the files, and leave out what does not matter to it.
 //!
-//! All instances of all actions are gone through: [`instances`] enumerates them by joins over what never changes,
-//! [`meaning`] says what each requires and does, and [`compare`] looks for the operator. A variable of the task stands for
-//! atoms of which at most one holds: that is true at first, and every instance keeps it so. Instances that require an atom that is
-//! out of reach, even if nothing is ever deleted, do not count.
+//! All instances of all actions are gone through: `instances` enumerates them by joins over what never changes, `reader` and
+//! `meaning` say what each requires and does, case by case, and `compare` looks for the operator, `effects` at what it does.
+//! `translation` reads the task in terms of the files. A variable of the task stands for
+//! atoms of which at most one holds: that is true at first, and every instance keeps it so. An instance needs no operator if it
+//! changes nothing that the task knows, or if it can never be executed: its conditions contradict what never changes, each other,
+//! the variables, or the witness. The witness (`invariant`) says which atoms may ever hold and which values numbers may have;
+//! that no instance leaves it is checked together with the rest.
 //!
-//! Covered are conjunctions of literals, equality and linear comparisons, and disjunctions of which what never changes leaves one
-//! part; unconditional effects; actions with and
-//! without a fixed duration, one after another; metrics to be minimized. Of everything else this says that it is not
-//! covered. Shared with grounding is the syntax tree and nothing else.
+//! Covered are conditions of all kinds; conditional and universal effects; linear numbers; derived predicates, also recursive ones
+//! that are variables of the task with the same rules; actions with and without a fixed duration, one after another; metrics to be
+//! minimized. Of everything else this says that it is not covered. Shared with grounding is the syntax tree and nothing else.
 //!
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
 
+mod axioms;
 mod compare;
+mod effects;
+mod formula;
+mod happening;
 mod instances;
+mod invariant;
 mod linear;
 mod meaning;
+mod reader;
+mod translation;
+mod verdict;
 mod world;
 
 use num_traits::Zero;
-use rustc_hash::FxHashSet;
 
 use crate::certificate::model::Model;
 use crate::certificate::shape;
 use crate::certificate::write::TASK_FORMAT;
-use crate::pddl::ast::{Domain, Problem};
+use crate::limits::Limits;
+use crate::pddl::ast::{Action, ActionBody, Condition, ConditionTime, Domain, Effect, Problem};
+use axioms::Axioms;
 use compare::Comparison;
-use meaning::Meaning;
+use invariant::{Invariant, Widening};
+use meaning::Case;
+use reader::Reader;
+use translation::{Names, Translation};
+use verdict::Obstacle;
+pub use verdict::{Cause, Difference, Faithful};
 use world::{Key, World};
 
 /// With more instances, nothing is checked.
 const INSTANCE_LIMIT: usize = 400_000;
-/// Of so many instances the meaning is kept once it is known.
-const KEPT: usize = 20_000;
+/// A witness is looked for in at most so many rounds.
+const ROUND_LIMIT: usize = 10_000;
 
-/// What came of the comparison of a task with its files.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Faithful {
-    /// It stands for them.
-    Yes {
-        /// Instances of actions that may be executed.
-        instances: usize,
-        /// Those of them that change nothing that the task knows.
-        idle: usize,
-        /// As [`crate::Task::is_timed`].
-        timed: bool,
-    },
-    /// Something is not covered.
-    Unknown(String),
-    /// The first thing that differs.
-    No(String),
+type Result<T> = std::result::Result<T, Obstacle>;
+
+/// Compares a written task with the files. The witness says what can become of their states.
+pub fn faithful(domain: &Domain, problem: &Problem, task: &str, witness: &str, limits: &Limits) -> Faithful {
+    let compared = read(task).and_then(|model| {
+        let files = Files::new(domain, problem, &model, limits)?;
+        files.compare(witness)
+    });
+    match compared {
+        Ok(verdict) => verdict,
+        Err(obstacle) => verdict(obstacle),
+    }
 }
 
-/// Why there is no answer yet.
-pub(super) enum Obstacle {
-    /// Not covered.
-    Unknown(String),
-    /// Wrong.
-    Wrong(String),
+/// Makes the witness for a written task.
+///
+/// # Errors
+/// What [`faithful`] would say: that the task is none, or that something is not covered.
+pub fn witness(
+    domain: &Domain,
+    problem: &Problem,
+    task: &str,
+    limits: &Limits,
+) -> std::result::Result<String, Faithful> {
+    let made = read(task).and_then(|model| Files::new(domain, problem, &model, limits)?.witness());
+    made.map_err(verdict)
 }
 
-/// Compares a written task with the files.
-pub fn faithful(domain: &Domain, problem: &Problem, task: &str) -> Faithful {
-    let model: Model = match serde_json::from_str(task) {
-        Ok(model) => model,
-        Err(error) => return Faithful::No(error.to_string()),
-    };
-    let formed = model.format == TASK_FORMAT;
-    if let Err(reason) =
-        shape::task(&model).and_then(|()| formed.then_some(()).ok_or("another format".into()))
-    {
-        return Faithful::No(reason);
+fn verdict(obstacle: Obstacle) -> Faithful {
+    match obstacle {
+        Obstacle::Differs(difference) => Faithful::No(difference),
+        Obstacle::Open(cause) => Faithful::Undecided(cause),
     }
-    match simulates(domain, problem, &model) {
-        Ok((instances, idle, timed)) => Faithful::Yes { instances, idle, timed },
-        Err(Obstacle::Unknown(reason)) => Faithful::Unknown(reason),
-        Err(Obstacle::Wrong(reason)) => Faithful::No(reason),
+}
+
+fn read(task: &str) -> Result<Model> {
+    let form = |reason: String| Obstacle::Differs(Difference::Form { reason });
+    let mut model: Model = serde_json::from_str(task).map_err(|error| form(error.to_string()))?;
+    if model.format != TASK_FORMAT {
+        return Err(form(format!("format `{}`, where `{TASK_FORMAT}` is expected", model.format)));
     }
+    shape::task(&mut model).map_err(form)?;
+    Ok(model)
 }
 
 /// An instance: the action, and its arguments as objects.
 struct Instance {
     action: usize,
     arguments: Vec<u32>,
+    /// Atoms without which it cannot be executed.
     requires: Vec<Key>,
-    adds: Vec<Key>,
-    takes_time: bool,
-    /// Worked out again where there are many instances.
-    meaning: Option<Meaning>,
 }
 
-fn simulates(domain: &Domain, problem: &Problem, model: &Model) -> Result<(usize, usize, bool), Obstacle> {
-    let world = World::new(domain, problem).map_err(Obstacle::Unknown)?;
-    let comparison = Comparison::new(&world, model)?;
-    let mut all = Vec::new();
-    for (action, schema) in domain.actions.iter().enumerate() {
-        for arguments in instances::of(&world, schema).map_err(Obstacle::Unknown)? {
-            if let Some(meaning) = Meaning::of(&world, schema, &arguments).map_err(Obstacle::Unknown)? {
-                let adds = meaning.truths.iter().filter(|(_, holds)| **holds).map(|(key, _)| key.clone());
-                let (adds, requires) = (adds.collect(), meaning.positive.iter().cloned().collect());
-                let takes_time = meaning.duration.as_ref().is_some_and(|duration| !duration.is_zero());
-                let meaning = (all.len() < KEPT).then_some(meaning);
-                all.push(Instance { action, arguments, requires, adds, takes_time, meaning });
+/// The files, with the names that the task has for what is in them.
+struct Files<'f> {
+    domain: &'f Domain,
+    world: World<'f>,
+    model: &'f Model,
+    names: Names,
+    instances: Vec<Instance>,
+    limits: &'f Limits,
+}
+
+impl<'f> Files<'f> {
+    fn new(domain: &'f Domain, problem: &'f Problem, model: &'f Model, limits: &'f Limits) -> Result<Self> {
+        let world = World::new(domain, problem)?;
+        let names = Names::new(&world, model)?;
+        let mut all = Vec::new();
+        for (action, schema) in domain.actions.iter().enumerate() {
+            for arguments in instances::of(&world, schema, limits)? {
+                let requires = requires(&world, schema, &arguments)?;
+                all.push(Instance { action, arguments, requires });
             }
             if all.len() > INSTANCE_LIMIT {
-                return Err(Obstacle::Unknown(format!("more than {INSTANCE_LIMIT} instances of actions")));
+                return Err(instances::too_many("actions").into());
             }
         }
+        Ok(Self { domain, world, model, names, instances: all, limits })
     }
-    let reached = reach(&world, &mut all);
-    // Without a metric, this is what says what plans are measured by.
-    if problem.metric.is_none() && comparison.timed != all.iter().any(|instance| instance.takes_time) {
-        return Err(Obstacle::Unknown("whether plans are measured by time or by length".into()));
+
+    fn stopped(&self) -> std::result::Result<(), Cause> {
+        if self.limits.reached() { Err(Cause::Stopped) } else { Ok(()) }
     }
-    comparison.initial()?;
-    comparison.goal(&reached)?;
-    let mut idle = 0;
-    for Instance { action, arguments, meaning, .. } in &mut all {
-        let schema = &domain.actions[*action];
-        let meaning = match meaning.take() {
-            Some(kept) => Some(kept),
-            None => Meaning::of(&world, schema, arguments).map_err(Obstacle::Unknown)?,
-        };
-        if let Some(meaning) = meaning {
-            idle += usize::from(!comparison.instance(schema, arguments, &meaning)?);
+
+    /// The cases in which an instance can be executed in states of the witness.
+    fn cases(&self, instance: &Instance, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Case>> {
+        self.stopped()?;
+        if instance.requires.iter().any(|key| !invariant.may_hold(key)) {
+            return Ok(Vec::new());
         }
+        let schema = &self.domain.actions[instance.action];
+        let mut reader = Reader::new(&self.world, invariant, axioms);
+        let names = schema.parameters.iter().map(|parameter| &parameter.identifier.name);
+        reader.binding = names.zip(instance.arguments.iter().copied()).collect();
+        Ok(meaning::cases(reader, &self.names.structure, schema)?)
     }
-    Ok((all.len(), idle, comparison.timed))
+
+    fn witness(&self) -> Result<String> {
+        let mut widening = Widening::new(&self.world);
+        let plain: Vec<bool> = self.domain.actions.iter().map(is_plain).collect();
+        // An instance that always does the same need not be looked at again.
+        let mut open: Vec<&Instance> = self.instances.iter().collect();
+        for _ in 0..ROUND_LIMIT {
+            let axioms = Axioms::new(&self.world, &widening.invariant, &self.names.linked)?;
+            // What is known of derived atoms is about the invariant as it is now.
+            let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
+            let (mut news, mut next) = (false, Vec::new());
+            for instance in open {
+                let invariant = frozen.as_ref().unwrap_or(&widening.invariant);
+                let cases = self.cases(instance, invariant, &axioms)?;
+                for case in &cases {
+                    news |= widening.include(&self.names.structure, case);
+                }
+                if cases.is_empty() || !plain[instance.action] {
+                    next.push(instance);
+                }
+            }
+            open = next;
+            if !news {
+                return Ok(widening.invariant.write(&self.world));
+            }
+        }
+        Err(invariant::too_many_rounds(ROUND_LIMIT).into())
+    }
+
+    fn compare(&self, witness: &str) -> Result<Faithful> {
+        let invariant = Invariant::read(&self.world, witness)?;
+        let axioms = Axioms::new(&self.world, &invariant, &self.names.linked)?;
+        let task = Translation::new(&self.world, self.model, &self.names, &invariant, &axioms)?;
+        let timed = self.world.problem.metric.is_none() && self.takes_time(&invariant, &axioms)?;
+        let comparison = Comparison::new(&task, timed)?;
+        comparison.initial()?;
+        comparison.goal()?;
+        comparison.rules()?;
+        let (mut instances, mut idle) = (0, 0);
+        for instance in &self.instances {
+            let cases = self.cases(instance, &invariant, &axioms)?;
+            instances += usize::from(!cases.is_empty());
+            let mut changes = false;
+            for case in &cases {
+                invariant.admits(&self.world, &self.names.structure, case)?;
+                let schema = &self.domain.actions[instance.action];
+                changes |= comparison.case(schema, &instance.arguments, case)?;
+            }
+            idle += usize::from(!cases.is_empty() && !changes);
+        }
+        Ok(Faithful::Yes { instances, idle, timed })
+    }
+
+    /// Whether an instance that can be executed has a duration other than 0.
+    fn takes_time(&self, invariant: &Invariant, axioms: &Axioms) -> Result<bool> {
+        for instance in &self.instances {
+            if matches!(self.domain.actions[instance.action].body, ActionBody::Durative { .. }) {
+                let cases = self.cases(instance, invariant, axioms)?;
+                if cases.iter().any(|case| case.duration.as_ref().is_some_and(|length| !length.is_zero())) {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
 }
 
-/// The atoms that may ever hold if nothing is deleted; instances that need others are dropped.
-fn reach(world: &World<'_>, all: &mut Vec<Instance>) -> FxHashSet<Key> {
-    let mut reached: FxHashSet<Key> = world.initial_atoms().collect();
-    let mut open: Vec<usize> = (0..all.len()).collect();
-    loop {
-        let before = open.len();
-        open.retain(|at| {
-            let instance = &all[*at];
-            let enabled = instance.requires.iter().all(|key| reached.contains(key));
-            if enabled {
-                reached.extend(instance.adds.iter().cloned());
-            }
-            !enabled
-        });
-        if open.len() == before {
-            break;
+/// Whether an action does the same wherever it can be executed.
+fn is_plain(action: &Action) -> bool {
+    fn plain(effect: &Effect) -> bool {
+        match effect {
+            Effect::And(parts) => parts.iter().all(plain),
+            Effect::ForAll(_, inner) => plain(inner),
+            Effect::Add(_) | Effect::Delete(_) => true,
+            Effect::When(..) | Effect::Assign(..) => false,
         }
     }
-    all.retain(|instance| instance.requires.iter().all(|key| reached.contains(key)));
-    reached
+    match &action.body {
+        ActionBody::Instantaneous { effect, .. } => plain(effect),
+        ActionBody::Durative { effects, .. } => effects.iter().all(|(_, effect)| plain(effect)),
+    }
+}
+
+/// The atoms among the conjuncts of what an instance requires at first, as far as actions change them.
+fn requires(world: &World<'_>, action: &Action, arguments: &[u32]) -> std::result::Result<Vec<Key>, Cause> {
+    let mut atoms = Vec::new();
+    match &action.body {
+        ActionBody::Instantaneous { precondition, .. } => instances::conjuncts(precondition, &mut atoms),
+        ActionBody::Durative { conditions, .. } => {
+            let start: Vec<&Condition> = conditions
+                .iter()
+                .filter(|(time, _)| *time == ConditionTime::AtStart)
+                .map(|(_, condition)| condition)
+                .collect();
+            start.into_iter().for_each(|condition| instances::conjuncts(condition, &mut atoms));
+        }
+    }
+    let names = action.parameters.iter().map(|parameter| &parameter.identifier.name);
+    let binding = names.zip(arguments.iter().copied()).collect();
+    let mut keys = Vec::new();
+    for atom in atoms {
+        let key = world.key(atom, &binding)?;
+        if world.changes(key.0) {
+            keys.push(key);
+        }
+    }
+    Ok(keys)
 }

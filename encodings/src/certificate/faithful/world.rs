@@ -1,10 +1,11 @@
-//! Objects, what holds at first, and what never changes.
+//! Objects, what holds at first, what never changes, and what follows from the rest.
 
 use num_rational::BigRational;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::certificate::faithful::verdict::Cause;
 use crate::pddl::ast::{
-    ActionBody, Atom, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
+    ActionBody, Atom, Derived, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
 };
 use crate::pddl::types::TypeHierarchy;
 
@@ -26,13 +27,12 @@ pub(super) struct World<'w> {
     values: FxHashMap<Key, BigRational>,
     /// Predicates and functions that some action changes.
     changing: FxHashSet<u32>,
+    /// The rules of derived predicates.
+    rules: FxHashMap<u32, Vec<&'w Derived>>,
 }
 
 impl<'w> World<'w> {
-    pub(super) fn new(domain: &'w Domain, problem: &'w Problem) -> Result<Self, String> {
-        if !domain.derived.is_empty() {
-            return Err("derived predicates".to_owned());
-        }
+    pub(super) fn new(domain: &'w Domain, problem: &'w Problem) -> Result<Self, Cause> {
         let mut world = Self {
             problem,
             types: TypeHierarchy::of(domain),
@@ -45,6 +45,7 @@ impl<'w> World<'w> {
             rows_with: FxHashMap::default(),
             values: FxHashMap::default(),
             changing: FxHashSet::default(),
+            rules: FxHashMap::default(),
         };
         for declaration in domain.predicates.iter().chain(&domain.functions) {
             world.intern(&declaration.identifier.name);
@@ -66,8 +67,15 @@ impl<'w> World<'w> {
                 }
             }
         }
+        for rule in &domain.derived {
+            let symbol = world.symbol(&rule.head.identifier.name)?;
+            world.rules.entry(symbol).or_default().push(rule);
+        }
         for element in &problem.init {
             world.state(element)?;
+        }
+        if world.facts.iter().any(|fact| world.rules.contains_key(&fact.0)) {
+            return Err(Cause::unsupported("derived predicates that hold at first by themselves"));
         }
         Ok(world)
     }
@@ -82,7 +90,7 @@ impl<'w> World<'w> {
         symbol
     }
 
-    fn note_changes(&mut self, effect: &Effect) -> Result<(), String> {
+    fn note_changes(&mut self, effect: &Effect) -> Result<(), Cause> {
         match effect {
             Effect::And(parts) => parts.iter().try_for_each(|part| self.note_changes(part)),
             Effect::Add(atom) | Effect::Delete(atom) | Effect::Assign(_, atom, ..) => {
@@ -90,12 +98,11 @@ impl<'w> World<'w> {
                 self.changing.insert(symbol);
                 Ok(())
             }
-            Effect::ForAll(..) => Err("universal effects".to_owned()),
-            Effect::When(..) => Err("conditional effects".to_owned()),
+            Effect::ForAll(_, inner) | Effect::When(_, inner) => self.note_changes(inner),
         }
     }
 
-    fn state(&mut self, element: &InitialElement) -> Result<(), String> {
+    fn state(&mut self, element: &InitialElement) -> Result<(), Cause> {
         match element {
             InitialElement::Fact(atom) => {
                 let key = self.key(atom, &FxHashMap::default())?;
@@ -112,27 +119,30 @@ impl<'w> World<'w> {
                 let key = self.key(atom, &FxHashMap::default())?;
                 self.values.insert(key, value.clone());
             }
-            InitialElement::Timed(..) => return Err("timed initial literals".to_owned()),
+            InitialElement::Timed(..) => return Err(Cause::unsupported("timed initial literals")),
         }
         Ok(())
     }
 
-    pub(super) fn symbol(&self, name: &Name) -> Result<u32, String> {
-        self.symbols.get(name).copied().ok_or_else(|| format!("{name}, which is declared nowhere"))
+    pub(super) fn symbol(&self, name: &Name) -> Result<u32, Cause> {
+        self.symbols
+            .get(name)
+            .copied()
+            .ok_or_else(|| Cause::unsupported(format!("{name}, which is declared nowhere")))
     }
 
     /// The object that a term stands for.
-    pub(super) fn object(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Result<u32, String> {
+    pub(super) fn object(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Result<u32, Cause> {
         match term {
             Term::Variable(identifier) => binding
                 .get(&identifier.name)
                 .copied()
-                .ok_or_else(|| format!("{}, which is free", identifier.name)),
+                .ok_or_else(|| Cause::unsupported(format!("{}, which is free", identifier.name))),
             Term::Constant(identifier) => self.symbol(&identifier.name),
         }
     }
 
-    pub(super) fn key(&self, atom: &Atom, binding: &FxHashMap<&Name, u32>) -> Result<Key, String> {
+    pub(super) fn key(&self, atom: &Atom, binding: &FxHashMap<&Name, u32>) -> Result<Key, Cause> {
         let objects = atom.arguments.iter().map(|term| self.object(term, binding));
         Ok((self.symbol(&atom.predicate.name)?, objects.collect::<Result<_, _>>()?))
     }
@@ -148,8 +158,31 @@ impl<'w> World<'w> {
         self.names.get(symbol as usize).map_or("?", Name::as_str)
     }
 
+    /// The atom or fluent that is written so; none if no symbols of the files are.
+    pub(super) fn written(&self, text: &str) -> Option<Key> {
+        let inner = text.strip_prefix('(')?.strip_suffix(')')?;
+        let mut words =
+            inner.split_ascii_whitespace().map(|word| self.symbols.get(&Name::new(word)).copied());
+        Some((words.next()??, words.collect::<Option<_>>()?))
+    }
+
+    /// Whether actions change it; what follows from the rest does not count.
     pub(super) fn changes(&self, symbol: u32) -> bool {
         self.changing.contains(&symbol)
+    }
+
+    /// The rules of a derived predicate.
+    pub(super) fn rules(&self, symbol: u32) -> Option<&[&'w Derived]> {
+        self.rules.get(&symbol).map(Vec::as_slice)
+    }
+
+    pub(super) fn is_derived(&self, atom: &Atom) -> bool {
+        !self.rules.is_empty()
+            && self.symbol(&atom.predicate.name).is_ok_and(|own| self.rules.contains_key(&own))
+    }
+
+    pub(super) fn derived(&self) -> impl Iterator<Item = (u32, &[&'w Derived])> {
+        self.rules.iter().map(|(symbol, rules)| (*symbol, rules.as_slice()))
     }
 
     pub(super) fn holds_initially(&self, key: &Key) -> bool {
@@ -158,6 +191,10 @@ impl<'w> World<'w> {
 
     pub(super) fn initial_atoms(&self) -> impl Iterator<Item = Key> + '_ {
         self.facts.iter().cloned()
+    }
+
+    pub(super) fn initial_values(&self) -> impl Iterator<Item = (&Key, &BigRational)> {
+        self.values.iter()
     }
 
     pub(super) fn initial_value(&self, key: &Key) -> Option<&BigRational> {

@@ -1,0 +1,198 @@
+//! What a case of an instance makes of the variables and numbers of the task, against what an operator makes of them.
+
+use std::collections::BTreeSet;
+
+use crate::certificate::faithful::formula::{Formula, Known};
+use crate::certificate::faithful::linear::Linear;
+use crate::certificate::faithful::meaning::Case;
+use crate::certificate::faithful::translation::Translation;
+use crate::certificate::faithful::world::Key;
+use crate::certificate::model::Operator;
+
+/// A variable is looked at in at most so many cases.
+const SPLIT_LIMIT: usize = 1_024;
+
+/// An operator with a choice of designs.
+#[derive(Clone, Copy)]
+pub(super) struct Made<'m> {
+    pub(super) operator: &'m Operator,
+    pub(super) choice: &'m [u32],
+}
+
+/// Compares a case with an operator, or with nothing that happens. An error is the first variable or number that differs.
+pub(super) fn compare(
+    task: &Translation<'_>,
+    case: &Case,
+    known: &Known,
+    made: Option<Made<'_>>,
+) -> Result<(), String> {
+    numbers(task, case, made)?;
+    let touched = case.truths.keys().chain(case.effects.iter().map(|(_, key, _)| key));
+    let touched = touched.filter_map(|key| Some(task.names.fact(key)?.0));
+    let mut variables: BTreeSet<u32> = touched.collect();
+    if let Some(Made { operator, .. }) = made {
+        let conditional = operator.conditional.iter().flat_map(|conditional| &conditional.effects);
+        variables.extend(operator.effects.iter().chain(conditional).map(|fact| fact.0));
+    }
+    for variable in variables {
+        let own = Variable::new(task, case, made.map(|made| made.operator), variable);
+        if !own.agrees(known) {
+            return Err(task.model.variables[variable as usize].join(" or "));
+        }
+    }
+    Ok(())
+}
+
+fn numbers(task: &Translation<'_>, case: &Case, made: Option<Made<'_>>) -> Result<(), String> {
+    for (number, key) in (0..).zip(&task.names.fluents) {
+        let same = || task.invariant.settled(&Linear::fluent(key.clone()));
+        let expected = case.changes.get(key).map_or_else(same, |after| task.invariant.settled(after));
+        let found = made.and_then(|Made { operator, choice }| {
+            let (_, value) = operator.changes.iter().find(|(own, _)| *own == number)?;
+            Some(task.value(value, choice, &task.model.sizes(operator)))
+        });
+        if found.unwrap_or_else(same) != expected {
+            return Err(task.world.show(key));
+        }
+    }
+    Ok(())
+}
+
+/// What becomes of one variable.
+struct Variable<'v> {
+    task: &'v Translation<'v>,
+    variable: u32,
+    case: &'v Case,
+    /// What the end of the case does to its atoms.
+    effects: Vec<&'v (Formula, Key, bool)>,
+    /// What the operator makes of it, and under which conditions, in order.
+    certain: Option<u32>,
+    conditional: Vec<(Formula, u32)>,
+}
+
+/// What is found where not everything is decided.
+enum Outcome<'o> {
+    Same,
+    Other,
+    /// It depends on this.
+    Open(Formula),
+    OpenPart(&'o Formula),
+}
+
+/// What a variable becomes; none if it stays what it is.
+type Value = Option<u32>;
+
+impl<'v> Variable<'v> {
+    fn new(task: &'v Translation<'v>, case: &'v Case, operator: Option<&'v Operator>, variable: u32) -> Self {
+        let is_own = |key: &Key| task.names.fact(key).is_some_and(|fact| fact.0 == variable);
+        let effects = case.effects.iter().filter(|(_, key, _)| is_own(key)).collect();
+        let own =
+            |facts: &[(u32, u32)]| facts.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
+        let conditional = operator.into_iter().flat_map(|operator| &operator.conditional);
+        let conditional = conditional
+            .filter_map(|effect| Some((task.literals(&effect.condition, true), own(&effect.effects)?)))
+            .collect();
+        let certain = operator.and_then(|operator| own(&operator.effects));
+        Self { task, variable, case, effects, certain, conditional }
+    }
+
+    /// Whether both make the same of it wherever this is known.
+    fn agrees(&self, known: &Known) -> bool {
+        let structure = &self.task.names.structure;
+        let mut open = vec![known.clone()];
+        for _ in 0..SPLIT_LIMIT {
+            let Some(known) = open.pop() else { return true };
+            let outcome = self.outcome(&known);
+            let leaf = match &outcome {
+                Outcome::Same => continue,
+                Outcome::Other => return false,
+                Outcome::Open(leaf) => leaf,
+                Outcome::OpenPart(leaf) => leaf,
+            };
+            let Ok(cases) = known.split(structure, std::iter::once(leaf)) else { return false };
+            open.extend(cases);
+        }
+        open.is_empty()
+    }
+
+    fn outcome(&self, known: &Known) -> Outcome<'_> {
+        let structure = &self.task.names.structure;
+        let guards = self.effects.iter().map(|(guard, ..)| guard);
+        for guard in guards.chain(self.conditional.iter().map(|(guard, _)| guard)) {
+            if let Some(leaf) = known.open(structure, guard, &|_| true) {
+                return Outcome::OpenPart(leaf);
+            }
+        }
+        let holds = |guard: &Formula| known.decide(structure, guard) == Some(true);
+        let last = self.conditional.iter().rev().find(|(guard, _)| holds(guard)).map(|(_, value)| *value);
+        let found: Value = last.or(self.certain);
+        let current = self.current(known);
+        let expected = match self.expected(known, current) {
+            Ok(expected) => expected,
+            Err(outcome) => return outcome,
+        };
+        if expected == found {
+            return Outcome::Same;
+        }
+        if let Some(current) = current {
+            let same = expected.unwrap_or(current) == found.unwrap_or(current);
+            return if same { Outcome::Same } else { Outcome::Other };
+        }
+        self.task
+            .names
+            .atoms(self.variable)
+            .find(|(_, key)| self.may_hold(known, key))
+            .map_or(Outcome::Other, |(_, key)| Outcome::Open(Formula::Atom(key.clone(), true)))
+    }
+
+    fn may_hold(&self, known: &Known, key: &Key) -> bool {
+        self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
+    }
+
+    /// The value before, if it is known.
+    fn current(&self, known: &Known) -> Value {
+        let structure = &self.task.names.structure;
+        let mut atoms = self.task.names.atoms(self.variable).filter(|(_, key)| self.may_hold(known, key));
+        match atoms.next() {
+            None => Some(self.task.model.variables[self.variable as usize].len() as u32 - 1),
+            Some((value, key)) if known.atom(structure, key) == Some(true) => Some(value),
+            // Where one is known to hold, the others are known not to.
+            Some(_) => None,
+        }
+    }
+
+    /// What the files make of it; of its atoms at most one may hold then.
+    fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
+        let structure = &self.task.names.structure;
+        let after = |key: &Key| {
+            let own = self.effects.iter().filter(|(_, own, _)| own == key);
+            let mut active =
+                own.filter(|(guard, ..)| known.decide(structure, guard) == Some(true)).peekable();
+            match active.peek() {
+                Some(_) => Some(active.any(|(_, _, holds)| *holds)),
+                None => self.case.truths.get(key).copied(),
+            }
+        };
+        let none = self.task.model.variables[self.variable as usize].len() as u32 - 1;
+        let (mut added, mut remaining, mut deleted) = (Vec::new(), Vec::new(), None);
+        for (value, key) in self.task.names.atoms(self.variable) {
+            match after(key) {
+                Some(true) => added.push(value),
+                Some(false) if self.may_hold(known, key) => deleted = Some(key),
+                None if self.may_hold(known, key) => remaining.push(value),
+                _ => {}
+            }
+        }
+        match (&added[..], &remaining[..]) {
+            ([], []) => Ok(Some(none)),
+            ([], _) if deleted.is_none() => Ok(None),
+            ([], _) => match (current, deleted) {
+                (None, Some(key)) => Err(Outcome::Open(Formula::Atom(key.clone(), true))),
+                // It is one that is not deleted.
+                _ => Ok(None),
+            },
+            ([value], []) => Ok(Some(*value)),
+            _ => Err(Outcome::Other),
+        }
+    }
+}

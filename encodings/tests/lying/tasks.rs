@@ -1,0 +1,174 @@
+//! Small tasks with their least costs, worked out by hand.
+
+pub struct Example {
+    pub name: &'static str,
+    pub domain: &'static str,
+    pub problem: &'static str,
+    /// None if there is no plan.
+    pub optimum: Option<&'static str>,
+}
+
+pub const TASKS: &[Example] = &[
+    // a to c directly costs 5, by b 2 + 2.
+    Example {
+        name: "ways",
+        domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (far ?a ?b) (total-cost))
+          (:action go :parameters (?a ?b) :precondition (and (at ?a) (way ?a ?b))
+            :effect (and (at ?b) (not (at ?a)) (increase (total-cost) (far ?a ?b)))))",
+        problem: "(define (problem p) (:domain d) (:objects a b c)
+          (:init (at a) (way a b) (way b c) (way a c) (way c a)
+            (= (far a b) 2) (= (far b c) 2) (= (far a c) 5) (= (far c a) 1) (= (total-cost) 0))
+          (:goal (at c)) (:metric minimize (total-cost)))",
+        optimum: Some("4"),
+    },
+    // The way that costs 4 takes 6 of the battery, so that it has to be filled for 3 before.
+    Example {
+        name: "battery",
+        domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (battery) (use ?a ?b) (total-cost))
+          (:action go :parameters (?a ?b)
+            :precondition (and (at ?a) (way ?a ?b) (>= (battery) (use ?a ?b)))
+            :effect (and (at ?b) (not (at ?a)) (decrease (battery) (use ?a ?b)) (increase (total-cost) 2)))
+          (:action fill :parameters () :precondition (<= (battery) 5)
+            :effect (and (assign (battery) 6.5) (increase (total-cost) 3))))",
+        problem: "(define (problem p) (:domain d) (:objects a b c)
+          (:init (at a) (way a b) (way b c) (way c a) (= (battery) 5) (= (use a b) 2.5) (= (use b c) 3.5)
+            (= (use c a) 9) (= (total-cost) 0))
+          (:goal (at c)) (:metric minimize (total-cost)))",
+        optimum: Some("7"),
+    },
+    // `lift` takes 4, and needs the hand in between; `carry` takes 2 and puts it down for ever.
+    Example {
+        name: "durative",
+        domain: "(define (domain d) (:predicates (free) (up) (done) (sure))
+          (:durative-action lift :parameters () :duration (= ?duration 4)
+            :condition (and (at start (free)) (over all (sure)) (at end (not (free))))
+            :effect (and (at start (not (free))) (at end (free)) (at end (up))))
+          (:durative-action carry :parameters () :duration (= ?duration 2.5)
+            :condition (and (at start (up)) (at start (free)))
+            :effect (and (at start (not (free))) (at end (done)) (at start (not (sure))))))",
+        problem: "(define (problem p) (:domain d) (:init (free) (sure)) (:goal (and (done) (up))))",
+        optimum: Some("13/2"),
+    },
+    // A lamp is switched by one action, and a second effect depends on what was before.
+    Example {
+        name: "switch",
+        domain: "(define (domain d) (:types lamp) (:predicates (on ?l - lamp) (seen ?l - lamp) (dark))
+          (:action press :parameters (?l - lamp) :precondition ()
+            :effect (and (when (on ?l) (and (not (on ?l)) (dark))) (when (not (on ?l)) (on ?l))))
+          (:action look :parameters () :precondition (not (dark))
+            :effect (forall (?l - lamp) (when (on ?l) (seen ?l))))
+          (:action wake :parameters () :precondition () :effect (not (dark))))",
+        problem: "(define (problem p) (:domain d) (:objects x y - lamp) (:init (on x) (dark))
+          (:goal (and (seen x) (seen y) (not (on x)))))",
+        optimum: Some("4"),
+    },
+    // Numbers under conditions: the second stroke counts double once the first has been made.
+    Example {
+        name: "strokes",
+        domain: "(define (domain d) (:predicates (warm) (p)) (:functions (work) (total-cost))
+          (:action strike :parameters () :precondition (<= (work) 20)
+            :effect (and (when (warm) (increase (work) 4)) (when (not (warm)) (increase (work) 1)) (warm)
+              (increase (total-cost) 3)))
+          (:action rest :parameters () :precondition () :effect (and (not (warm)) (increase (total-cost) 1))))",
+        problem: "(define (problem p) (:domain d) (:init (= (work) 0) (= (total-cost) 0)) (:goal (>= (work) 9))
+          (:metric minimize (total-cost)))",
+        optimum: Some("9"),
+    },
+    // The door opens with one of two keys, or if nobody is at home.
+    Example {
+        name: "door",
+        domain: "(define (domain d) (:types key room) (:predicates (have ?k - key) (fits ?k - key) (home ?r - room) (in))
+          (:action fetch :parameters (?k - key) :precondition (not (have ?k)) :effect (have ?k))
+          (:action leave :parameters (?r - room) :precondition (home ?r) :effect (not (home ?r)))
+          (:action enter :parameters ()
+            :precondition (or (exists (?k - key) (and (have ?k) (fits ?k))) (forall (?r - room) (not (home ?r))))
+            :effect (in))
+          (:action lock :parameters () :precondition (imply (in) (exists (?r - room) (home ?r))) :effect (not (in))))",
+        problem: "(define (problem p) (:domain d) (:objects k1 k2 k3 - key r1 r2 r3 - room)
+          (:init (fits k2) (fits k3) (home r1) (home r2) (home r3)) (:goal (in)))",
+        optimum: Some("2"),
+    },
+    // A switch joins two lines; what is reached follows from what is joined.
+    Example {
+        name: "lines",
+        domain: "(define (domain d) (:constants b c d) (:predicates (line ?a ?b) (joined ?a ?b) (live ?a) (source ?a) (safe))
+          (:derived (live ?a) (or (source ?a) (exists (?b) (and (live ?b) (joined ?b ?a)))))
+          (:derived (safe) (not (live b)))
+          (:action join :parameters (?a ?b) :precondition (and (line ?a ?b) (not (joined ?a ?b)))
+            :effect (joined ?a ?b))
+          (:action cut :parameters (?a ?b) :precondition (joined ?a ?b) :effect (not (joined ?a ?b)))
+          (:action ring :parameters () :precondition (live c) :effect (source d)))",
+        problem: "(define (problem p) (:domain d) (:objects a e)
+          (:init (line a b) (line b c) (line a e) (line e c) (source a) (joined a b)) (:goal (and (safe) (source d))))",
+        optimum: Some("3"),
+    },
+    // Lines that go round: what is live depends on itself.
+    Example {
+        name: "ring",
+        domain: "(define (domain d) (:predicates (joined ?a ?b) (live ?a) (source ?a) (lit ?a))
+          (:derived (live ?a) (or (source ?a) (exists (?b) (and (joined ?b ?a) (live ?b)))))
+          (:action join :parameters (?a ?b) :precondition (and (not (= ?a ?b)) (not (joined ?a ?b)))
+            :effect (joined ?a ?b))
+          (:action end :parameters (?a) :precondition (source ?a) :effect (not (source ?a)))
+          (:action light :parameters (?a) :precondition (live ?a) :effect (lit ?a))
+          (:action move :parameters (?a ?b) :precondition (and (joined ?a ?b) (not (live ?a)))
+            :effect (and (source ?b) (not (joined ?a ?b)))))",
+        problem: "(define (problem p) (:domain d) (:objects a b c) (:init (source a) (joined a b))
+          (:goal (and (lit c) (not (live a)) (live b))))",
+        optimum: Some("4"),
+    },
+    // At the start one of two things happens, and the end depends on which.
+    Example {
+        name: "start",
+        domain: "(define (domain d) (:predicates (wet) (dry) (tried) (won))
+          (:durative-action try :parameters () :duration (= ?duration 3)
+            :condition (and (at start (not (won))) (at end (dry)))
+            :effect (and (at start (when (wet) (not (dry)))) (at start (when (not (wet)) (dry))) (at end (won))
+              (at start (tried))))
+          (:durative-action wipe :parameters () :duration (= ?duration 2) :condition (at start (wet))
+            :effect (at end (not (wet)))))",
+        problem: "(define (problem p) (:domain d) (:init (wet) (dry)) (:goal (and (won) (tried))))",
+        optimum: Some("5"),
+    },
+    // Numbers are too small for one of the actions, whatever is done.
+    Example {
+        name: "bounds",
+        domain: "(define (domain d) (:predicates (p) (q)) (:functions (level) (total-cost))
+          (:action jump :parameters () :precondition (>= (level) 10)
+            :effect (and (q) (increase (total-cost) 1)))
+          (:action climb :parameters () :precondition (<= (level) 6)
+            :effect (and (increase (level) 2) (increase (total-cost) 2)))
+          (:action walk :parameters () :precondition (>= (level) 7)
+            :effect (and (q) (increase (total-cost) 9))))",
+        problem: "(define (problem p) (:domain d) (:init (= (level) 1) (= (total-cost) 0)) (:goal (q))
+          (:metric minimize (total-cost)))",
+        optimum: Some("15"),
+    },
+    // Nothing makes (at c) true, and numbers are out of reach.
+    Example {
+        name: "island",
+        domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b))
+          (:action go :parameters (?a ?b) :precondition (and (at ?a) (way ?a ?b))
+            :effect (and (at ?b) (not (at ?a)))))",
+        problem: "(define (problem p) (:domain d) (:objects a b c) (:init (at a) (way a b) (way b a) (way c a))
+          (:goal (at c)))",
+        optimum: None,
+    },
+    Example {
+        name: "shallow",
+        domain: "(define (domain d) (:predicates (q)) (:functions (level))
+          (:action climb :parameters () :precondition (< (level) 3) :effect (increase (level) 1))
+          (:action jump :parameters () :precondition (>= (level) 4) :effect (q)))",
+        problem: "(define (problem p) (:domain d) (:init (= (level) 0)) (:goal (q)))",
+        optimum: None,
+    },
+    Example {
+        name: "both",
+        domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b))
+          (:action go :parameters (?a ?b) :precondition (and (at ?a) (way ?a ?b))
+            :effect (and (at ?b) (not (at ?a)))))",
+        problem: "(define (problem p) (:domain d) (:objects a b) (:init (at a) (way a b) (way b a))
+          (:goal (and (at a) (at b))))",
+        optimum: None,
+    },
+];
