@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::number::Int;
+use crate::number::TaskNumber;
 use crate::quantity::Quantity;
 use crate::task::{Operator, OperatorId, State, Task};
 
@@ -13,12 +13,12 @@ pub(crate) struct OperatorIndex {
 }
 
 impl OperatorIndex {
-    pub(crate) fn new(task: &Task) -> Self {
+    pub(crate) fn new<N>(task: &Task<N>) -> Self {
         Self::over(task, (0..task.operators.len() as u32).map(OperatorId))
     }
 
     /// An index of some operators, ascending.
-    pub(crate) fn over(task: &Task, operators: impl Iterator<Item = OperatorId>) -> Self {
+    pub(crate) fn over<N>(task: &Task<N>, operators: impl Iterator<Item = OperatorId>) -> Self {
         let mut index = Self { by_fact: FxHashMap::default(), always: Vec::new() };
         for id in operators {
             let widest = task.operators[id.index()]
@@ -35,7 +35,7 @@ impl OperatorIndex {
     }
 
     /// The operators whose propositional condition holds, ascending.
-    pub(crate) fn applicable(&self, task: &Task, state: &State) -> Vec<OperatorId> {
+    pub(crate) fn applicable<N>(&self, task: &Task<N>, state: &State<N>) -> Vec<OperatorId> {
         let mut found = self.always.clone();
         for (variable, value) in state.values.iter().enumerate() {
             found.extend(self.by_fact.get(&(variable as u32, *value)).into_iter().flatten());
@@ -50,11 +50,14 @@ impl OperatorIndex {
 const CHOICE_LIMIT: usize = 100_000;
 
 /// Designs for some slots of an operator, with what they add to its cost and to the numbers in its conditions and effects.
-struct Partial {
+struct Partial<N> {
     choice: Vec<u16>,
-    cost: Int,
-    profile: Vec<Int>,
+    cost: N,
+    profile: Vec<N>,
 }
+
+/// Combinations of designs, with their costs.
+pub(crate) type Choices<N> = Vec<(Vec<u16>, N)>;
 
 /// The combinations of an operator's designs that no other one dominates, with their costs: none is cheaper or
 /// leaves more of the numeric variables. Of equal ones the first stands for all, unless `all` are asked for. None if there
@@ -62,13 +65,18 @@ struct Partial {
 ///
 /// Slots that no table and no exclusion joins contribute by themselves, so what is dominated among the combinations of some of
 /// them is dominated in all combinations that extend it: k functions of m designs cost no m^k comparisons.
-pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Option<Vec<(Vec<u16>, Int)>> {
+pub(crate) fn undominated<N: TaskNumber>(
+    operator: &Operator<N>,
+    monotone: bool,
+    all: bool,
+) -> Option<Choices<N>> {
     let sizes = operator.sizes();
     let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
-    let conditions = operator.condition.comparisons.iter().map(|linear| &linear.quantity);
-    let quantities: Vec<&Quantity<Int>> = effects.chain(conditions).collect();
-    let profile = quantities.iter().map(|quantity| quantity.constant).collect();
-    let mut front = vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant, profile }];
+    let conditions = operator.condition.linears().map(|linear| &linear.quantity);
+    let quantities: Vec<&Quantity<N>> = effects.chain(conditions).collect();
+    let profile = quantities.iter().map(|quantity| quantity.constant.clone()).collect();
+    let mut front =
+        vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant.clone(), profile }];
     for slots in independent(operator, &quantities) {
         let mut own = Vec::new();
         each_combination(&slots, &sizes, &mut |choice| {
@@ -80,7 +88,7 @@ pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Opt
                         .iter()
                         .any(|bad| rule.slots.iter().zip(bad).all(|(s, d)| choice[*s as usize] == *d))
             });
-            let sum = |quantity: &Quantity<Int>| quantity.part(&slots, choice, &sizes);
+            let sum = |quantity: &Quantity<N>| quantity.part(&slots, choice, &sizes);
             if !excluded {
                 own.push(Partial {
                     choice: choice.to_vec(),
@@ -101,26 +109,26 @@ pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Opt
     Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect())
 }
 
-impl Partial {
+impl<N: TaskNumber> Partial<N> {
     fn with(&self, other: &Self, slots: &[u16]) -> Self {
         let mut choice = self.choice.clone();
         for slot in slots {
             choice[*slot as usize] = other.choice[*slot as usize];
         }
-        let profile = self.profile.iter().zip(&other.profile).map(|(a, b)| a + b).collect();
-        Self { choice, cost: self.cost + other.cost, profile }
+        let profile = self.profile.iter().zip(&other.profile).map(|(a, b)| a.clone() + b.clone()).collect();
+        Self { choice, cost: self.cost.clone() + other.cost.clone(), profile }
     }
 }
 
 /// Those that none dominates, in lexicographic order of the designs.
-fn best(mut all_of_them: Vec<Partial>, monotone: bool, all: bool) -> Vec<Partial> {
+fn best<N: Ord>(mut all_of_them: Vec<Partial<N>>, monotone: bool, all: bool) -> Vec<Partial<N>> {
     // What dominates comes before what it dominates.
     all_of_them.sort_by(|a, b| {
         a.cost.cmp(&b.cost).then_with(|| b.profile.cmp(&a.profile)).then_with(|| a.choice.cmp(&b.choice))
     });
-    let mut front: Vec<Partial> = Vec::new();
+    let mut front: Vec<Partial<N>> = Vec::new();
     for new in all_of_them {
-        let dominates = |old: &Partial| {
+        let dominates = |old: &Partial<N>| {
             let no_worse = if monotone {
                 old.profile.iter().zip(&new.profile).all(|(old, new)| old >= new)
             } else {
@@ -137,7 +145,7 @@ fn best(mut all_of_them: Vec<Partial>, monotone: bool, all: bool) -> Vec<Partial
 }
 
 /// The slots of an operator in groups that no table and no exclusion joins.
-fn independent(operator: &Operator, quantities: &[&Quantity<Int>]) -> Vec<Vec<u16>> {
+fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Vec<u16>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
     let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));
     let mut groups: Vec<Vec<u16>> = (0..operator.slots.len() as u16).map(|slot| vec![slot]).collect();
@@ -175,6 +183,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::number::Int;
     use crate::quantity::{Linear, NumericId, Table};
     use crate::task::{Condition, Forbidden, NumericEffect, SlotId, SlotUse};
 

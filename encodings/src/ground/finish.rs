@@ -19,7 +19,7 @@ use crate::ground::mutex;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::prune::{atom_name, numeric_name, read_atoms};
 use crate::lifted::{Lifted, ObjectId, Rational};
-use crate::number::{Int, LIMIT, checked_lcm};
+use crate::number::{TaskNumber, checked_lcm};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
     Axiom, Condition, ConditionalEffect, Fact, Layer, Literal, NumericEffect, Objective, Operator, Slot,
@@ -30,22 +30,22 @@ use crate::task::{
 ///
 /// # Errors
 /// `Error::Overflow` if exact integers would not fit.
-pub(crate) fn finish(
+pub(crate) fn finish<N: TaskNumber>(
     lifted: &Lifted,
     mut task: GroundTask<'_>,
     unreachable: Option<String>,
     generality: &Generality,
-) -> Result<Task, Error> {
+) -> Result<Task<N>, Error> {
     let atoms = Atoms::new(lifted, &task);
-    let mut numbers = Numbers::new(lifted, &task, generality)?;
-    let (mut objectives, mut costs) = objectives(&task)?;
+    let mut numbers = Numbers::<N>::new(lifted, &task, generality)?;
+    let (mut objectives, mut costs) = objectives::<N>(&task)?;
     let mut durations = Denominator::new("durations");
     for operator in &task.operators {
         durations.quantity(&operator.duration);
         let bounds = [&operator.timing.start, &operator.timing.end].into_iter().flatten();
         operator.wait.iter().chain(bounds.map(|(time, _)| time)).for_each(|time| durations.number(time));
     }
-    let mut durations = durations.integers()?;
+    let mut durations = durations.integers::<N>()?;
     let mut slots = Slots::new(&task.operators);
 
     let mut operators = Distinct::with_capacity(task.operators.len());
@@ -63,7 +63,7 @@ pub(crate) fn finish(
             effects: atoms.effects(&ground),
             conditional: atoms.conditional(&ground),
             numeric_effects: numbers.effects(&ground)?,
-            cost: by_objective.next().unwrap_or_else(|| Ok(Quantity::constant(1)))?,
+            cost: by_objective.next().unwrap_or_else(|| Ok(Quantity::constant(N::one())))?,
             others: by_objective.collect::<Result<_, _>>()?,
             duration: durations.quantity(&ground.duration)?,
             arguments: ground.arguments,
@@ -108,20 +108,20 @@ pub(crate) fn finish(
 }
 
 /// Operators without repetitions, in order.
-struct Distinct {
-    operators: Vec<Operator>,
+struct Distinct<N> {
+    operators: Vec<Operator<N>>,
     /// Positions by hash.
     positions: FxHashMap<u64, SmallVec<[u32; 2]>>,
 }
 
-impl Distinct {
+impl<N: TaskNumber> Distinct<N> {
     fn with_capacity(capacity: usize) -> Self {
         let mut positions = FxHashMap::default();
         positions.reserve(capacity);
         Self { operators: Vec::with_capacity(capacity), positions }
     }
 
-    fn insert(&mut self, operator: Operator) {
+    fn insert(&mut self, operator: Operator<N>) {
         let positions = self.positions.entry(FxBuildHasher.hash_one(&operator)).or_default();
         if positions.iter().all(|position| self.operators[*position as usize] != operator) {
             positions.push(self.operators.len() as u32);
@@ -131,7 +131,8 @@ impl Distinct {
 }
 
 /// The objectives, and what makes integers of the costs by each.
-fn objectives(task: &GroundTask<'_>) -> Result<(Vec<Objective>, Vec<Integers>), Error> {
+#[expect(clippy::type_complexity, reason = "a list for each of two things")]
+fn objectives<N: TaskNumber>(task: &GroundTask<'_>) -> Result<(Vec<Objective<N>>, Vec<Integers<N>>), Error> {
     let (mut objectives, mut conversions) = (Vec::new(), Vec::new());
     for (objective, position) in task.objectives.iter().zip(0..) {
         let mut denominator = Denominator::new("the metric");
@@ -261,7 +262,11 @@ impl Atoms {
     }
 
     /// The rules of derived variables in layers: what a layer depends on comes before it.
-    fn axioms(&self, task: &GroundTask<'_>, numbers: &mut Numbers) -> Result<Vec<Layer>, Error> {
+    fn axioms<N: TaskNumber>(
+        &self,
+        task: &GroundTask<'_>,
+        numbers: &mut Numbers<N>,
+    ) -> Result<Vec<Layer<N>>, Error> {
         let axioms = &task.world.definitions.axioms;
         let mut layers = Vec::new();
         for component in components(axioms) {
@@ -280,14 +285,14 @@ impl Atoms {
 }
 
 /// The numeric variables that conditions depend on, with the factor that makes all their values integers.
-struct Numbers {
-    initial: Vec<Int>,
+struct Numbers<N> {
+    initial: Vec<N>,
     names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
-    integers: Integers,
+    integers: Integers<N>,
 }
 
-impl Numbers {
+impl<N: TaskNumber> Numbers<N> {
     fn new(lifted: &Lifted, task: &GroundTask<'_>, generality: &Generality) -> Result<Self, Error> {
         let mut used = FxHashSet::default();
         let mut denominator = Denominator::new("numeric fluents");
@@ -320,17 +325,16 @@ impl Numbers {
         Ok(Self { initial, names, ids, integers })
     }
 
-    fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<Int>, Error> {
+    fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<N>, Error> {
         let overflow = || Error::Overflow { what: "a factor of a numeric fluent".into() };
         let coefficients = linear.coefficients.iter().map(|(variable, factor)| {
-            let factor = factor.to_int().filter(|factor| factor.abs() < LIMIT);
-            Ok((self.ids[variable], factor.ok_or_else(overflow)?))
+            Ok((self.ids[variable], N::from_rational(factor, 1).ok_or_else(overflow)?))
         });
         let coefficients = coefficients.collect::<Result<_, Error>>()?;
         Ok(Linear { coefficients, quantity: self.integers.quantity(&linear.quantity)? })
     }
 
-    fn effects(&mut self, operator: &GroundOperator) -> Result<Vec<NumericEffect>, Error> {
+    fn effects(&mut self, operator: &GroundOperator) -> Result<Vec<NumericEffect<N>>, Error> {
         let mut effects = Vec::new();
         for (variable, value) in operator.numeric_effects.iter() {
             if let Some(variable) = self.ids.get(variable).copied() {
@@ -341,7 +345,11 @@ impl Numbers {
     }
 }
 
-fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> Result<Condition, Error> {
+fn condition<N: TaskNumber>(
+    ground: &GroundCondition,
+    atoms: &Atoms,
+    numbers: &mut Numbers<N>,
+) -> Result<Condition<N>, Error> {
     let mut condition = Condition::default();
     for literal in &ground.literals {
         let literal = atoms.literal(*literal);
@@ -358,6 +366,11 @@ fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> 
         condition.clauses.push(clause.iter().map(|literal| atoms.literal(*literal)).collect());
     }
     for (linear, strict) in &ground.comparisons {
+        if !N::SCALED {
+            let list = if *strict { &mut condition.above } else { &mut condition.comparisons };
+            list.push(numbers.linear(linear)?);
+            continue;
+        }
         let mut linear = linear.clone();
         // A comparison may be scaled at will, so fractional factors do no harm here.
         let mut denominators = linear.coefficients.iter().map(|(_, factor)| factor.denominator());
@@ -366,7 +379,7 @@ fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> 
         linear.scale(&Rational::from_integer(common));
         let mut integers = numbers.linear(&linear)?;
         if *strict {
-            integers.quantity.constant -= 1;
+            integers.quantity.constant = integers.quantity.constant + -N::one();
         }
         condition.comparisons.push(integers);
     }
@@ -376,7 +389,7 @@ fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> 
 }
 
 /// Whether two values of one variable are required.
-fn contradictory(condition: &Condition) -> bool {
+fn contradictory<N>(condition: &Condition<N>) -> bool {
     condition.facts.windows(2).any(|pair| pair[0].variable == pair[1].variable)
 }
 

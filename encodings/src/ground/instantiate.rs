@@ -152,7 +152,7 @@ pub(crate) fn instantiate<'a>(
     }
     operators.extend(timeline.iter().flat_map(|timeline| timeline.waits(lifted.schemas.len() as u32)));
     if let Some(timeline) = &timeline {
-        timeline.settle(&mut operators).map_err(|error| vec![error])?;
+        timeline.settle(&mut operators);
     }
     let mut task = GroundTask { world, operators, goal, objectives: Vec::new() };
     derived::simplify(&mut task);

@@ -1,7 +1,7 @@
 //! The bounded reading of a metric that actions improve: fewest steps first, then the metric.
 
 use crate::bounds::Bounds;
-use crate::number::Int;
+use crate::number::{Int, TaskNumber};
 use crate::optimize::{Best, Config, Run, Tightened, optimize};
 use crate::plan::{GroundStep, decode, replay};
 use crate::quantity::Quantity;
@@ -83,14 +83,17 @@ impl Task {
         task.objective = crate::task::Objective::sum();
         task
     }
+}
 
+#[expect(private_bounds, reason = "nobody else has numbers of tasks")]
+impl<N: TaskNumber> Task<N> {
     /// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is.
-    fn can_repeat_reward(&self, plan: &[GroundStep]) -> bool {
+    pub(crate) fn can_repeat_reward(&self, plan: &[GroundStep]) -> bool {
         let Some((states, _)) = replay(self, plan) else { return false };
         states.iter().any(|state| {
-            self.operators.iter().filter(|operator| operator.cost.minimum() < 0).any(|operator| {
+            self.operators.iter().filter(|operator| operator.cost.minimum() < N::zero()).any(|operator| {
                 operator.choices().any(|choice| {
-                    operator.cost.at(&choice, &operator.sizes()) < 0
+                    operator.cost.at(&choice, &operator.sizes()) < N::zero()
                         && operator.applicable(state, &choice)
                         && self.successor(operator, state, &choice).as_ref() == Some(state)
                 })
