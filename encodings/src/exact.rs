@@ -56,7 +56,7 @@ impl ExactTask {
 /// Finds a cheapest plan by search. Of the configuration it heeds the horizon and the limits.
 ///
 /// With a horizon, a cheapest plan that is longer is no answer: then a best plan within it is looked for, which is not called
-/// optimal. Where actions improve the metric, plans with fewest actions count, and of those the best by the metric.
+/// optimal. Where actions improve the metric, plans with fewest steps count, and of those the best by the metric.
 pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     let started = Instant::now();
     let task = &task.0;
@@ -76,7 +76,7 @@ pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
 fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     let any = explore(task, &config.limits);
     let too_long =
-        |plan: &GroundPlan<Rational>| config.horizon.is_some_and(|horizon| actions(task, plan) > horizon);
+        |plan: &GroundPlan<Rational>| config.horizon.is_some_and(|horizon| plan.steps.len() > horizon);
     match (any, config.horizon) {
         (Explored::Known(solution), _) => *solution,
         (Explored::Optimal(plan), _) if !too_long(&plan) => {
@@ -95,7 +95,7 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// The best plan with at most `horizon` actions, where no plan at all costs less than `lower`.
+/// The best plan with at most `horizon` steps, where no plan at all costs less than `lower`.
 fn within(task: &Task<Rational>, horizon: usize, lower: &Rational, limits: &Limits) -> Solution {
     let (status, plan, proof) = match explore(&task.with_horizon(horizon), limits) {
         Explored::Optimal(plan) => (Status::Feasible, Some(plan), None),
@@ -107,13 +107,13 @@ fn within(task: &Task<Rational>, horizon: usize, lower: &Rational, limits: &Limi
     Solution { lower_bound: Some(metric(task, lower.clone())), horizon, ..solution }
 }
 
-/// For a metric that actions improve: fewest actions first, then the best metric among those plans.
+/// For a metric that actions improve: fewest steps first, then the best metric among those plans.
 fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let nothing = |solution: Solution| Solution { lower_bound: None, ..solution };
     let unknown = || nothing(answer(task, Status::Unknown, None, None));
     let by_steps = task.with_costs(|_| Quantity::constant(Rational::one()));
     let steps = match explore(&by_steps, &config.limits) {
-        Explored::Optimal(plan) => actions(task, &plan),
+        Explored::Optimal(plan) => plan.steps.len(),
         Explored::Known(solution) => return nothing(*solution),
         Explored::Unknown(..) => return unknown(),
     };
@@ -121,7 +121,7 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
         let solution = answer(task, Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
         return Solution { horizon: config.horizon.unwrap_or(steps), ..nothing(solution) };
     }
-    // No plan has fewer actions, so a constant for each action changes nothing but the sign of the costs.
+    // No plan has fewer steps, so a constant for each step changes nothing but the sign of the costs.
     let least = task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or_default();
     let shifted = task.with_horizon(steps).with_costs(|operator| {
         let mut cost = operator.cost.clone();
@@ -141,11 +141,6 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
         unbounded: Some(if proved { Unbounded::Proved } else { Unbounded::Suspected }),
         ..nothing(answer(task, Status::Feasible, Some(&plan), proof))
     }
-}
-
-/// How many steps of a plan are no waits.
-fn actions(task: &Task<Rational>, plan: &GroundPlan<Rational>) -> usize {
-    plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none()).count()
 }
 
 /// What a search came to.
@@ -190,27 +185,25 @@ fn answer(
 }
 
 impl Task<Rational> {
-    /// The same task with other costs of its actions, and a metric of their plain sum.
+    /// The same task with other costs, and a metric of their plain sum.
     fn with_costs(&self, cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>) -> Self {
         let mut task = self.clone();
         for operator in &mut task.operators {
-            if operator.wait.is_none() {
-                operator.cost = cost(operator);
-            }
+            operator.cost = cost(operator);
         }
         task.objective = Objective { scale: 1, offset: Rational::zero(), maximize: false };
         task
     }
 
-    /// The same task for plans with at most so many actions: each uses up one of a number of them.
+    /// The same task for plans with at most so many steps: each uses up one of a number of them. As in formulas, waits are steps.
     fn with_horizon(&self, horizon: usize) -> Self {
         let mut task = self.clone();
         let left = NumericId(task.initial.numbers.len() as u32);
-        task.number_names.push("actions left".to_owned());
+        task.number_names.push("steps left".to_owned());
         task.initial.numbers.push(Rational::from_big(BigRational::from_integer(horizon.into())));
         let mut after = Linear::variable(left);
         after.quantity.constant = -Rational::one();
-        for operator in task.operators.iter_mut().filter(|operator| operator.wait.is_none()) {
+        for operator in &mut task.operators {
             operator.condition.comparisons.push(after.clone());
             operator.numeric_effects.push(NumericEffect { variable: left, value: after.clone() });
         }

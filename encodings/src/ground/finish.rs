@@ -38,10 +38,11 @@ pub(crate) fn finish<N: TaskNumber>(
 ) -> Result<Task<N>, Error> {
     let atoms = Atoms::new(lifted, &task);
     let mut numbers = Numbers::<N>::new(lifted, &task, generality)?;
-    let (mut objectives, mut costs) = objectives::<N>(&task)?;
+    let (mut objectives, mut costs) = objectives::<N>(lifted, &task)?;
     let mut durations = Denominator::new("durations");
     for operator in &task.operators {
         durations.quantity(&operator.duration);
+        durations.note(|| schema_name(lifted, operator));
         let bounds = [&operator.timing.start, &operator.timing.end].into_iter().flatten();
         operator.wait.iter().chain(bounds.map(|(time, _)| time)).for_each(|time| durations.number(time));
     }
@@ -50,31 +51,10 @@ pub(crate) fn finish<N: TaskNumber>(
 
     let mut operators = Distinct::with_capacity(task.operators.len());
     for ground in std::mem::take(&mut task.operators) {
-        let condition = condition(&ground.condition, &atoms, &mut numbers)?;
-        if contradictory(&condition) {
-            continue;
-        }
-        let by_objective = ground.costs.iter().zip(&mut costs);
-        let mut by_objective = by_objective.map(|(cost, integers)| integers.quantity(cost));
-        operators.insert(Operator {
-            schema: ground.schema,
-            slots: slots.uses(&ground.slots),
-            condition,
-            effects: atoms.effects(&ground),
-            conditional: atoms.conditional(&ground),
-            numeric_effects: numbers.effects(&ground)?,
-            cost: by_objective.next().unwrap_or_else(|| Ok(Quantity::constant(N::one())))?,
-            others: by_objective.collect::<Result<_, _>>()?,
-            duration: durations.quantity(&ground.duration)?,
-            arguments: ground.arguments,
-            configuration: ground.configuration,
-            forbidden: ground.forbidden,
-            wait: ground.wait.map(|time| durations.number(&time)).transpose()?,
-            timing: Timing {
-                start: ground.timing.start.map(|(time, _)| durations.number(&time)).transpose()?,
-                end: ground.timing.end.map(|(time, _)| durations.number(&time)).transpose()?,
-            },
-        });
+        let name = schema_name(lifted, &ground);
+        let kinds = (&mut numbers, &mut costs[..], &mut durations);
+        let finished = operator(ground, &atoms, &mut slots, kinds).map_err(|error| error.within(&name))?;
+        finished.into_iter().for_each(|operator| operators.insert(operator));
     }
     let goal = match &task.goal {
         Some(goal) => condition(goal, &atoms, &mut numbers)?,
@@ -107,6 +87,46 @@ pub(crate) fn finish<N: TaskNumber>(
     Ok(task)
 }
 
+/// An operator of the final task; none if its condition contradicts itself.
+fn operator<N: TaskNumber>(
+    ground: GroundOperator,
+    atoms: &Atoms,
+    slots: &mut Slots,
+    (numbers, costs, durations): (&mut Numbers<N>, &mut [Integers<N>], &mut Integers<N>),
+) -> Result<Option<Operator<N>>, Error> {
+    let condition = condition(&ground.condition, atoms, numbers)?;
+    if contradictory(&condition) {
+        return Ok(None);
+    }
+    let by_objective = ground.costs.iter().zip(costs);
+    let mut by_objective = by_objective.map(|(cost, integers)| integers.quantity(cost));
+    Ok(Some(Operator {
+        schema: ground.schema,
+        slots: slots.uses(&ground.slots),
+        condition,
+        effects: atoms.effects(&ground),
+        conditional: atoms.conditional(&ground),
+        numeric_effects: numbers.effects(&ground)?,
+        cost: by_objective.next().unwrap_or_else(|| Ok(Quantity::constant(N::one())))?,
+        others: by_objective.collect::<Result<_, _>>()?,
+        duration: durations.quantity(&ground.duration)?,
+        arguments: ground.arguments,
+        configuration: ground.configuration,
+        forbidden: ground.forbidden,
+        wait: ground.wait.map(|time| durations.number(&time)).transpose()?,
+        timing: Timing {
+            start: ground.timing.start.map(|(time, _)| durations.number(&time)).transpose()?,
+            end: ground.timing.end.map(|(time, _)| durations.number(&time)).transpose()?,
+        },
+    }))
+}
+
+/// The action of an operator, for errors.
+fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> String {
+    let schema = lifted.schemas.get(operator.schema as usize);
+    schema.map_or_else(|| "a wait".to_owned(), |schema| format!("`{}`", schema.name))
+}
+
 /// Operators without repetitions, in order.
 struct Distinct<N> {
     operators: Vec<Operator<N>>,
@@ -132,12 +152,19 @@ impl<N: TaskNumber> Distinct<N> {
 
 /// The objectives, and what makes integers of the costs by each.
 #[expect(clippy::type_complexity, reason = "a list for each of two things")]
-fn objectives<N: TaskNumber>(task: &GroundTask<'_>) -> Result<(Vec<Objective<N>>, Vec<Integers<N>>), Error> {
+fn objectives<N: TaskNumber>(
+    lifted: &Lifted,
+    task: &GroundTask<'_>,
+) -> Result<(Vec<Objective<N>>, Vec<Integers<N>>), Error> {
     let (mut objectives, mut conversions) = (Vec::new(), Vec::new());
     for (objective, position) in task.objectives.iter().zip(0..) {
         let mut denominator = Denominator::new("the metric");
         denominator.number(&objective.offset);
-        task.operators.iter().for_each(|operator| denominator.quantity(&operator.costs[position]));
+        denominator.note(|| "its value at the start".to_owned());
+        for operator in &task.operators {
+            denominator.quantity(&operator.costs[position]);
+            denominator.note(|| schema_name(lifted, operator));
+        }
         let integers = denominator.integers()?;
         let offset = integers.number(&objective.offset)?;
         objectives.push(Objective { scale: integers.scale, offset, maximize: objective.maximize });
@@ -312,8 +339,10 @@ impl<N: TaskNumber> Numbers<N> {
         let mut used: Vec<_> = used.into_iter().collect();
         used.sort_unstable();
         let initial: Vec<_> = used.iter().map(|variable| initial_value(&task.world, *variable)).collect();
-        for number in &initial {
+        denominator.note(|| "those in conditions and effects".to_owned());
+        for (number, variable) in initial.iter().zip(&used) {
             denominator.number(number);
+            denominator.note(|| numeric_name(lifted, task, *variable));
         }
         if let Some(precision) = generality.numbers {
             denominator.number(&Rational::new(1, i128::from(precision)));

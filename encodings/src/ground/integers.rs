@@ -51,6 +51,8 @@ pub(super) struct Denominator {
     what: &'static str,
     /// None if it is too large.
     common: Option<Int>,
+    /// Where the number was that made it so.
+    culprit: Option<String>,
     /// Tables that have been looked at.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
@@ -58,7 +60,7 @@ pub(super) struct Denominator {
 impl Denominator {
     /// `what` names the numbers in errors.
     pub(super) fn new(what: &'static str) -> Self {
-        Self { what, common: Some(1), seen: FxHashMap::default() }
+        Self { what, common: Some(1), culprit: None, seen: FxHashMap::default() }
     }
 
     pub(super) fn number(&mut self, number: &Rational) {
@@ -80,13 +82,24 @@ impl Denominator {
         }
     }
 
+    /// Notes where the last number was, if it made the factor too large.
+    pub(super) fn note(&mut self, place: impl FnOnce() -> String) {
+        if self.common.is_none() && self.culprit.is_none() {
+            self.culprit = Some(place());
+        }
+    }
+
     /// The conversion.
     ///
     /// # Errors
     /// `Error::Overflow` if the factor is too large.
     pub(super) fn integers<N: TaskNumber>(self) -> Result<Integers<N>, Error> {
         let common = if N::SCALED { self.common } else { Some(1) };
-        let scale = common.ok_or_else(|| Error::Overflow { what: self.what.into() })?;
+        let overflow = || {
+            let error = Error::Overflow { what: self.what.into() };
+            self.culprit.iter().fold(error, |error, place| error.within(place))
+        };
+        let scale = common.ok_or_else(overflow)?;
         Ok(Integers { what: self.what, scale, tables: TableMap::new() })
     }
 }
