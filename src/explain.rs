@@ -103,7 +103,7 @@ fn solve(
     let proved = matches!(solution.status, Status::Optimal | Status::Unsolvable);
     let steps = solution.plan.iter().flat_map(|plan| &plan.steps);
     let steps = steps.map(|step| PlannedStep::new(mission, step)).collect();
-    Ok(Answer { cost: solution.plan.map(|plan| number::of_plan(plan.cost)), proved, steps })
+    Ok(Answer { cost: solution.plan.map(|plan| number::of_plan(&plan.cost)), proved, steps })
 }
 
 /// Explains one design, by its local name.

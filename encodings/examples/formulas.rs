@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let line = [
         format!("{:?}", solution.status),
-        text(solution.plan.as_ref().map(|plan| plan.cost)),
+        text(solution.plan.as_ref().map(|plan| plan.cost.clone())),
         text(solution.lower_bound),
         solution.horizon.to_string(),
         solution.statistics.calls.to_string(),

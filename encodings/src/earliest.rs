@@ -4,12 +4,12 @@
 //! do that. So each action in turn is tried at its earlier passages, with waits before the next one where that needs events;
 //! what still is a plan, and costs no more, is kept.
 
-use crate::number::Int;
+use crate::number::TaskNumber;
 use crate::plan::{GroundPlan, GroundStep, replay};
 use crate::task::{Operator, OperatorId, Task};
 
 /// The same actions, each as early as the ones before it and the rest of the plan admit.
-pub(crate) fn earliest(task: &Task, plan: &GroundPlan) -> GroundPlan {
+pub(crate) fn earliest<N: TaskNumber>(task: &Task<N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
     let mut plan = plan.clone();
     if task.operators.iter().all(|operator| operator.wait.is_none()) {
         return plan;
@@ -34,9 +34,9 @@ pub(crate) fn earliest(task: &Task, plan: &GroundPlan) -> GroundPlan {
 }
 
 /// The other operators of the action of an operator.
-fn same_action(task: &Task, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
+fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
     let own = &task.operators[id.index()];
-    let same = move |other: &Operator| {
+    let same = move |other: &Operator<N>| {
         other.schema == own.schema && other.arguments == own.arguments && other.slots == own.slots
     };
     let all = task.operators.iter().zip((0..).map(OperatorId));
@@ -44,7 +44,12 @@ fn same_action(task: &Task, id: OperatorId) -> impl Iterator<Item = OperatorId> 
 }
 
 /// The plan with another operator at a position, and waits where they are needed; none if that is no plan, or a dearer one.
-fn with(task: &Task, plan: &GroundPlan, position: usize, other: OperatorId) -> Option<GroundPlan> {
+fn with<N: TaskNumber>(
+    task: &Task<N>,
+    plan: &GroundPlan<N>,
+    position: usize,
+    other: OperatorId,
+) -> Option<GroundPlan<N>> {
     let waits: Vec<OperatorId> = task
         .operators
         .iter()
@@ -75,19 +80,19 @@ fn with(task: &Task, plan: &GroundPlan, position: usize, other: OperatorId) -> O
 }
 
 /// When the actions start, in the task's time unit.
-pub(crate) fn starts(task: &Task, steps: &[GroundStep]) -> Vec<Int> {
-    let mut clock: Int = 0;
+pub(crate) fn starts<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Vec<N> {
+    let mut clock = N::zero();
     let mut all = Vec::new();
     for step in steps {
         let operator = &task.operators[step.operator.index()];
-        if let Some(time) = operator.wait {
-            clock = clock.max(time);
+        if let Some(time) = &operator.wait {
+            clock = clock.max(time.clone());
             continue;
         }
         let duration = operator.duration.at(&step.choice, &operator.sizes());
-        let bounds = operator.timing.start.into_iter().chain(operator.timing.end.map(|end| end - duration));
-        let start = bounds.fold(clock, Int::max);
-        all.push(start);
+        let by_end = operator.timing.end.clone().map(|end| end + -duration.clone());
+        let start = operator.timing.start.clone().into_iter().chain(by_end).fold(clock, N::max);
+        all.push(start.clone());
         clock = start + duration;
     }
     all

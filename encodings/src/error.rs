@@ -52,7 +52,9 @@ pub enum Error {
         place: Place,
     },
     /// A number that does not fit the exact integer arithmetic of the encoder.
-    #[error("{what} needs more than 62 bits once all values are scaled to integers")]
+    #[error(
+        "{what}: a number exceeds 2^118 after scaling to integers, or has fractions that no scale makes integers"
+    )]
     Overflow {
         /// The quantity.
         what: String,
@@ -72,6 +74,14 @@ impl From<Interrupted> for Error {
 }
 
 impl Error {
+    /// The same error, if numbers are too large, with the place where they are.
+    pub(crate) fn within(self, place: &str) -> Self {
+        match self {
+            Self::Overflow { what } => Self::Overflow { what: format!("{what} ({place})") },
+            other => other,
+        }
+    }
+
     /// The stable code of the cause.
     pub fn code(&self) -> &'static str {
         match self {

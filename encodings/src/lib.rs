@@ -22,6 +22,7 @@ pub mod pddl;
 pub mod validate;
 
 mod error;
+mod exact;
 mod lifted;
 mod normalize;
 mod number;
@@ -67,6 +68,7 @@ pub use certificate::{
 pub use concurrent::{Concurrent, ground_concurrent, optimize_concurrent};
 pub use encode::Semantics;
 pub use error::{Error, File, Place};
+pub use exact::{ExactTask, ground_exact, optimize_exact};
 pub use ground::{Config as GroundConfig, ground};
 pub use limits::Limits;
 pub use objectives::{Front, Point, lexicographic, pareto};

@@ -11,6 +11,8 @@ use num_bigint::BigInt;
 use num_rational::{BigRational, Ratio};
 use num_traits::{CheckedAdd, CheckedDiv, CheckedMul, CheckedSub, One, Signed, ToPrimitive, Zero};
 
+use crate::quantity::Number;
+
 /// A number of a ground task, scaled to an integer.
 ///
 /// Constants stay below [`LIMIT`] in magnitude. What can outgrow the type (products with fluents, fluents that grow with every
@@ -41,6 +43,9 @@ impl Rational {
 
     /// `numerator / denominator`; the denominator must not be 0.
     pub(crate) fn new(numerator: Int, denominator: Int) -> Self {
+        if numerator > Int::MIN && denominator > 0 {
+            return Self(Repr::Small(Ratio::new(numerator, denominator)));
+        }
         Self::from_big(BigRational::new(numerator.into(), denominator.into()))
     }
 
@@ -160,6 +165,122 @@ impl Zero for Rational {
 impl One for Rational {
     fn one() -> Self {
         Self::from_integer(1)
+    }
+}
+
+/// Rationals of a task may take this many bits; a state with longer ones is left out, and the search knows that it is not complete
+/// then.
+const BIT_LIMIT: u64 = 4_096;
+
+/// What numbers of a ground task are: integers that are scaled, or, where these do not fit, rationals as they are.
+pub(crate) trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
+    /// Whether fractions become integers by a common factor; otherwise that factor is 1.
+    const SCALED: bool;
+
+    /// A rational times a factor; none if that is no number of this kind.
+    fn from_rational(number: &Rational, scale: Int) -> Option<Self>;
+
+    /// The number as a rational.
+    fn to_rational(&self) -> Rational;
+
+    /// The sum; none if it does not fit.
+    fn plus(&self, other: &Self) -> Option<Self>;
+
+    /// The product; none if it does not fit.
+    fn times(&self, other: &Self) -> Option<Self>;
+
+    /// Whether a fluent or a sum of costs may become as large as this.
+    fn is_moderate(&self) -> bool;
+
+    /// Whether `start`, with products added, is at least 0 (more than 0 if `strict`), however large the numbers in between.
+    fn compare<'n>(
+        start: Self,
+        terms: impl Iterator<Item = (&'n Self, &'n Self)> + Clone,
+        strict: bool,
+    ) -> bool
+    where
+        Self: 'n;
+}
+
+/// The sum of a number and of products; none if something does not fit.
+pub(crate) fn sum_of_products<'n, N: TaskNumber + 'n>(
+    start: N,
+    mut terms: impl Iterator<Item = (&'n N, &'n N)>,
+) -> Option<N> {
+    terms.try_fold(start, |sum, (a, b)| sum.plus(&a.times(b)?))
+}
+
+impl TaskNumber for Int {
+    const SCALED: bool = true;
+
+    fn from_rational(number: &Rational, scale: Int) -> Option<Self> {
+        let scaled = (number.clone() * &Rational::from_integer(scale)).to_int();
+        scaled.filter(|integer| integer.abs() < LIMIT)
+    }
+
+    fn to_rational(&self) -> Rational {
+        Rational::from_integer(*self)
+    }
+
+    fn plus(&self, other: &Self) -> Option<Self> {
+        (*self).checked_add(*other)
+    }
+
+    fn times(&self, other: &Self) -> Option<Self> {
+        (*self).checked_mul(*other)
+    }
+
+    fn is_moderate(&self) -> bool {
+        self.abs() <= GROWTH_LIMIT
+    }
+
+    fn compare<'n>(
+        start: Self,
+        terms: impl Iterator<Item = (&'n Self, &'n Self)> + Clone,
+        strict: bool,
+    ) -> bool {
+        if let Some(value) = sum_of_products(start, terms.clone()) {
+            return if strict { value > 0 } else { value >= 0 };
+        }
+        let products = terms.map(|(a, b)| BigInt::from(*a) * b);
+        let value = products.fold(BigInt::from(start), |sum, product| sum + product);
+        if strict { value.is_positive() } else { !value.is_negative() }
+    }
+}
+
+impl TaskNumber for Rational {
+    const SCALED: bool = false;
+
+    fn from_rational(number: &Rational, scale: Int) -> Option<Self> {
+        Some(number.clone() * &Self::from_integer(scale))
+    }
+
+    fn to_rational(&self) -> Rational {
+        self.clone()
+    }
+
+    fn plus(&self, other: &Self) -> Option<Self> {
+        Some(self.clone() + other)
+    }
+
+    fn times(&self, other: &Self) -> Option<Self> {
+        Some(self.clone() * other)
+    }
+
+    fn is_moderate(&self) -> bool {
+        match &self.0 {
+            Repr::Small(_) => true,
+            Repr::Big(big) => big.numer().bits().max(big.denom().bits()) <= BIT_LIMIT,
+        }
+    }
+
+    fn compare<'n>(
+        start: Self,
+        terms: impl Iterator<Item = (&'n Self, &'n Self)> + Clone,
+        strict: bool,
+    ) -> bool {
+        let value = terms.fold(start, |sum, (a, b)| sum + a.clone() * b);
+        if strict { value.is_positive() } else { !value.is_negative() }
     }
 }
 

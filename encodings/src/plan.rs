@@ -1,11 +1,12 @@
 //! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
 
-use num_rational::{BigRational, Ratio};
-use num_traits::ToPrimitive;
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{ToPrimitive, Zero};
 
 use crate::earliest::{earliest, starts};
 use crate::lifted::ObjectId;
-use crate::number::Int;
+use crate::number::{Int, Rational, TaskNumber};
 use crate::pddl::number::to_decimal;
 use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 
@@ -19,34 +20,50 @@ pub(crate) struct GroundStep {
 
 /// A plan and the sum of its operators' costs, in the task's integer unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct GroundPlan {
+pub(crate) struct GroundPlan<N = Int> {
     pub(crate) steps: Vec<GroundStep>,
-    pub(crate) cost: Int,
+    pub(crate) cost: N,
 }
 
-/// An exact decimal or fraction: `numerator / denominator`, in the units of the PDDL files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Exact {
-    /// Numerator.
-    pub numerator: Int,
-    /// Denominator, positive.
-    pub denominator: Int,
-}
+/// An exact number of any size, in the units of the PDDL files.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Exact(Rational);
 
 impl Exact {
-    pub(crate) fn scaled(value: Int, scale: Int) -> Self {
-        let divisor = num_integer::gcd(value, scale).max(1);
-        Self { numerator: value / divisor, denominator: scale / divisor }
+    /// A number of a ground task that is so many times what the files write.
+    pub(crate) fn scaled<N: TaskNumber>(value: N, scale: Int) -> Self {
+        Self(value.to_rational() / Rational::from_integer(scale))
+    }
+
+    /// The numerator of the reduced fraction.
+    pub fn numerator(&self) -> BigInt {
+        self.0.to_big().numer().clone()
+    }
+
+    /// The denominator of the reduced fraction, positive.
+    pub fn denominator(&self) -> BigInt {
+        self.0.to_big().denom().clone()
+    }
+
+    /// Whether it is 0.
+    pub fn is_zero(&self) -> bool {
+        self.0.is_zero()
     }
 
     /// As a rational.
-    pub fn to_rational(self) -> BigRational {
-        BigRational::new(self.numerator.into(), self.denominator.into())
+    pub fn to_rational(&self) -> BigRational {
+        self.0.to_big()
     }
 
     /// The nearest double.
-    pub fn to_f64(self) -> f64 {
+    pub fn to_f64(&self) -> f64 {
         self.to_rational().to_f64().unwrap_or(f64::NAN)
+    }
+}
+
+impl From<BigRational> for Exact {
+    fn from(number: BigRational) -> Self {
+        Self(Rational::from_big(number))
     }
 }
 
@@ -88,43 +105,38 @@ pub struct Plan {
 }
 
 /// The plan in the names of the task.
-pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
+pub(crate) fn decode<N: TaskNumber>(task: &Task<N>, plan: &GroundPlan<N>) -> Plan {
     let plan = earliest(task, plan);
     let mut steps = Vec::new();
     let mut current: Vec<(String, String)> = Vec::new();
-    let sign = if task.objective.maximize { -1 } else { 1 };
     let actions = plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none());
     for (step, start) in actions.zip(starts(task, &plan.steps)) {
         let operator = &task.operators[step.operator.index()];
         let sizes = operator.sizes();
         let duration = operator.duration.at(&step.choice, &sizes);
-        let cost = sign * operator.cost.at(&step.choice, &sizes);
+        let cost = task.objective.signed(operator.cost.at(&step.choice, &sizes));
         let mut step = Step::new(task, operator, &step.choice, (start, duration, cost));
         step.note_reconfigured(&mut current);
         steps.push(step);
     }
-    Plan { steps, cost: metric(task, plan.cost) }
+    Plan { steps, cost: metric(task, plan.cost.clone()) }
 }
 
 impl Plan {
     /// When the last action ends, in the domain's time unit.
     pub fn makespan(&self) -> Exact {
-        let ends = self.steps.iter().map(|step| {
-            Ratio::new(step.start.numerator, step.start.denominator)
-                + Ratio::new(step.duration.numerator, step.duration.denominator)
-        });
-        let last = ends.max().unwrap_or_default();
-        Exact { numerator: *last.numer(), denominator: *last.denom() }
+        let ends = self.steps.iter().map(|step| step.start.0.clone() + &step.duration.0);
+        Exact(ends.max().unwrap_or_default())
     }
 }
 
 impl Step {
     /// An operator in names, with its start and duration in the task's time unit and its cost in the task's cost unit.
-    pub(crate) fn new(
-        task: &Task,
-        operator: &Operator,
+    pub(crate) fn new<N: TaskNumber>(
+        task: &Task<N>,
+        operator: &Operator<N>,
         choice: &[u32],
-        (start, duration, cost): (Int, Int, Int),
+        (start, duration, cost): (N, N, N),
     ) -> Self {
         Self {
             action: task.schema_names[operator.schema as usize].clone(),
@@ -153,20 +165,29 @@ impl Step {
 }
 
 /// The metric of the problem file for a sum of operator costs.
-pub(crate) fn metric(task: &Task, cost: Int) -> Exact {
+pub(crate) fn metric<N: TaskNumber>(task: &Task<N>, cost: N) -> Exact {
     task.objective.metric(cost)
 }
 
-impl Objective {
+impl<N: TaskNumber> Objective<N> {
     /// The metric as the file writes it for a sum of operator costs.
-    pub(crate) fn metric(&self, cost: Int) -> Exact {
-        let sign = if self.maximize { -1 } else { 1 };
-        Exact::scaled(sign * (cost + self.offset), self.scale)
+    pub(crate) fn metric(&self, cost: N) -> Exact {
+        Exact::scaled(self.signed(cost + self.offset.clone()), self.scale)
+    }
+
+    /// A cost as the file counts it.
+    fn signed(&self, cost: N) -> N {
+        if self.maximize { -cost } else { cost }
     }
 }
 
 /// The object that an argument stands for, with a combination of designs.
-pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u32], argument: Argument) -> ObjectId {
+pub(crate) fn resolve<N>(
+    task: &Task<N>,
+    operator: &Operator<N>,
+    choice: &[u32],
+    argument: Argument,
+) -> ObjectId {
     match argument {
         Argument::Object(object) => object,
         Argument::Slot(position) => {
@@ -177,15 +198,15 @@ pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u32], argument
     }
 }
 
-fn argument(task: &Task, operator: &Operator, choice: &[u32], argument: Argument) -> String {
+fn argument<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32], argument: Argument) -> String {
     task.object_names[resolve(task, operator, choice, argument).index()].clone()
 }
 
-fn arguments(task: &Task, operator: &Operator, choice: &[u32]) -> Vec<String> {
+fn arguments<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<String> {
     operator.arguments.iter().map(|a| argument(task, operator, choice, *a)).collect()
 }
 
-fn configuration(task: &Task, operator: &Operator, choice: &[u32]) -> Vec<(String, String)> {
+fn configuration<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<(String, String)> {
     let name = |function: ObjectId| task.object_names[function.index()].clone();
     let pairs = operator.configuration.iter();
     pairs.map(|(function, design)| (name(*function), argument(task, operator, choice, *design))).collect()
@@ -193,21 +214,25 @@ fn configuration(task: &Task, operator: &Operator, choice: &[u32]) -> Vec<(Strin
 
 /// The states that a plan passes through, the initial one first; none if a step is not applicable or the last
 /// state is not a goal state.
-pub(crate) fn replay(task: &Task, plan: &[GroundStep]) -> Option<(Vec<State>, Int)> {
+pub(crate) fn replay<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<(Vec<State<N>>, N)> {
     replay_from(task, &task.initial, plan)
 }
 
 /// The same from a state of its own.
-pub(crate) fn replay_from(task: &Task, initial: &State, plan: &[GroundStep]) -> Option<(Vec<State>, Int)> {
+pub(crate) fn replay_from<N: TaskNumber>(
+    task: &Task<N>,
+    initial: &State<N>,
+    plan: &[GroundStep],
+) -> Option<(Vec<State<N>>, N)> {
     let mut states = vec![initial.clone()];
-    let mut cost: Int = 0;
+    let mut cost = N::zero();
     for step in plan {
         let operator = &task.operators[step.operator.index()];
         let state = states.last()?;
         if !operator.admits(&step.choice) || !operator.applicable(state, &step.choice) {
             return None;
         }
-        cost = cost.checked_add(operator.cost.at(&step.choice, &operator.sizes()))?;
+        cost = cost.plus(&operator.cost.at(&step.choice, &operator.sizes()))?;
         let next = task.successor(operator, state, &step.choice)?;
         states.push(next);
     }

@@ -151,13 +151,15 @@ impl<N: Number> Quantity<N> {
     }
 }
 
-impl Quantity<Int> {
+impl<N: Number> Quantity<N> {
     /// A lower bound that ignores that tables share slots; exact if no two do.
-    pub(crate) fn minimum(&self) -> Int {
-        self.constant
-            + self.tables.iter().map(|table| table.values.iter().min().copied().unwrap_or(0)).sum::<Int>()
+    pub(crate) fn minimum(&self) -> N {
+        let least = self.tables.iter().filter_map(|table| table.values.iter().min());
+        least.fold(self.constant.clone(), |sum, value| sum + value.clone())
     }
+}
 
+impl Quantity<Int> {
     /// An upper bound, as `minimum` is a lower one.
     pub(crate) fn maximum(&self) -> Int {
         self.constant

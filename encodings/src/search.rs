@@ -17,10 +17,10 @@ use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
 use crate::limits::{Interrupted, Limits, Pulse};
-use crate::number::{GROWTH_LIMIT, Int, dense};
+use crate::number::{Int, TaskNumber, dense};
 use crate::plan::{GroundPlan, GroundStep};
 use crate::successors::{OperatorIndex, Priced, undominated};
-use crate::task::{Fact, OperatorId, State, Task};
+use crate::task::{Condition, Fact, OperatorId, State, Task};
 
 /// How many states are stored at most.
 pub(crate) const STATE_LIMIT: usize = 400_000;
@@ -29,35 +29,35 @@ const SOON: usize = 20_000;
 
 /// What the search found.
 #[derive(Debug)]
-pub(crate) enum Found {
+pub(crate) enum Found<N = Int> {
     /// A cheapest plan.
-    Optimal(GroundPlan),
+    Optimal(GroundPlan<N>),
     /// There is no plan: every reachable state was visited, or is dominated by one that was.
     None,
     /// A limit was reached first; the best plan so far.
-    Unknown(Option<GroundPlan>),
+    Unknown(Option<GroundPlan<N>>),
 }
 
-struct Node {
-    state: State,
-    cost: Int,
+struct Node<N> {
+    state: State<N>,
+    cost: N,
     steps: u32,
     parent: Option<(u32, OperatorId, u32)>,
     dominated: bool,
 }
 
 /// What a search needs to know of a task, whatever state it begins in.
-pub(crate) struct Prepared {
+pub(crate) struct Prepared<N = Int> {
     /// For each operator its combinations of designs that no other one dominates, with their costs.
-    choices: Vec<Priced>,
+    choices: Vec<Priced<N>>,
     index: OperatorIndex,
     /// Whether more of any numeric variable never hurts.
     monotone: bool,
 }
 
-impl Prepared {
+impl<N: TaskNumber> Prepared<N> {
     /// None if some operator has too many combinations of designs.
-    pub(crate) fn new(task: &Task, limits: &Limits) -> Result<Option<Self>, Interrupted> {
+    pub(crate) fn new(task: &Task<N>, limits: &Limits) -> Result<Option<Self>, Interrupted> {
         let monotone = is_monotone(task);
         let mut choices = Vec::with_capacity(task.operators.len());
         for operator in limits.watch(&task.operators) {
@@ -68,29 +68,49 @@ impl Prepared {
     }
 }
 
-struct Search<'a> {
-    task: &'a Task,
-    bounds: &'a Bounds,
-    prepared: &'a Prepared,
-    nodes: Vec<Node>,
+/// A lower bound on the cost from a state to the goal.
+pub(crate) trait Estimate<N> {
+    /// None if the goal cannot be reached.
+    fn estimate(&self, state: &State<N>) -> Option<N>;
+}
+
+impl Estimate<Int> for Bounds {
+    fn estimate(&self, state: &State) -> Option<Int> {
+        self.estimate(state)
+    }
+}
+
+struct Search<'a, N, E> {
+    task: &'a Task<N>,
+    bounds: &'a E,
+    prepared: &'a Prepared<N>,
+    nodes: Vec<Node<N>>,
     seen: FxHashMap<Box<[u32]>, Vec<u32>>,
-    open: BinaryHeap<Reverse<(Int, u32, u32)>>,
+    open: BinaryHeap<Reverse<(N, u32, u32)>>,
     /// Whether states were left out because their numbers do not fit.
     incomplete: bool,
     /// Whether only estimates decide what comes next.
     greedy: bool,
     /// The cheapest goal state so far.
     best: Option<u32>,
-    /// What a known plan costs: nothing dearer is looked at.
-    limit: Int,
+    /// What a known plan costs, if there is one: nothing dearer is looked at.
+    limit: Option<N>,
 }
 
 /// Searches a task whose operators all cost at least 0.
 pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
+    search_states(task, bounds, STATE_LIMIT, limits)
+}
+
+/// Searches it, storing at most so many states.
+pub(crate) fn search_states<N: TaskNumber>(
+    task: &Task<N>,
+    bounds: &impl Estimate<N>,
+    most: usize,
+    limits: &Limits,
+) -> Found<N> {
     match Prepared::new(task, limits) {
-        Ok(Some(prepared)) => {
-            search_from(task, bounds, &prepared, &task.initial, Int::MAX, STATE_LIMIT, limits)
-        }
+        Ok(Some(prepared)) => search_within(task, bounds, &prepared, &task.initial, None, most, limits),
         Ok(None) | Err(Interrupted) => Found::Unknown(None),
     }
 }
@@ -106,17 +126,31 @@ pub(crate) fn search_from(
     most: usize,
     limits: &Limits,
 ) -> Found {
+    let limit = (limit < Int::MAX).then_some(limit);
+    search_within(task, bounds, prepared, initial, limit, most, limits)
+}
+
+fn search_within<N: TaskNumber>(
+    task: &Task<N>,
+    bounds: &impl Estimate<N>,
+    prepared: &Prepared<N>,
+    initial: &State<N>,
+    limit: Option<N>,
+    most: usize,
+    limits: &Limits,
+) -> Found<N> {
+    let known = limit.is_some();
     let mut search = Search::new(task, bounds, prepared, initial, false);
     search.limit = limit;
     if let Some(found) = search.run(limits, SOON.min(most)) {
         return found;
     }
     let mut some = None;
-    if search.best.is_none() && limit == Int::MAX {
+    if search.best.is_none() && !known {
         let mut greedy = Search::new(task, bounds, prepared, initial, true);
         greedy.run(limits, SOON.min(most));
         some = greedy.best_plan();
-        search.limit = some.as_ref().map_or(limit, |plan| plan.cost);
+        search.limit = some.as_ref().map(|plan| plan.cost.clone());
     }
     match search.run(limits, most) {
         Some(Found::Unknown(plan)) => Found::Unknown(cheaper(plan, some)),
@@ -125,8 +159,8 @@ pub(crate) fn search_from(
     }
 }
 
-fn cheaper(one: Option<GroundPlan>, other: Option<GroundPlan>) -> Option<GroundPlan> {
-    one.into_iter().chain(other).min_by_key(|plan| (plan.cost, plan.steps.len()))
+fn cheaper<N: Ord>(one: Option<GroundPlan<N>>, other: Option<GroundPlan<N>>) -> Option<GroundPlan<N>> {
+    one.into_iter().chain(other).min_by(|a, b| (&a.cost, a.steps.len()).cmp(&(&b.cost, b.steps.len())))
 }
 
 /// A state's basic values and numbers, and what was paid on the way to it.
@@ -147,21 +181,21 @@ pub(crate) fn closed_labels(
         (Found::None, None) => {}
         _ => return None,
     }
-    let below = |node: &&Node| {
+    let below = |node: &&Node<Int>| {
         let estimate = bounds.estimate(&node.state);
         !node.dominated && estimate.is_some_and(|more| cost.is_none_or(|cost| node.cost + more < cost))
     };
     let label =
-        |node: &Node| (node.state.values[..task.basic].to_vec(), node.state.numbers.clone(), node.cost);
+        |node: &Node<Int>| (node.state.values[..task.basic].to_vec(), node.state.numbers.clone(), node.cost);
     Some(search.nodes.iter().filter(below).map(label).collect())
 }
 
-impl<'a> Search<'a> {
+impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     fn new(
-        task: &'a Task,
-        bounds: &'a Bounds,
-        prepared: &'a Prepared,
-        initial: &State,
+        task: &'a Task<N>,
+        bounds: &'a E,
+        prepared: &'a Prepared<N>,
+        initial: &State<N>,
         greedy: bool,
     ) -> Self {
         let mut search = Search {
@@ -174,14 +208,14 @@ impl<'a> Search<'a> {
             incomplete: false,
             greedy,
             best: None,
-            limit: Int::MAX,
+            limit: None,
         };
-        search.push(initial.clone(), 0, 0, None);
+        search.push(initial.clone(), N::zero(), 0, None);
         search
     }
 
     /// None if there are more states than `most` before anything is known; it may be called again.
-    fn run(&mut self, limits: &Limits, most: usize) -> Option<Found> {
+    fn run(&mut self, limits: &Limits, most: usize) -> Option<Found<N>> {
         let mut pulse = limits.pulse();
         while self.nodes.len() <= most {
             let Some(Reverse((_, steps, id))) = self.open.pop() else {
@@ -203,7 +237,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    fn best_plan(&self) -> Option<GroundPlan> {
+    fn best_plan(&self) -> Option<GroundPlan<N>> {
         self.best.map(|goal| self.plan(goal))
     }
 
@@ -211,7 +245,7 @@ impl<'a> Search<'a> {
     /// search must end there.
     fn expand(&mut self, id: u32, steps: u32, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
         let state = self.nodes[id as usize].state.clone();
-        let cost = self.nodes[id as usize].cost;
+        let cost = self.nodes[id as usize].cost.clone();
         let prepared = self.prepared;
         for operator_id in prepared.index.applicable(self.task, &state) {
             let operator = &self.task.operators[operator_id.index()];
@@ -220,7 +254,7 @@ impl<'a> Search<'a> {
                 pulse.beat()?;
                 if operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
                     let parent = Some((id, operator_id, dense(index)));
-                    match (self.task.successor(operator, &state, choice), cost.checked_add(*step)) {
+                    match (self.task.successor(operator, &state, choice), cost.plus(step)) {
                         (Some(next), Some(cost)) => self.push(next, cost, steps + 1, parent),
                         _ => self.incomplete = true,
                     }
@@ -230,13 +264,13 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    fn push(&mut self, state: State, cost: Int, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
+    fn push(&mut self, state: State<N>, cost: N, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
         let Some(estimate) = self.bounds.estimate(&state) else { return };
-        let Some(total) = cost.checked_add(estimate).filter(|total| *total < GROWTH_LIMIT) else {
+        let Some(total) = cost.plus(&estimate).filter(N::is_moderate) else {
             self.incomplete = true;
             return;
         };
-        if total > self.limit {
+        if self.limit.as_ref().is_some_and(|limit| total > *limit) {
             return;
         }
         let id = dense(self.nodes.len());
@@ -246,36 +280,37 @@ impl<'a> Search<'a> {
             }
             Entry::Occupied(mut entry) => {
                 let (nodes, monotone) = (&mut self.nodes, self.prepared.monotone);
-                let at_least = |a: &[Int], b: &[Int]| {
+                let at_least = |a: &[N], b: &[N]| {
                     if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b }
                 };
                 let known = |id: &u32| &nodes[*id as usize];
                 let front = entry.get_mut();
                 if front.iter().any(|id| {
-                    (known(id).cost, known(id).steps) <= (cost, steps)
+                    (&known(id).cost, known(id).steps) <= (&cost, steps)
                         && at_least(&known(id).state.numbers, &state.numbers)
                 }) {
                     return;
                 }
                 front.retain(|id| {
                     let node = &mut nodes[*id as usize];
-                    node.dominated = (cost, steps) <= (node.cost, node.steps)
+                    node.dominated = (&cost, steps) <= (&node.cost, node.steps)
                         && at_least(&state.numbers, &node.state.numbers);
                     !node.dominated
                 });
                 front.push(id);
             }
         }
-        if (self.best.is_none() || cost < self.limit) && self.task.is_goal(&state) {
+        let improves = self.best.is_none() || self.limit.as_ref().is_none_or(|limit| cost < *limit);
+        if improves && self.task.is_goal(&state) {
             self.best = Some(id);
-            self.limit = cost;
+            self.limit = Some(cost.clone());
         }
         self.nodes.push(Node { state, cost, steps, parent, dominated: false });
-        let so_far = if self.greedy { 0 } else { cost };
-        self.open.push(Reverse((so_far + estimate, steps, id)));
+        let priority = if self.greedy { estimate } else { total };
+        self.open.push(Reverse((priority, steps, id)));
     }
 
-    fn plan(&self, goal: u32) -> GroundPlan {
+    fn plan(&self, goal: u32) -> GroundPlan<N> {
         let mut steps = Vec::new();
         let mut at = goal;
         while let Some((parent, operator, choice)) = self.nodes[at as usize].parent {
@@ -284,22 +319,22 @@ impl<'a> Search<'a> {
             at = parent;
         }
         steps.reverse();
-        GroundPlan { steps, cost: self.nodes[goal as usize].cost }
+        GroundPlan { steps, cost: self.nodes[goal as usize].cost.clone() }
     }
 }
 
 /// Whether more of any numeric variable can only help: it enters conditions and effects with factors ≥ 0, and
 /// whether a derived variable holds that depends on numbers is asked only where it helps.
-pub(crate) fn is_monotone(task: &Task) -> bool {
+pub(crate) fn is_monotone<N: TaskNumber>(task: &Task<N>) -> bool {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain([&task.goal]);
     let rules = || task.axioms.iter().flat_map(|layer| &layer.rules);
     let conditions: Vec<_> = conditions.chain(rules().map(|rule| &rule.body)).collect();
     let mut numeric = vec![false; task.variables.len()];
     loop {
-        let depends = |rule: &&crate::task::Axiom| {
+        let depends = |rule: &&crate::task::Axiom<N>| {
             let depends = |fact: &Fact| numeric[fact.variable.index()];
             !numeric[rule.head.variable.index()]
-                && (!rule.body.comparisons.is_empty() || rule.body.facts.iter().any(depends))
+                && (rule.body.linears().next().is_some() || rule.body.facts.iter().any(depends))
         };
         let Some(rule) = rules().find(depends) else { break };
         numeric[rule.head.variable.index()] = true;
@@ -315,8 +350,10 @@ pub(crate) fn is_monotone(task: &Task) -> bool {
     if !asked || triggers.any(|literal| numeric[literal.fact.variable.index()]) {
         return false;
     }
-    let comparisons = conditions.into_iter().flat_map(|condition| &condition.comparisons);
+    let comparisons = conditions.into_iter().flat_map(Condition::linears);
     let effects =
         task.operators.iter().flat_map(|operator| &operator.numeric_effects).map(|effect| &effect.value);
-    comparisons.chain(effects).all(|linear| linear.coefficients.iter().all(|(_, factor)| *factor >= 0))
+    comparisons
+        .chain(effects)
+        .all(|linear| linear.coefficients.iter().all(|(_, factor)| *factor >= N::zero()))
 }

@@ -36,7 +36,7 @@ pub enum Proof {
 }
 
 /// A better plan was found, or a better lower bound.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Improvement {
     /// The metric of the best plan so far.
     pub cost: Exact,

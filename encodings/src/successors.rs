@@ -5,7 +5,7 @@ use std::collections::hash_map::Entry;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::limits::{Interrupted, Limits};
-use crate::number::{Int, dense};
+use crate::number::{TaskNumber, dense};
 use crate::quantity::{Quantity, SlotSet};
 use crate::task::{Operator, OperatorId, State, Task};
 
@@ -16,12 +16,12 @@ pub(crate) struct OperatorIndex {
 }
 
 impl OperatorIndex {
-    pub(crate) fn new(task: &Task) -> Self {
+    pub(crate) fn new<N>(task: &Task<N>) -> Self {
         Self::over(task, OperatorId::all(task.operators.len()))
     }
 
     /// An index of some operators, ascending.
-    pub(crate) fn over(task: &Task, operators: impl Iterator<Item = OperatorId>) -> Self {
+    pub(crate) fn over<N>(task: &Task<N>, operators: impl Iterator<Item = OperatorId>) -> Self {
         let mut index = Self { by_fact: FxHashMap::default(), always: Vec::new() };
         for id in operators {
             let widest = task.operators[id.index()]
@@ -38,7 +38,7 @@ impl OperatorIndex {
     }
 
     /// The operators whose propositional condition holds, ascending.
-    pub(crate) fn applicable(&self, task: &Task, state: &State) -> Vec<OperatorId> {
+    pub(crate) fn applicable<N>(&self, task: &Task<N>, state: &State<N>) -> Vec<OperatorId> {
         let mut found = self.always.clone();
         for (variable, value) in state.values.iter().enumerate() {
             found.extend(self.by_fact.get(&(dense(variable), *value)).into_iter().flatten());
@@ -55,14 +55,14 @@ const COMBINATION_LIMIT: usize = 2_000_000;
 const CHOICE_LIMIT: usize = 100_000;
 
 /// Designs for some slots of an operator, with what they add to its cost and to the numbers in its conditions and effects.
-struct Partial {
+struct Partial<N> {
     choice: Vec<u32>,
-    cost: Int,
-    profile: Vec<Int>,
+    cost: N,
+    profile: Vec<N>,
 }
 
 /// Combinations of designs, each with its cost.
-pub(crate) type Priced = Vec<(Vec<u32>, Int)>;
+pub(crate) type Priced<N> = Vec<(Vec<u32>, N)>;
 
 /// The combinations of an operator's designs that no other one dominates, with their costs: none is cheaper or
 /// leaves more of the numeric variables. Of equal ones the first stands for all, unless `all` are asked for. None if there
@@ -70,24 +70,25 @@ pub(crate) type Priced = Vec<(Vec<u32>, Int)>;
 ///
 /// Slots that no table and no exclusion joins contribute by themselves, so what is dominated among the combinations of some of
 /// them is dominated in all combinations that extend it: k functions of m designs cost no m^k comparisons.
-pub(crate) fn undominated(
-    operator: &Operator,
+pub(crate) fn undominated<N: TaskNumber>(
+    operator: &Operator<N>,
     monotone: bool,
     all: bool,
     limits: &Limits,
-) -> Result<Option<Priced>, Interrupted> {
+) -> Result<Option<Priced<N>>, Interrupted> {
     let sizes = operator.sizes();
     let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
-    let conditions = operator.condition.comparisons.iter().map(|linear| &linear.quantity);
+    let conditions = operator.condition.linears().map(|linear| &linear.quantity);
     // A resource is usually compared and reduced by the same quantity.
-    let mut quantities: Vec<&Quantity<Int>> = Vec::new();
+    let mut quantities: Vec<&Quantity<N>> = Vec::new();
     for quantity in effects.chain(conditions) {
         if !quantities.contains(&quantity) {
             quantities.push(quantity);
         }
     }
-    let profile = quantities.iter().map(|quantity| quantity.constant).collect();
-    let mut front = vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant, profile }];
+    let profile = quantities.iter().map(|quantity| quantity.constant.clone()).collect();
+    let mut front =
+        vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant.clone(), profile }];
     for slots in independent(operator, &quantities) {
         let Some(own) = own_front(operator, &quantities, &slots, (monotone, all), limits)? else {
             return Ok(None);
@@ -103,13 +104,13 @@ pub(crate) fn undominated(
 }
 
 /// Those combinations of designs for some slots that no other one dominates; none if there are too many.
-fn own_front(
-    operator: &Operator,
-    quantities: &[&Quantity<Int>],
+fn own_front<N: TaskNumber>(
+    operator: &Operator<N>,
+    quantities: &[&Quantity<N>],
     slots: &[u32],
     (monotone, all): (bool, bool),
     limits: &Limits,
-) -> Result<Option<Vec<Partial>>, Interrupted> {
+) -> Result<Option<Vec<Partial<N>>>, Interrupted> {
     let sizes = operator.sizes();
     let mut counts = slots.iter().map(|slot| sizes[*slot as usize]);
     let count = counts.try_fold(1_usize, usize::checked_mul);
@@ -126,7 +127,7 @@ fn own_front(
         if rules.iter().any(|(slots, bad)| bad.contains(&part(slots))) {
             continue;
         }
-        let sum = |quantity: &Quantity<Int>| quantity.part(slots, &choice, &sizes);
+        let sum = |quantity: &Quantity<N>| quantity.part(slots, &choice, &sizes);
         let cost = sum(&operator.cost);
         let profile = quantities.iter().map(|quantity| sum(quantity)).collect();
         own.push(Partial { choice, cost, profile });
@@ -140,35 +141,35 @@ fn own_front(
     best(own, monotone, all, limits).map(Some)
 }
 
-impl Partial {
+impl<N: TaskNumber> Partial<N> {
     fn with(&self, other: &Self, slots: &[u32]) -> Self {
         let mut choice = self.choice.clone();
         for slot in slots {
             choice[*slot as usize] = other.choice[*slot as usize];
         }
-        let profile = self.profile.iter().zip(&other.profile).map(|(a, b)| a + b).collect();
-        Self { choice, cost: self.cost + other.cost, profile }
+        let profile = self.profile.iter().zip(&other.profile).map(|(a, b)| a.clone() + b.clone()).collect();
+        Self { choice, cost: self.cost.clone() + other.cost.clone(), profile }
     }
 }
 
 /// Those that none dominates, in lexicographic order of the designs.
-fn best(
-    mut all_of_them: Vec<Partial>,
+fn best<N: TaskNumber>(
+    mut all_of_them: Vec<Partial<N>>,
     monotone: bool,
     all: bool,
     limits: &Limits,
-) -> Result<Vec<Partial>, Interrupted> {
+) -> Result<Vec<Partial<N>>, Interrupted> {
     limits.check()?;
     // What dominates comes before what it dominates.
     all_of_them.sort_by(|a, b| {
         a.cost.cmp(&b.cost).then_with(|| b.profile.cmp(&a.profile)).then_with(|| a.choice.cmp(&b.choice))
     });
-    let mut front: Vec<Partial> = Vec::new();
+    let mut front: Vec<Partial<N>> = Vec::new();
     // Where profiles have to be equal, the first with each: none that comes later is cheaper.
-    let mut cheapest: FxHashMap<Vec<Int>, Int> = FxHashMap::default();
+    let mut cheapest: FxHashMap<Vec<N>, N> = FxHashMap::default();
     let mut pulse = limits.pulse();
     for new in all_of_them {
-        let is_equal = |cost: Int, profile: &[Int]| all && cost == new.cost && profile == new.profile;
+        let is_equal = |cost: &N, profile: &[N]| all && *cost == new.cost && profile == new.profile;
         let is_dominated = if monotone {
             // In one dimension the last one has the most of all that are as cheap.
             let candidates = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
@@ -176,7 +177,7 @@ fn best(
             for old in &front[candidates..] {
                 pulse.beat()?;
                 let no_worse = old.profile.iter().zip(&new.profile).all(|(old, new)| old >= new);
-                if no_worse && !is_equal(old.cost, &old.profile) {
+                if no_worse && !is_equal(&old.cost, &old.profile) {
                     is_dominated = true;
                     break;
                 }
@@ -185,9 +186,9 @@ fn best(
         } else {
             pulse.beat()?;
             match cheapest.entry(new.profile.clone()) {
-                Entry::Occupied(known) => !is_equal(*known.get(), known.key()),
+                Entry::Occupied(known) => !is_equal(known.get(), known.key()),
                 Entry::Vacant(entry) => {
-                    entry.insert(new.cost);
+                    entry.insert(new.cost.clone());
                     false
                 }
             }
@@ -201,7 +202,7 @@ fn best(
 }
 
 /// The slots of an operator in groups that no table and no exclusion joins.
-fn independent(operator: &Operator, quantities: &[&Quantity<Int>]) -> Vec<Vec<u32>> {
+fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Vec<u32>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
     let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));
     let mut groups: Vec<Vec<u32>> = (0..dense(operator.slots.len())).map(|slot| vec![slot]).collect();
@@ -255,6 +256,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::number::Int;
     use crate::quantity::{Linear, NumericId, Table};
     use crate::task::{Condition, Forbidden, NumericEffect, SlotId, SlotUse};
 

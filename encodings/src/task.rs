@@ -9,11 +9,9 @@
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use num_bigint::{BigInt, Sign};
-
 use crate::ground::events::Timing;
 use crate::lifted::ObjectId;
-use crate::number::{GROWTH_LIMIT, Int, dense};
+use crate::number::{Int, TaskNumber, dense, sum_of_products};
 pub use crate::quantity::NumericId;
 use crate::quantity::{Linear, Quantity, SlotSet};
 
@@ -89,12 +87,14 @@ pub(crate) struct Literal {
 }
 
 /// What must hold: all facts, one literal of every clause, and every linear expression at least zero.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub(crate) struct Condition {
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Condition<N = Int> {
     pub(crate) facts: Vec<Fact>,
     pub(crate) clauses: Vec<Vec<Literal>>,
     /// Each is ≥ 0.
-    pub(crate) comparisons: Vec<Linear<Int>>,
+    pub(crate) comparisons: Vec<Linear<N>>,
+    /// Each is > 0. Integers have none: one that is > 0 is ≥ 1.
+    pub(crate) above: Vec<Linear<N>>,
 }
 
 /// A finite-domain variable: at every moment exactly one of its values holds.
@@ -129,9 +129,9 @@ pub(crate) struct Forbidden {
 
 /// What an operator does to a numeric variable: the variable becomes this.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct NumericEffect {
+pub(crate) struct NumericEffect<N = Int> {
     pub(crate) variable: NumericId,
-    pub(crate) value: Linear<Int>,
+    pub(crate) value: Linear<N>,
 }
 
 /// What an operator sets if all literals hold before it.
@@ -143,15 +143,15 @@ pub(crate) struct ConditionalEffect {
 
 /// A rule of a derived variable: it has the value of the head if the body holds, and its last value if no body does.
 #[derive(Debug, Clone)]
-pub(crate) struct Axiom {
+pub(crate) struct Axiom<N = Int> {
     pub(crate) head: Fact,
-    pub(crate) body: Condition,
+    pub(crate) body: Condition<N>,
 }
 
 /// Rules that depend on each other, or a single one; negated variables and those of other rules are in earlier layers.
 #[derive(Debug, Clone)]
-pub(crate) struct Layer {
-    pub(crate) rules: Vec<Axiom>,
+pub(crate) struct Layer<N = Int> {
+    pub(crate) rules: Vec<Axiom<N>>,
     pub(crate) recursive: bool,
 }
 
@@ -164,7 +164,7 @@ pub(crate) enum Argument {
 
 /// An operator. What depends on its designs is shared with other operators of the same schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Operator {
+pub(crate) struct Operator<N = Int> {
     /// Index of the action schema in the domain.
     pub(crate) schema: u32,
     pub(crate) arguments: Vec<Argument>,
@@ -172,38 +172,38 @@ pub(crate) struct Operator {
     pub(crate) configuration: Vec<(ObjectId, Argument)>,
     pub(crate) slots: Arc<[SlotUse]>,
     pub(crate) forbidden: Arc<[Forbidden]>,
-    pub(crate) condition: Condition,
+    pub(crate) condition: Condition<N>,
     /// At most one value for each variable, ascending by variable.
     pub(crate) effects: Vec<Fact>,
     /// In order: later ones prevail over earlier ones and over `effects`.
     pub(crate) conditional: Vec<ConditionalEffect>,
-    pub(crate) numeric_effects: Vec<NumericEffect>,
+    pub(crate) numeric_effects: Vec<NumericEffect<N>>,
     /// In the task's cost unit; may be negative where the metric rewards.
-    pub(crate) cost: Quantity<Int>,
+    pub(crate) cost: Quantity<N>,
     /// By the task's other objectives, in their units.
-    pub(crate) others: Vec<Quantity<Int>>,
+    pub(crate) others: Vec<Quantity<N>>,
     /// In the task's time unit.
-    pub(crate) duration: Quantity<Int>,
+    pub(crate) duration: Quantity<N>,
     /// Set if this is no action but a wait until that time, in the task's time unit from the start of the plan.
-    pub(crate) wait: Option<Int>,
+    pub(crate) wait: Option<N>,
     /// In the task's time unit from the start of the plan.
-    pub(crate) timing: Timing<Int>,
+    pub(crate) timing: Timing<N>,
 }
 
 /// A state: a value for each variable.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct State {
+pub(crate) struct State<N = Int> {
     pub(crate) values: Vec<u32>,
-    pub(crate) numbers: Vec<Int>,
+    pub(crate) numbers: Vec<N>,
 }
 
 /// How integer costs relate to the metric of the problem file.
 #[derive(Debug, Clone)]
-pub struct Objective {
+pub struct Objective<N = Int> {
     /// Costs are this many times the metric.
     pub(crate) scale: Int,
     /// Added to the sum of operator costs (in scaled units).
-    pub(crate) offset: Int,
+    pub(crate) offset: N,
     /// Whether the file asks to maximize; operator costs are negated then.
     pub(crate) maximize: bool,
 }
@@ -217,7 +217,7 @@ impl Objective {
 
 /// A ground task.
 #[derive(Debug, Clone)]
-pub struct Task {
+pub struct Task<N = Int> {
     pub(crate) object_names: Vec<String>,
     pub(crate) schema_names: Vec<String>,
     /// The basic variables, then the derived ones, which have two values: true (0) and false (1).
@@ -232,14 +232,14 @@ pub struct Task {
     /// Numbers are this many times the values of the files.
     pub(crate) number_scale: Int,
     /// The rules of the derived variables, in the order of their evaluation.
-    pub(crate) axioms: Vec<Layer>,
+    pub(crate) axioms: Vec<Layer<N>>,
     pub(crate) slots: Vec<Slot>,
-    pub(crate) operators: Vec<Operator>,
-    pub(crate) initial: State,
-    pub(crate) goal: Condition,
-    pub(crate) objective: Objective,
+    pub(crate) operators: Vec<Operator<N>>,
+    pub(crate) initial: State<N>,
+    pub(crate) goal: Condition<N>,
+    pub(crate) objective: Objective<N>,
     /// Less important ones, in order.
-    pub(crate) others: Vec<Objective>,
+    pub(crate) others: Vec<Objective<N>>,
     /// Durations are this many times the values of the files.
     pub(crate) time_scale: Int,
     /// Set if relaxed reachability shows that the goal cannot be reached: the reason.
@@ -247,13 +247,19 @@ pub struct Task {
 }
 
 /// By what usually tells operators apart; the rest may be long.
-impl Hash for Operator {
+impl<N> Hash for Operator<N> {
     fn hash<H: Hasher>(&self, state: &mut H) {
         (self.schema, &self.arguments, &self.condition.facts, &self.effects).hash(state);
     }
 }
 
-impl Operator {
+impl<N> Default for Condition<N> {
+    fn default() -> Self {
+        Self { facts: Vec::new(), clauses: Vec::new(), comparisons: Vec::new(), above: Vec::new() }
+    }
+}
+
+impl<N> Operator<N> {
     /// How many designs each slot admits.
     pub(crate) fn sizes(&self) -> Vec<usize> {
         self.slots.iter().map(|slot| slot.designs.len()).collect()
@@ -268,26 +274,21 @@ impl Operator {
         })
     }
 
-    /// The cost with a combination of designs.
-    pub(crate) fn cost_of(&self, choice: &[u32]) -> Int {
-        self.cost.at(choice, &self.sizes())
-    }
-
     /// All admitted combinations of designs, in lexicographic order.
-    pub(crate) fn choices(&self) -> Choices<'_> {
+    pub(crate) fn choices(&self) -> Choices<'_, N> {
         let empty = self.slots.iter().any(|slot| slot.designs.is_empty());
         Choices { operator: self, sizes: self.sizes(), next: (!empty).then(|| vec![0; self.slots.len()]) }
     }
 }
 
 /// Iterator over the admitted combinations of an operator's designs.
-pub(crate) struct Choices<'a> {
-    operator: &'a Operator,
+pub(crate) struct Choices<'a, N = Int> {
+    operator: &'a Operator<N>,
     sizes: Vec<usize>,
     next: Option<Vec<u32>>,
 }
 
-impl Iterator for Choices<'_> {
+impl<N> Iterator for Choices<'_, N> {
     type Item = Vec<u32>;
 
     fn next(&mut self) -> Option<Vec<u32>> {
@@ -309,34 +310,41 @@ impl Iterator for Choices<'_> {
     }
 }
 
-impl Linear<Int> {
-    /// The value in a state, for a combination of designs; none if it does not fit.
-    pub(crate) fn value(&self, numbers: &[Int], choice: &[u32], sizes: &[usize]) -> Option<Int> {
-        let mut terms = self.coefficients.iter().map(|(v, factor)| factor.checked_mul(numbers[v.index()]));
-        terms.try_fold(self.quantity.at(choice, sizes), |sum, term| sum.checked_add(term?))
+impl<N: TaskNumber> Linear<N> {
+    /// Factors with the numbers that they stand at.
+    fn terms<'n>(&'n self, numbers: &'n [N]) -> impl Iterator<Item = (&'n N, &'n N)> + Clone {
+        self.coefficients.iter().map(|(variable, factor)| (factor, &numbers[variable.index()]))
     }
 
-    /// Whether the value is at least 0, however large the numbers in between.
-    fn is_at_least_zero(&self, numbers: &[Int], choice: &[u32], sizes: &[usize]) -> bool {
-        if let Some(value) = self.value(numbers, choice, sizes) {
-            return value >= 0;
-        }
-        let terms = self.coefficients.iter().map(|(v, factor)| BigInt::from(*factor) * numbers[v.index()]);
-        terms.fold(BigInt::from(self.quantity.at(choice, sizes)), |sum, term| sum + term).sign()
-            != Sign::Minus
+    /// The value in a state, for a combination of designs; none if it does not fit.
+    pub(crate) fn value(&self, numbers: &[N], choice: &[u32], sizes: &[usize]) -> Option<N> {
+        sum_of_products(self.quantity.at(choice, sizes), self.terms(numbers))
+    }
+
+    /// Whether the value is at least 0, or above 0 if `strict`.
+    fn compares(&self, numbers: &[N], choice: &[u32], sizes: &[usize], strict: bool) -> bool {
+        N::compare(self.quantity.at(choice, sizes), self.terms(numbers), strict)
     }
 }
 
-impl Condition {
+impl<N> Condition<N> {
     /// Whether the propositional part holds.
     pub(crate) fn holds_propositionally(&self, values: &[u32]) -> bool {
         self.facts.iter().all(|fact| fact.holds(values))
             && self.clauses.iter().all(|clause| clause.iter().any(|literal| literal.holds(values)))
     }
 
+    /// What the numeric part compares, whether or not strictly.
+    pub(crate) fn linears(&self) -> impl Iterator<Item = &Linear<N>> {
+        self.comparisons.iter().chain(&self.above)
+    }
+}
+
+impl<N: TaskNumber> Condition<N> {
     /// Whether the numeric part holds.
-    pub(crate) fn holds_numerically(&self, numbers: &[Int], choice: &[u32], sizes: &[usize]) -> bool {
-        self.comparisons.iter().all(|comparison| comparison.is_at_least_zero(numbers, choice, sizes))
+    pub(crate) fn holds_numerically(&self, numbers: &[N], choice: &[u32], sizes: &[usize]) -> bool {
+        self.comparisons.iter().all(|linear| linear.compares(numbers, choice, sizes, false))
+            && self.above.iter().all(|linear| linear.compares(numbers, choice, sizes, true))
     }
 }
 
@@ -355,8 +363,15 @@ impl Literal {
 }
 
 impl Operator {
+    /// The cost with a combination of designs.
+    pub(crate) fn cost_of(&self, choice: &[u32]) -> Int {
+        self.cost.at(choice, &self.sizes())
+    }
+}
+
+impl<N: TaskNumber> Operator<N> {
     /// Whether the operator may be applied with this combination of designs.
-    pub(crate) fn applicable(&self, state: &State, choice: &[u32]) -> bool {
+    pub(crate) fn applicable(&self, state: &State<N>, choice: &[u32]) -> bool {
         self.condition.holds_propositionally(&state.values)
             && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())
     }
@@ -365,19 +380,32 @@ impl Operator {
 impl Task {
     /// Where the problem has no metric: whether plans are measured by their time, and not by the number of their steps.
     pub fn is_timed(&self) -> bool {
-        let step = |operator: &Operator| if operator.wait.is_some() { 0 } else { self.objective.scale };
+        self.is_measured_by_time(&self.objective.scale)
+    }
+}
+
+#[expect(private_bounds, reason = "nobody else has numbers of tasks")]
+impl<N: TaskNumber> Task<N> {
+    /// [`Task::is_timed`], where `step` is what a step costs.
+    pub(crate) fn is_measured_by_time(&self, step: &N) -> bool {
+        let step = |operator: &Operator<N>| if operator.wait.is_some() { N::zero() } else { step.clone() };
         self.operators.iter().any(|operator| operator.cost != Quantity::constant(step(operator)))
     }
 
     /// Whether a state satisfies the goal.
-    pub(crate) fn is_goal(&self, state: &State) -> bool {
+    pub(crate) fn is_goal(&self, state: &State<N>) -> bool {
         self.goal.holds_propositionally(&state.values)
             && self.goal.holds_numerically(&state.numbers, &[], &[])
     }
 
     /// The state after an operator, which must be applicable with this combination of designs; none if its numbers grow
-    /// beyond [`GROWTH_LIMIT`].
-    pub(crate) fn successor(&self, operator: &Operator, state: &State, choice: &[u32]) -> Option<State> {
+    /// too large.
+    pub(crate) fn successor(
+        &self,
+        operator: &Operator<N>,
+        state: &State<N>,
+        choice: &[u32],
+    ) -> Option<State<N>> {
         let mut next = state.clone();
         for effect in &operator.effects {
             next.values[effect.variable.index()] = effect.value;
@@ -393,7 +421,7 @@ impl Task {
             let sizes = operator.sizes();
             for effect in &operator.numeric_effects {
                 let value = effect.value.value(&state.numbers, choice, &sizes)?;
-                if value.abs() > GROWTH_LIMIT {
+                if !value.is_moderate() {
                     return None;
                 }
                 next.numbers[effect.variable.index()] = value;
@@ -404,7 +432,7 @@ impl Task {
     }
 
     /// Gives the derived variables their values: the least fixpoint of the rules, layer by layer.
-    pub(crate) fn close(&self, state: &mut State) {
+    pub(crate) fn close(&self, state: &mut State<N>) {
         if self.axioms.is_empty() {
             return;
         }

@@ -31,10 +31,7 @@ fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     let task =
         ground(&domain, &problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
     let solution = optimize(&task, &Config::default(), &mut |_| {});
-    let cost = solution
-        .plan
-        .as_ref()
-        .map(|plan| BigRational::new(plan.cost.numerator.into(), plan.cost.denominator.into()));
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_rational());
     assert_eq!(solution.status, if cost.is_some() { Status::Optimal } else { Status::Unsolvable });
     assert_eq!(cost, mission.oracle().map(|cost| BigRational::from_integer(cost.into())), "seed {seed}");
     let certificate = certify(&task, &solution, &Limits::none());

@@ -77,7 +77,7 @@ fn check(
     assert_eq!(solution.status, Status::Optimal, "{name}");
     let value = metric(&domain, &problem, &text, &separation)
         .unwrap_or_else(|message| panic!("{name}: {message}\n{text}"));
-    assert_eq!(value, rational(plan.cost.numerator, plan.cost.denominator), "{name}\n{text}");
+    assert_eq!(value, plan.cost.to_rational(), "{name}\n{text}");
     let shown = Some((plan.cost.to_string(), text.lines().map(str::to_owned).collect::<Vec<_>>()));
     let expected =
         expected.map(|(cost, lines)| (cost.to_owned(), lines.iter().map(ToString::to_string).collect()));
@@ -377,9 +377,9 @@ fn agree(seed: u64) -> bool {
     };
     let text = written(found);
     let value = metric(&domain, &problem, &text, &separation);
-    let claimed = rational(found.cost.numerator, found.cost.denominator);
+    let claimed = found.cost.to_rational();
     assert_eq!(value, Ok(claimed.clone()), "{}\n{text}", context());
-    let within = |step: &metaplan_encodings::Step| step.start.numerator <= LAST * step.start.denominator;
+    let within = |step: &metaplan_encodings::Step| step.start.to_rational() <= rational(LAST, 1);
     if found.steps.len() <= 3 && found.steps.iter().all(within) {
         assert_eq!(Some(&claimed), expected.as_ref(), "{}\n{text}", context());
     } else {
@@ -481,13 +481,13 @@ fn robots_on_maps() {
                 "{count} robots, {} places, {looks} looks, seed {seed}: {:?} {} >= {} in {:.2?}",
                 side * side,
                 solution.status,
-                shown(solution.plan.as_ref().map(|plan| plan.cost)),
+                shown(solution.plan.as_ref().map(|plan| plan.cost.clone())),
                 shown(solution.lower_bound),
                 start.elapsed()
             );
             if let Some(plan) = &solution.plan {
                 let value = metric(&domain, &problem, &written(plan), &separation);
-                assert_eq!(value, Ok(rational(plan.cost.numerator, plan.cost.denominator)));
+                assert_eq!(value, Ok(plan.cost.to_rational()));
             }
         }
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::validate::{Options, PlanText, validate};
-use metaplan_encodings::{Exact, GroundConfig, Limits, Status, ground_concurrent, optimize_concurrent};
+use metaplan_encodings::{GroundConfig, Limits, Status, ground_concurrent, optimize_concurrent};
 use num_bigint::BigInt;
 use num_rational::BigRational;
 
@@ -34,8 +34,7 @@ fn proved(domain: &str, problem: &str) -> String {
     let verdict = validate(&domain, &problem, &parsed, &Options { concurrent: true, tolerance: separation });
     assert!(verdict.valid, "{text}{:?}", verdict.violation);
     let value = verdict.metric.unwrap_or(verdict.total_time);
-    let Exact { numerator, denominator } = plan.cost;
-    assert_eq!(value, BigRational::new(numerator.into(), denominator.into()), "{text}");
+    assert_eq!(value, plan.cost.to_rational(), "{text}");
     plan.cost.to_string()
 }
 

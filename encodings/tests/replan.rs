@@ -143,7 +143,7 @@ fn compare(expected: &Solution, found: &Replanned, context: &dyn Fn() -> String)
                 steps.iter().map(name).collect::<Vec<_>>()
             };
             assert_eq!(names(&plan.steps), names(steps), "{}", context());
-            let cost = BigRational::new(plan.cost.numerator.into(), plan.cost.denominator.into());
+            let cost = plan.cost.to_rational();
             assert_eq!(cost, *metric, "{}", context());
         }
         (None, Replanned::Unsolvable) => assert_eq!(expected.status, Status::Unsolvable, "{}", context()),
@@ -220,7 +220,7 @@ fn check_close(seed: u64) {
     let others = alternatives(&task, &solution, 200, &Config::default());
     let Some(others) = others.filter(|others| others.complete) else { return };
     let best = solution.plan.as_ref().expect("a plan");
-    let cost = BigRational::new(best.cost.numerator.into(), best.cost.denominator.into());
+    let cost = best.cost.to_rational();
     assert_eq!(cost, metric, "seed {seed}");
     assert_eq!(steps.len(), best.steps.len(), "seed {seed}");
     let kept = |plan: &Named| plan.iter().filter(|step| old.contains(step)).count();

@@ -18,6 +18,8 @@ use metaplan_encodings::pddl::ast::{ActionBody, Domain, Problem};
 use metaplan_encodings::pddl::{Source, print_domain, print_problem, read};
 use metaplan_encodings::validate::{Options, PlanText, ViolationKind, validate};
 use metaplan_encodings::{Config, Exact, GroundConfig, Limits, ground, optimize};
+use num_bigint::BigInt;
+use num_traits::ToPrimitive;
 
 const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/pddl");
 
@@ -87,7 +89,8 @@ fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     for (words, duration) in steps {
         let action = domain.actions.iter().find(|action| action.identifier.name.as_str() == words[0]);
         let is_durative = action.is_some_and(|action| matches!(action.body, ActionBody::Durative { .. }));
-        let length = duration.numerator * 1000 / duration.denominator;
+        let length =
+            (duration.to_rational() * BigInt::from(1000)).to_integer().to_i128().expect("a short time");
         timed.push((time, words, is_durative.then_some(length)));
         time += length + 10;
     }

@@ -9,8 +9,9 @@ use serde_json::{Value, json};
 
 use crate::cli::Failure;
 use crate::cli::concurrent::Reading;
-use crate::cli::plan::{confirm, steps_text};
+use crate::cli::plan::confirm;
 use crate::cli::plan_json::step_json;
+use crate::cli::plan_text::steps_text;
 
 /// Looks for further plans; each is executed by the validator as the first one is.
 pub(super) fn find(
@@ -23,7 +24,7 @@ pub(super) fn find(
 ) -> Result<Option<Alternatives>, Failure> {
     let Some(mut found) = encodings::alternatives(task, solution, most, config) else { return Ok(None) };
     for plan in &found.plans {
-        confirm(mission, problem, plan, &Reading::sequential(task))?;
+        confirm(mission, problem, plan, &Reading::sequential(task.is_timed()))?;
     }
     found.plans = found.plans.into_iter().map(|plan| mission.written(plan)).collect();
     Ok(Some(found))

@@ -3,7 +3,7 @@
 use clap::Args;
 use encodings::pddl::ast::Problem;
 use encodings::validate::Options;
-use encodings::{Improvement, Limits, Plan, Point, Task, optimize_concurrent};
+use encodings::{Improvement, Limits, Plan, Point, optimize_concurrent};
 use metaplan::mission::Mission;
 use num_rational::BigRational;
 
@@ -46,8 +46,8 @@ pub(super) struct Reading {
 
 impl Reading {
     /// Actions are executed one after another.
-    pub(super) fn sequential(task: &Task) -> Self {
-        Self { options: Options::default(), timed: task.is_timed() }
+    pub(super) fn sequential(timed: bool) -> Self {
+        Self { options: Options::default(), timed }
     }
 
     /// Actions overlap.
@@ -71,7 +71,7 @@ pub(super) fn solve(
             Failure { exit, messages }
         })?;
     let solution = optimize_concurrent(&task, limits, report);
-    let values = solution.plan.iter().map(|plan| plan.cost);
+    let values = solution.plan.iter().map(|plan| plan.cost.clone());
     Ok(Point { values: values.filter(|_| !objectives.metrics.is_empty()).collect(), solution })
 }
 

@@ -13,6 +13,7 @@ mod memory;
 mod objectives;
 mod output;
 mod plan;
+mod plan_exact;
 mod plan_json;
 mod plan_text;
 mod plan_verdict;

@@ -66,7 +66,7 @@ impl Objectives {
         for (metric, value) in self.metrics.iter().zip(&point.values) {
             let problem = Problem { metric: Some(metric.clone()), ..problem.clone() };
             let mut plan = plan.clone();
-            plan.cost = *value;
+            plan.cost = value.clone();
             confirm(mission, &problem, &plan, reading)?;
         }
         Ok(())
@@ -74,7 +74,7 @@ impl Objectives {
 
     fn values(&self, point: &Point) -> Vec<Value> {
         let pairs = self.texts.iter().zip(&point.values);
-        pairs.map(|(text, value)| json!({ "minimize": text, "value": output::number(*value) })).collect()
+        pairs.map(|(text, value)| json!({ "minimize": text, "value": output::number(value) })).collect()
     }
 
     /// Adds the values by objective to a plan in JSON.
@@ -102,7 +102,7 @@ impl Objectives {
             let values: Vec<_> = pairs.map(|(text, value)| format!("{text} = {value}")).collect();
             let _ = writeln!(text, "point {number}: {}", values.join(", "));
             if let Some(plan) = &point.solution.plan {
-                text += &crate::cli::plan::steps_text(plan);
+                text += &crate::cli::plan_text::steps_text(plan);
             }
             text.push('\n');
         }

@@ -112,7 +112,7 @@ pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> St
 }
 
 /// An exact number as a JSON number; a fraction that is no decimal, rounded to a double.
-pub fn number(exact: Exact) -> Value {
+pub fn number(exact: &Exact) -> Value {
     let text = exact.to_string();
     match text.parse::<serde_json::Number>() {
         Ok(number) => Value::Number(number),

@@ -9,23 +9,22 @@ use clap::{Args, ValueEnum};
 use encodings::pddl::ast::{Name, Problem};
 use encodings::validate::{PlanStep, PlanText, validate};
 use encodings::{
-    Alternatives, Backend, BackendError, Config, Exact, Front, Improvement, Limits, Plan, Point, Semantics,
-    Solution, Status, Step, Task,
+    Alternatives, Backend, BackendError, Config, Front, Improvement, Limits, Plan, Point, Semantics,
+    Solution, Status, Task,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::certificate;
 use metaplan::measure::measure;
 use metaplan::message::Message;
 use metaplan::mission::{Blocking, Mission};
-use num_rational::BigRational;
 use serde_json::json;
 
 use crate::cli::concurrent::{self, Overlap, Reading};
 use crate::cli::objectives::Objectives;
 use crate::cli::plan_json::json as plan_json;
-use crate::cli::plan_text::plan_text;
+use crate::cli::plan_text::{plan_text, steps_text};
 use crate::cli::plan_verdict::{blocking_text, verdict};
-use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, memory, output};
+use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, memory, output, plan_exact};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -162,6 +161,21 @@ fn limits(arguments: &Arguments) -> Result<Limits, Failure> {
     Ok(limits)
 }
 
+/// What the user asks of the optimizer.
+fn configuration(arguments: &Arguments, limits: Limits) -> Config {
+    let backend = arguments.solver.clone();
+    let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
+    let strategy = arguments.strategy.into();
+    Config { horizon, semantics, strategy, limits, backend, ..Config::default() }
+}
+
+impl Arguments {
+    /// Whether one plan is not all that the user wants.
+    fn asks_for_more(&self) -> bool {
+        self.pareto.is_some() || self.alternatives.is_some()
+    }
+}
+
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let started = Instant::now();
@@ -196,16 +210,30 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         objectives.confirm(&mission, &problem, &point, &Reading::concurrent(separation))?;
         return finish(point, &Beside::default(), &mission, &objectives, &stages, (arguments, common));
     }
-    let task = mission.ground(&problem, &objectives.metrics, &limits).map_err(|messages| {
-        let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
+    let config = configuration(arguments, limits);
+    let failed = |messages| {
+        let exit = if config.limits.reached() { Exit::NothingFound } else { Exit::BadInput };
         Failure { exit, messages }
-    })?;
+    };
+    let ground = mission.ground(&problem, &objectives.metrics, &config.limits);
     let stages = Stages { read, ground: started.elapsed().saturating_sub(read) };
-
-    let backend = arguments.solver.clone();
-    let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
-    let strategy = arguments.strategy.into();
-    let config = Config { horizon, semantics, strategy, limits, backend, ..Config::default() };
+    let task = match ground {
+        Ok(task) => task,
+        Err(refused) if plan_exact::is_too_large(&refused) && !arguments.asks_for_more() => {
+            let found = plan_exact::solve(&mission, &problem, &objectives, &config, refused.clone());
+            progress.finish_and_clear();
+            let (point, reading) = found.map_err(failed)?;
+            objectives.confirm(&mission, &problem, &point, &reading)?;
+            if common.verbose {
+                plan_exact::explain(&refused);
+            }
+            if arguments.certificate.is_some() {
+                output::warnings(common, &[plan_exact::no_certificate(&refused)]);
+            }
+            return finish(point, &Beside::default(), &mission, &objectives, &stages, (arguments, common));
+        }
+        Err(messages) => return Err(failed(messages)),
+    };
     if arguments.pareto.is_some() {
         let front = encodings::pareto(&task, &config, &mut report);
         progress.finish_and_clear();
@@ -216,7 +244,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(reason) = &point.solution.statistics.contradiction {
         return Err(fault(reason));
     }
-    objectives.confirm(&mission, &problem, &point, &Reading::sequential(&task))?;
+    objectives.confirm(&mission, &problem, &point, &Reading::sequential(task.is_timed()))?;
     if let Some(directory) = &arguments.certificate {
         certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
             .unwrap_or_else(|message| output::warnings(common, &[message]));
@@ -288,7 +316,7 @@ fn show(
                 alternatives::attach(&mut answer, others);
             }
             if let (Some(_), Some(plan)) = (arguments.overlap.separation(), &solution.plan) {
-                answer["makespan"] = output::number(plan.makespan());
+                answer["makespan"] = output::number(&plan.makespan());
             }
             if let Some(Blocking::Designs(designs)) = &beside.blocking {
                 answer["blocking"] = json!(designs);
@@ -335,7 +363,7 @@ fn show_front(
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
     for point in &mut front.points {
-        objectives.confirm(mission, problem, point, &Reading::sequential(task))?;
+        objectives.confirm(mission, problem, point, &Reading::sequential(task.is_timed()))?;
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let text = match common.format {
@@ -356,12 +384,11 @@ pub(super) fn confirm(
     plan: &Plan,
     reading: &Reading,
 ) -> Result<(), Failure> {
-    let rational = |exact: Exact| BigRational::new(exact.numerator.into(), exact.denominator.into());
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
         arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
-        start: Some(rational(step.start)),
-        duration: (step.duration.numerator != 0).then(|| rational(step.duration)),
+        start: Some(step.start.to_rational()),
+        duration: (!step.duration.is_zero()).then(|| step.duration.to_rational()),
         line: 0,
     });
     let verdict = validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &reading.options);
@@ -369,7 +396,7 @@ pub(super) fn confirm(
         (Some(violation), _) => {
             format!("the validator refuses the plan that was found: {}", violation.message)
         }
-        (None, Some(value)) if value != rational(plan.cost) => {
+        (None, Some(value)) if value != plan.cost.to_rational() => {
             format!("the plan that was found costs {value}, and not {} as claimed", plan.cost)
         }
         (None, _) => return Ok(()),
@@ -429,7 +456,7 @@ pub(super) fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stag
             if name.is_empty() { String::new() } else { format!("{name}: ") },
             plan.cost
         );
-        if let Some(bound) = solution.lower_bound.filter(|_| solution.status != Status::Optimal) {
+        if let Some(bound) = solution.lower_bound.as_ref().filter(|_| solution.status != Status::Optimal) {
             let _ = write!(text, ", lower bound {bound}");
         }
         text += ": ";
@@ -439,32 +466,6 @@ pub(super) fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stag
         text += &statistics_text(solution, stages);
     }
     text
-}
-
-/// The steps as a table.
-pub(super) fn steps_text(plan: &Plan) -> String {
-    let rows = plan.steps.iter().enumerate().map(|(index, step)| {
-        let configuration: Vec<_> =
-            step.configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
-        let changed = if step.reconfigured.is_empty() { "" } else { " (changed)" };
-        vec![
-            (index + 1).to_string(),
-            step.start.to_string(),
-            step.duration.to_string(),
-            format!("{} {}", step.action, route(step).join(" ")).trim_end().to_owned(),
-            configuration.join(", ") + changed,
-            step.cost.to_string(),
-        ]
-    });
-    let rows: Vec<_> = rows.collect();
-    output::table(&["step", "start", "duration", "action", "configuration", "cost"], rows)
-}
-
-/// The arguments of a step apart from functions and their designs.
-fn route(step: &Step) -> Vec<&str> {
-    let configured =
-        |argument: &String| step.configuration.iter().any(|(f, design)| f == argument || design == argument);
-    step.arguments.iter().filter(|argument| !configured(argument)).map(String::as_str).collect()
 }
 
 pub(super) fn milliseconds(duration: Duration) -> f64 {

@@ -14,9 +14,9 @@ pub(super) fn step_json(step: &Step) -> Value {
         "action": step.action,
         "arguments": step.arguments,
         "configuration": configuration,
-        "start": output::number(step.start),
-        "duration": output::number(step.duration),
-        "cost": output::number(step.cost),
+        "start": output::number(&step.start),
+        "duration": output::number(&step.duration),
+        "cost": output::number(&step.cost),
         "reconfigured": step.reconfigured,
     })
 }
@@ -41,8 +41,8 @@ pub(super) fn json(name: &str, solution: &Solution, stages: &Stages) -> Value {
         "format": "metaplan-plan/1",
         "mission": name,
         "status": status_word(solution.status),
-        "cost": solution.plan.as_ref().map(|plan| output::number(plan.cost)),
-        "lower_bound": solution.lower_bound.map(output::number),
+        "cost": solution.plan.as_ref().map(|plan| output::number(&plan.cost)),
+        "lower_bound": solution.lower_bound.as_ref().map(output::number),
         "horizon": solution.horizon,
         "proof": proof,
         "unbounded": unbounded,

@@ -4,18 +4,19 @@ use std::fmt::Write as _;
 
 use encodings::{Exact, Plan, Step};
 
+use crate::cli::output;
 use crate::cli::plan::PlanFormat;
 
 /// The plan in the formats of the planning competitions and of `PlanSys2`.
 pub(super) fn plan_text(plan: &Plan, format: PlanFormat) -> String {
-    let timed = |step: &Step| step.duration.numerator != 0 || step.start.numerator != 0;
+    let timed = |step: &Step| !step.duration.is_zero() || !step.start.is_zero();
     let temporal = plan.steps.iter().any(timed) || format == PlanFormat::Plansys2;
     let mut text = if format == PlanFormat::Plansys2 { "Solution Found\n".to_owned() } else { String::new() };
     for step in &plan.steps {
         let call: Vec<&str> =
             std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
         if temporal {
-            let (start, duration) = (decimal(step.start), decimal(step.duration));
+            let (start, duration) = (decimal(&step.start), decimal(&step.duration));
             let _ = writeln!(text, "{start}: ({})  [{duration}]", call.join(" "));
         } else {
             let _ = writeln!(text, "({})", call.join(" "));
@@ -24,8 +25,34 @@ pub(super) fn plan_text(plan: &Plan, format: PlanFormat) -> String {
     text
 }
 
+/// The steps as a table.
+pub(super) fn steps_text(plan: &Plan) -> String {
+    let rows = plan.steps.iter().enumerate().map(|(index, step)| {
+        let configuration: Vec<_> =
+            step.configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
+        let changed = if step.reconfigured.is_empty() { "" } else { " (changed)" };
+        vec![
+            (index + 1).to_string(),
+            step.start.to_string(),
+            step.duration.to_string(),
+            format!("{} {}", step.action, route(step).join(" ")).trim_end().to_owned(),
+            configuration.join(", ") + changed,
+            step.cost.to_string(),
+        ]
+    });
+    let rows: Vec<_> = rows.collect();
+    output::table(&["step", "start", "duration", "action", "configuration", "cost"], rows)
+}
+
+/// The arguments of a step apart from functions and their designs.
+fn route(step: &Step) -> Vec<&str> {
+    let configured =
+        |argument: &String| step.configuration.iter().any(|(f, design)| f == argument || design == argument);
+    step.arguments.iter().filter(|argument| !configured(argument)).map(String::as_str).collect()
+}
+
 /// A time with three decimals, or as many more as it has: an action must not start before what it waits for.
-fn decimal(time: Exact) -> String {
+fn decimal(time: &Exact) -> String {
     let text = time.to_string();
     match text.split_once('.') {
         _ if text.contains('/') => format!("{:.9}", time.to_f64()),
@@ -36,6 +63,9 @@ fn decimal(time: Exact) -> String {
 
 #[cfg(test)]
 mod tests {
+    use num_bigint::BigInt;
+    use num_rational::BigRational;
+
     use super::*;
 
     #[test]
@@ -47,7 +77,8 @@ mod tests {
             (100_001, 10_000, "10.0001"),
             (1, 3, "0.333333333"),
         ] {
-            assert_eq!(decimal(Exact { numerator, denominator }), expected);
+            let time = BigRational::new(BigInt::from(numerator), BigInt::from(denominator));
+            assert_eq!(decimal(&time.into()), expected);
         }
     }
 }

@@ -57,8 +57,8 @@ pub(crate) fn to_f64(value: &BigRational) -> f64 {
 }
 
 /// An exact number of the planner.
-pub(crate) fn of_plan(value: encodings::Exact) -> BigRational {
-    BigRational::new(value.numerator.into(), value.denominator.into())
+pub(crate) fn of_plan(value: &encodings::Exact) -> BigRational {
+    value.to_rational()
 }
 
 #[cfg(test)]

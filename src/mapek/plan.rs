@@ -102,7 +102,7 @@ pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits) -> Outcome {
     let solution = optimize(&task, &config, &mut |_| {});
     match (solution.status, solution.plan) {
         (status, Some(plan)) => Outcome {
-            cost: number::of_plan(plan.cost),
+            cost: number::of_plan(&plan.cost),
             steps: Some(plan.steps.iter().map(|step| PlannedStep::new(ask.mission, step)).collect()),
             proved: status == Status::Optimal,
             because: String::new(),

@@ -33,8 +33,8 @@ impl PlannedStep {
             arguments: step.arguments.clone(),
             written: mission.written_arguments(&step.action).unwrap_or(step.arguments.len()),
             configuration: step.configuration.clone(),
-            duration: number::of_plan(step.duration),
-            cost: number::of_plan(step.cost),
+            duration: number::of_plan(&step.duration),
+            cost: number::of_plan(&step.cost),
         }
     }
 

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use encodings::pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use encodings::pddl::{self, Severity, Source};
-use encodings::{Concurrent, Limits, Plan, Task};
+use encodings::{Concurrent, ExactTask, Limits, Plan, Task};
 use num_rational::BigRational;
 
 use crate::knowledge::Knowledge;
@@ -275,6 +275,21 @@ impl Mission {
         limits: &Limits,
     ) -> Result<Task, Vec<Message>> {
         self.ground_with(&self.domain, problem, objectives, limits)
+    }
+
+    /// As [`Mission::ground`], whatever the size of the numbers: for plans that are searched for in exact rationals.
+    ///
+    /// # Errors
+    /// As [`Mission::ground`].
+    pub fn ground_exact(
+        &self,
+        problem: &Problem,
+        objectives: &[Metric],
+        limits: &Limits,
+    ) -> Result<ExactTask, Vec<Message>> {
+        let config = self.config(objectives, limits);
+        encodings::ground_exact(&self.domain, problem, &config)
+            .map_err(|errors| Message::from_encodings(&errors, &self.domain_source, &self.problem_source))
     }
 
     /// Grounds a filled problem for plans whose actions overlap; those that interfere are to lie `separation` apart, in the

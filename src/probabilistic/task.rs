@@ -9,8 +9,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use encodings::pddl::ast::{InitialElement, Name, Problem};
 use encodings::validate::{PlanStep, advance};
-use encodings::{Exact, Limits, Situation as TaskState, Step, Task, Transition};
-use num_bigint::BigInt;
+use encodings::{Limits, Situation as TaskState, Step, Task, Transition};
 use num_rational::BigRational;
 use num_traits::{One, Zero};
 
@@ -178,9 +177,7 @@ impl Explorer<'_> {
     fn transition(&mut self, from: usize, state: &TaskState, transition: Transition) {
         let before = self.task.metric(state);
         let after = self.task.metric(&transition.after);
-        let rational =
-            |exact: Exact| BigRational::new(BigInt::from(exact.numerator), BigInt::from(exact.denominator));
-        let time = rational(after) - rational(before);
+        let time = after.to_rational() - before.to_rational();
         let target = transition.after.unpaid();
         let to = self.numbers.get(&target).copied().unwrap_or_else(|| {
             self.numbers.insert(target.clone(), self.places.len());

@@ -252,7 +252,7 @@ impl Exchange {
         }
         clauses.sort();
         let comparisons = condition.comparisons.clone();
-        Condition { facts: self.facts(&condition.facts), clauses, comparisons }
+        Condition { facts: self.facts(&condition.facts), clauses, comparisons, above: Vec::new() }
     }
 
     /// Whether the task with the objects exchanged is the same task.

@@ -16,9 +16,10 @@
 //! [1] M. Fox, D. Long: PDDL2.1: an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
 //! [2] S. Edelkamp, J. Hoffmann: PDDL2.2: the language for the classical part of IPC-4, technical report 195, 2004.
 
+use num_bigint::BigInt;
+use num_rational::BigRational;
 use num_traits::{One, Zero};
 
-use crate::error::Error;
 use crate::ground::effects::{GroundChange, Moment};
 use crate::ground::evaluate::{AtomId, World};
 use crate::ground::instantiate::GroundOperator;
@@ -27,7 +28,7 @@ use crate::ground::numbers::Numbers;
 use crate::ground::reads::{Reads, matches};
 use crate::ground::residual::{Residual, constant_comparison};
 use crate::lifted::{Arguments, Event, Lifted, ObjectId, Rational};
-use crate::number::{Int, checked_lcm, dense};
+use crate::number::dense;
 use crate::quantity::{Linear, NumericId, Quantity};
 
 /// The atoms and the numeric variables that stand for time; none of them has a name in the files.
@@ -275,21 +276,16 @@ impl Timeline {
     }
 
     /// Puts a number for the moment, now that all durations are known; operators that cannot be there any more go.
-    ///
-    /// # Errors
-    /// `Error::Overflow` if times have too many digits.
-    pub(super) fn settle(&self, operators: &mut Vec<GroundOperator>) -> Result<(), Error> {
-        let overflow = || Error::Overflow { what: "times and durations".into() };
+    pub(super) fn settle(&self, operators: &mut Vec<GroundOperator>) {
         let durations = operators.iter().flat_map(|operator| {
             let tables = operator.duration.tables.iter().flat_map(|table| table.values.iter());
             tables.chain([&operator.duration.constant])
         });
-        let mut times = self.events.iter().map(|(time, _)| time).chain(durations);
+        let times = self.events.iter().map(|(time, _)| time).chain(durations);
         // At most the separation that validators take for granted, so that nobody waits longer than need be.
-        let unit = times.try_fold(500, |unit, time| checked_lcm(unit, time.denominator()?));
-        let unit = unit.and_then(|unit: Int| unit.checked_mul(2)).ok_or_else(overflow)?;
-        drop(times);
-        let moment = Rational::new(1, unit);
+        let unit =
+            times.fold(BigInt::from(1000), |unit, time| num_integer::lcm(unit, time.to_big().denom() * 2_u8));
+        let moment = Rational::from_big(BigRational::new(BigInt::from(1), unit));
         let put = |linear: &mut Linear<Rational>| {
             let position = linear.coefficients.iter().position(|(variable, _)| *variable == self.moment);
             if let Some(position) = position {
@@ -314,7 +310,6 @@ impl Timeline {
             }
             holds
         });
-        Ok(())
     }
 }
 

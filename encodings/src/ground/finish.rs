@@ -20,7 +20,7 @@ use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::prune::{atom_name, numeric_name, read_atoms};
 use crate::lifted::{Lifted, ObjectId, Rational};
 use crate::limits::{Interrupted, Limits};
-use crate::number::{Int, LIMIT, checked_lcm, dense};
+use crate::number::{TaskNumber, checked_lcm, dense};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
     Axiom, Condition, ConditionalEffect, Fact, Layer, Literal, NumericEffect, Objective, Operator, Slot,
@@ -31,54 +31,34 @@ use crate::task::{
 ///
 /// # Errors
 /// `Error::Overflow` if exact integers would not fit.
-pub(crate) fn finish(
+pub(crate) fn finish<N: TaskNumber>(
     lifted: &Lifted,
     mut task: GroundTask<'_>,
     unreachable: Option<String>,
     generality: &Generality,
     limits: &Limits,
-) -> Result<Task, Error> {
+) -> Result<Task<N>, Error> {
     let atoms = Atoms::new(lifted, &task, limits)?;
-    let mut numbers = Numbers::new(lifted, &task, generality)?;
-    let (mut objectives, mut costs) = objectives(&task)?;
+    let mut numbers = Numbers::<N>::new(lifted, &task, generality)?;
+    let (mut objectives, mut costs) = objectives::<N>(lifted, &task)?;
     let mut durations = Denominator::new("durations");
     for operator in limits.watch(&task.operators) {
         let operator = operator?;
         durations.quantity(&operator.duration);
+        durations.note(|| schema_name(lifted, operator));
         let bounds = [&operator.timing.start, &operator.timing.end].into_iter().flatten();
         operator.wait.iter().chain(bounds.map(|(time, _)| time)).for_each(|time| durations.number(time));
     }
-    let mut durations = durations.integers()?;
+    let mut durations = durations.integers::<N>()?;
     let mut slots = Slots::new(&task.operators);
 
     let mut operators = Distinct::with_capacity(task.operators.len());
     for ground in limits.watch(std::mem::take(&mut task.operators)) {
         let ground = ground?;
-        let condition = condition(&ground.condition, &atoms, &mut numbers)?;
-        if contradictory(&condition) {
-            continue;
-        }
-        let by_objective = ground.costs.iter().zip(&mut costs);
-        let mut by_objective = by_objective.map(|(cost, integers)| integers.quantity(cost));
-        operators.insert(Operator {
-            schema: ground.schema,
-            slots: slots.uses(&ground.slots),
-            condition,
-            effects: atoms.effects(&ground),
-            conditional: atoms.conditional(&ground),
-            numeric_effects: numbers.effects(&ground)?,
-            cost: by_objective.next().unwrap_or_else(|| Ok(Quantity::constant(1)))?,
-            others: by_objective.collect::<Result<_, _>>()?,
-            duration: durations.quantity(&ground.duration)?,
-            arguments: ground.arguments,
-            configuration: ground.configuration,
-            forbidden: ground.forbidden,
-            wait: ground.wait.map(|time| durations.number(&time)).transpose()?,
-            timing: Timing {
-                start: ground.timing.start.map(|(time, _)| durations.number(&time)).transpose()?,
-                end: ground.timing.end.map(|(time, _)| durations.number(&time)).transpose()?,
-            },
-        });
+        let name = schema_name(lifted, &ground);
+        let kinds = (&mut numbers, &mut costs[..], &mut durations);
+        let finished = operator(ground, &atoms, &mut slots, kinds).map_err(|error| error.within(&name))?;
+        finished.into_iter().for_each(|operator| operators.insert(operator));
     }
     let goal = match &task.goal {
         Some(goal) => condition(goal, &atoms, &mut numbers)?,
@@ -112,21 +92,61 @@ pub(crate) fn finish(
     Ok(task)
 }
 
+/// An operator of the final task; none if its condition contradicts itself.
+fn operator<N: TaskNumber>(
+    ground: GroundOperator,
+    atoms: &Atoms,
+    slots: &mut Slots,
+    (numbers, costs, durations): (&mut Numbers<N>, &mut [Integers<N>], &mut Integers<N>),
+) -> Result<Option<Operator<N>>, Error> {
+    let condition = condition(&ground.condition, atoms, numbers)?;
+    if contradictory(&condition) {
+        return Ok(None);
+    }
+    let by_objective = ground.costs.iter().zip(costs);
+    let mut by_objective = by_objective.map(|(cost, integers)| integers.quantity(cost));
+    Ok(Some(Operator {
+        schema: ground.schema,
+        slots: slots.uses(&ground.slots),
+        condition,
+        effects: atoms.effects(&ground),
+        conditional: atoms.conditional(&ground),
+        numeric_effects: numbers.effects(&ground)?,
+        cost: by_objective.next().unwrap_or_else(|| Ok(Quantity::constant(N::one())))?,
+        others: by_objective.collect::<Result<_, _>>()?,
+        duration: durations.quantity(&ground.duration)?,
+        arguments: ground.arguments,
+        configuration: ground.configuration,
+        forbidden: ground.forbidden,
+        wait: ground.wait.map(|time| durations.number(&time)).transpose()?,
+        timing: Timing {
+            start: ground.timing.start.map(|(time, _)| durations.number(&time)).transpose()?,
+            end: ground.timing.end.map(|(time, _)| durations.number(&time)).transpose()?,
+        },
+    }))
+}
+
+/// The action of an operator, for errors.
+fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> String {
+    let schema = lifted.schemas.get(operator.schema as usize);
+    schema.map_or_else(|| "a wait".to_owned(), |schema| format!("`{}`", schema.name))
+}
+
 /// Operators without repetitions, in order.
-struct Distinct {
-    operators: Vec<Operator>,
+struct Distinct<N> {
+    operators: Vec<Operator<N>>,
     /// Positions by hash.
     positions: FxHashMap<u64, SmallVec<[u32; 2]>>,
 }
 
-impl Distinct {
+impl<N: TaskNumber> Distinct<N> {
     fn with_capacity(capacity: usize) -> Self {
         let mut positions = FxHashMap::default();
         positions.reserve(capacity);
         Self { operators: Vec::with_capacity(capacity), positions }
     }
 
-    fn insert(&mut self, operator: Operator) {
+    fn insert(&mut self, operator: Operator<N>) {
         let positions = self.positions.entry(FxBuildHasher.hash_one(&operator)).or_default();
         if positions.iter().all(|position| self.operators[*position as usize] != operator) {
             positions.push(dense(self.operators.len()));
@@ -136,12 +156,20 @@ impl Distinct {
 }
 
 /// The objectives, and what makes integers of the costs by each.
-fn objectives(task: &GroundTask<'_>) -> Result<(Vec<Objective>, Vec<Integers>), Error> {
+#[expect(clippy::type_complexity, reason = "a list for each of two things")]
+fn objectives<N: TaskNumber>(
+    lifted: &Lifted,
+    task: &GroundTask<'_>,
+) -> Result<(Vec<Objective<N>>, Vec<Integers<N>>), Error> {
     let (mut objectives, mut conversions) = (Vec::new(), Vec::new());
     for (objective, position) in task.objectives.iter().zip(0..) {
         let mut denominator = Denominator::new("the metric");
         denominator.number(&objective.offset);
-        task.operators.iter().for_each(|operator| denominator.quantity(&operator.costs[position]));
+        denominator.note(|| "its value at the start".to_owned());
+        for operator in &task.operators {
+            denominator.quantity(&operator.costs[position]);
+            denominator.note(|| schema_name(lifted, operator));
+        }
         let integers = denominator.integers()?;
         let offset = integers.number(&objective.offset)?;
         objectives.push(Objective { scale: integers.scale, offset, maximize: objective.maximize });
@@ -279,7 +307,11 @@ impl Atoms {
     }
 
     /// The rules of derived variables in layers: what a layer depends on comes before it.
-    fn axioms(&self, task: &GroundTask<'_>, numbers: &mut Numbers) -> Result<Vec<Layer>, Error> {
+    fn axioms<N: TaskNumber>(
+        &self,
+        task: &GroundTask<'_>,
+        numbers: &mut Numbers<N>,
+    ) -> Result<Vec<Layer<N>>, Error> {
         let axioms = &task.world.definitions.axioms;
         let mut layers = Vec::new();
         for component in components(axioms) {
@@ -298,14 +330,14 @@ impl Atoms {
 }
 
 /// The numeric variables that conditions depend on, with the factor that makes all their values integers.
-struct Numbers {
-    initial: Vec<Int>,
+struct Numbers<N> {
+    initial: Vec<N>,
     names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
-    integers: Integers,
+    integers: Integers<N>,
 }
 
-impl Numbers {
+impl<N: TaskNumber> Numbers<N> {
     fn new(lifted: &Lifted, task: &GroundTask<'_>, generality: &Generality) -> Result<Self, Error> {
         let mut used = FxHashSet::default();
         let mut denominator = Denominator::new("numeric fluents");
@@ -325,8 +357,10 @@ impl Numbers {
         let mut used: Vec<_> = used.into_iter().collect();
         used.sort_unstable();
         let initial: Vec<_> = used.iter().map(|variable| initial_value(&task.world, *variable)).collect();
-        for number in &initial {
+        denominator.note(|| "those in conditions and effects".to_owned());
+        for (number, variable) in initial.iter().zip(&used) {
             denominator.number(number);
+            denominator.note(|| numeric_name(lifted, task, *variable));
         }
         if let Some(precision) = generality.numbers {
             denominator.number(&Rational::new(1, precision));
@@ -338,17 +372,16 @@ impl Numbers {
         Ok(Self { initial, names, ids, integers })
     }
 
-    fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<Int>, Error> {
+    fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<N>, Error> {
         let overflow = || Error::Overflow { what: "a factor of a numeric fluent".into() };
         let coefficients = linear.coefficients.iter().map(|(variable, factor)| {
-            let factor = factor.to_int().filter(|factor| factor.abs() < LIMIT);
-            Ok((self.ids[variable], factor.ok_or_else(overflow)?))
+            Ok((self.ids[variable], N::from_rational(factor, 1).ok_or_else(overflow)?))
         });
         let coefficients = coefficients.collect::<Result<_, Error>>()?;
         Ok(Linear { coefficients, quantity: self.integers.quantity(&linear.quantity)? })
     }
 
-    fn effects(&mut self, operator: &GroundOperator) -> Result<Vec<NumericEffect>, Error> {
+    fn effects(&mut self, operator: &GroundOperator) -> Result<Vec<NumericEffect<N>>, Error> {
         let mut effects = Vec::new();
         for (variable, value) in operator.numeric_effects.iter() {
             if let Some(variable) = self.ids.get(variable).copied() {
@@ -359,7 +392,11 @@ impl Numbers {
     }
 }
 
-fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> Result<Condition, Error> {
+fn condition<N: TaskNumber>(
+    ground: &GroundCondition,
+    atoms: &Atoms,
+    numbers: &mut Numbers<N>,
+) -> Result<Condition<N>, Error> {
     let mut condition = Condition::default();
     for literal in &ground.literals {
         let literal = atoms.literal(*literal);
@@ -376,6 +413,11 @@ fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> 
         condition.clauses.push(clause.iter().map(|literal| atoms.literal(*literal)).collect());
     }
     for (linear, strict) in &ground.comparisons {
+        if !N::SCALED {
+            let list = if *strict { &mut condition.above } else { &mut condition.comparisons };
+            list.push(numbers.linear(linear)?);
+            continue;
+        }
         let mut linear = linear.clone();
         // A comparison may be scaled at will, so fractional factors do no harm here.
         let mut denominators = linear.coefficients.iter().map(|(_, factor)| factor.denominator());
@@ -384,7 +426,7 @@ fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> 
         linear.scale(&Rational::from_integer(common));
         let mut integers = numbers.linear(&linear)?;
         if *strict {
-            integers.quantity.constant -= 1;
+            integers.quantity.constant = integers.quantity.constant + -N::one();
         }
         condition.comparisons.push(integers);
     }
@@ -394,7 +436,7 @@ fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> 
 }
 
 /// Whether two values of one variable are required.
-fn contradictory(condition: &Condition) -> bool {
+fn contradictory<N>(condition: &Condition<N>) -> bool {
     condition.facts.windows(2).any(|pair| pair[0].variable == pair[1].variable)
 }
 

@@ -153,7 +153,7 @@ pub(crate) fn instantiate<'a>(
     }
     operators.extend(timeline.iter().flat_map(|timeline| timeline.waits(dense(lifted.schemas.len()))));
     if let Some(timeline) = &timeline {
-        timeline.settle(&mut operators).map_err(|error| vec![error])?;
+        timeline.settle(&mut operators);
     }
     let mut task = GroundTask { world, operators, goal, objectives: Vec::new() };
     derived::simplify(&mut task);

@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::lifted::Rational;
-use crate::number::{Int, LIMIT, checked_lcm};
+use crate::number::{Int, LIMIT, TaskNumber, checked_lcm};
 use crate::quantity::{Quantity, Table};
 
 /// The values of a table, and what they are mapped to.
@@ -51,6 +51,8 @@ pub(super) struct Denominator {
     what: &'static str,
     /// None if it is too large.
     common: Option<Int>,
+    /// Where the number was that made it so.
+    culprit: Option<String>,
     /// Tables that have been looked at.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
@@ -58,7 +60,7 @@ pub(super) struct Denominator {
 impl Denominator {
     /// `what` names the numbers in errors.
     pub(super) fn new(what: &'static str) -> Self {
-        Self { what, common: Some(1), seen: FxHashMap::default() }
+        Self { what, common: Some(1), culprit: None, seen: FxHashMap::default() }
     }
 
     pub(super) fn number(&mut self, number: &Rational) {
@@ -80,36 +82,47 @@ impl Denominator {
         }
     }
 
+    /// Notes where the last number was, if it made the factor too large.
+    pub(super) fn note(&mut self, place: impl FnOnce() -> String) {
+        if self.common.is_none() && self.culprit.is_none() {
+            self.culprit = Some(place());
+        }
+    }
+
     /// The conversion.
     ///
     /// # Errors
     /// `Error::Overflow` if the factor is too large.
-    pub(super) fn integers(self) -> Result<Integers, Error> {
-        let scale = self.common.ok_or_else(|| Error::Overflow { what: self.what.into() })?;
+    pub(super) fn integers<N: TaskNumber>(self) -> Result<Integers<N>, Error> {
+        let common = if N::SCALED { self.common } else { Some(1) };
+        let overflow = || {
+            let error = Error::Overflow { what: self.what.into() };
+            self.culprit.iter().fold(error, |error, place| error.within(place))
+        };
+        let scale = common.ok_or_else(overflow)?;
         Ok(Integers { what: self.what, scale, tables: TableMap::new() })
     }
 }
 
-/// Turns numbers of one kind into integers.
+/// Turns numbers of one kind into integers, or leaves them as they are.
 #[derive(Debug)]
-pub(super) struct Integers {
+pub(super) struct Integers<N> {
     what: &'static str,
     pub(super) scale: Int,
-    tables: TableMap<Int>,
+    tables: TableMap<N>,
 }
 
-impl Integers {
-    pub(super) fn number(&self, number: &Rational) -> Result<Int, Error> {
+impl<N: TaskNumber> Integers<N> {
+    pub(super) fn number(&self, number: &Rational) -> Result<N, Error> {
         integer(number, self.scale, self.what)
     }
 
-    pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<Int>, Error> {
+    pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<N>, Error> {
         let (scale, what) = (self.scale, self.what);
         self.tables.map(quantity, &|number| integer(number, scale, what))
     }
 }
 
-fn integer(number: &Rational, scale: Int, what: &str) -> Result<Int, Error> {
-    let scaled = (number.clone() * &Rational::from_integer(scale)).to_int();
-    scaled.filter(|integer| integer.abs() < LIMIT).ok_or_else(|| Error::Overflow { what: what.into() })
+fn integer<N: TaskNumber>(number: &Rational, scale: Int, what: &str) -> Result<N, Error> {
+    N::from_rational(number, scale).ok_or_else(|| Error::Overflow { what: what.into() })
 }

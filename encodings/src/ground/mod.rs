@@ -33,7 +33,7 @@ use crate::ground::reach::Reached;
 use crate::lifted::Lifted;
 use crate::limits::Limits;
 use crate::normalize::{normalize, zero};
-use crate::number::Int;
+use crate::number::{Int, TaskNumber};
 use crate::pddl::ast::{Domain, Metric, Name, Problem};
 use crate::task::Task;
 
@@ -76,12 +76,12 @@ pub(crate) struct Generality {
 }
 
 /// Grounds a problem so that other initial states can take the place of its own.
-pub(crate) fn ground_for(
+pub(crate) fn ground_for<N: TaskNumber>(
     domain: &Domain,
     problem: &Problem,
     config: &Config,
     generality: &Generality,
-) -> Result<Task, Vec<Error>> {
+) -> Result<Task<N>, Vec<Error>> {
     let mut lifted = normalize(domain, problem, &config.objectives)?;
     zero::split(&mut lifted)?;
     events::begin(&mut lifted);
@@ -100,13 +100,13 @@ pub(crate) fn ground_for(
 ///
 /// # Errors
 /// As [`ground`].
-pub(crate) fn ground_lifted(
+pub(crate) fn ground_lifted<N: TaskNumber>(
     lifted: &Lifted,
     designs: &[Vec<SlotParameter>],
     slots: &[Vec<SlotParameter>],
     generality: &Generality,
     limits: &Limits,
-) -> Result<(Task, Reached), Vec<Error>> {
+) -> Result<(Task<N>, Reached), Vec<Error>> {
     let reached = reach::reach(lifted, slots, limits).map_err(|error| vec![error])?;
     let mut ground = instantiate::instantiate(lifted, designs, slots, &reached, limits)?;
     metric::attach_costs(lifted, &mut ground)?;

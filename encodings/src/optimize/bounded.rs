@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use crate::bounds::Bounds;
 use crate::limits::{Interrupted, Limits};
-use crate::number::Int;
+use crate::number::{Int, TaskNumber};
 use crate::optimize::{Best, Config, Run, Tightened, optimize};
 use crate::plan::{GroundStep, decode, replay};
 use crate::quantity::Quantity;
@@ -102,15 +102,18 @@ impl Task {
         task.objective = crate::task::Objective::sum();
         task
     }
+}
 
+#[expect(private_bounds, reason = "nobody else has numbers of tasks")]
+impl<N: TaskNumber> Task<N> {
     /// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is; no if a
     /// limit is reached before one is found.
-    fn can_repeat_reward(&self, plan: &[GroundStep], limits: &Limits) -> bool {
+    pub(crate) fn can_repeat_reward(&self, plan: &[GroundStep], limits: &Limits) -> bool {
         let Some((states, _)) = replay(self, plan) else { return false };
         states.iter().any(|state| {
-            self.operators.iter().filter(|operator| operator.cost.minimum() < 0).any(|operator| {
+            self.operators.iter().filter(|operator| operator.cost.minimum() < N::zero()).any(|operator| {
                 operator.choices().take_while(|_| !limits.reached()).any(|choice| {
-                    operator.cost.at(&choice, &operator.sizes()) < 0
+                    operator.cost.at(&choice, &operator.sizes()) < N::zero()
                         && operator.applicable(state, &choice)
                         && self.successor(operator, state, &choice).as_ref() == Some(state)
                 })

@@ -112,7 +112,8 @@ pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize
         assert_eq!(lifted.is_goal(task), ground.reaches_goal(&state), "{holding:?}\n{}", context());
         if let Some(steps) = steps {
             let found = ground.metric(&state);
-            let found = num_rational::Ratio::new(found.numerator, found.denominator);
+            let part = |part: num_bigint::BigInt| i128::try_from(part).expect("a small number");
+            let found = num_rational::Ratio::new(part(found.numerator()), part(found.denominator()));
             let possible = match &task.metric {
                 Some(_) => vec![lifted.metric(task)],
                 None => vec![Some(lifted.time), Some(num_rational::Ratio::from_integer(steps as i128))],
