@@ -233,9 +233,12 @@ impl Tally {
         if let Some(directory) = std::env::var_os("ORACLE_SAVE") {
             let directory = PathBuf::from(directory).join(name);
             std::fs::create_dir_all(&directory).expect("a directory");
-            for (file, text) in [("domain.pddl", domain), ("problem.pddl", problem), ("failure.txt", &text)] {
+            for (file, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {
                 std::fs::write(directory.join(file), text).expect("a file");
             }
+            let failures = directory.join("failures.txt");
+            let before = std::fs::read_to_string(&failures).unwrap_or_default();
+            std::fs::write(failures, before + &text).expect("a file");
         }
         self.count(format!("FAILURE {kind}"));
         self.failures.push(Failure { kind, text });

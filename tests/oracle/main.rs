@@ -7,3 +7,4 @@
 //! `ORACLE_FROM` is the first seed, `ORACLE_TASKS` how many follow, `ORACLE_SAVE` a directory for the files of what fails.
 
 mod judge;
+mod temporal;
