@@ -7,4 +7,5 @@
 //! `ORACLE_FROM` is the first seed, `ORACLE_TASKS` how many follow, `ORACLE_SAVE` a directory for the files of what fails.
 
 mod judge;
+mod numbers;
 mod temporal;
