@@ -12,6 +12,7 @@ pub mod validate;
 mod error;
 mod lifted;
 mod normalize;
+mod number;
 
 mod configuration;
 mod ground;

@@ -6,13 +6,9 @@
 
 use std::sync::Arc;
 
-use num_rational::Ratio;
-
 use crate::error::Place;
+pub(crate) use crate::number::Rational;
 use crate::pddl::ast::{Assignment, Comparison, Direction, Name};
-
-/// An exact number.
-pub(crate) type Rational = Ratio<i128>;
 
 /// An object or constant, by order of declaration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

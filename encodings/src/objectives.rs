@@ -7,6 +7,7 @@
 //! [1] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
 //! and system optimization, IEEE Trans. SMC 1(3), 1971.
 
+use crate::number::Int;
 use crate::optimize::{Config, optimize};
 use crate::plan::{Exact, GroundPlan};
 use crate::quantity::{Linear, NumericId, Quantity};
@@ -42,7 +43,7 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
 /// the other, one plan for each pair of values.
 pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Front {
     let mut points = Vec::new();
-    let mut budgets: Vec<(usize, i64)> = Vec::new();
+    let mut budgets: Vec<(usize, Int)> = Vec::new();
     loop {
         let point = in_order(task, &[0, 1], &budgets, config, report);
         match (point.solution.status, &point.solution.ground) {
@@ -72,7 +73,7 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
 fn in_order(
     task: &Task,
     order: &[usize],
-    budgets: &[(usize, i64)],
+    budgets: &[(usize, Int)],
     config: &Config,
     report: &mut dyn FnMut(Improvement),
 ) -> Point {
@@ -127,12 +128,12 @@ fn finish(task: &Task, mut solution: Solution) -> Point {
 }
 
 impl Task {
-    fn cost(operator: &Operator, objective: usize) -> &Quantity<i64> {
+    fn cost(operator: &Operator, objective: usize) -> &Quantity<Int> {
         objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
     }
 
     /// What a plan costs by an objective, by its position.
-    fn cost_by(&self, objective: usize, plan: &GroundPlan) -> i64 {
+    fn cost_by(&self, objective: usize, plan: &GroundPlan) -> Int {
         let costs = plan.steps.iter().map(|step| {
             let operator = &self.operators[step.operator.index()];
             Self::cost(operator, objective).at(&step.choice, &operator.sizes())
@@ -141,7 +142,7 @@ impl Task {
     }
 
     /// Admits only plans that cost at most so much by an objective.
-    fn limit(&mut self, objective: usize, budget: i64) {
+    fn limit(&mut self, objective: usize, budget: Int) {
         let variable = NumericId(self.initial.numbers.len() as u32);
         self.initial.numbers.push(budget);
         self.number_names.push(String::new());

@@ -1,8 +1,11 @@
 //! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
 
-use num_rational::Ratio;
+use num_rational::{BigRational, Ratio};
+use num_traits::ToPrimitive;
 
 use crate::lifted::ObjectId;
+use crate::number::Int;
+use crate::pddl::number::to_decimal;
 use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 
 /// One step of a plan over operators.
@@ -17,57 +20,40 @@ pub(crate) struct GroundStep {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct GroundPlan {
     pub(crate) steps: Vec<GroundStep>,
-    pub(crate) cost: i64,
+    pub(crate) cost: Int,
 }
 
 /// An exact decimal or fraction: `numerator / denominator`, in the units of the PDDL files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Exact {
     /// Numerator.
-    pub numerator: i64,
+    pub numerator: Int,
     /// Denominator, positive.
-    pub denominator: i64,
+    pub denominator: Int,
 }
 
 impl Exact {
-    pub(crate) fn scaled(value: i64, scale: i64) -> Self {
+    pub(crate) fn scaled(value: Int, scale: Int) -> Self {
         let divisor = num_integer::gcd(value, scale).max(1);
         Self { numerator: value / divisor, denominator: scale / divisor }
     }
 
+    /// As a rational.
+    pub fn to_rational(self) -> BigRational {
+        BigRational::new(self.numerator.into(), self.denominator.into())
+    }
+
     /// The nearest double.
     pub fn to_f64(self) -> f64 {
-        self.numerator as f64 / self.denominator as f64
+        self.to_rational().to_f64().unwrap_or(f64::NAN)
     }
 }
 
 /// Writes an exact decimal where there is one, else a fraction.
 impl std::fmt::Display for Exact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (mut denominator, mut digits) = (self.denominator, 0_u32);
-        while denominator % 10 == 0 {
-            denominator /= 10;
-            digits += 1;
-        }
-        while denominator > 1 && digits < 18 {
-            if denominator % 2 == 0 {
-                denominator /= 2;
-            } else if denominator % 5 == 0 {
-                denominator /= 5;
-            } else {
-                return write!(f, "{}/{}", self.numerator, self.denominator);
-            }
-            digits += 1;
-        }
-        let shift = 10_i128.pow(digits);
-        let scaled = i128::from(self.numerator) * shift / i128::from(self.denominator);
-        let sign = if scaled < 0 { "-" } else { "" };
-        let (whole, rest) = (scaled.abs() / shift, scaled.abs() % shift);
-        if rest == 0 {
-            return write!(f, "{sign}{whole}");
-        }
-        let fraction = format!("{rest:0width$}", width = digits as usize);
-        write!(f, "{sign}{whole}.{}", fraction.trim_end_matches('0'))
+        let exact = self.to_rational();
+        f.write_str(&to_decimal(&exact).unwrap_or_else(|| exact.to_string()))
     }
 }
 
@@ -126,10 +112,12 @@ pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
 impl Plan {
     /// When the last action ends, in the domain's time unit.
     pub fn makespan(&self) -> Exact {
-        let exact = |exact: Exact| Ratio::new(i128::from(exact.numerator), i128::from(exact.denominator));
-        let ends = self.steps.iter().map(|step| exact(step.start) + exact(step.duration));
+        let ends = self.steps.iter().map(|step| {
+            Ratio::new(step.start.numerator, step.start.denominator)
+                + Ratio::new(step.duration.numerator, step.duration.denominator)
+        });
         let last = ends.max().unwrap_or_default();
-        Exact { numerator: *last.numer() as i64, denominator: *last.denom() as i64 }
+        Exact { numerator: *last.numer(), denominator: *last.denom() }
     }
 }
 
@@ -139,7 +127,7 @@ impl Step {
         task: &Task,
         operator: &Operator,
         choice: &[u16],
-        (start, duration, cost): (i64, i64, i64),
+        (start, duration, cost): (Int, Int, Int),
     ) -> Self {
         Self {
             action: task.schema_names[operator.schema as usize].clone(),
@@ -168,13 +156,13 @@ impl Step {
 }
 
 /// The metric of the problem file for a sum of operator costs.
-pub(crate) fn metric(task: &Task, cost: i64) -> Exact {
+pub(crate) fn metric(task: &Task, cost: Int) -> Exact {
     task.objective.metric(cost)
 }
 
 impl Objective {
     /// The metric as the file writes it for a sum of operator costs.
-    pub(crate) fn metric(&self, cost: i64) -> Exact {
+    pub(crate) fn metric(&self, cost: Int) -> Exact {
         let sign = if self.maximize { -1 } else { 1 };
         Exact::scaled(sign * (cost + self.offset), self.scale)
     }
@@ -208,22 +196,22 @@ fn configuration(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<(Strin
 
 /// The states that a plan passes through, the initial one first; none if a step is not applicable or the last
 /// state is not a goal state.
-pub(crate) fn replay(task: &Task, plan: &[GroundStep]) -> Option<(Vec<State>, i64)> {
+pub(crate) fn replay(task: &Task, plan: &[GroundStep]) -> Option<(Vec<State>, Int)> {
     replay_from(task, &task.initial, plan)
 }
 
 /// The same from a state of its own.
-pub(crate) fn replay_from(task: &Task, initial: &State, plan: &[GroundStep]) -> Option<(Vec<State>, i64)> {
+pub(crate) fn replay_from(task: &Task, initial: &State, plan: &[GroundStep]) -> Option<(Vec<State>, Int)> {
     let mut states = vec![initial.clone()];
-    let mut cost = 0;
+    let mut cost: Int = 0;
     for step in plan {
         let operator = &task.operators[step.operator.index()];
         let state = states.last()?;
         if !operator.admits(&step.choice) || !operator.applicable(state, &step.choice) {
             return None;
         }
-        cost += operator.cost.at(&step.choice, &operator.sizes());
-        let next = task.successor(operator, state, &step.choice);
+        cost = cost.checked_add(operator.cost.at(&step.choice, &operator.sizes()))?;
+        let next = task.successor(operator, state, &step.choice)?;
         states.push(next);
     }
     task.is_goal(states.last()?).then_some((states, cost))

@@ -3,6 +3,7 @@
 //! A quantity is a constant plus tables over slots. The tables are what keeps the encoding factored: a sum over
 //! k functions of m designs each is k tables of m entries, not one of m^k.
 
+use crate::number::Int;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
@@ -140,17 +141,17 @@ impl<N: Number> Quantity<N> {
     }
 }
 
-impl Quantity<i64> {
+impl Quantity<Int> {
     /// A lower bound that ignores that tables share slots; exact if no two do.
-    pub(crate) fn minimum(&self) -> i64 {
+    pub(crate) fn minimum(&self) -> Int {
         self.constant
-            + self.tables.iter().map(|table| table.values.iter().min().copied().unwrap_or(0)).sum::<i64>()
+            + self.tables.iter().map(|table| table.values.iter().min().copied().unwrap_or(0)).sum::<Int>()
     }
 
     /// An upper bound, as `minimum` is a lower one.
-    pub(crate) fn maximum(&self) -> i64 {
+    pub(crate) fn maximum(&self) -> Int {
         self.constant
-            + self.tables.iter().map(|table| table.values.iter().max().copied().unwrap_or(0)).sum::<i64>()
+            + self.tables.iter().map(|table| table.values.iter().max().copied().unwrap_or(0)).sum::<Int>()
     }
 }
 

@@ -17,6 +17,7 @@ use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
 use crate::limits::Limits;
+use crate::number::{GROWTH_LIMIT, Int};
 use crate::plan::{GroundPlan, GroundStep};
 use crate::successors::{OperatorIndex, undominated};
 use crate::task::{Fact, OperatorId, State, Task};
@@ -25,8 +26,6 @@ use crate::task::{Fact, OperatorId, State, Task};
 pub(crate) const STATE_LIMIT: usize = 400_000;
 /// After so many states without a plan the greedy search has its turn, with as many.
 const SOON: usize = 20_000;
-/// States with larger numbers are left out.
-const NUMBER_LIMIT: u64 = 1 << 60;
 
 /// What the search found.
 #[derive(Debug)]
@@ -41,7 +40,7 @@ pub(crate) enum Found {
 
 struct Node {
     state: State,
-    cost: i64,
+    cost: Int,
     steps: u32,
     parent: Option<(u32, OperatorId, u32)>,
     dominated: bool,
@@ -50,7 +49,7 @@ struct Node {
 /// What a search needs to know of a task, whatever state it begins in.
 pub(crate) struct Prepared {
     /// For each operator its combinations of designs that no other one dominates, with their costs.
-    choices: Vec<Vec<(Vec<u16>, i64)>>,
+    choices: Vec<Vec<(Vec<u16>, Int)>>,
     index: OperatorIndex,
     /// Whether more of any numeric variable never hurts.
     monotone: bool,
@@ -71,7 +70,7 @@ struct Search<'a> {
     prepared: &'a Prepared,
     nodes: Vec<Node>,
     seen: FxHashMap<Box<[u32]>, Vec<u32>>,
-    open: BinaryHeap<Reverse<(i64, u32, u32)>>,
+    open: BinaryHeap<Reverse<(Int, u32, u32)>>,
     /// Whether states were left out because their numbers do not fit.
     incomplete: bool,
     /// Whether only estimates decide what comes next.
@@ -79,25 +78,25 @@ struct Search<'a> {
     /// The cheapest goal state so far.
     best: Option<u32>,
     /// What a known plan costs: nothing dearer is looked at.
-    limit: i64,
+    limit: Int,
 }
 
 /// Searches a task whose operators all cost at least 0.
 pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
     let prepared = Prepared::new(task);
     let found = prepared
-        .map(|prepared| search_from(task, bounds, &prepared, &task.initial, i64::MAX, STATE_LIMIT, limits));
+        .map(|prepared| search_from(task, bounds, &prepared, &task.initial, Int::MAX, STATE_LIMIT, limits));
     found.unwrap_or(Found::Unknown(None))
 }
 
 /// Searches it from a state of its own, storing at most so many states, for a plan that costs at most `limit`: what a known one
-/// costs, or `i64::MAX`.
+/// costs, or `Int::MAX`.
 pub(crate) fn search_from(
     task: &Task,
     bounds: &Bounds,
     prepared: &Prepared,
     initial: &State,
-    limit: i64,
+    limit: Int,
     most: usize,
     limits: &Limits,
 ) -> Found {
@@ -107,7 +106,7 @@ pub(crate) fn search_from(
         return found;
     }
     let mut some = None;
-    if search.best.is_none() && limit == i64::MAX {
+    if search.best.is_none() && limit == Int::MAX {
         let mut greedy = Search::new(task, bounds, prepared, initial, true);
         greedy.run(limits, SOON.min(most));
         some = greedy.best_plan();
@@ -125,7 +124,7 @@ fn cheaper(one: Option<GroundPlan>, other: Option<GroundPlan>) -> Option<GroundP
 }
 
 /// A state's basic values and numbers, and what was paid on the way to it.
-pub(crate) type ClosedLabel = (Vec<u32>, Vec<i64>, i64);
+pub(crate) type ClosedLabel = (Vec<u32>, Vec<Int>, Int);
 
 /// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
 /// nothing left; none if there is a cheaper plan, or if a limit comes first.
@@ -133,7 +132,7 @@ pub(crate) fn closed_labels(
     task: &Task,
     bounds: &Bounds,
     limits: &Limits,
-    cost: Option<i64>,
+    cost: Option<Int>,
 ) -> Option<Vec<ClosedLabel>> {
     let prepared = Prepared::new(task)?;
     let mut search = Search::new(task, bounds, &prepared, &task.initial, false);
@@ -169,7 +168,7 @@ impl<'a> Search<'a> {
             incomplete: false,
             greedy,
             best: None,
-            limit: i64::MAX,
+            limit: Int::MAX,
         };
         search.push(initial.clone(), 0, 0, None);
         search
@@ -213,20 +212,23 @@ impl<'a> Search<'a> {
             let sizes = operator.sizes();
             for (index, (choice, step)) in prepared.choices[operator_id.index()].iter().enumerate() {
                 if operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
-                    let next = self.task.successor(operator, &state, choice);
-                    self.push(next, cost + step, steps + 1, Some((id, operator_id, index as u32)));
+                    let parent = Some((id, operator_id, index as u32));
+                    match (self.task.successor(operator, &state, choice), cost.checked_add(*step)) {
+                        (Some(next), Some(cost)) => self.push(next, cost, steps + 1, parent),
+                        _ => self.incomplete = true,
+                    }
                 }
             }
         }
     }
 
-    fn push(&mut self, state: State, cost: i64, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
+    fn push(&mut self, state: State, cost: Int, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
         let Some(estimate) = self.bounds.estimate(&state) else { return };
-        if cost + estimate > self.limit {
-            return;
-        }
-        if state.numbers.iter().any(|number| number.unsigned_abs() > NUMBER_LIMIT) {
+        let Some(total) = cost.checked_add(estimate).filter(|total| *total < GROWTH_LIMIT) else {
             self.incomplete = true;
+            return;
+        };
+        if total > self.limit {
             return;
         }
         let id = self.nodes.len() as u32;
@@ -236,7 +238,7 @@ impl<'a> Search<'a> {
             }
             Entry::Occupied(mut entry) => {
                 let (nodes, monotone) = (&mut self.nodes, self.prepared.monotone);
-                let at_least = |a: &[i64], b: &[i64]| {
+                let at_least = |a: &[Int], b: &[Int]| {
                     if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b }
                 };
                 let known = |id: &u32| &nodes[*id as usize];

@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::number::Int;
 use crate::quantity::Quantity;
 use crate::task::{Operator, OperatorId, State, Task};
 
@@ -51,8 +52,8 @@ const CHOICE_LIMIT: usize = 100_000;
 /// Designs for some slots of an operator, with what they add to its cost and to the numbers in its conditions and effects.
 struct Partial {
     choice: Vec<u16>,
-    cost: i64,
-    profile: Vec<i64>,
+    cost: Int,
+    profile: Vec<Int>,
 }
 
 /// The combinations of an operator's designs that no other one dominates, with their costs: none is cheaper or
@@ -61,11 +62,11 @@ struct Partial {
 ///
 /// Slots that no table and no exclusion joins contribute by themselves, so what is dominated among the combinations of some of
 /// them is dominated in all combinations that extend it: k functions of m designs cost no m^k comparisons.
-pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Option<Vec<(Vec<u16>, i64)>> {
+pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Option<Vec<(Vec<u16>, Int)>> {
     let sizes = operator.sizes();
     let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
     let conditions = operator.condition.comparisons.iter().map(|linear| &linear.quantity);
-    let quantities: Vec<&Quantity<i64>> = effects.chain(conditions).collect();
+    let quantities: Vec<&Quantity<Int>> = effects.chain(conditions).collect();
     let profile = quantities.iter().map(|quantity| quantity.constant).collect();
     let mut front = vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant, profile }];
     for slots in independent(operator, &quantities) {
@@ -79,7 +80,7 @@ pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Opt
                         .iter()
                         .any(|bad| rule.slots.iter().zip(bad).all(|(s, d)| choice[*s as usize] == *d))
             });
-            let sum = |quantity: &Quantity<i64>| quantity.part(&slots, choice, &sizes);
+            let sum = |quantity: &Quantity<Int>| quantity.part(&slots, choice, &sizes);
             if !excluded {
                 own.push(Partial {
                     choice: choice.to_vec(),
@@ -136,7 +137,7 @@ fn best(mut all_of_them: Vec<Partial>, monotone: bool, all: bool) -> Vec<Partial
 }
 
 /// The slots of an operator in groups that no table and no exclusion joins.
-fn independent(operator: &Operator, quantities: &[&Quantity<i64>]) -> Vec<Vec<u16>> {
+fn independent(operator: &Operator, quantities: &[&Quantity<Int>]) -> Vec<Vec<u16>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
     let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));
     let mut groups: Vec<Vec<u16>> = (0..operator.slots.len() as u16).map(|slot| vec![slot]).collect();
@@ -180,7 +181,7 @@ mod tests {
     const SIZES: [usize; 4] = [2, 3, 2, 2];
 
     /// A quantity with a table over each list of slots, filled with small numbers.
-    fn quantity(tables: &[Vec<u16>], numbers: &mut impl Iterator<Item = i64>) -> Quantity<i64> {
+    fn quantity(tables: &[Vec<u16>], numbers: &mut impl Iterator<Item = Int>) -> Quantity<Int> {
         let mut quantity = Quantity::constant(numbers.next().unwrap_or(0));
         for slots in tables {
             let size = slots.iter().map(|slot| SIZES[*slot as usize]).product();
@@ -190,7 +191,7 @@ mod tests {
         quantity
     }
 
-    fn operator(costs: &[Vec<u16>], uses: &[Vec<u16>], excluded: &[(u16, u16)], numbers: &[i64]) -> Operator {
+    fn operator(costs: &[Vec<u16>], uses: &[Vec<u16>], excluded: &[(u16, u16)], numbers: &[Int]) -> Operator {
         let mut numbers = numbers.iter().copied().cycle();
         let cost = quantity(costs, &mut numbers);
         let variable = NumericId(0);
@@ -219,7 +220,7 @@ mod tests {
     }
 
     /// By definition: every combination against every other one.
-    fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u16>, i64)> {
+    fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u16>, Int)> {
         let sizes = operator.sizes();
         let value = |choice: &Vec<u16>| {
             (operator.cost.at(choice, &sizes), operator.numeric_effects[0].value.quantity.at(choice, &sizes))
@@ -244,13 +245,13 @@ mod tests {
             costs in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![1, 2]], 0..=5),
             uses in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![0, 3]], 0..=5),
             excluded in proptest::collection::vec((0_u16..2, 0_u16..3), 0..4),
-            numbers in proptest::collection::vec(-4_i64..5, 1..40),
+            numbers in proptest::collection::vec(-4_i128..5, 1..40),
             monotone: bool,
         ) {
             let operator = operator(&costs, &uses, &excluded, &numbers);
             prop_assert_eq!(undominated(&operator, monotone, true), Some(expected(&operator, monotone, true)));
             // Of equal ones one stands for all.
-            let values = |choices: Vec<(Vec<u16>, i64)>| {
+            let values = |choices: Vec<(Vec<u16>, Int)>| {
                 let sizes = operator.sizes();
                 let left = |choice: &[u16]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);
                 let mut values: Vec<_> = choices.iter().map(|(choice, cost)| (*cost, left(choice))).collect();

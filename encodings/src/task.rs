@@ -9,7 +9,10 @@
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
+use num_bigint::{BigInt, Sign};
+
 use crate::lifted::ObjectId;
+use crate::number::{GROWTH_LIMIT, Int};
 pub use crate::quantity::NumericId;
 use crate::quantity::{Linear, Quantity, SlotSet};
 
@@ -65,7 +68,7 @@ pub(crate) struct Condition {
     pub(crate) facts: Vec<Fact>,
     pub(crate) clauses: Vec<Vec<Literal>>,
     /// Each is ≥ 0.
-    pub(crate) comparisons: Vec<Linear<i64>>,
+    pub(crate) comparisons: Vec<Linear<Int>>,
 }
 
 /// A finite-domain variable: at every moment exactly one of its values holds.
@@ -102,7 +105,7 @@ pub(crate) struct Forbidden {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct NumericEffect {
     pub(crate) variable: NumericId,
-    pub(crate) value: Linear<i64>,
+    pub(crate) value: Linear<Int>,
 }
 
 /// What an operator sets if all literals hold before it.
@@ -150,29 +153,29 @@ pub(crate) struct Operator {
     pub(crate) conditional: Vec<ConditionalEffect>,
     pub(crate) numeric_effects: Vec<NumericEffect>,
     /// In the task's cost unit; may be negative where the metric rewards.
-    pub(crate) cost: Quantity<i64>,
+    pub(crate) cost: Quantity<Int>,
     /// By the task's other objectives, in their units.
-    pub(crate) others: Vec<Quantity<i64>>,
+    pub(crate) others: Vec<Quantity<Int>>,
     /// In the task's time unit.
-    pub(crate) duration: Quantity<i64>,
+    pub(crate) duration: Quantity<Int>,
     /// Set if this is no action but a wait until that time, in the task's time unit from the start of the plan.
-    pub(crate) wait: Option<i64>,
+    pub(crate) wait: Option<Int>,
 }
 
 /// A state: a value for each variable.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct State {
     pub(crate) values: Vec<u32>,
-    pub(crate) numbers: Vec<i64>,
+    pub(crate) numbers: Vec<Int>,
 }
 
 /// How integer costs relate to the metric of the problem file.
 #[derive(Debug, Clone)]
 pub struct Objective {
     /// Costs are this many times the metric.
-    pub(crate) scale: i64,
+    pub(crate) scale: Int,
     /// Added to the sum of operator costs (in scaled units).
-    pub(crate) offset: i64,
+    pub(crate) offset: Int,
     /// Whether the file asks to maximize; operator costs are negated then.
     pub(crate) maximize: bool,
 }
@@ -196,7 +199,7 @@ pub struct Task {
     /// The numeric variables as PDDL writes them.
     pub(crate) number_names: Vec<String>,
     /// Numbers are this many times the values of the files.
-    pub(crate) number_scale: i64,
+    pub(crate) number_scale: Int,
     /// The rules of the derived variables, in the order of their evaluation.
     pub(crate) axioms: Vec<Layer>,
     pub(crate) slots: Vec<Slot>,
@@ -207,7 +210,7 @@ pub struct Task {
     /// Less important ones, in order.
     pub(crate) others: Vec<Objective>,
     /// Durations are this many times the values of the files.
-    pub(crate) time_scale: i64,
+    pub(crate) time_scale: Int,
     /// Set if relaxed reachability shows that the goal cannot be reached: the reason.
     pub(crate) unreachable: Option<String>,
 }
@@ -235,7 +238,7 @@ impl Operator {
     }
 
     /// The cost with a combination of designs.
-    pub(crate) fn cost_of(&self, choice: &[u16]) -> i64 {
+    pub(crate) fn cost_of(&self, choice: &[u16]) -> Int {
         self.cost.at(choice, &self.sizes())
     }
 
@@ -275,11 +278,21 @@ impl Iterator for Choices<'_> {
     }
 }
 
-impl Linear<i64> {
-    /// The value in a state, for a combination of designs.
-    pub(crate) fn value(&self, numbers: &[i64], choice: &[u16], sizes: &[usize]) -> i64 {
-        let terms = self.coefficients.iter().map(|(v, factor)| factor.saturating_mul(numbers[v.index()]));
-        terms.fold(self.quantity.at(choice, sizes), i64::saturating_add)
+impl Linear<Int> {
+    /// The value in a state, for a combination of designs; none if it does not fit.
+    pub(crate) fn value(&self, numbers: &[Int], choice: &[u16], sizes: &[usize]) -> Option<Int> {
+        let mut terms = self.coefficients.iter().map(|(v, factor)| factor.checked_mul(numbers[v.index()]));
+        terms.try_fold(self.quantity.at(choice, sizes), |sum, term| sum.checked_add(term?))
+    }
+
+    /// Whether the value is at least 0, however large the numbers in between.
+    fn is_at_least_zero(&self, numbers: &[Int], choice: &[u16], sizes: &[usize]) -> bool {
+        if let Some(value) = self.value(numbers, choice, sizes) {
+            return value >= 0;
+        }
+        let terms = self.coefficients.iter().map(|(v, factor)| BigInt::from(*factor) * numbers[v.index()]);
+        terms.fold(BigInt::from(self.quantity.at(choice, sizes)), |sum, term| sum + term).sign()
+            != Sign::Minus
     }
 }
 
@@ -291,8 +304,8 @@ impl Condition {
     }
 
     /// Whether the numeric part holds.
-    pub(crate) fn holds_numerically(&self, numbers: &[i64], choice: &[u16], sizes: &[usize]) -> bool {
-        self.comparisons.iter().all(|comparison| comparison.value(numbers, choice, sizes) >= 0)
+    pub(crate) fn holds_numerically(&self, numbers: &[Int], choice: &[u16], sizes: &[usize]) -> bool {
+        self.comparisons.iter().all(|comparison| comparison.is_at_least_zero(numbers, choice, sizes))
     }
 }
 
@@ -331,8 +344,9 @@ impl Task {
             && self.goal.holds_numerically(&state.numbers, &[], &[])
     }
 
-    /// The state after an operator, which must be applicable with this combination of designs.
-    pub(crate) fn successor(&self, operator: &Operator, state: &State, choice: &[u16]) -> State {
+    /// The state after an operator, which must be applicable with this combination of designs; none if its numbers grow
+    /// beyond [`GROWTH_LIMIT`].
+    pub(crate) fn successor(&self, operator: &Operator, state: &State, choice: &[u16]) -> Option<State> {
         let mut next = state.clone();
         for effect in &operator.effects {
             next.values[effect.variable.index()] = effect.value;
@@ -347,11 +361,15 @@ impl Task {
         if !operator.numeric_effects.is_empty() {
             let sizes = operator.sizes();
             for effect in &operator.numeric_effects {
-                next.numbers[effect.variable.index()] = effect.value.value(&state.numbers, choice, &sizes);
+                let value = effect.value.value(&state.numbers, choice, &sizes)?;
+                if value.abs() > GROWTH_LIMIT {
+                    return None;
+                }
+                next.numbers[effect.variable.index()] = value;
             }
         }
         self.close(&mut next);
-        next
+        Some(next)
     }
 
     /// Gives the derived variables their values: the least fixpoint of the rules, layer by layer.

@@ -15,6 +15,7 @@ use crate::bounds::Bounds;
 use crate::encode::{CostLimit, Counting, Encoding, Semantics};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::pddl::{Source, read};
 use crate::plan::replay;
 use crate::sat::{Answer, Backend};
@@ -29,14 +30,14 @@ const STEPS: usize = 6;
 const MOST_STEPS: usize = 16;
 
 /// More than any plan of the small tasks below costs.
-const MUCH: i64 = 200;
+const MUCH: Int = 200;
 
 /// Whether there is a plan with at most so many steps and at most this cost; if so, it is one.
 fn is_solvable(
     task: &Task,
     bounds: &Bounds,
     steps: usize,
-    limit: i64,
+    limit: Int,
     semantics: Semantics,
     backend: &Backend,
 ) -> bool {
@@ -63,7 +64,7 @@ fn check(seed: u64, backend: &Backend) {
     let (domain, problem) = (Source::new("d", mission.domain()), Source::new("p", mission.problem()));
     let (domain, problem, _) = read(&domain, &problem).expect("PDDL");
     let task = ground(&domain, &problem, &Config::default()).expect("a task");
-    let optimum = mission.oracle();
+    let optimum = mission.oracle().map(Int::from);
     if task.unreachable.is_some() {
         assert!(optimum.is_none(), "seed {seed}");
         return;
@@ -73,6 +74,7 @@ fn check(seed: u64, backend: &Backend) {
     let below = optimum.map_or(MUCH, |optimum| optimum * scale - offset - 1);
     let step_bound = bounds.window(&task, Some(below), None).steps.unwrap_or(STEPS);
     let costs = mission.oracle_by_steps(step_bound.clamp(STEPS, MOST_STEPS));
+    let costs: Vec<_> = costs.into_iter().map(|cost| cost.map(Int::from)).collect();
     assert!(
         costs.iter().flatten().all(|cost| optimum.is_some_and(|optimum| optimum <= *cost)),
         "seed {seed}"
@@ -86,7 +88,7 @@ fn check(seed: u64, backend: &Backend) {
                     assert!(solvable(cost * scale - offset), "{}", context());
                     assert!(!solvable(cost * scale - offset - 1), "{}", context());
                 }
-                None => assert!(!solvable(i64::from(i32::MAX)), "{}", context()),
+                None => assert!(!solvable(Int::from(i32::MAX)), "{}", context()),
             }
         }
     }
@@ -166,18 +168,19 @@ pub(crate) fn fleet(seed: u64) -> (String, String) {
 }
 
 /// Where a state leads to, and what that costs.
-fn successors(task: &Task, state: &State) -> Vec<(State, i64)> {
+fn successors(task: &Task, state: &State) -> Vec<(State, Int)> {
     let mut all = Vec::new();
     for operator in &task.operators {
         for choice in operator.choices().filter(|choice| operator.applicable(state, choice)) {
-            all.push((task.successor(operator, state, &choice), operator.cost_of(&choice)));
+            let next = task.successor(operator, state, &choice).expect("small numbers");
+            all.push((next, operator.cost_of(&choice)));
         }
     }
     all
 }
 
 /// The least cost of a plan, by Dijkstra over all states that can be reached.
-pub(crate) fn optimum(task: &Task) -> Option<i64> {
+pub(crate) fn optimum(task: &Task) -> Option<Int> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
     let mut states = vec![task.initial.clone()];
     let mut open = BinaryHeap::from([Reverse((0, 0))]);
@@ -190,7 +193,7 @@ pub(crate) fn optimum(task: &Task) -> Option<i64> {
             return Some(cost);
         }
         for (next, step) in successors(task, &state) {
-            let known = best.entry(next.clone()).or_insert(i64::MAX);
+            let known = best.entry(next.clone()).or_insert(Int::MAX);
             if cost + step < *known {
                 *known = cost + step;
                 open.push(Reverse((cost + step, states.len())));
@@ -202,7 +205,7 @@ pub(crate) fn optimum(task: &Task) -> Option<i64> {
 }
 
 /// The least cost of a plan with at most so many steps, for each number from 0.
-fn costs_by_steps(task: &Task, most: usize) -> Vec<Option<i64>> {
+fn costs_by_steps(task: &Task, most: usize) -> Vec<Option<Int>> {
     let mut best = FxHashMap::from_iter([(task.initial.clone(), 0)]);
     let mut improved = vec![(task.initial.clone(), 0)];
     let mut costs = Vec::new();
@@ -212,7 +215,7 @@ fn costs_by_steps(task: &Task, most: usize) -> Vec<Option<i64>> {
         let mut next = Vec::new();
         for (state, cost) in improved {
             for (after, step) in successors(task, &state) {
-                let known = best.entry(after.clone()).or_insert(i64::MAX);
+                let known = best.entry(after.clone()).or_insert(Int::MAX);
                 if cost + step < *known {
                     *known = cost + step;
                     next.push((after, cost + step));

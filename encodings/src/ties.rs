@@ -19,6 +19,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::bounds::{Bounds, Projection};
 use crate::lifted::ObjectId;
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::plan::{GroundPlan, GroundStep, resolve};
 use crate::search::is_monotone;
 use crate::successors::{OperatorIndex, undominated};
@@ -33,7 +34,7 @@ struct Label {
     state: State,
     /// The design that each function ran with last.
     designs: Vec<Option<ObjectId>>,
-    cost: i64,
+    cost: Int,
     steps: usize,
     changes: Changes,
 }
@@ -51,7 +52,7 @@ pub(crate) type Changes = (usize, usize);
 /// A combination of designs of an operator.
 struct Choice {
     designs: Vec<u16>,
-    cost: i64,
+    cost: Int,
     /// Functions, by position, and their designs.
     configuration: Vec<(usize, ObjectId)>,
     /// Whether it is a step of the plan to stay close to, or there is no such plan.
@@ -83,7 +84,7 @@ pub(crate) struct Beginning<'a> {
 /// What choosing needs to know of a task, whatever state plans begin in.
 pub(crate) struct Prepared {
     /// By projection and abstract state.
-    steps_to_go: Vec<Vec<Option<i64>>>,
+    steps_to_go: Vec<Vec<Option<Int>>>,
     index: OperatorIndex,
     monotone: bool,
     functions: Vec<ObjectId>,
@@ -137,7 +138,7 @@ struct Ties<'a> {
     /// Where they depend on the plan to stay close to.
     choices: Option<Vec<OnceLock<Choices>>>,
     close_to: &'a FxHashSet<GroundStep>,
-    cost: i64,
+    cost: Int,
     steps: usize,
     made: Cell<usize>,
 }
@@ -220,12 +221,12 @@ impl Ties<'_> {
         {
             return None;
         }
-        let state = self.task.successor(operator, &label.state, &choice.designs);
+        let state = self.task.successor(operator, &label.state, &choice.designs)?;
         if cost + self.bounds.estimate(&state)? > self.cost {
             return None;
         }
-        let most = (self.steps - steps) as i64;
-        let in_time = |(projection, to_go): (&Projection, &Vec<Option<i64>>)| {
+        let most = (self.steps - steps) as Int;
+        let in_time = |(projection, to_go): (&Projection, &Vec<Option<Int>>)| {
             to_go[projection.state(&state) as usize].is_some_and(|more| more <= most)
         };
         if !self.bounds.projections.iter().zip(&self.prepared.steps_to_go).all(in_time) {

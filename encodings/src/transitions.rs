@@ -2,6 +2,7 @@
 //!
 //! Every function design is chosen here, so an action appears once for each combination of its designs.
 
+use crate::number::Int;
 use crate::plan::{Exact, GroundPlan, GroundStep, Step, decode, metric};
 use crate::task::{OperatorId, State, Task};
 
@@ -10,7 +11,7 @@ use crate::task::{OperatorId, State, Task};
 pub struct Situation {
     state: State,
     /// In the task's integer unit.
-    cost: i64,
+    cost: Int,
 }
 
 impl Situation {
@@ -97,19 +98,19 @@ impl Task {
         metric(self, situation.cost)
     }
 
-    /// Everything that can be done.
-    pub fn transitions(&self, situation: &Situation) -> Vec<Transition> {
+    /// Everything that can be done; none if numbers grow too large for it.
+    pub fn transitions(&self, situation: &Situation) -> Option<Vec<Transition>> {
         let Situation { state, cost } = situation;
         let mut found = Vec::new();
         for id in self.ids() {
             let operator = &self.operators[id.index()];
             for choice in operator.choices().filter(|choice| operator.applicable(state, choice)) {
-                let cost = cost + operator.cost.at(&choice, &operator.sizes());
-                let after = Situation { state: self.successor(operator, state, &choice), cost };
+                let cost = cost.checked_add(operator.cost.at(&choice, &operator.sizes()))?;
+                let after = Situation { state: self.successor(operator, state, &choice)?, cost };
                 let Some(Step { action, arguments, .. }) = self.step(id, choice) else { continue };
                 found.push(Transition { action, arguments, after });
             }
         }
-        found
+        Some(found)
     }
 }

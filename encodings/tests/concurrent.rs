@@ -21,7 +21,7 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-fn rational(numerator: i64, denominator: i64) -> BigRational {
+fn rational(numerator: i128, denominator: i128) -> BigRational {
     BigRational::new(BigInt::from(numerator), BigInt::from(denominator))
 }
 
@@ -59,7 +59,13 @@ fn metric(
 }
 
 /// The metric and the lines of the plan; none if it is proved that there is no plan.
-fn check(name: &str, domain: &str, problem: &str, separation: (i64, i64), expected: Option<(&str, &[&str])>) {
+fn check(
+    name: &str,
+    domain: &str,
+    problem: &str,
+    separation: (i128, i128),
+    expected: Option<(&str, &[&str])>,
+) {
     let (domain, problem) = parse(domain, problem);
     let separation = rational(separation.0, separation.1);
     let solution = solve(&domain, &problem, &separation);
@@ -316,13 +322,13 @@ fn sample(random: &mut Random) -> Sample {
 }
 
 /// The last start that brute force tries. With a separation of one unit all times of a best plan are whole numbers.
-const LAST: i64 = 7;
+const LAST: i128 = 7;
 
 /// The least metric of valid plans of up to three actions, none of which overlaps with itself.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;
-    let mut open: Vec<Vec<(i64, usize)>> = vec![Vec::new()];
+    let mut open: Vec<Vec<(i128, usize)>> = vec![Vec::new()];
     while let Some(plan) = open.pop() {
         let mut text = String::new();
         for (start, action) in &plan {
@@ -339,8 +345,9 @@ fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigR
         let (from, after) = plan.last().copied().unwrap_or((0, 0));
         for start in from..=LAST {
             for action in 0..3 {
-                let again =
-                    |other: &(i64, usize)| other.1 == action && start < other.0 + task.durations[action];
+                let again = |other: &(i128, usize)| {
+                    other.1 == action && start < other.0 + i128::from(task.durations[action])
+                };
                 if (start, action) >= (from, after) && !plan.iter().any(again) {
                     let mut longer = plan.clone();
                     longer.push((start, action));

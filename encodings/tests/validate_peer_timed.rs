@@ -51,14 +51,14 @@ for text in open(sys.argv[3]).read().split('---\\n'):
     print('valid' if valid else 'invalid')";
 
 /// A step: its start in thousandths, its words, and its duration in thousandths.
-type Timed = (i64, Vec<String>, Option<i64>);
+type Timed = (i128, Vec<String>, Option<i128>);
 
 fn file(name: &str) -> PathBuf {
     let folder = if name.starts_with("suave") { "suave_metaplan/" } else { "plansys2/plansys2_" };
     PathBuf::from(format!("{REAL}/{folder}{name}.pddl"))
 }
 
-fn thousandths(value: i64) -> String {
+fn thousandths(value: i128) -> String {
     format!("{}.{:03}", value / 1000, value % 1000)
 }
 
@@ -98,7 +98,7 @@ fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
 fn changed(plan: &[Timed], objects: &[String], number: usize) -> Vec<Timed> {
     let mut plan = plan.to_vec();
     let place = number / 7 % plan.len();
-    let some = i64::try_from(number / 11 % 5).unwrap_or_default();
+    let some = i128::try_from(number / 11 % 5).unwrap_or_default();
     match number % 7 {
         0 => drop(plan.remove(place)),
         1 => {

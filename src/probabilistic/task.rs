@@ -163,7 +163,10 @@ impl Explorer<'_> {
             self.moves.push(HashMap::new());
             // Nothing comes after the goal.
             let transitions =
-                if self.task.reaches_goal(&state) { Vec::new() } else { self.task.transitions(&state) };
+                if self.task.reaches_goal(&state) { Some(Vec::new()) } else { self.task.transitions(&state) };
+            let transitions = transitions.ok_or_else(|| {
+                vec![Message::error("M127", "numbers of the task grow too large for a process of its states")]
+            })?;
             for transition in transitions {
                 self.transition(at, &state, transition);
             }

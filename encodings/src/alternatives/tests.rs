@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Forced, alternatives};
 use crate::ground::{Config as GroundConfig, ground};
+use crate::number::Int;
 use crate::optimize::{Config, optimize};
 use crate::pddl::{Source, read};
 use crate::plan::{GroundPlan, GroundStep, Plan, decode};
@@ -12,7 +13,7 @@ use crate::task::{State, Task};
 use crate::tests::missions::Mission;
 
 /// All plans that cost exactly so much, from a state on.
-fn all(task: &Task, state: &State, left: i64, path: &mut Vec<GroundStep>, found: &mut Vec<Vec<GroundStep>>) {
+fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found: &mut Vec<Vec<GroundStep>>) {
     if left == 0 && task.is_goal(state) {
         found.push(path.clone());
     }
@@ -20,7 +21,7 @@ fn all(task: &Task, state: &State, left: i64, path: &mut Vec<GroundStep>, found:
         for choice in operator.choices().filter(|choice| operator.applicable(state, choice)) {
             let cost = operator.cost_of(&choice);
             if cost <= left {
-                let next = task.successor(operator, state, &choice);
+                let next = task.successor(operator, state, &choice).expect("small numbers");
                 path.push(GroundStep { operator: id, choice });
                 all(task, &next, left - cost, path, found);
                 path.pop();

@@ -19,6 +19,7 @@ use resources::Resource;
 use smallvec::SmallVec;
 
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::quantity::NumericId;
 use crate::task::{State, Task};
 
@@ -109,7 +110,7 @@ impl Bounds {
     }
 
     /// A lower bound on the cost from a state to the goal; none if the goal cannot be reached.
-    pub(crate) fn estimate(&self, state: &State) -> Option<i64> {
+    pub(crate) fn estimate(&self, state: &State) -> Option<Int> {
         let mut best = 0;
         if self.partitions.is_empty() {
             for projection in &self.projections {
@@ -122,14 +123,14 @@ impl Bounds {
                 best = best.max(projection.to_go(own)?);
                 states.push(own);
             }
-            best = self.partitions.iter().map(|partition| partition.estimate(&states)).fold(best, i64::max);
+            best = self.partitions.iter().map(|partition| partition.estimate(&states)).fold(best, Int::max);
         }
         let enough = |resource: &Resource| resource.suffices(state, &self.projections);
         self.resources.iter().all(enough).then_some(best)
     }
 
     /// What must be left of resources: the number, the projection, and a value for each of its abstract states.
-    pub(crate) fn needs(&self) -> impl Iterator<Item = (NumericId, &Projection, &[Option<i64>])> {
+    pub(crate) fn needs(&self) -> impl Iterator<Item = (NumericId, &Projection, &[Option<Int>])> {
         let projection = |position: &usize| &self.projections[*position];
         self.resources.iter().flat_map(move |resource| {
             let needs = resource.needs.iter();
@@ -138,7 +139,7 @@ impl Bounds {
     }
 
     /// What is known of plans with cost at most `limit` and at most `horizon` steps, where either is given.
-    pub(crate) fn window(&self, task: &Task, limit: Option<i64>, horizon: Option<usize>) -> Window {
+    pub(crate) fn window(&self, task: &Task, limit: Option<Int>, horizon: Option<usize>) -> Window {
         let mut steps: Option<usize> = None;
         if let Some(limit) = limit {
             for projection in &self.projections {

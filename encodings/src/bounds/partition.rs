@@ -9,7 +9,10 @@
 
 use std::cmp::Reverse;
 
+use num_bigint::BigInt;
+
 use crate::bounds::Projection;
+use crate::number::Int;
 use crate::task::Task;
 
 /// How many sums are kept.
@@ -20,18 +23,18 @@ const EFFORT: usize = 6_000_000;
 
 /// Estimates that may be added up: positions of projections, and the share of the cost to go from each abstract state.
 pub(super) struct Partition {
-    parts: Vec<(usize, Vec<Option<i64>>)>,
+    parts: Vec<(usize, Vec<Option<Int>>)>,
 }
 
 impl Partition {
     /// The sum for a state, of which the abstract states are given by position.
-    pub(super) fn estimate(&self, states: &[u32]) -> i64 {
+    pub(super) fn estimate(&self, states: &[u32]) -> Int {
         let shares = self.parts.iter().map(|(position, to_go)| to_go[states[*position] as usize]);
         // Dead ends are noticed by the projections themselves.
         shares.map(|share| share.unwrap_or(0)).sum()
     }
 
-    fn new(projections: &[Projection], costs: &[i64], order: &[usize]) -> Self {
+    fn new(projections: &[Projection], costs: &[Int], order: &[usize]) -> Self {
         let mut left = costs.to_vec();
         let mut parts = Vec::new();
         for position in order {
@@ -50,7 +53,7 @@ impl Partition {
 /// Sums of shares for the projections of a task, the one with the highest estimate of the initial state first; none where one
 /// projection alone is as good.
 pub(super) fn partitions(task: &Task, projections: &[Projection]) -> Vec<Partition> {
-    let costs: Vec<i64> = task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect();
+    let costs: Vec<Int> = task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect();
     let initial: Vec<u32> = projections.iter().map(|projection| projection.state(&task.initial)).collect();
     let alone = |position: usize| projections[position].to_go(initial[position]).unwrap_or(0);
     let useful: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
@@ -59,8 +62,8 @@ pub(super) fn partitions(task: &Task, projections: &[Projection]) -> Vec<Partiti
         return Vec::new();
     }
     let mut budget = (EFFORT / transitions.max(1)).clamp(1, ORDERS);
-    let mut tried: Vec<(i64, Vec<usize>, Partition)> = Vec::new();
-    let mut attempt = |order: Vec<usize>, tried: &mut Vec<(i64, Vec<usize>, Partition)>| {
+    let mut tried: Vec<(Int, Vec<usize>, Partition)> = Vec::new();
+    let mut attempt = |order: Vec<usize>, tried: &mut Vec<(Int, Vec<usize>, Partition)>| {
         if budget == 0 || tried.iter().any(|(_, known, _)| *known == order) {
             return;
         }
@@ -91,15 +94,14 @@ pub(super) fn partitions(task: &Task, projections: &[Projection]) -> Vec<Partiti
 }
 
 /// Projections that give much and take little come first.
-fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> i64) -> Vec<usize> {
+fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> Int) -> Vec<usize> {
     let taken = |position: usize| {
         let projection = &projections[position];
-        projection.saturated(projection.costs()).sum::<i64>().max(1)
+        projection.saturated(projection.costs()).sum::<Int>().max(1)
     };
-    let mut order: Vec<(usize, i64, i64)> =
+    let mut order: Vec<(usize, Int, Int)> =
         useful.iter().map(|position| (*position, alone(*position), taken(*position))).collect();
-    order.sort_by(|(_, a, s), (_, b, t)| {
-        (i128::from(*b) * i128::from(*s)).cmp(&(i128::from(*a) * i128::from(*t)))
-    });
+    let product = |a: &Int, b: &Int| BigInt::from(*a) * b;
+    order.sort_by(|(_, a, s), (_, b, t)| product(b, s).cmp(&product(a, t)));
     order.into_iter().map(|(position, ..)| position).collect()
 }

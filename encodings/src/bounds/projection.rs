@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use crate::number::Int;
 use crate::task::{ConditionalEffect, Literal, OperatorId, State, Task, VariableId};
 
 /// An operator leads from one abstract state to another.
@@ -20,11 +21,11 @@ pub(crate) struct Projection {
     goals: Vec<u32>,
     /// For each operator its cost with the cheapest designs and where it leads; empty if it reads and changes
     /// nothing of the pattern.
-    operators: Vec<(i64, Vec<Transition>)>,
+    operators: Vec<(Int, Vec<Transition>)>,
     /// The least cost of an operator that touches nothing of the pattern.
-    idle_cost: Option<i64>,
+    idle_cost: Option<Int>,
     /// Cost to the nearest goal state.
-    to_go: Vec<Option<i64>>,
+    to_go: Vec<Option<Int>>,
 }
 
 impl Projection {
@@ -63,11 +64,11 @@ impl Projection {
                     }
                 }
             } else {
-                projection.idle_cost = Some(projection.idle_cost.map_or(cost, |known: i64| known.min(cost)));
+                projection.idle_cost = Some(projection.idle_cost.map_or(cost, |known: Int| known.min(cost)));
             }
             projection.operators.push((cost, transitions));
         }
-        let costs: Vec<i64> = projection.operators.iter().map(|(cost, _)| *cost).collect();
+        let costs: Vec<Int> = projection.operators.iter().map(|(cost, _)| *cost).collect();
         projection.to_go = projection.costs_to_go(&costs);
         projection
     }
@@ -154,17 +155,17 @@ impl Projection {
     }
 
     /// The cost to go from each abstract state, if operators cost so much.
-    pub(crate) fn costs_to_go(&self, costs: &[i64]) -> Vec<Option<i64>> {
+    pub(crate) fn costs_to_go(&self, costs: &[Int]) -> Vec<Option<Int>> {
         self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)))
     }
 
     /// The least costs of operators with which the cost to go is as given.
-    pub(crate) fn saturated(&self, to_go: &[Option<i64>]) -> impl Iterator<Item = i64> {
+    pub(crate) fn saturated(&self, to_go: &[Option<Int>]) -> impl Iterator<Item = Int> {
         self.operators.iter().map(|(_, transitions)| {
             let falls = transitions
                 .iter()
                 .filter_map(|t| Some(to_go[t.source as usize]? - to_go[t.target as usize]?));
-            falls.fold(0, i64::max)
+            falls.fold(0, Int::max)
         })
     }
 
@@ -174,13 +175,13 @@ impl Projection {
     }
 
     /// The least number of steps from each abstract state to the goal.
-    pub(crate) fn steps_to_go(&self) -> Vec<Option<i64>> {
+    pub(crate) fn steps_to_go(&self) -> Vec<Option<Int>> {
         self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)))
     }
 
     /// What of a resource is used up at least until it is replenished or a goal state is reached. `used` is what
     /// each operator uses, none if it may replenish; `left` is what a goal state must have left.
-    pub(crate) fn needs(&self, used: &[Option<i64>], left: i64) -> Vec<Option<i64>> {
+    pub(crate) fn needs(&self, used: &[Option<Int>], left: Int) -> Vec<Option<Int>> {
         let replenishing = self.operators.iter().zip(used).filter(|(_, used)| used.is_none());
         let free = replenishing.flat_map(|((_, transitions), _)| transitions).map(|t| (t.source, 0));
         let goals = self.goals.iter().map(|goal| (*goal, left));
@@ -195,10 +196,10 @@ impl Projection {
     /// The least sum of costs from each abstract state to one of the targets, each of which adds its own.
     fn distances(
         &self,
-        cost: impl Fn(usize) -> i64,
-        targets: impl Iterator<Item = (u32, i64)>,
-    ) -> Vec<Option<i64>> {
-        let mut incoming: Vec<Vec<(u32, i64)>> = vec![Vec::new(); self.size()];
+        cost: impl Fn(usize) -> Int,
+        targets: impl Iterator<Item = (u32, Int)>,
+    ) -> Vec<Option<Int>> {
+        let mut incoming: Vec<Vec<(u32, Int)>> = vec![Vec::new(); self.size()];
         for (operator, (_, transitions)) in self.operators.iter().enumerate() {
             for transition in transitions.iter().filter(|t| t.source != t.target) {
                 incoming[transition.target as usize].push((transition.source, cost(operator)));
@@ -221,16 +222,16 @@ impl Projection {
     }
 
     /// The cost to go from the abstract state of a state; none if the goal is out of reach.
-    pub(crate) fn estimate(&self, state: &State) -> Option<i64> {
+    pub(crate) fn estimate(&self, state: &State) -> Option<Int> {
         self.to_go[self.state(state) as usize]
     }
 
     /// The cost to go from each abstract state.
-    pub(crate) fn costs(&self) -> &[Option<i64>] {
+    pub(crate) fn costs(&self) -> &[Option<Int>] {
         &self.to_go
     }
 
-    pub(crate) fn to_go(&self, state: u32) -> Option<i64> {
+    pub(crate) fn to_go(&self, state: u32) -> Option<Int> {
         self.to_go[state as usize]
     }
 
@@ -240,9 +241,9 @@ impl Projection {
     }
 
     /// Least cost of reaching each abstract state in exactly one more step.
-    fn advance(&self, costs: &[Option<i64>]) -> Vec<Option<i64>> {
+    fn advance(&self, costs: &[Option<Int>]) -> Vec<Option<Int>> {
         let improve =
-            |slot: &mut Option<i64>, cost: i64| *slot = Some(slot.map_or(cost, |known| known.min(cost)));
+            |slot: &mut Option<Int>, cost: Int| *slot = Some(slot.map_or(cost, |known| known.min(cost)));
         let mut next = vec![None; costs.len()];
         if let Some(idle) = self.idle_cost {
             for (slot, cost) in next.iter_mut().zip(costs) {
@@ -261,15 +262,15 @@ impl Projection {
         next
     }
 
-    fn start(&self) -> Vec<Option<i64>> {
+    fn start(&self) -> Vec<Option<Int>> {
         let mut costs = vec![None; self.size()];
         costs[self.initial as usize] = Some(0);
         costs
     }
 
     /// The most steps that a plan with cost at most `limit` can have; none if there is no such bound, or one above `most`.
-    pub(crate) fn step_bound(&self, limit: i64, most: usize) -> Option<usize> {
-        let fits = |costs: &[Option<i64>]| {
+    pub(crate) fn step_bound(&self, limit: Int, most: usize) -> Option<usize> {
+        let fits = |costs: &[Option<Int>]| {
             costs.iter().zip(&self.to_go).any(|(c, h)| matches!((c, h), (Some(c), Some(h)) if c + h <= limit))
         };
         let mut costs = self.start();
@@ -289,11 +290,11 @@ impl Projection {
     }
 
     /// Clears `allowed[step][operator]` wherever no plan with cost at most `limit` has the operator at that step.
-    pub(crate) fn restrict(&self, limit: Option<i64>, allowed: &mut [Vec<bool>]) {
-        let within = |cost: i64| limit.is_none_or(|limit| cost <= limit);
+    pub(crate) fn restrict(&self, limit: Option<Int>, allowed: &mut [Vec<bool>]) {
+        let within = |cost: Int| limit.is_none_or(|limit| cost <= limit);
         let mut costs = self.start();
         for row in allowed {
-            let through = |(c, h): (&Option<i64>, &Option<i64>)| Some((*c)? + (*h)?);
+            let through = |(c, h): (&Option<Int>, &Option<Int>)| Some((*c)? + (*h)?);
             let cheapest = costs.iter().zip(&self.to_go).filter_map(through).min();
             for (flag, (cost, transitions)) in row.iter_mut().zip(&self.operators) {
                 *flag = *flag

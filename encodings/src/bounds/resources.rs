@@ -8,6 +8,7 @@
 //! path problem, Networks 42(3), 2003.
 
 use crate::bounds::Projection;
+use crate::number::Int;
 use crate::quantity::NumericId;
 use crate::task::{Operator, State, Task};
 
@@ -15,7 +16,7 @@ use crate::task::{Operator, State, Task};
 pub(super) struct Resource {
     pub(super) variable: NumericId,
     /// By position of the projection.
-    pub(super) needs: Vec<(usize, Vec<Option<i64>>)>,
+    pub(super) needs: Vec<(usize, Vec<Option<Int>>)>,
 }
 
 impl Resource {
@@ -37,7 +38,7 @@ pub(super) fn resources(task: &Task, projections: &[Projection]) -> Vec<Resource
             continue;
         };
         let left = task.goal.comparisons.iter().filter(|c| c.coefficients[..] == [(variable, 1)]);
-        let left = left.map(|comparison| -comparison.quantity.constant).fold(0, i64::max);
+        let left = left.map(|comparison| -comparison.quantity.constant).fold(0, Int::max);
         let mut needs = Vec::new();
         for (projection, position) in projections.iter().zip(0..) {
             let anywhere = |operator: usize| used[operator].is_none() && !projection.touches(operator);
@@ -52,7 +53,7 @@ pub(super) fn resources(task: &Task, projections: &[Projection]) -> Vec<Resource
 
 /// What an operator uses at least (none if it may replenish); nothing if it may lower the variable below 0.
 #[allow(clippy::option_option)]
-fn used(operator: &Operator, variable: NumericId) -> Option<Option<i64>> {
+fn used(operator: &Operator, variable: NumericId) -> Option<Option<Int>> {
     let Some(effect) = operator.numeric_effects.iter().find(|effect| effect.variable == variable) else {
         return Some(Some(0));
     };

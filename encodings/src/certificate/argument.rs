@@ -1,5 +1,6 @@
 //! The argument of a certificate as it is written.
 
+use crate::number::Int;
 use serde::{Deserialize, Serialize};
 
 /// Why no plan is cheaper.
@@ -18,7 +19,7 @@ pub(super) struct Argument {
 pub(super) struct Potential {
     pub(super) pattern: Vec<u32>,
     /// For each combination of values, the last variable varying fastest; null where no goal state is within reach.
-    pub(super) values: Vec<Option<i64>>,
+    pub(super) values: Vec<Option<Int>>,
 }
 
 /// A lower bound on what must be left of a number, by the values of a few variables.
@@ -28,9 +29,9 @@ pub(super) struct Need {
     pub(super) number: u32,
     pub(super) pattern: Vec<u32>,
     /// As in [`Potential::values`].
-    pub(super) values: Vec<Option<i64>>,
+    pub(super) values: Vec<Option<Int>>,
 }
 
 /// A state, derived variables left out, and what was paid on the way to it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Label(pub(super) Vec<u32>, pub(super) Vec<i64>, pub(super) i64);
+pub(super) struct Label(pub(super) Vec<u32>, pub(super) Vec<Int>, pub(super) Int);

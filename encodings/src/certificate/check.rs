@@ -13,6 +13,7 @@ use crate::certificate::semantics::{State, holds_without_numbers};
 use crate::certificate::shape;
 use crate::certificate::table::{Table, check_need, check_potential};
 use crate::certificate::write::{ARGUMENT_FORMAT, TASK_FORMAT};
+use crate::number::Int;
 
 /// Combinations of designs that matter, of all operators together, are not more than this.
 const CHOICE_LIMIT: usize = 1 << 20;
@@ -95,7 +96,7 @@ pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<
         })?;
         needs.push((need.number as usize, table));
     }
-    let mut labels: FxHashMap<&[u32], Vec<(&[i64], i64)>> = FxHashMap::default();
+    let mut labels: FxHashMap<&[u32], Vec<(&[Int], Int)>> = FxHashMap::default();
     for label in &argument.labels {
         labels.entry(&label.0).or_default().push((&label.1, label.2));
     }
@@ -163,7 +164,7 @@ struct Checker<'c> {
     cost: Option<i128>,
     potentials: Vec<Table<'c>>,
     needs: Vec<(usize, Table<'c>)>,
-    labels: FxHashMap<&'c [u32], Vec<(&'c [i64], i64)>>,
+    labels: FxHashMap<&'c [u32], Vec<(&'c [Int], Int)>>,
     monotone: bool,
     /// For each operator.
     choices: Vec<Rc<[Choice]>>,

@@ -1,6 +1,7 @@
 //! What a written task means: states, operators and what they cost. Slow and plain; all arithmetic is exact.
 
 use crate::certificate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
+use crate::number::Int;
 
 /// Values of all variables and numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -16,7 +17,7 @@ pub(super) fn in_range(number: i128) -> bool {
 
 impl Model {
     /// A state with these basic values; the derived ones follow.
-    pub(super) fn state(&self, basic: &[u32], numbers: &[i64]) -> State {
+    pub(super) fn state(&self, basic: &[u32], numbers: &[Int]) -> State {
         let mut values = basic.to_vec();
         values.resize(self.variables.len(), 0);
         let mut state = State { values, numbers: numbers.iter().map(|number| i128::from(*number)).collect() };

@@ -5,11 +5,12 @@ use crate::certificate::model::{
     self, Condition, Exclusion, Fact, Linear, Literal, Model, Operator, Quantity,
 };
 use crate::certificate::semantics::in_range;
+use crate::number::Int;
 
 type Found = Result<(), String>;
 
 /// Factors, constants and entries of tables are smaller, so that sums of products with numbers fit 128 bits.
-const SMALL: i64 = 1 << 50;
+const SMALL: Int = 1 << 50;
 /// As many summands, and fewer, are added up.
 const SUMMANDS: usize = 1 << 10;
 
@@ -30,7 +31,7 @@ fn are_distinct(numbers: impl Iterator<Item = u32>) -> bool {
     all.len() == count
 }
 
-fn is_small(number: i64) -> bool {
+fn is_small(number: Int) -> bool {
     number.unsigned_abs() < SMALL.unsigned_abs()
 }
 
@@ -154,7 +155,7 @@ impl Model {
     }
 
     fn check_linear(&self, linear: &Linear, sizes: &[usize]) -> Found {
-        let exists = |(number, _): &(u32, i64)| (*number as usize) < self.numbers.len();
+        let exists = |(number, _): &(u32, Int)| (*number as usize) < self.numbers.len();
         require(linear.factors.iter().all(exists), || "no such number".into())?;
         require(are_distinct(linear.factors.iter().map(|(number, _)| *number)), || {
             "a number with two factors".into()

@@ -11,6 +11,7 @@ use num_rational::BigRational;
 use crate::certificate::argument::{Argument, Label, Need, Potential};
 use crate::certificate::check::{Fault, parse};
 use crate::certificate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
+use crate::number::Int;
 
 /// The verification conditions for a claim, as `check` takes it. None for tasks with derived variables, whose least
 /// fixpoints have no short form.
@@ -130,8 +131,8 @@ impl Writer<'_> {
     fn entries(
         &self,
         pattern: &[u32],
-        values: &[Option<i64>],
-        entry: impl Fn(Option<i64>) -> Option<String>,
+        values: &[Option<Int>],
+        entry: impl Fn(Option<Int>) -> Option<String>,
     ) -> String {
         any(values.iter().enumerate().filter_map(|(row, value)| {
             let said = entry(*value)?;

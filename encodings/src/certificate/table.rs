@@ -7,6 +7,7 @@
 
 use crate::certificate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
 use crate::certificate::semantics::State;
+use crate::number::Int;
 
 /// A bound; none is infinity.
 type Bound = Option<i128>;
@@ -15,11 +16,11 @@ type Bound = Option<i128>;
 pub(super) struct Table<'t> {
     pattern: &'t [u32],
     sizes: Vec<usize>,
-    values: &'t [Option<i64>],
+    values: &'t [Option<Int>],
 }
 
 impl<'t> Table<'t> {
-    pub(super) fn new(model: &Model, pattern: &'t [u32], values: &'t [Option<i64>]) -> Self {
+    pub(super) fn new(model: &Model, pattern: &'t [u32], values: &'t [Option<Int>]) -> Self {
         let sizes = pattern.iter().map(|variable| model.variables[*variable as usize].len()).collect();
         Self { pattern, sizes, values }
     }

@@ -12,6 +12,7 @@ use crate::certificate::model::{
     Quantity,
 };
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::search::closed_labels;
 use crate::solution::{Solution, Status};
 use crate::task::{self, Task};
@@ -44,7 +45,7 @@ pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Cert
     let bounds = Bounds::of_projections(task, limits);
     let cost = solution.ground.as_ref().map(|plan| plan.cost);
     let labels = closed_labels(task, &bounds, limits, cost)?;
-    let label = |(values, numbers, cost): (Vec<u32>, Vec<i64>, i64)| Label(values, numbers, cost);
+    let label = |(values, numbers, cost): (Vec<u32>, Vec<Int>, Int)| Label(values, numbers, cost);
     let potential = |projection: &crate::bounds::Projection| Potential {
         pattern: projection.pattern.iter().map(|variable| variable.0).collect(),
         values: projection.costs().to_vec(),
@@ -101,7 +102,7 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
 type Uses = Vec<(u32, Vec<u16>)>;
 
 struct Writer {
-    tables: Pool<Arc<[i64]>, Vec<i64>>,
+    tables: Pool<Arc<[Int]>, Vec<Int>>,
     uses: Pool<Arc<[task::SlotUse]>, Uses>,
     exclusions: Pool<Arc<[task::Forbidden]>, Vec<Exclusion>>,
 }
@@ -200,14 +201,14 @@ impl Writer {
         }
     }
 
-    fn linear(&mut self, linear: &crate::quantity::Linear<i64>) -> Linear {
+    fn linear(&mut self, linear: &crate::quantity::Linear<Int>) -> Linear {
         Linear {
             factors: linear.coefficients.iter().map(|(number, factor)| (number.0, *factor)).collect(),
             quantity: self.quantity(&linear.quantity),
         }
     }
 
-    fn quantity(&mut self, quantity: &crate::quantity::Quantity<i64>) -> Quantity {
+    fn quantity(&mut self, quantity: &crate::quantity::Quantity<Int>) -> Quantity {
         let tables = quantity.tables.iter();
         Quantity {
             constant: quantity.constant,

@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::ground::evaluate::{AtomId, Binding, World};
 use crate::ground::reach::Reached;
 use crate::lifted::{Change, Effect, ObjectId};
+use crate::number::Int;
 use crate::quantity::NumericId;
 use crate::task::{Argument, OperatorId, Task};
 
@@ -40,7 +41,7 @@ pub(super) struct Builder<'a> {
     footprints: Footprints<'a>,
     split: &'a Split,
     /// In the unit of all times.
-    separation: i64,
+    separation: Int,
     /// What each operator writes.
     written: Vec<Footprint>,
     instances: FxHashMap<InstanceKey, Halves>,
@@ -50,7 +51,7 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(super) fn new(split: &'a Split, reached: &'a Reached, separation: i64) -> Self {
+    pub(super) fn new(split: &'a Split, reached: &'a Reached, separation: Int) -> Self {
         let held = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
         Self {
             footprints: Footprints::new(World::new(&split.lifted, reached)),

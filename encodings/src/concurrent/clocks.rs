@@ -10,6 +10,7 @@
 //! [2] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
 
 use crate::concurrent::time::{Float, Time};
+use crate::number::{Int, words};
 
 /// A kind of access to an atom or a number.
 pub(super) type Key = u32;
@@ -19,7 +20,7 @@ pub(super) type Key = u32;
 pub(super) struct Open {
     pub(super) instance: u32,
     pub(super) float: Float,
-    pub(super) offset: i64,
+    pub(super) offset: Int,
     /// Of an action with a condition over all that several happenings can keep up together: the last of them.
     last: Option<Time>,
 }
@@ -28,7 +29,7 @@ pub(super) struct Open {
 struct Start {
     lower: Time,
     /// The start is before this.
-    upper: i64,
+    upper: Int,
 }
 
 /// The times that matter in a node of the search.
@@ -42,11 +43,11 @@ pub(super) struct Clocks {
     /// Ascending by instance.
     opens: Vec<Open>,
     /// The time at which all must happen until each condition over all holds again.
-    group: Option<(Float, i64)>,
+    group: Option<(Float, Int)>,
     /// Negative if nothing has happened.
     latest: Time,
     /// The time of the last timed initial literals; negative before.
-    floor: i64,
+    floor: Int,
 }
 
 /// Whether a happening is a start, an end, or both.
@@ -62,9 +63,9 @@ pub(super) struct Happening<'h> {
     pub(super) kind: Kind,
     pub(super) instance: u32,
     /// Of the instance.
-    pub(super) duration: i64,
+    pub(super) duration: Int,
     /// It lies this much after the last access of these kinds.
-    pub(super) after: &'h [(Key, i64)],
+    pub(super) after: &'h [(Key, Int)],
     pub(super) marks: &'h [Key],
     /// Whether the instance has a condition over all that several happenings can keep up together.
     pub(super) joint: bool,
@@ -104,17 +105,17 @@ impl Clocks {
     }
 
     /// The least time at which everything so far has happened.
-    pub(super) fn latest(&self) -> i64 {
+    pub(super) fn latest(&self) -> Int {
         self.latest.base.max(0)
     }
 
     /// The least time at which an action under way has started.
-    pub(super) fn start(&self, open: &Open) -> i64 {
+    pub(super) fn start(&self, open: &Open) -> Int {
         self.floats[usize::from(open.float)].lower.base + open.offset
     }
 
     /// The least time at which a variable got its value; none if it has had it from the beginning.
-    pub(super) fn changed(&self, variable: u32) -> Option<i64> {
+    pub(super) fn changed(&self, variable: u32) -> Option<Int> {
         self.change(variable).map(|time| time.base)
     }
 
@@ -131,15 +132,12 @@ impl Clocks {
     /// What must agree between clocks that can be compared.
     pub(super) fn signature(&self, out: &mut Vec<u32>) {
         for open in &self.opens {
-            out.extend([
-                open.instance,
-                u32::from(open.float),
-                open.offset as u32,
-                (open.offset >> 32) as u32,
-            ]);
+            out.extend([open.instance, u32::from(open.float)]);
+            out.extend(words(open.offset));
         }
         if let Some((float, offset)) = self.group {
-            out.extend([u32::MAX, u32::from(float), offset as u32, (offset >> 32) as u32]);
+            out.extend([u32::MAX, u32::from(float)]);
+            out.extend(words(offset));
         }
     }
 
@@ -187,22 +185,22 @@ impl Clocks {
     }
 
     /// A moment that is not before `lower`: the one at which all must happen, or a new one.
-    fn moment(&mut self, lower: Time, group: Option<(Float, i64)>) -> Option<(Float, i64)> {
+    fn moment(&mut self, lower: Time, group: Option<(Float, Int)>) -> Option<(Float, Int)> {
         if let Some((float, offset)) = group {
             self.raise(float, &lower, offset)?;
             return Some((float, offset));
         }
-        self.floats.push(Start { lower, upper: i64::MAX });
+        self.floats.push(Start { lower, upper: Int::MAX });
         Some((Float::try_from(self.floats.len() - 1).ok()?, 0))
     }
 
-    fn open(&mut self, instance: u32, float: Float, offset: i64) {
+    fn open(&mut self, instance: u32, float: Float, offset: Int) {
         let position = self.opens.partition_point(|open| open.instance < instance);
         self.opens.insert(position, Open { instance, float, offset, last: None });
     }
 
     /// The time that lies so much after a float.
-    fn at(&self, float: Float, offset: i64) -> Time {
+    fn at(&self, float: Float, offset: Int) -> Time {
         let mut time = self.floats[usize::from(float)].lower.shifted(offset);
         time.put_off_after(float, offset);
         time
@@ -243,7 +241,7 @@ impl Clocks {
     }
 
     /// From now on, so much after a float is not before `lower`. None if that cannot be.
-    fn raise(&mut self, float: Float, lower: &Time, offset: i64) -> Option<()> {
+    fn raise(&mut self, float: Float, lower: &Time, offset: Int) -> Option<()> {
         let mut bound = lower.shifted(-offset);
         if bound.forget(float).is_some_and(|lag| lag > 0) {
             return None;
@@ -281,7 +279,7 @@ impl Clocks {
         for _ in 0..self.floats.len() {
             for index in 0..self.floats.len() {
                 let Start { lower, upper } = self.floats[index].clone();
-                for (other, lag) in lower.lags.iter().filter(|_| upper < i64::MAX) {
+                for (other, lag) in lower.lags.iter().filter(|_| upper < Int::MAX) {
                     let known = &mut self.floats[usize::from(*other)].upper;
                     *known = (*known).min(upper - lag);
                 }
@@ -291,7 +289,7 @@ impl Clocks {
     }
 
     /// One float is another one and so much more.
-    fn unify(&mut self, float: Float, other: Float, by: i64) -> Option<()> {
+    fn unify(&mut self, float: Float, other: Float, by: Int) -> Option<()> {
         let Start { mut lower, upper } = self.floats[usize::from(float)].clone();
         let target = &mut self.floats[usize::from(other)];
         target.upper = target.upper.min(upper.saturating_sub(by));
@@ -350,7 +348,7 @@ impl Clocks {
 
     /// The clocks after timed initial literals that change some variables: all so far was before them, and nothing from now
     /// on is. None if that cannot be.
-    pub(super) fn timed(&self, time: i64, changes: &[u32]) -> Option<Self> {
+    pub(super) fn timed(&self, time: Int, changes: &[u32]) -> Option<Self> {
         if self.latest.base >= time || self.unsettled() {
             return None;
         }
@@ -368,13 +366,13 @@ impl Clocks {
     }
 
     /// Forgets accesses that put nothing off any more: everything that heeds one comes after its guard has changed.
-    pub(super) fn forget(&mut self, guards: &[Option<u32>], separation: i64) {
+    pub(super) fn forget(&mut self, guards: &[Option<u32>], separation: Int) {
         let mut entries = std::mem::take(&mut self.entries);
         entries.retain(|(key, time)| !self.is_past(*key, time, guards, separation));
         self.entries = entries;
     }
 
-    fn is_past(&self, key: Key, time: &Time, guards: &[Option<u32>], separation: i64) -> bool {
+    fn is_past(&self, key: Key, time: &Time, guards: &[Option<u32>], separation: Int) -> bool {
         if time.precedes(&Time::constant(self.floor), separation) {
             return true;
         }
@@ -383,7 +381,7 @@ impl Clocks {
     }
 
     /// Whether whatever can follow `other` can follow `self`, no later. Their signatures must agree.
-    pub(super) fn no_later(&self, other: &Self, guards: &[Option<u32>], separation: i64) -> bool {
+    pub(super) fn no_later(&self, other: &Self, guards: &[Option<u32>], separation: Int) -> bool {
         let floats = || self.floats.iter().zip(&other.floats);
         let lasts = || self.opens.iter().zip(&other.opens);
         let last = |(own, other): (&Open, &Open)| match (&own.last, &other.last) {

@@ -1,7 +1,5 @@
 //! The split ground task to happenings: what pairs a start with its end, what each waits for, and integers for all times.
 
-use num_integer::Integer;
-use num_traits::ToPrimitive;
 use rustc_hash::FxHashSet;
 
 use crate::concurrent::builder::Builder;
@@ -12,11 +10,12 @@ use crate::concurrent::split::{Half, Split};
 use crate::error::{Error, File, Place};
 use crate::ground::reach::Reached;
 use crate::lifted::Rational;
+use crate::number::{Int, checked_lcm};
 use crate::pddl::ast::Span;
 use crate::task::{OperatorId, Task};
 
 /// Times and durations stay below this.
-const LIMIT: i64 = 1 << 46;
+const LIMIT: Int = 1 << 46;
 
 /// What a happening is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,7 +27,7 @@ pub(super) enum Role {
     /// All of an action that takes no time.
     Whole,
     /// Timed initial literals, at this time.
-    Timed(i64),
+    Timed(Int),
     /// A condition over all, or half of an instance that cannot be executed: never happens.
     #[default]
     Never,
@@ -53,7 +52,7 @@ pub(super) struct Instance {
     pub(super) end: OperatorId,
     /// The operator whose condition must hold over all.
     pub(super) over_all: Option<OperatorId>,
-    pub(super) duration: i64,
+    pub(super) duration: Int,
     pub(super) designs: Designs,
     /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
     pub(super) joint: Vec<u32>,
@@ -70,31 +69,31 @@ pub struct Concurrent {
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure,
     /// How far apart interfering happenings are, in the task's time unit.
-    pub(super) separation: i64,
+    pub(super) separation: Int,
 }
 
 /// The unit of all times: so many to the unit of the files.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Unit(i128);
+pub(super) struct Unit(Int);
 
 impl Unit {
     /// A unit in which durations, separation and timed initial literals are integers.
-    fn new(task: &Task, split: &Split, separation: Rational) -> Result<Self, Error> {
-        let mut times = split.events.iter().map(|event| event.time).chain([separation]);
-        let common = times.try_fold(i128::from(task.time_scale), |scale, time| {
-            Some(scale.lcm(time.denom())).filter(|scale| *scale < i128::from(LIMIT))
+    fn new(task: &Task, split: &Split, separation: &Rational) -> Result<Self, Error> {
+        let mut times = split.events.iter().map(|event| &event.time).chain([separation]);
+        let common = times.try_fold(task.time_scale, |scale, time| {
+            checked_lcm(scale, time.denominator()?).filter(|scale| *scale < LIMIT)
         });
         common.map(Self).ok_or_else(|| Error::Overflow { what: "durations and times".into() })
     }
 
-    fn of(self, time: Rational) -> Result<i64, Error> {
-        let units = (time * Rational::from_integer(self.0)).to_integer().to_i64();
+    fn of(self, time: &Rational) -> Result<Int, Error> {
+        let units = (time.clone() * &Rational::from_integer(self.0)).to_int();
         units.filter(|units| *units < LIMIT).ok_or_else(|| Error::Overflow { what: "a time".into() })
     }
 
     /// A duration of the task, in this unit.
-    pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<i64, Error> {
-        let factor = self.0 as i64 / task.time_scale;
+    pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<Int, Error> {
+        let factor = self.0 / task.time_scale;
         let duration = task.operators[operator.index()].duration.constant.checked_mul(factor);
         let duration = duration.filter(|duration| *duration < LIMIT);
         duration.ok_or_else(|| Error::Overflow { what: "a duration".into() })
@@ -110,23 +109,23 @@ pub(super) fn compile(
     time_weight: Rational,
 ) -> Result<Concurrent, Vec<Error>> {
     let one = |error| vec![error];
-    let unit = Unit::new(&task, split, separation).map_err(one)?;
-    let separation = unit.of(separation).map_err(one)?;
+    let unit = Unit::new(&task, split, &separation).map_err(one)?;
+    let separation = unit.of(&separation).map_err(one)?;
     refuse_rewards(&task, split).map_err(one)?;
     let mut builder = Builder::new(split, reached, separation);
     builder.collect(&task)?;
-    let measure = Measure::new(&task.objective, time_weight, unit.0 as i64).map_err(one)?;
+    let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(one)?;
     let mut roles = vec![Role::Never; task.operators.len()];
     let mut instances = builder.instances(&task, unit, &mut roles).map_err(one)?;
     for ((operator, role), written) in task.operators.iter().zip(&mut roles).zip(builder.written()) {
         match split.origins[operator.schema as usize].half {
             Half::Whole if !written.conflicts() => *role = Role::Whole,
-            Half::Timed(event) => *role = Role::Timed(unit.of(split.events[event].time).map_err(one)?),
+            Half::Timed(event) => *role = Role::Timed(unit.of(&split.events[event].time).map_err(one)?),
             _ => {}
         }
     }
     let (happenings, keys) = builder.happenings(&task, &roles, &mut instances);
-    task.time_scale = unit.0 as i64;
+    task.time_scale = unit.0;
     drop_held(&mut task, &instances);
     let guards = vec![None; keys];
     let mut concurrent = Concurrent { task, happenings, instances, guards, measure, separation };

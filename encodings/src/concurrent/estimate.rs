@@ -9,30 +9,31 @@ use std::collections::BinaryHeap;
 
 use crate::concurrent::clocks::Clocks;
 use crate::concurrent::compile::{Concurrent, Role};
+use crate::number::Int;
 use crate::task::{Fact, Operator, State, VariableId};
 
 /// The time to the goal for each value of a variable; none if there is no way.
 struct Path {
     variable: usize,
-    left: Vec<Option<i64>>,
+    left: Vec<Option<Int>>,
 }
 
 /// Paths of the variables of the goal.
 pub(super) struct Estimate {
     paths: Vec<Path>,
-    separation: i64,
+    separation: Int,
 }
 
 /// A change of a variable: from a value, or from any, to a value, so long after the value before.
-type Edge = (Option<u32>, u32, i64);
+type Edge = (Option<u32>, u32, Int);
 
 /// What is left in a node of the search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Left {
     /// The least time at which the goal can be reached.
-    pub(super) makespan: i64,
+    pub(super) makespan: Int,
     /// The sum over variables, which may be too much.
-    pub(super) sum: i64,
+    pub(super) sum: Int,
 }
 
 impl Estimate {
@@ -124,9 +125,9 @@ fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
 }
 
 fn end(
-    duration: i64,
+    duration: Int,
     (set, from, to): (Option<u32>, Option<u32>, u32),
-    apart: i64,
+    apart: Int,
     kept: impl FnOnce() -> Option<u32>,
 ) -> Edge {
     match (set, from) {

@@ -7,6 +7,7 @@ use crate::concurrent::clocks::Key;
 use crate::concurrent::footprint::{Footprint, Way};
 use crate::ground::evaluate::AtomId;
 use crate::lifted::ObjectId;
+use crate::number::Int;
 use crate::quantity::NumericId;
 
 /// A kind of access.
@@ -31,7 +32,7 @@ enum Access {
 /// What a happening waits for, each with how long after it, and the accesses that it makes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Accesses {
-    pub(super) after: Vec<(Key, i64)>,
+    pub(super) after: Vec<(Key, Int)>,
     pub(super) marks: Vec<Key>,
 }
 
@@ -42,13 +43,13 @@ pub(super) type Designs = Vec<(ObjectId, ObjectId)>;
 pub(super) struct Keys {
     known: IndexMap<Access, (), FxBuildHasher>,
     /// In the task's time unit.
-    separation: i64,
+    separation: Int,
     /// All designs with which some action uses each function.
     designs: FxHashSet<(ObjectId, ObjectId)>,
 }
 
 impl Keys {
-    pub(super) fn new(separation: i64, designs: FxHashSet<(ObjectId, ObjectId)>) -> Self {
+    pub(super) fn new(separation: Int, designs: FxHashSet<(ObjectId, ObjectId)>) -> Self {
         Self { known: IndexMap::default(), separation, designs }
     }
 
@@ -106,7 +107,7 @@ impl Keys {
     }
 
     /// What an action waits for so that at any time each function has one design.
-    pub(super) fn designs(&mut self, designs: &Designs) -> Vec<(Key, i64)> {
+    pub(super) fn designs(&mut self, designs: &Designs) -> Vec<(Key, Int)> {
         let mut own = Collected::default();
         for (function, design) in designs {
             let mut others: Vec<_> =
@@ -135,7 +136,7 @@ impl Keys {
         let separation = self.separation;
         let apart: Vec<_> = own.apart.iter().map(|access| (self.key(*access), separation)).collect();
         let not_before = own.not_before.iter().map(|access| (self.key(*access), 0));
-        let mut after: Vec<(Key, i64)> = not_before.collect();
+        let mut after: Vec<(Key, Int)> = not_before.collect();
         after.extend(apart);
         let marks = own.marks.iter().map(|access| self.key(*access)).collect();
         Accesses { after, marks }

@@ -1,11 +1,9 @@
 //! What a plan whose actions overlap is measured by: a weight for its makespan, and the costs of its actions.
 
-use num_integer::Integer;
-use num_traits::{Signed, ToPrimitive};
-
 use crate::error::Error;
 use crate::lifted::{Expression, Metric, Rational};
 use crate::normalize::duration::time_factor;
+use crate::number::{Int, LIMIT, checked_lcm};
 use crate::pddl::ast::Direction;
 use crate::plan::Exact;
 use crate::task::Objective;
@@ -13,38 +11,39 @@ use crate::task::Objective;
 /// The metric in integers: `time` for each unit of time and `cost` for each unit of cost.
 #[derive(Debug, Clone)]
 pub(super) struct Measure {
-    pub(super) time: i64,
-    pub(super) cost: i64,
+    pub(super) time: Int,
+    pub(super) cost: Int,
     /// Both together are this many times the metric.
-    scale: i64,
-    offset: i64,
+    scale: Int,
+    offset: Int,
     maximize: bool,
 }
 
 impl Measure {
     /// For costs by an objective, and times that are `time_scale` times those of the files.
-    pub(super) fn new(objective: &Objective, weight: Rational, time_scale: i64) -> Result<Self, Error> {
+    pub(super) fn new(objective: &Objective, weight: Rational, time_scale: Int) -> Result<Self, Error> {
         let overflow = || Error::Overflow { what: "the metric".into() };
-        let by_time = weight / Rational::from_integer(i128::from(time_scale));
-        let scale = by_time.denom().lcm(&i128::from(objective.scale));
-        let integer = |number: i128| number.to_i64().filter(|number| *number < 1 << 46).ok_or_else(overflow);
-        let cost = integer(scale / i128::from(objective.scale))?;
+        let by_time = weight / Rational::from_integer(time_scale);
+        let common = by_time.denominator().and_then(|own| checked_lcm(own, objective.scale));
+        let scale = common.filter(|scale| *scale < LIMIT).ok_or_else(overflow)?;
+        let time = (by_time * Rational::from_integer(scale)).to_int();
+        let cost = scale / objective.scale;
         Ok(Self {
-            time: integer((by_time * Rational::from_integer(scale)).to_integer())?,
+            time: time.filter(|time| *time < LIMIT).ok_or_else(overflow)?,
             cost,
-            scale: integer(scale)?,
+            scale,
             offset: objective.offset.checked_mul(cost).ok_or_else(overflow)?,
             maximize: objective.maximize,
         })
     }
 
-    /// A plan of this makespan and cost, in integers.
-    pub(super) fn total(&self, makespan: i64, cost: i64) -> i64 {
-        self.time.saturating_mul(makespan).saturating_add(self.cost.saturating_mul(cost))
+    /// A plan of this makespan and cost, in integers; none if that does not fit.
+    pub(super) fn total(&self, makespan: Int, cost: Int) -> Option<Int> {
+        self.time.checked_mul(makespan)?.checked_add(self.cost.checked_mul(cost)?)
     }
 
     /// The metric of the file.
-    pub(super) fn metric(&self, total: i64) -> Exact {
+    pub(super) fn metric(&self, total: Int) -> Exact {
         let sign = if self.maximize { -1 } else { 1 };
         Exact::scaled(sign * (total + self.offset), self.scale)
     }

@@ -25,9 +25,8 @@ mod time;
 
 use std::time::Instant;
 
-use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::{Signed, ToPrimitive};
+use num_traits::Signed;
 
 use crate::bounds::Bounds;
 use crate::error::{Error, File, Place};
@@ -35,6 +34,7 @@ use crate::ground::{Config as GroundConfig, Generality, ground_lifted};
 use crate::lifted::{Expression, Metric, Rational};
 use crate::limits::Limits;
 use crate::normalize::normalize;
+use crate::number::Int;
 use crate::pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
 use crate::plan::{Plan, Step};
 use crate::solution::{Improvement, Proof, Solution, Statistics, Status};
@@ -65,12 +65,10 @@ pub fn ground_concurrent(
         return Err(errors);
     }
     let overflow = || vec![Error::Overflow { what: "the separation".into() }];
-    let exact = |number: &BigInt| number.to_i64().map(i128::from).ok_or_else(overflow);
-    let separation = if separation.is_positive() {
-        Rational::new(exact(separation.numer())?, exact(separation.denom())?)
-    } else {
+    if !separation.is_positive() {
         return Err(overflow());
-    };
+    }
+    let separation = Rational::from_big(separation.clone());
     let mut lifted = normalize(domain, problem, &config.objectives)?;
     let place = Place { file: File::Problem, span: Span::default() };
     let number = |number| Expression::Number(Rational::from_integer(number));
@@ -143,7 +141,7 @@ pub fn optimize_concurrent(
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
     let bounds = (costs || !task.initial.numbers.is_empty()).then(|| Bounds::new(task, limits));
     let estimate = Estimate::new(concurrent);
-    let mut hear = |sequence: &Sequence, lower: i64| {
+    let mut hear = |sequence: &Sequence, lower: Int| {
         report(Improvement {
             cost: concurrent.measure.metric(sequence.value.0),
             lower_bound: concurrent.measure.metric(lower.min(sequence.value.0)),
@@ -176,7 +174,7 @@ impl Concurrent {
     /// A sequence in names, its actions in the order of their starts.
     fn plan(&self, sequence: &Sequence) -> Plan {
         let times = schedule::schedule(self, &sequence.happenings, &sequence.together);
-        let mut steps: Vec<((i64, OperatorId), Step)> = Vec::new();
+        let mut steps: Vec<((Int, OperatorId), Step)> = Vec::new();
         for (id, time) in sequence.happenings.iter().zip(times) {
             let (end, duration) = match self.happenings[id.index()].role {
                 Role::Start(instance) => {

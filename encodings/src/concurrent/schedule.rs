@@ -4,14 +4,15 @@ use rustc_hash::FxHashMap;
 
 use crate::concurrent::clocks::Key;
 use crate::concurrent::compile::{Concurrent, Role};
+use crate::number::Int;
 use crate::task::OperatorId;
 
 /// A lower bound: from a happening to another one, at least so much later.
-type Bound = (usize, usize, i64);
+type Bound = (usize, usize, Int);
 
 /// The earliest times of a sequence that the search has found. `together` says which happenings take place at the time of
 /// the one before.
-pub(super) fn schedule(concurrent: &Concurrent, sequence: &[OperatorId], together: &[bool]) -> Vec<i64> {
+pub(super) fn schedule(concurrent: &Concurrent, sequence: &[OperatorId], together: &[bool]) -> Vec<Int> {
     let mut times = vec![0; sequence.len()];
     let bounds = bounds(concurrent, sequence, together, &mut times);
     // No chain of bounds is longer than the sequence.
@@ -35,7 +36,7 @@ fn bounds(
     concurrent: &Concurrent,
     sequence: &[OperatorId],
     together: &[bool],
-    times: &mut [i64],
+    times: &mut [Int],
 ) -> Vec<Bound> {
     let mut bounds = Vec::new();
     let mut marked: FxHashMap<Key, Vec<usize>> = FxHashMap::default();

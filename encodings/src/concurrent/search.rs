@@ -18,6 +18,7 @@ use crate::concurrent::clocks::{self, Clocks, Kind};
 use crate::concurrent::compile::{Concurrent, Role};
 use crate::concurrent::estimate::Estimate;
 use crate::limits::Limits;
+use crate::number::{GROWTH_LIMIT, Int, words};
 use crate::search::is_monotone;
 use crate::successors::OperatorIndex;
 use crate::task::{OperatorId, State};
@@ -26,7 +27,7 @@ use crate::task::{OperatorId, State};
 #[derive(Debug, Clone)]
 pub(super) struct Sequence {
     /// The metric in integers, then the makespan.
-    pub(super) value: (i64, i64),
+    pub(super) value: (Int, Int),
     pub(super) happenings: Vec<OperatorId>,
     /// Which of them take place at the time of the one before.
     pub(super) together: Vec<bool>,
@@ -37,22 +38,22 @@ pub(super) enum Ended {
     /// Nothing is left that could be better than the incumbent.
     Exhausted,
     /// At a limit: no plan that is not known has a lower metric than this, in integers.
-    Stopped(i64),
+    Stopped(Int),
 }
 
 struct Node {
     state: State,
     clocks: Clocks,
-    cost: i64,
+    cost: Int,
     /// How many happenings lead here.
-    depth: i64,
+    depth: Int,
     parent: Option<(u32, OperatorId)>,
     dominated: bool,
 }
 
 /// The metric, the makespan, the sum of what is left, and the number of the node; greedily, the sum and the depth come
 /// first.
-type Priority = (i64, i64, i64, i64, u32);
+type Priority = (Int, Int, Int, Int, u32);
 
 pub(super) struct Search<'a> {
     concurrent: &'a Concurrent,
@@ -66,7 +67,12 @@ pub(super) struct Search<'a> {
     seen: FxHashMap<Box<[u32]>, Vec<u32>>,
     open: BinaryHeap<Reverse<Priority>>,
     pub(super) incumbent: Option<Sequence>,
+    /// Whether something was left out because its numbers do not fit.
+    incomplete: bool,
 }
+
+/// Numbers of a node do not fit their type.
+struct Unfit;
 
 impl<'a> Search<'a> {
     pub(super) fn new(
@@ -91,6 +97,7 @@ impl<'a> Search<'a> {
             seen: FxHashMap::default(),
             open: BinaryHeap::new(),
             incumbent,
+            incomplete: false,
         };
         let state = concurrent.task.initial.clone();
         search.push(Node { state, clocks: Clocks::new(), cost: 0, depth: 0, parent: None, dominated: false });
@@ -103,7 +110,7 @@ impl<'a> Search<'a> {
         &mut self,
         limits: &Limits,
         most: usize,
-        report: &mut dyn FnMut(&Sequence, i64),
+        report: &mut dyn FnMut(&Sequence, Int),
     ) -> Ended {
         let mut expanded = 0;
         while let Some(Reverse(priority)) = self.open.pop() {
@@ -127,10 +134,10 @@ impl<'a> Search<'a> {
             expanded += 1;
             self.expand(id);
         }
-        Ended::Exhausted
+        if self.incomplete { Ended::Stopped(0) } else { Ended::Exhausted }
     }
 
-    fn is_better(&self, value: (i64, i64)) -> bool {
+    fn is_better(&self, value: (Int, Int)) -> bool {
         self.incumbent.as_ref().is_none_or(|incumbent| value < incumbent.value)
     }
 
@@ -153,31 +160,33 @@ impl<'a> Search<'a> {
         let mut next = self.index.applicable(&concurrent.task, state);
         next.extend(clocks.opens().iter().map(|open| concurrent.instances[open.instance as usize].end));
         for operator in next {
-            if let Some(node) = self.successor(id, operator) {
-                self.push(node);
+            match self.successor(id, operator) {
+                Ok(Some(node)) => self.push(node),
+                Ok(None) => {}
+                Err(Unfit) => self.incomplete = true,
             }
         }
     }
 
     /// The node after a happening; none if it cannot happen here.
-    fn successor(&self, id: u32, operator_id: OperatorId) -> Option<Node> {
+    fn successor(&self, id: u32, operator_id: OperatorId) -> Result<Option<Node>, Unfit> {
         let concurrent = self.concurrent;
         let Node { state, clocks, cost, depth, .. } = &self.nodes[id as usize];
         let (operator, happening) =
             (&concurrent.task.operators[operator_id.index()], &concurrent.happenings[operator_id.index()]);
         if !operator.applicable(state, &[]) {
-            return None;
+            return Ok(None);
         }
         let (kind, instance) = match happening.role {
             Role::Start(instance) => (Kind::Start, instance),
             Role::End(instance) => (Kind::End, instance),
             Role::Whole | Role::Timed(_) => (Kind::Whole, u32::MAX),
-            Role::Never => return None,
+            Role::Never => return Ok(None),
         };
         if kind == Kind::Start && clocks.is_open(instance) || self.clashes(clocks, happening) {
-            return None;
+            return Ok(None);
         }
-        let after = concurrent.task.successor(operator, state, &[]);
+        let after = concurrent.task.successor(operator, state, &[]).ok_or(Unfit)?;
         let open = clocks.opens().iter().map(|open| open.instance);
         let going_on = open.filter(|open| kind != Kind::End || *open != instance);
         let mut going_on = going_on.chain((kind == Kind::Start).then_some(instance));
@@ -186,11 +195,8 @@ impl<'a> Search<'a> {
         let changes: Vec<u32> = sets
             .filter(|variable| state.values[*variable as usize] != after.values[*variable as usize])
             .collect();
-        let mut clocks = if let Role::Timed(time) = happening.role {
-            if !settled {
-                return None;
-            }
-            clocks.timed(time, &changes)?
+        let clocks = if let Role::Timed(time) = happening.role {
+            if settled { clocks.timed(time, &changes) } else { None }
         } else {
             let own = concurrent.instances.get(instance as usize);
             clocks.after(&clocks::Happening {
@@ -203,12 +209,13 @@ impl<'a> Search<'a> {
                 touches: &|instance| concurrent.touches(operator_id, instance),
                 changes: &changes,
                 settled,
-            })?
+            })
         };
+        let Some(mut clocks) = clocks else { return Ok(None) };
         clocks.forget(&concurrent.guards, concurrent.separation);
-        let cost = cost + operator.cost.constant;
+        let cost = cost.checked_add(operator.cost.constant).ok_or(Unfit)?;
         let parent = Some((id, operator_id));
-        Some(Node { state: after, clocks, cost, depth: depth + 1, parent, dominated: false })
+        Ok(Some(Node { state: after, clocks, cost, depth: depth + 1, parent, dominated: false }))
     }
 
     /// Whether an action under way uses a function with another design.
@@ -231,14 +238,20 @@ impl<'a> Search<'a> {
             },
             None => 0,
         };
-        let value = (concurrent.measure.total(left.makespan, node.cost + costs), left.makespan);
+        let total =
+            node.cost.checked_add(costs).and_then(|cost| concurrent.measure.total(left.makespan, cost));
+        let Some(total) = total.filter(|total| *total < GROWTH_LIMIT) else {
+            self.incomplete = true;
+            return;
+        };
+        let value = (total, left.makespan);
         if !self.is_better(value) {
             return;
         }
         let mut key = node.state.values[..concurrent.task.basic].to_vec();
         node.clocks.signature(&mut key);
         if !self.monotone {
-            key.extend(node.state.numbers.iter().flat_map(|number| [*number as u32, (*number >> 32) as u32]));
+            key.extend(node.state.numbers.iter().flat_map(|number| words(*number)));
         }
         let id = self.nodes.len() as u32;
         let (guards, separation) = (&concurrent.guards, concurrent.separation);
@@ -276,7 +289,8 @@ impl<'a> Search<'a> {
     fn sequence(&self, goal: u32) -> Sequence {
         let node = &self.nodes[goal as usize];
         let latest = node.clocks.latest();
-        let value = (self.concurrent.measure.total(latest, node.cost), latest);
+        let total = self.concurrent.measure.total(latest, node.cost);
+        let value = (total.expect("invariant: what is on the way to a goal was measured"), latest);
         let (mut happenings, mut together) = (Vec::new(), Vec::new());
         let mut at = goal;
         while let Some((parent, operator)) = self.nodes[at as usize].parent {

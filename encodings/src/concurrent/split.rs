@@ -101,10 +101,11 @@ fn parts(lifted: &mut Lifted, schema: &Schema) -> Vec<(Half, Schema)> {
         ..schema.clone()
     };
     let Some(duration) = &schema.duration else { return vec![(Half::Whole, schema.clone())] };
-    let known = if let Expression::Number(number) = duration { Some(*number) } else { None };
-    let zero = Rational::from_integer(0);
-    let compare =
-        |comparison| Formula::Compare(comparison, duration.clone(), Expression::Number(zero), schema.place);
+    let known = if let Expression::Number(number) = duration { Some(number) } else { None };
+    let zero = &Rational::from_integer(0);
+    let compare = |comparison| {
+        Formula::Compare(comparison, duration.clone(), Expression::Number(zero.clone()), schema.place)
+    };
     let mut all = Vec::new();
     if known.is_none_or(|known| known == zero) {
         let condition =

@@ -1,5 +1,6 @@
 //! Times that are bounded from below, some of them relative to starts that can still be put off.
 
+use crate::number::Int;
 use smallvec::SmallVec;
 
 /// A moment that can still be put off: the start of an action under way, by its position in the clocks.
@@ -8,34 +9,34 @@ pub(super) type Float = u16;
 /// The least time of a happening: at least `base`, and at least so long after each of some floats.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Time {
-    pub(super) base: i64,
+    pub(super) base: Int,
     /// Ascending by float.
-    pub(super) lags: SmallVec<[(Float, i64); 1]>,
+    pub(super) lags: SmallVec<[(Float, Int); 1]>,
 }
 
 impl Time {
-    pub(super) fn constant(base: i64) -> Self {
+    pub(super) fn constant(base: Int) -> Self {
         Self { base, lags: SmallVec::new() }
     }
 
-    pub(super) fn lag(&self, float: Float) -> Option<i64> {
+    pub(super) fn lag(&self, float: Float) -> Option<Int> {
         self.lags.iter().find(|(own, _)| *own == float).map(|(_, lag)| *lag)
     }
 
     /// Later, or earlier, by so much.
-    pub(super) fn shifted(&self, by: i64) -> Self {
+    pub(super) fn shifted(&self, by: Int) -> Self {
         Self { base: self.base + by, lags: self.lags.iter().map(|(float, lag)| (*float, lag + by)).collect() }
     }
 
     /// From now on not before `other` and so much more.
-    pub(super) fn put_off(&mut self, other: &Self, by: i64) {
+    pub(super) fn put_off(&mut self, other: &Self, by: Int) {
         self.base = self.base.max(other.base + by);
         for (float, lag) in &other.lags {
             self.put_off_after(*float, lag + by);
         }
     }
 
-    pub(super) fn put_off_after(&mut self, float: Float, by: i64) {
+    pub(super) fn put_off_after(&mut self, float: Float, by: Int) {
         match self.lags.binary_search_by_key(&float, |(own, _)| *own) {
             Ok(position) => self.lags[position].1 = self.lags[position].1.max(by),
             Err(position) => self.lags.insert(position, (float, by)),
@@ -43,13 +44,13 @@ impl Time {
     }
 
     /// Takes a float out; returns how long after it this was.
-    pub(super) fn forget(&mut self, float: Float) -> Option<i64> {
+    pub(super) fn forget(&mut self, float: Float) -> Option<Int> {
         let position = self.lags.iter().position(|(own, _)| *own == float)?;
         Some(self.lags.remove(position).1)
     }
 
     /// Whether this is so much before `other`, whatever the floats come to.
-    pub(super) fn precedes(&self, other: &Self, by: i64) -> bool {
+    pub(super) fn precedes(&self, other: &Self, by: Int) -> bool {
         self.base + by <= other.base
             && self.lags.iter().all(|(float, lag)| other.lag(*float).is_some_and(|later| lag + by <= later))
     }

@@ -1,15 +1,16 @@
 //! Binary numbers in clauses: two's complement, ripple-carry addition, constants folded.
 
 use crate::encode::formula::{Family, Formula, Meaning};
+use crate::number::Int;
 use crate::sat::Lit;
 
 /// Bits of a number, the lowest first; the last one is the sign.
 pub(crate) type Bits = Vec<Lit>;
 
 /// How many bits a number needs, sign included.
-pub(crate) fn width(low: i64, high: i64) -> usize {
-    let bits = |number: i64| {
-        65 - if number < 0 { (!number).leading_zeros() } else { number.leading_zeros() } as usize
+pub(crate) fn width(low: Int, high: Int) -> usize {
+    let bits = |number: Int| {
+        129 - if number < 0 { (!number).leading_zeros() } else { number.leading_zeros() } as usize
     };
     bits(low).max(bits(high))
 }
@@ -26,9 +27,10 @@ impl Arithmetic<'_> {
         self.formula.fresh(Meaning::Bit { bit })
     }
 
-    pub(crate) fn constant(value: i64, width: usize) -> Bits {
-        let bit =
-            |index: usize| if value >> index.min(63) & 1 == 1 { Formula::truth() } else { !Formula::truth() };
+    pub(crate) fn constant(value: Int, width: usize) -> Bits {
+        let bit = |index: usize| {
+            if value >> index.min(127) & 1 == 1 { Formula::truth() } else { !Formula::truth() }
+        };
         (0..width).map(bit).collect()
     }
 
@@ -118,12 +120,12 @@ impl Arithmetic<'_> {
     }
 
     /// A multiple of a number, by shifts and additions.
-    pub(crate) fn multiple(&mut self, bits: &Bits, factor: i64, width: usize) -> Bits {
+    pub(crate) fn multiple(&mut self, bits: &Bits, factor: Int, width: usize) -> Bits {
         if factor == 1 {
             return Self::extend(bits, width);
         }
         let mut sum = Self::constant(0, width);
-        for shift in (0..63).filter(|shift| factor.unsigned_abs() >> shift & 1 == 1) {
+        for shift in (0..127).filter(|shift| factor.unsigned_abs() >> shift & 1 == 1) {
             let shifted: Bits = std::iter::repeat_n(!Formula::truth(), shift)
                 .chain(Self::extend(bits, width))
                 .take(width)
@@ -139,12 +141,12 @@ impl Arithmetic<'_> {
 
     /// A number that is the given value under each premise (a conjunction), and 0 if `active` is false. At most
     /// one premise holds at a time, and one does whenever `active` does.
-    pub(crate) fn choose(&mut self, premises: &[(Vec<Lit>, i64)], active: Lit) -> Bits {
-        let low = premises.iter().map(|(_, value)| *value).fold(0, i64::min);
-        let high = premises.iter().map(|(_, value)| *value).fold(0, i64::max);
+    pub(crate) fn choose(&mut self, premises: &[(Vec<Lit>, Int)], active: Lit) -> Bits {
+        let low = premises.iter().map(|(_, value)| *value).fold(0, Int::min);
+        let high = premises.iter().map(|(_, value)| *value).fold(0, Int::max);
         (0..width(low, high))
             .map(|index| {
-                let set = |value: i64| value >> index & 1 == 1;
+                let set = |value: Int| value >> index.min(127) & 1 == 1;
                 if premises.iter().all(|(_, value)| !set(*value)) {
                     return !Formula::truth();
                 }
@@ -169,7 +171,7 @@ impl Arithmetic<'_> {
     }
 
     /// The number is at most a constant.
-    pub(crate) fn at_most(&mut self, bits: &Bits, limit: i64) {
+    pub(crate) fn at_most(&mut self, bits: &Bits, limit: Int) {
         let width = bits.len().max(width(limit, limit));
         let bits = Self::extend(bits, width);
         let Some((sign, magnitude)) = bits.split_last() else { return };
@@ -177,7 +179,7 @@ impl Arithmetic<'_> {
         let order: Vec<(Lit, bool)> = magnitude
             .iter()
             .enumerate()
-            .map(|(i, bit)| (*bit, limit >> i & 1 == 1))
+            .map(|(i, bit)| (*bit, limit >> i.min(127) & 1 == 1))
             .chain([(!*sign, limit >= 0)])
             .collect();
         for (index, (bit, set)) in order.iter().enumerate() {
@@ -197,7 +199,7 @@ mod tests {
     use crate::sat::{Answer, Backend};
 
     /// Whether the formula has an assignment in which the bits read as the value.
-    fn can_be(formula: &Formula, bits: &Bits, value: i64) -> bool {
+    fn can_be(formula: &Formula, bits: &Bits, value: Int) -> bool {
         let mut solver = Backend::default().start(&Limits::none(), u64::MAX);
         formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));
         for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
@@ -210,7 +212,7 @@ mod tests {
         (0..bits).map(|bit| formula.fresh(Meaning::Bit { bit: bit as u32 })).collect()
     }
 
-    fn fix(formula: &mut Formula, bits: &Bits, value: i64) {
+    fn fix(formula: &mut Formula, bits: &Bits, value: Int) {
         for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
             formula.add(Family::Numeric, [if wanted == Formula::truth() { *bit } else { !*bit }]);
         }

@@ -17,8 +17,8 @@ use crate::sat::Lit;
 use crate::task::{Layer, VariableId};
 
 impl Encoding<'_> {
-    /// What derived variables hold before a step; `numbers` are the numeric variables then.
-    pub(super) fn axioms(&mut self, step: usize, numbers: &[Bits]) {
+    /// What derived variables hold before a step; `numbers` are the numeric variables then. None if numbers do not fit.
+    pub(super) fn axioms(&mut self, step: usize, numbers: &[Bits]) -> Option<()> {
         let task = self.task;
         for (layer, index) in task.axioms.iter().zip(0..) {
             let mut bodies: BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>> = BTreeMap::new();
@@ -30,7 +30,7 @@ impl Encoding<'_> {
                     premises.extend(clause.iter().map(|literal| self.literal(*literal, step)));
                 }
                 for comparison in &rule.body.comparisons {
-                    premises.push(self.is_at_least_zero(comparison, numbers, Family::Axiom));
+                    premises.push(self.is_at_least_zero(comparison, numbers, Family::Axiom)?);
                 }
                 let meaning = Meaning::Body { layer: index, rule: position, step: step as u32 };
                 let body = self.equivalent(meaning, &premises, Family::Axiom);
@@ -49,6 +49,7 @@ impl Encoding<'_> {
                 self.levels(step, layer, &bodies);
             }
         }
+        Some(())
     }
 
     /// Variables of a layer must not hold because of each other alone.

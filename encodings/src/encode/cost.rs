@@ -15,6 +15,7 @@ use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::selection::global;
 use crate::encode::{CostLimit, Counting, Encoding};
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::sat::Lit;
 use crate::task::{Operator, OperatorId};
 
@@ -22,25 +23,25 @@ use crate::task::{Operator, OperatorId};
 const AMOUNT_LIMIT: usize = 1_000;
 
 /// What one source adds to the cost of a step: the amount if the premise (a conjunction) holds.
-type Increments = Vec<(Vec<Lit>, i64)>;
+type Increments = Vec<(Vec<Lit>, Int)>;
 
 /// The spent cost at the end, less its lower bound.
 pub(super) struct Cost {
-    lower: i64,
+    lower: Int,
     spent: Spent,
 }
 
 enum Spent {
     /// `at least amount`, for every positive amount that can occur.
-    Order(BTreeMap<i64, Lit>),
+    Order(BTreeMap<Int, Lit>),
     Binary(Bits),
     /// Literals that add their weight if they are true.
-    Apart(Vec<(Lit, i64)>),
+    Apart(Vec<(Lit, Int)>),
 }
 
 impl Cost {
     /// What every plan costs at least, and what it may pay beyond that.
-    pub(super) fn payments(&self) -> (i64, &[(Lit, i64)]) {
+    pub(super) fn payments(&self) -> (Int, &[(Lit, Int)]) {
         match &self.spent {
             Spent::Apart(literals) => (self.lower, literals),
             Spent::Order(_) | Spent::Binary(_) => (self.lower, &[]),
@@ -48,7 +49,7 @@ impl Cost {
     }
 
     /// Adds clauses that admit only plans with cost at most `limit`.
-    pub(super) fn at_most(&self, formula: &mut Formula, limit: i64) {
+    pub(super) fn at_most(&self, formula: &mut Formula, limit: Int) {
         let gap = limit - self.lower;
         if gap < 0 {
             formula.add(Family::Bound, []);
@@ -75,7 +76,7 @@ impl Encoding<'_> {
         };
         let (Some(_), Some(lower)) = (lower, potential.estimate(&self.task.initial)) else {
             self.formula.add(Family::Bound, []);
-            return Some(Cost { lower: i64::MAX, spent: Spent::Order(BTreeMap::new()) });
+            return Some(Cost { lower: Int::MAX, spent: Spent::Order(BTreeMap::new()) });
         };
         let gap = cost.limit - lower;
         if gap < 0 {
@@ -185,10 +186,10 @@ impl Encoding<'_> {
     fn add_in_order(
         &mut self,
         steps: &[Vec<Increments>],
-        gap: i64,
+        gap: Int,
         limits: &Limits,
-    ) -> Option<BTreeMap<i64, Lit>> {
-        let mut spent: BTreeMap<i64, Lit> = BTreeMap::new();
+    ) -> Option<BTreeMap<Int, Lit>> {
+        let mut spent: BTreeMap<Int, Lit> = BTreeMap::new();
         for (step, sources) in steps.iter().enumerate() {
             for (stage, source) in sources.iter().enumerate() {
                 if limits.reached() {
@@ -204,18 +205,18 @@ impl Encoding<'_> {
     fn add_amounts(
         &mut self,
         source: &Increments,
-        spent: &BTreeMap<i64, Lit>,
-        gap: i64,
+        spent: &BTreeMap<Int, Lit>,
+        gap: Int,
         step: u32,
         stage: u32,
-    ) -> BTreeMap<i64, Lit> {
+    ) -> BTreeMap<Int, Lit> {
         let increments = self.amounts(source, gap, step, stage);
         if increments.is_empty() {
             return spent.clone();
         }
-        let amounts: BTreeSet<i64> =
+        let amounts: BTreeSet<Int> =
             next_amounts(&spent.keys().copied().collect(), increments.keys().copied(), gap);
-        let mut after: BTreeMap<i64, Lit> = BTreeMap::new();
+        let mut after: BTreeMap<Int, Lit> = BTreeMap::new();
         for amount in amounts {
             let literal = self.formula.fresh(Meaning::CostAtLeast { amount, step: step + 1, stage });
             if let Some((_, smaller)) = after.last_key_value() {
@@ -236,8 +237,8 @@ impl Encoding<'_> {
     }
 
     /// A literal for each positive amount that a source can add, which its premise implies; what is above the gap is a conflict.
-    fn amounts(&mut self, source: &Increments, gap: i64, step: u32, stage: u32) -> BTreeMap<i64, Lit> {
-        let mut increments: BTreeMap<i64, Lit> = BTreeMap::new();
+    fn amounts(&mut self, source: &Increments, gap: Int, step: u32, stage: u32) -> BTreeMap<Int, Lit> {
+        let mut increments: BTreeMap<Int, Lit> = BTreeMap::new();
         for (premise, amount) in source.iter().filter(|(_, amount)| *amount > 0) {
             let conclusion = if *amount > gap {
                 !Formula::truth()
@@ -252,8 +253,8 @@ impl Encoding<'_> {
     }
 
     /// The amounts of a source, each implying the next smaller one, and what it has more than that.
-    fn apart(&mut self, source: &Increments, gap: i64, step: u32, stage: u32) -> Vec<(Lit, i64)> {
-        let mut weighted: Vec<(Lit, i64)> = Vec::new();
+    fn apart(&mut self, source: &Increments, gap: Int, step: u32, stage: u32) -> Vec<(Lit, Int)> {
+        let mut weighted: Vec<(Lit, Int)> = Vec::new();
         let mut before = 0;
         for (amount, literal) in self.amounts(source, gap, step, stage) {
             if let Some((smaller, _)) = weighted.last() {
@@ -265,7 +266,7 @@ impl Encoding<'_> {
         weighted
     }
 
-    fn add_in_binary(&mut self, steps: &[Vec<Increments>], gap: i64) -> Bits {
+    fn add_in_binary(&mut self, steps: &[Vec<Increments>], gap: Int) -> Bits {
         let width = crate::encode::arithmetic::width(0, gap) + 2;
         let mut spent = Arithmetic::constant(0, 1);
         for (step, sources) in steps.iter().enumerate() {
@@ -289,7 +290,7 @@ impl Encoding<'_> {
 /// The tables of an operator in the task's numbering: combinations of (slot, design), and how much more than
 /// the cheapest each of them costs.
 #[allow(clippy::type_complexity)]
-fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<i64>)> {
+fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<Int>)> {
     let tables = operator.cost.tables.iter();
     tables
         .map(|table| {
@@ -320,7 +321,7 @@ pub(super) fn combinations(operator: &Operator, slots: &[u16]) -> Vec<Vec<(usize
 }
 
 /// The amounts that can be spent after one more source.
-fn next_amounts(spent: &BTreeSet<i64>, increments: impl Iterator<Item = i64>, gap: i64) -> BTreeSet<i64> {
+fn next_amounts(spent: &BTreeSet<Int>, increments: impl Iterator<Item = Int>, gap: Int) -> BTreeSet<Int> {
     let mut amounts = spent.clone();
     for increment in increments {
         amounts.insert(increment);
@@ -330,10 +331,10 @@ fn next_amounts(spent: &BTreeSet<i64>, increments: impl Iterator<Item = i64>, ga
 }
 
 /// Whether so few amounts can occur that the order encoding is worth its clauses.
-fn amounts_fit(steps: &[Vec<Increments>], gap: i64) -> bool {
+fn amounts_fit(steps: &[Vec<Increments>], gap: Int) -> bool {
     let mut spent = BTreeSet::new();
     for source in steps.iter().flatten() {
-        let increments: BTreeSet<i64> =
+        let increments: BTreeSet<Int> =
             source.iter().map(|(_, amount)| *amount).filter(|amount| (1..=gap).contains(amount)).collect();
         if spent.len().saturating_mul(increments.len()) > AMOUNT_LIMIT * 50 {
             return false;

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::number::Int;
 use crate::sat::Lit;
 
 /// What a clause is for. The documentation of each family stands in the file that writes it.
@@ -92,9 +93,9 @@ pub(crate) enum Meaning {
     /// The operator at the step is one of a group.
     Group { group: u32, step: u32 },
     /// The accumulated cost before the step, less its lower bound, is at least the amount.
-    CostAtLeast { amount: i64, step: u32, stage: u32 },
+    CostAtLeast { amount: Int, step: u32, stage: u32 },
     /// The step adds at least the amount.
-    Increment { amount: i64, step: u32, stage: u32 },
+    Increment { amount: Int, step: u32, stage: u32 },
     /// The conditional effect (by its position) of the operator takes place at the step.
     Fires { operator: u32, effect: u32, step: u32 },
     /// The body of a rule (by its position) of a layer of derived variables holds before the step.

@@ -25,6 +25,7 @@ use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::plan::GroundStep;
 use crate::sat::{Lit, Solver};
 use crate::task::{Fact, Literal, OperatorId, Task};
@@ -57,7 +58,7 @@ pub(crate) struct Encoding<'a> {
 
 /// The cost limit of an encoding: only plans with cost at most `limit` count, by the estimates of `bounds`.
 pub(crate) struct CostLimit<'a> {
-    pub(crate) limit: i64,
+    pub(crate) limit: Int,
     pub(crate) bounds: &'a Bounds,
     pub(crate) counting: Counting,
 }
@@ -73,7 +74,7 @@ pub(crate) enum Counting {
 
 impl<'a> Encoding<'a> {
     /// Encodes plans of at most `allowed.len()` steps, with the operators allowed at each step; of plans that differ by
-    /// exchanging what is equal only some. None if a limit was reached meanwhile.
+    /// exchanging what is equal only some. None if a limit was reached meanwhile, or if numbers are too large for a formula.
     pub(crate) fn new(
         task: &'a Task,
         allowed: &[Vec<bool>],
@@ -126,9 +127,9 @@ impl<'a> Encoding<'a> {
         encoding.domain(horizon);
         let numbers = encoding.numeric(limits)?;
         for (step, numbers) in numbers.iter().enumerate() {
-            encoding.axioms(step, numbers);
+            encoding.axioms(step, numbers)?;
         }
-        encoding.goal(&numbers[horizon]);
+        encoding.goal(&numbers[horizon])?;
         if let Some(cost) = cost {
             encoding.cost = Some(encoding.accumulate(&cost, limits)?);
         }
@@ -147,7 +148,7 @@ impl<'a> Encoding<'a> {
     }
 
     /// The last state satisfies the goal; idle steps at the end keep it satisfied.
-    fn goal(&mut self, numbers: &[arithmetic::Bits]) {
+    fn goal(&mut self, numbers: &[arithmetic::Bits]) -> Option<()> {
         let task = self.task;
         for fact in &task.goal.facts {
             let literal = self.fact(*fact, self.horizon);
@@ -158,11 +159,11 @@ impl<'a> Encoding<'a> {
                 clause.iter().map(|literal| self.literal(*literal, self.horizon)).collect();
             self.formula.add(Family::Goal, literals);
         }
-        self.numeric_goal(numbers);
+        self.numeric_goal(numbers)
     }
 
     /// From now on only plans with cost at most `limit`, which must not be above the limit of the encoding.
-    pub(crate) fn tighten(&mut self, limit: i64) {
+    pub(crate) fn tighten(&mut self, limit: Int) {
         if let Some(cost) = self.cost.take() {
             cost.at_most(&mut self.formula, limit);
             self.cost = Some(cost);
@@ -175,7 +176,7 @@ impl<'a> Encoding<'a> {
     }
 
     /// What every plan costs at least, and literals each of which adds its weight if it is true.
-    pub(crate) fn payments(&self) -> (i64, &[(Lit, i64)]) {
+    pub(crate) fn payments(&self) -> (Int, &[(Lit, Int)]) {
         self.cost.as_ref().map_or((0, &[]), Cost::payments)
     }
 

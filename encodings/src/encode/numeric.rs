@@ -13,21 +13,22 @@ use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::cost::combinations;
 use crate::encode::formula::{Family, Formula};
 use crate::limits::Limits;
+use crate::number::{GROWTH_LIMIT, Int};
 use crate::quantity::{Linear, Quantity};
 use crate::sat::Lit;
 use crate::task::{NumericId, Operator, OperatorId};
 
 /// Conjunctions, each with the number that it stands for.
-type Premises = Vec<(Vec<Lit>, i64)>;
+type Premises = Vec<(Vec<Lit>, Int)>;
 
 /// Factors of numeric variables.
-type Shape = Vec<(NumericId, i64)>;
+type Shape = Vec<(NumericId, Int)>;
 
 /// The values that a number can have.
 #[derive(Debug, Clone, Copy)]
 struct Range {
-    low: i64,
-    high: i64,
+    low: Int,
+    high: Int,
 }
 
 impl Encoding<'_> {
@@ -44,28 +45,29 @@ impl Encoding<'_> {
             if limits.reached() {
                 return None;
             }
-            let next_ranges = self.next_ranges(step, &ranges);
+            let next_ranges = self.next_ranges(step, &ranges)?;
             let mut next = Vec::with_capacity(numbers.len());
             for (range, variable) in next_ranges.iter().zip((0..).map(NumericId)) {
-                next.push(self.next_number(step, variable, &numbers, *range, &ranges));
+                next.push(self.next_number(step, variable, &numbers, *range, &ranges)?);
             }
-            self.comparisons(step, &numbers, &next, &ranges);
+            self.comparisons(step, &numbers, &next, &ranges)?;
             (numbers, ranges) = (next, next_ranges);
             all.push(numbers.clone());
         }
         Some(all)
     }
 
-    fn next_ranges(&self, step: usize, ranges: &[Range]) -> Vec<Range> {
+    /// None if a number can grow beyond what the formula has bits for.
+    fn next_ranges(&self, step: usize, ranges: &[Range]) -> Option<Vec<Range>> {
         let mut next = ranges.to_vec();
         for (id, _) in &self.operators[step] {
             for effect in &self.task.operators[id.index()].numeric_effects {
-                let range = linear_range(&effect.value, ranges);
+                let range = linear_range(&effect.value, ranges)?;
                 let slot = &mut next[effect.variable.index()];
                 *slot = Range { low: slot.low.min(range.low), high: slot.high.max(range.high) };
             }
         }
-        next
+        Some(next)
     }
 
     fn next_number(
@@ -75,8 +77,8 @@ impl Encoding<'_> {
         numbers: &[Bits],
         range: Range,
         ranges: &[Range],
-    ) -> Bits {
-        let own = |operator: &Operator| -> Vec<Linear<i64>> {
+    ) -> Option<Bits> {
+        let own = |operator: &Operator| -> Vec<Linear<Int>> {
             let effects = operator.numeric_effects.iter().filter(|effect| effect.variable == variable);
             effects.map(|effect| effect.value.clone()).collect()
         };
@@ -84,7 +86,7 @@ impl Encoding<'_> {
             .partition(step, |operator| own(operator).into_iter().map(|value| value.coefficients).collect());
         let current = numbers[variable.index()].clone();
         if shapes.is_empty() {
-            return current;
+            return Some(current);
         }
         let members: Vec<OperatorId> = shapes.values().flatten().copied().collect();
         let mut members = members;
@@ -94,11 +96,11 @@ impl Encoding<'_> {
         let base = if shapes.keys().all(|shape| *shape == stay) {
             current
         } else {
-            self.base(step, &shapes, &current, numbers, ranges)
+            self.base(step, &shapes, &current, numbers, ranges)?
         };
         let width = width(range.low, range.high) + 1;
         let quantity = |operator: &Operator| own(operator).into_iter().map(|value| value.quantity).collect();
-        self.plus_quantities(step, base, &members, &quantity, active, width)
+        Some(self.plus_quantities(step, base, &members, &quantity, active, width))
     }
 
     /// The part of the next value that depends on the present ones, by the shape of the effect at the step.
@@ -109,13 +111,13 @@ impl Encoding<'_> {
         current: &Bits,
         numbers: &[Bits],
         ranges: &[Range],
-    ) -> Bits {
+    ) -> Option<Bits> {
         let mut options = Vec::new();
         let mut length = current.len();
         let mut changing = Vec::new();
         for (shape, members) in shapes {
             let group = self.group(step, members, Family::Numeric);
-            let bits = self.weighted(shape, numbers, ranges);
+            let bits = self.weighted(shape, numbers, ranges)?;
             length = length.max(bits.len());
             changing.push(group);
             options.push((group, bits));
@@ -133,12 +135,12 @@ impl Encoding<'_> {
         self.formula.add(Family::Numeric, changing.into_iter().chain([unchanged]));
         Arithmetic { formula: &mut self.formula, family: Family::Numeric }
             .equal_if(unchanged, &base, current);
-        base
+        Some(base)
     }
 
-    fn weighted(&mut self, shape: &Shape, numbers: &[Bits], ranges: &[Range]) -> Bits {
+    fn weighted(&mut self, shape: &Shape, numbers: &[Bits], ranges: &[Range]) -> Option<Bits> {
         let linear = Linear { coefficients: shape.clone(), quantity: Quantity::constant(0) };
-        let range = linear_range(&linear, ranges);
+        let range = linear_range(&linear, ranges)?;
         let width = width(range.low, range.high) + 2;
         let mut sum: Option<Bits> = None;
         let mut arithmetic = Arithmetic { formula: &mut self.formula, family: Family::Numeric };
@@ -149,7 +151,7 @@ impl Encoding<'_> {
                 Some(sum) => arithmetic.add(&sum, &multiple, width),
             });
         }
-        sum.unwrap_or_else(|| Arithmetic::constant(0, 1))
+        Some(sum.unwrap_or_else(|| Arithmetic::constant(0, 1)))
     }
 
     /// Adds what the operators' quantities contribute: one number for their constants, one for each table.
@@ -158,12 +160,12 @@ impl Encoding<'_> {
         step: usize,
         base: Bits,
         members: &[OperatorId],
-        quantities: &dyn Fn(&Operator) -> Vec<Quantity<i64>>,
+        quantities: &dyn Fn(&Operator) -> Vec<Quantity<Int>>,
         active: Lit,
         width: usize,
     ) -> Bits {
         let is_member = |id: &OperatorId| members.binary_search(id).is_ok();
-        let mut constants: BTreeMap<i64, Vec<OperatorId>> = BTreeMap::new();
+        let mut constants: BTreeMap<Int, Vec<OperatorId>> = BTreeMap::new();
         let mut tables: BTreeMap<TableKey, Vec<OperatorId>> = BTreeMap::new();
         for (id, _) in self.operators[step].iter().filter(|(id, _)| is_member(id)) {
             let operator = &self.task.operators[id.index()];
@@ -205,7 +207,7 @@ impl Encoding<'_> {
         sum
     }
 
-    fn add_source(&mut self, base: Bits, premises: &[(Vec<Lit>, i64)], active: Lit, width: usize) -> Bits {
+    fn add_source(&mut self, base: Bits, premises: &[(Vec<Lit>, Int)], active: Lit, width: usize) -> Bits {
         let mut arithmetic = Arithmetic { formula: &mut self.formula, family: Family::Numeric };
         let more = arithmetic.choose(premises, active);
         if more.iter().all(|bit| *bit == !Formula::truth()) {
@@ -215,7 +217,7 @@ impl Encoding<'_> {
     }
 
     /// The numeric conditions of the operators at a step.
-    fn comparisons(&mut self, step: usize, numbers: &[Bits], next: &[Bits], ranges: &[Range]) {
+    fn comparisons(&mut self, step: usize, numbers: &[Bits], next: &[Bits], ranges: &[Range]) -> Option<()> {
         for index in 0..self.operators[step].len() {
             let (id, literal) = self.operators[step][index];
             let operator = &self.task.operators[id.index()];
@@ -228,9 +230,9 @@ impl Encoding<'_> {
                 }
             }
         }
-        let remaining = |operator: &Operator| -> Vec<(usize, Linear<i64>)> {
+        let remaining = |operator: &Operator| -> Vec<(usize, Linear<Int>)> {
             let assigned =
-                |c: &&Linear<i64>| operator.numeric_effects.iter().any(|effect| effect.value == **c);
+                |c: &&Linear<Int>| operator.numeric_effects.iter().any(|effect| effect.value == **c);
             operator.condition.comparisons.iter().filter(|c| !assigned(c)).cloned().enumerate().collect()
         };
         let shapes = self.partition(step, |operator| {
@@ -241,8 +243,8 @@ impl Encoding<'_> {
         });
         for ((shape, position), members) in shapes {
             let group = self.group(step, &members, Family::Numeric);
-            let base = self.weighted(&shape, numbers, ranges);
-            let own = |operator: &Operator| -> Vec<Quantity<i64>> {
+            let base = self.weighted(&shape, numbers, ranges)?;
+            let own = |operator: &Operator| -> Vec<Quantity<Int>> {
                 let matching = remaining(operator)
                     .into_iter()
                     .filter(|(p, l)| *p == position && l.coefficients == shape);
@@ -251,7 +253,7 @@ impl Encoding<'_> {
             let values = members.iter().flat_map(|id| remaining(&self.task.operators[id.index()]));
             let mut range = Range { low: 0, high: 0 };
             for (_, linear) in values {
-                let own = linear_range(&linear, ranges);
+                let own = linear_range(&linear, ranges)?;
                 range = Range { low: range.low.min(own.low), high: range.high.max(own.high) };
             }
             let width = width(range.low, range.high).max(base.len()) + 2;
@@ -260,45 +262,53 @@ impl Encoding<'_> {
                 self.formula.add(Family::Numeric, [!group, !*sign]);
             }
         }
+        Some(())
     }
 
-    /// The numeric part of the goal.
-    pub(super) fn numeric_goal(&mut self, numbers: &[Bits]) {
+    /// The numeric part of the goal; none if its numbers do not fit.
+    pub(super) fn numeric_goal(&mut self, numbers: &[Bits]) -> Option<()> {
         for comparison in &self.task.goal.comparisons {
-            let holds = self.is_at_least_zero(comparison, numbers, Family::Goal);
+            let holds = self.is_at_least_zero(comparison, numbers, Family::Goal)?;
             self.formula.add(Family::Goal, [holds]);
         }
+        Some(())
     }
 
-    /// Whether an expression that mentions no designs is at least 0.
-    pub(super) fn is_at_least_zero(&mut self, linear: &Linear<i64>, numbers: &[Bits], family: Family) -> Lit {
-        let whole = Range { low: -(1 << 50), high: 1 << 50 };
+    /// Whether an expression that mentions no designs is at least 0; none if its numbers do not fit.
+    pub(super) fn is_at_least_zero(
+        &mut self,
+        linear: &Linear<Int>,
+        numbers: &[Bits],
+        family: Family,
+    ) -> Option<Lit> {
         let ranges: Vec<Range> = numbers
             .iter()
             .map(|bits| {
-                let limit = 1_i64 << (bits.len() - 1).min(50);
-                Range { low: whole.low.max(-limit), high: whole.high.min(limit) }
+                // A number of so many bits is not larger, and `next_ranges` admits none of more.
+                let limit: Int = 1 << (bits.len() - 1).min(126);
+                Range { low: -limit, high: limit }
             })
             .collect();
-        let base = self.weighted(&linear.coefficients, numbers, &ranges);
-        let range = linear_range(linear, &ranges);
+        let base = self.weighted(&linear.coefficients, numbers, &ranges)?;
+        let range = linear_range(linear, &ranges)?;
         let width = width(range.low, range.high).max(base.len()) + 2;
         let mut arithmetic = Arithmetic { formula: &mut self.formula, family };
         let sum = arithmetic.add(&base, &Arithmetic::constant(linear.quantity.constant, width), width);
-        sum.last().map_or(Formula::truth(), |sign| !*sign)
+        Some(sum.last().map_or(Formula::truth(), |sign| !*sign))
     }
 }
 
 /// The combinations of a table in the task's numbering, and its values.
-type TableKey = (Vec<Vec<(usize, usize)>>, Arc<[i64]>);
+type TableKey = (Vec<Vec<(usize, usize)>>, Arc<[Int]>);
 
-fn linear_range(linear: &Linear<i64>, ranges: &[Range]) -> Range {
+/// None if it exceeds what the formula has bits for.
+fn linear_range(linear: &Linear<Int>, ranges: &[Range]) -> Option<Range> {
     let (mut low, mut high) = (linear.quantity.minimum(), linear.quantity.maximum());
     for (variable, factor) in &linear.coefficients {
         let range = ranges[variable.index()];
-        let (a, b) = (factor * range.low, factor * range.high);
-        low += a.min(b);
-        high += a.max(b);
+        let (a, b) = (factor.checked_mul(range.low)?, factor.checked_mul(range.high)?);
+        low = low.checked_add(a.min(b))?;
+        high = high.checked_add(a.max(b))?;
     }
-    Range { low, high }
+    (low >= -GROWTH_LIMIT && high <= GROWTH_LIMIT).then_some(Range { low, high })
 }

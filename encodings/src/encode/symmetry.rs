@@ -18,6 +18,7 @@ use rustc_hash::FxHashMap;
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::lifted::ObjectId;
+use crate::number::Int;
 use crate::quantity::Quantity;
 use crate::sat::Lit;
 use crate::task::{
@@ -76,7 +77,7 @@ fn no_difference(operator: &Operator, position: usize, a: u16, b: u16) -> bool {
         _ => return false,
     };
     let sizes = operator.sizes();
-    let same = |quantity: &Quantity<i64>| {
+    let same = |quantity: &Quantity<Int>| {
         quantity.tables.iter().all(|table| {
             let Some(own) = table.slots.iter().position(|slot| *slot as usize == position) else {
                 return true;

@@ -440,7 +440,7 @@ fn scaled(
     if !factor.coefficients.is_empty() || !factor.quantity.tables.is_empty() {
         return Err(Failure::Error(Error::NonLinear { place }));
     }
-    let factor = factor.quantity.constant;
+    let factor = factor.quantity.constant.clone();
     if inverse && factor == Rational::from_integer(0) {
         return Err(Failure::Undefined);
     }

@@ -91,7 +91,11 @@ impl<'a> World<'a> {
         Self {
             lifted,
             facts: lifted.facts.iter().chain(&reached.derived).cloned().collect(),
-            values: lifted.values.iter().map(|(f, args, value)| ((*f, args.clone()), *value)).collect(),
+            values: lifted
+                .values
+                .iter()
+                .map(|(f, args, value)| ((*f, args.clone()), value.clone()))
+                .collect(),
             reached,
             atoms: IndexMap::default(),
             numerics: IndexMap::default(),
@@ -129,7 +133,7 @@ impl<'a> World<'a> {
 
     /// The initial value of a numeric fluent, or the value of a static function.
     pub(crate) fn value(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<Rational> {
-        self.values.get(&Key(function, arguments)).copied()
+        self.values.get(&Key(function, arguments)).cloned()
     }
 
     /// The variable of a numeric fluent, which must have a value from the start; `total-cost` begins at 0.
@@ -176,7 +180,7 @@ impl<'a> World<'a> {
         binding: &Binding,
     ) -> Result<Linear<Rational>, Failure> {
         match expression {
-            Expression::Number(number) => Ok(Linear::constant(*number)),
+            Expression::Number(number) => Ok(Linear::constant(number.clone())),
             // Only the metric mentions it, and takes it apart before it comes here.
             Expression::TotalTime => Err(Failure::Undefined),
             Expression::Function(function, terms, place) => {

@@ -56,7 +56,7 @@ impl Timeline {
                 let changes = event.changes.iter();
                 let changes =
                     changes.map(|(predicate, arguments, holds)| (world.atom(*predicate, arguments), *holds));
-                (event.time, changes.collect())
+                (event.time.clone(), changes.collect())
             })
             .collect();
         Some(Self { clock, phases, waited, events })
@@ -65,10 +65,10 @@ impl Timeline {
     /// The phases in which an action of this duration can start and end.
     pub(super) fn passages(&self, duration: &Quantity<Rational>) -> impl Iterator<Item = Passage<'_>> {
         let longest = duration.tables.iter().filter_map(|table| table.values.iter().max());
-        let longest = longest.fold(duration.constant, |sum, value| sum + value);
+        let longest = longest.fold(duration.constant.clone(), |sum, value| sum + value);
         let fits = move |from: usize, to: usize| {
             // An action that starts in a phase starts before the phase ends.
-            from == to || self.events[to - 1].0 - self.events[from].0 < longest
+            from == to || self.events[to - 1].0.clone() - &self.events[from].0 < longest
         };
         let all =
             (0..self.phases.len()).flat_map(move |from| (from..self.phases.len()).map(move |to| (from, to)));
@@ -99,10 +99,10 @@ impl Timeline {
                 adds,
                 deletes,
                 conditional: Vec::new(),
-                numeric_effects: Numbers::one(self.clock, Linear::constant(*time)),
+                numeric_effects: Numbers::one(self.clock, Linear::constant(time.clone())),
                 costs: Vec::new(),
                 duration: Quantity::constant(Rational::zero()),
-                wait: Some(*time),
+                wait: Some(time.clone()),
             }
         })
     }
@@ -125,7 +125,7 @@ impl<'t> Passage<'t> {
     /// When an action of this duration starts and ends in these phases.
     pub(super) fn conditions(&self, duration: &Quantity<Rational>) -> Vec<Residual> {
         let Timeline { clock, phases, events, .. } = self.timeline;
-        let time = |phase: usize| Linear::constant(events[phase].0);
+        let time = |phase: usize| Linear::constant(events[phase].0.clone());
         let start = Linear::variable(*clock);
         let mut end = start.clone();
         end.quantity.add(duration);
@@ -168,7 +168,7 @@ impl<'t> Passage<'t> {
     pub(super) fn clock(&self, duration: &Quantity<Rational>) -> (NumericId, Linear<Rational>) {
         let Timeline { clock, events, .. } = self.timeline;
         let value = match events.last() {
-            Some((last, _)) if self.to == events.len() => Linear::constant(*last),
+            Some((last, _)) if self.to == events.len() => Linear::constant(last.clone()),
             _ => Linear { coefficients: vec![(*clock, Rational::one())], quantity: duration.clone() },
         };
         (*clock, value)

@@ -4,8 +4,6 @@ use std::collections::BTreeMap;
 use std::hash::BuildHasher;
 use std::sync::Arc;
 
-use num_integer::Integer;
-use num_traits::ToPrimitive;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
@@ -20,6 +18,7 @@ use crate::ground::mutex;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::prune::{atom_name, numeric_name, read_atoms};
 use crate::lifted::{Lifted, ObjectId, Rational};
+use crate::number::{Int, LIMIT, checked_lcm};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
     Axiom, Condition, ConditionalEffect, Fact, Layer, Literal, NumericEffect, Objective, Operator, Slot,
@@ -276,7 +275,7 @@ impl Atoms {
 
 /// The numeric variables that conditions depend on, with the factor that makes all their values integers.
 struct Numbers {
-    initial: Vec<i64>,
+    initial: Vec<Int>,
     names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
     integers: Integers,
@@ -315,10 +314,10 @@ impl Numbers {
         Ok(Self { initial, names, ids, integers })
     }
 
-    fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<i64>, Error> {
+    fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<Int>, Error> {
         let overflow = || Error::Overflow { what: "a factor of a numeric fluent".into() };
         let coefficients = linear.coefficients.iter().map(|(variable, factor)| {
-            let factor = if factor.is_integer() { factor.to_integer().to_i64() } else { None };
+            let factor = factor.to_int().filter(|factor| factor.abs() < LIMIT);
             Ok((self.ids[variable], factor.ok_or_else(overflow)?))
         });
         let coefficients = coefficients.collect::<Result<_, Error>>()?;
@@ -355,8 +354,10 @@ fn condition(ground: &GroundCondition, atoms: &Atoms, numbers: &mut Numbers) -> 
     for (linear, strict) in &ground.comparisons {
         let mut linear = linear.clone();
         // A comparison may be scaled at will, so fractional factors do no harm here.
-        let denominators = linear.coefficients.iter().map(|(_, factor)| *factor.denom());
-        linear.scale(&Rational::from_integer(denominators.fold(1, |lcm: i128, d| lcm.lcm(&d))));
+        let mut denominators = linear.coefficients.iter().map(|(_, factor)| factor.denominator());
+        let common = denominators.try_fold(1, |common, next| checked_lcm(common, next?));
+        let common = common.ok_or_else(|| Error::Overflow { what: "a factor of a numeric fluent".into() })?;
+        linear.scale(&Rational::from_integer(common));
         let mut integers = numbers.linear(&linear)?;
         if *strict {
             integers.quantity.constant -= 1;

@@ -312,7 +312,7 @@ impl Build<'_, '_> {
     pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) {
         let zero = Rational::from_integer(0);
         let least = duration.tables.iter().filter_map(|table| table.values.iter().min());
-        if least.fold(duration.constant, |sum, value| sum + value) >= zero {
+        if least.fold(duration.constant.clone(), |sum, value| sum + value) >= zero {
             return;
         }
         let slots: BTreeSet<u16> =

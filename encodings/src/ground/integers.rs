@@ -3,16 +3,12 @@
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
-use num_integer::Integer;
-use num_traits::{One, ToPrimitive};
 use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::lifted::Rational;
+use crate::number::{Int, LIMIT, checked_lcm};
 use crate::quantity::{Quantity, Table};
-
-/// Integers of a task stay below this, so that sums over a plan fit 64 bits.
-const LIMIT: i64 = 1 << 46;
 
 /// The values of a table, and what they are mapped to.
 type Mapped<M> = (Arc<[Rational]>, Arc<[M]>);
@@ -53,7 +49,8 @@ impl<M> TableMap<M> {
 #[derive(Debug)]
 pub(super) struct Denominator {
     what: &'static str,
-    common: i128,
+    /// None if it is too large.
+    common: Option<Int>,
     /// Tables that have been looked at.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
@@ -61,12 +58,15 @@ pub(super) struct Denominator {
 impl Denominator {
     /// `what` names the numbers in errors.
     pub(super) fn new(what: &'static str) -> Self {
-        Self { what, common: 1, seen: FxHashMap::default() }
+        Self { what, common: Some(1), seen: FxHashMap::default() }
     }
 
     pub(super) fn number(&mut self, number: &Rational) {
-        if self.common <= i128::from(LIMIT) && !number.denom().is_one() {
-            self.common = self.common.lcm(number.denom());
+        if let Some(common) = self.common
+            && !number.is_integer()
+        {
+            let next = number.denominator().and_then(|denominator| checked_lcm(common, denominator));
+            self.common = next.filter(|next| *next < LIMIT);
         }
     }
 
@@ -85,10 +85,8 @@ impl Denominator {
     /// # Errors
     /// `Error::Overflow` if the factor is too large.
     pub(super) fn integers(self) -> Result<Integers, Error> {
-        if self.common > i128::from(LIMIT) {
-            return Err(Error::Overflow { what: self.what.into() });
-        }
-        Ok(Integers { what: self.what, scale: self.common as i64, tables: TableMap::new() })
+        let scale = self.common.ok_or_else(|| Error::Overflow { what: self.what.into() })?;
+        Ok(Integers { what: self.what, scale, tables: TableMap::new() })
     }
 }
 
@@ -96,25 +94,22 @@ impl Denominator {
 #[derive(Debug)]
 pub(super) struct Integers {
     what: &'static str,
-    pub(super) scale: i64,
-    tables: TableMap<i64>,
+    pub(super) scale: Int,
+    tables: TableMap<Int>,
 }
 
 impl Integers {
-    pub(super) fn number(&self, number: &Rational) -> Result<i64, Error> {
+    pub(super) fn number(&self, number: &Rational) -> Result<Int, Error> {
         integer(number, self.scale, self.what)
     }
 
-    pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<i64>, Error> {
+    pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<Int>, Error> {
         let (scale, what) = (self.scale, self.what);
         self.tables.map(quantity, &|number| integer(number, scale, what))
     }
 }
 
-fn integer(number: &Rational, scale: i64, what: &str) -> Result<i64, Error> {
-    let scaled = number * Rational::from_integer(i128::from(scale));
-    match scaled.to_integer().to_i64() {
-        Some(integer) if scaled.is_integer() && integer.abs() < LIMIT => Ok(integer),
-        _ => Err(Error::Overflow { what: what.into() }),
-    }
+fn integer(number: &Rational, scale: Int, what: &str) -> Result<Int, Error> {
+    let scaled = (number.clone() * &Rational::from_integer(scale)).to_int();
+    scaled.filter(|integer| integer.abs() < LIMIT).ok_or_else(|| Error::Overflow { what: what.into() })
 }

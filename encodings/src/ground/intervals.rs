@@ -18,7 +18,7 @@ use crate::quantity::{Linear, NumericId, Quantity};
 const ROUNDS: usize = 3;
 
 /// A range of numbers; an end that is missing is unbounded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 struct Interval {
     low: Option<Rational>,
     high: Option<Rational>,
@@ -49,7 +49,7 @@ fn reachable(task: &GroundTask<'_>) -> Vec<Interval> {
     let mut intervals: Vec<Interval> = variables
         .map(|variable| {
             let initial = initial_value(&task.world, variable);
-            Interval { low: Some(initial), high: Some(initial) }
+            Interval { low: Some(initial.clone()), high: Some(initial) }
         })
         .collect();
     let changing: Vec<_> =
@@ -61,8 +61,8 @@ fn reachable(task: &GroundTask<'_>) -> Vec<Interval> {
             for (variable, value) in operator.numeric_effects.iter() {
                 let range = range(value, &before);
                 let own = &mut intervals[variable.index()];
-                own.low = own.low.zip(range.low).map(|(a, b)| a.min(b));
-                own.high = own.high.zip(range.high).map(|(a, b)| a.max(b));
+                own.low = own.low.take().zip(range.low).map(|(a, b)| a.min(b));
+                own.high = own.high.take().zip(range.high).map(|(a, b)| a.max(b));
             }
         }
         if intervals == before {
@@ -71,8 +71,8 @@ fn reachable(task: &GroundTask<'_>) -> Vec<Interval> {
         round += 1;
         if round > ROUNDS {
             for (interval, before) in intervals.iter_mut().zip(&before) {
-                interval.low = interval.low.filter(|low| before.low == Some(*low));
-                interval.high = interval.high.filter(|high| before.high == Some(*high));
+                interval.low = interval.low.take().filter(|low| before.low.as_ref() == Some(low));
+                interval.high = interval.high.take().filter(|high| before.high.as_ref() == Some(high));
             }
         }
     }
@@ -91,11 +91,10 @@ fn range(linear: &Linear<Rational>, intervals: &[Interval]) -> Interval {
     let mut low = Some(extreme(&linear.quantity, Iterator::min));
     let mut high = Some(extreme(&linear.quantity, Iterator::max));
     for (variable, factor) in &linear.coefficients {
-        let own = intervals[variable.index()];
-        let (least, most) =
-            if *factor > Rational::zero() { (own.low, own.high) } else { (own.high, own.low) };
-        low = low.zip(least).map(|(sum, value)| sum + factor * value);
-        high = high.zip(most).map(|(sum, value)| sum + factor * value);
+        let own = &intervals[variable.index()];
+        let (least, most) = if factor.is_positive() { (&own.low, &own.high) } else { (&own.high, &own.low) };
+        low = low.zip(least.as_ref()).map(|(sum, value)| sum + factor.clone() * value);
+        high = high.zip(most.as_ref()).map(|(sum, value)| sum + factor.clone() * value);
     }
     Interval { low, high }
 }
@@ -106,5 +105,5 @@ fn extreme<'q>(
     pick: impl Fn(std::slice::Iter<'q, Rational>) -> Option<&'q Rational>,
 ) -> Rational {
     let tables = quantity.tables.iter().filter_map(|table| pick(table.values.iter()));
-    tables.fold(quantity.constant, |sum, value| sum + value)
+    tables.fold(quantity.constant.clone(), |sum, value| sum + value)
 }

@@ -55,13 +55,16 @@ fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric) -> Result
         linear = linear.negated();
         time = -time;
     }
-    let initial =
-        linear.coefficients.iter().map(|(variable, factor)| initial_value(&task.world, *variable) * factor);
-    let offset = initial.fold(linear.quantity.constant, |sum, value| sum + value);
+    let initial: Vec<_> = linear
+        .coefficients
+        .iter()
+        .map(|(variable, factor)| initial_value(&task.world, *variable) * factor)
+        .collect();
+    let offset = initial.into_iter().fold(linear.quantity.constant.clone(), |sum, value| sum + value);
     task.objectives.push(GroundObjective { offset, maximize });
     let mut scaled = Scaled::default();
     for operator in &mut task.operators {
-        let cost = cost(operator, &linear, time, &mut scaled).ok_or_else(|| Error::Unsupported {
+        let cost = cost(operator, &linear, &time, &mut scaled).ok_or_else(|| Error::Unsupported {
             construct: format!(
                 "a metric over a fluent that `{}` changes depending on the state",
                 lifted.schemas[operator.schema as usize].name
@@ -111,7 +114,7 @@ fn split(
         Expression::Quotient(left, right, place) => {
             let (mut linear, time) = split(world, left, *place)?;
             let (divisor, divisor_time) = split(world, right, *place)?;
-            let constant = divisor.quantity.constant;
+            let constant = divisor.quantity.constant.clone();
             if !divisor.coefficients.is_empty() || !divisor_time.is_zero() || constant.is_zero() {
                 return Err(Error::NonLinear { place: *place });
             }
@@ -144,7 +147,7 @@ fn multiply(
         return None;
     };
     linear.scale(&factor.quantity.constant);
-    Some((linear, time * factor.quantity.constant))
+    Some((linear, time * &factor.quantity.constant))
 }
 
 /// Quantities times the factors of a metric; what operators share, they share afterwards.
@@ -154,15 +157,15 @@ struct Scaled {
 }
 
 impl Scaled {
-    fn times(&mut self, quantity: &Quantity<Rational>, factor: Rational) -> Quantity<Rational> {
+    fn times(&mut self, quantity: &Quantity<Rational>, factor: &Rational) -> Quantity<Rational> {
         if factor.is_one() {
             return quantity.clone();
         }
         if factor.is_zero() {
-            return Quantity::constant(factor);
+            return Quantity::constant(Rational::zero());
         }
-        let tables = self.by_factor.entry(factor).or_insert_with(TableMap::new);
-        let Ok(scaled) = tables.map::<Infallible>(quantity, &|number| Ok(number * factor));
+        let tables = self.by_factor.entry(factor.clone()).or_insert_with(TableMap::new);
+        let Ok(scaled) = tables.map::<Infallible>(quantity, &|number| Ok(number.clone() * factor));
         scaled
     }
 }
@@ -171,7 +174,7 @@ impl Scaled {
 fn cost(
     operator: &GroundOperator,
     metric: &Linear<Rational>,
-    time: Rational,
+    time: &Rational,
     scaled: &mut Scaled,
 ) -> Option<Quantity<Rational>> {
     let mut total = scaled.times(&operator.duration, time);
@@ -180,7 +183,7 @@ fn cost(
         if value.coefficients[..] != [(*variable, Rational::one())] {
             return None;
         }
-        total.add(&scaled.times(&value.quantity, *factor));
+        total.add(&scaled.times(&value.quantity, factor));
     }
     Some(total)
 }

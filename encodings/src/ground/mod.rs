@@ -30,6 +30,7 @@ use crate::ground::reach::Reached;
 use crate::lifted::Lifted;
 use crate::limits::Limits;
 use crate::normalize::normalize;
+use crate::number::Int;
 use crate::pddl::ast::{Domain, Metric, Name, Problem};
 use crate::task::Task;
 
@@ -68,7 +69,7 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Tas
 pub(crate) struct Generality {
     /// If given, numbers of the initial state may be others, too, that are integers when multiplied by this: nothing is
     /// concluded from those of the problem.
-    pub(crate) numbers: Option<i64>,
+    pub(crate) numbers: Option<Int>,
 }
 
 /// Grounds a problem so that other initial states can take the place of its own.

@@ -221,7 +221,7 @@ fn is_idle(operator: &GroundOperator) -> bool {
     let known = |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();
     let lowest = |cost: &Quantity<Rational>| {
         let tables = cost.tables.iter().filter_map(|table| table.values.iter().min());
-        tables.fold(cost.constant, |sum, value| sum + value)
+        tables.fold(cost.constant.clone(), |sum, value| sum + value)
     };
     operator.adds.iter().all(|atom| known(*atom, true))
         && operator.deletes.iter().all(|atom| known(*atom, false))

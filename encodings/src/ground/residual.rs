@@ -186,7 +186,7 @@ pub(crate) fn constant_comparison(linear: &Linear<Rational>, strict: bool) -> Op
     if !linear.coefficients.is_empty() || !linear.quantity.tables.is_empty() {
         return None;
     }
-    let (value, zero) = (linear.quantity.constant, Rational::from_integer(0));
+    let (value, zero) = (&linear.quantity.constant, &Rational::from_integer(0));
     Some(truth(if strict { value > zero } else { value >= zero }))
 }
 

@@ -100,9 +100,7 @@ impl Normalizer {
     pub(super) fn expression(&mut self, expression: &ast::Expression, scope: &mut Scope) -> Expression {
         use ast::Arithmetic as Op;
         match expression {
-            ast::Expression::Number(number, span) => {
-                Expression::Number(self.number(number, scope.place(*span)))
-            }
+            ast::Expression::Number(number, _) => Expression::Number(Rational::from_big(number.clone())),
             ast::Expression::Fluent(atom) => {
                 let function = self.function(atom, scope.file);
                 Expression::Function(function, self.terms(atom, scope), scope.place(atom.span))

@@ -35,7 +35,7 @@ pub(super) fn is_rewarded(metrics: &[Metric]) -> Option<bool> {
 /// The factor of total time in an expression.
 pub(crate) fn time_factor(expression: &Expression) -> Option<Rational> {
     let number = |expression: &Expression| match expression {
-        Expression::Number(number) => Some(*number),
+        Expression::Number(number) => Some(number.clone()),
         _ => None,
     };
     match expression {
@@ -52,7 +52,7 @@ pub(crate) fn time_factor(expression: &Expression) -> Option<Rational> {
                 [only] => (0..parts.len())
                     .filter(|i| *i != only)
                     .map(|i| number(&parts[i]))
-                    .try_fold(factors[only], |product, number| Some(product * number?)),
+                    .try_fold(factors[only].clone(), |product, number| Some(product * number?)),
                 _ => None,
             }
         }

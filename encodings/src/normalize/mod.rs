@@ -8,8 +8,6 @@ mod condition;
 pub(crate) mod duration;
 mod objects;
 
-use num_rational::BigRational;
-use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::configuration::{is_static, recursive_through_forall};
@@ -264,14 +262,6 @@ impl Normalizer {
         bound.into_iter().map(|bound| Parameter { candidates: bound.candidates }).collect()
     }
 
-    fn number(&mut self, number: &BigRational, place: Place) -> Rational {
-        if let (Some(numerator), Some(denominator)) = (number.numer().to_i128(), number.denom().to_i128()) {
-            return Rational::new(numerator, denominator);
-        }
-        self.unsupported("a number of more than 38 digits", "a shorter one", place.file, place.span);
-        Rational::from_integer(0)
-    }
-
     fn predicate(&mut self, atom: &ast::Atom, file: File) -> PredicateId {
         self.predicate_ids.get(&atom.predicate.name).copied().unwrap_or_else(|| {
             self.unknown("predicate", &atom.predicate, file);
@@ -323,8 +313,8 @@ impl Normalizer {
                     }
                 }
                 ast::InitialElement::NegatedFact(_) | ast::InitialElement::Timed(..) => {}
-                ast::InitialElement::Value(atom, number, span) => {
-                    let number = self.number(number, Place { file: File::Problem, span: *span });
+                ast::InitialElement::Value(atom, number, _) => {
+                    let number = Rational::from_big(number.clone());
                     values.push((self.function(atom, File::Problem), self.objects(atom), number));
                 }
             }
@@ -359,8 +349,8 @@ impl Normalizer {
     fn events(&mut self, problem: &ast::Problem) -> Vec<Event> {
         let mut events: Vec<Event> = Vec::new();
         for element in &problem.init {
-            let ast::InitialElement::Timed(time, atom, holds, span) = element else { continue };
-            let time = self.number(time, Place { file: File::Problem, span: *span });
+            let ast::InitialElement::Timed(time, atom, holds, _) = element else { continue };
+            let time = Rational::from_big(time.clone());
             let change = (self.predicate(atom, File::Problem), self.objects(atom), *holds);
             let position = events.partition_point(|event| event.time < time);
             match events.get_mut(position).filter(|event| event.time == time) {

@@ -1,6 +1,7 @@
 //! The bounded reading of a metric that actions improve: fewest steps first, then the metric.
 
 use crate::bounds::Bounds;
+use crate::number::Int;
 use crate::optimize::{Best, Config, Run, Tightened, optimize};
 use crate::plan::{GroundStep, decode, replay};
 use crate::quantity::Quantity;
@@ -55,7 +56,7 @@ impl Run<'_> {
         let proof = matches!(tightened, Tightened::Exhausted).then_some(Proof::Sat { step_bound: steps });
         let mut plan = best.plan;
         let statistics = run.statistics;
-        plan.cost += lowest * steps as i64;
+        plan.cost += lowest * steps as Int;
         let unbounded =
             if self.task.can_repeat_reward(&plan.steps) { Unbounded::Proved } else { Unbounded::Suspected };
         Solution {
@@ -73,7 +74,7 @@ impl Run<'_> {
 
 impl Task {
     /// The same task with other costs, and a metric of their plain sum.
-    fn with_costs(&self, cost: impl Fn(&crate::task::Operator) -> Quantity<i64>) -> Self {
+    fn with_costs(&self, cost: impl Fn(&crate::task::Operator) -> Quantity<Int>) -> Self {
         let mut task = self.clone();
         for operator in &mut task.operators {
             operator.cost = cost(operator);
@@ -90,7 +91,7 @@ impl Task {
                 operator.choices().any(|choice| {
                     operator.cost.at(&choice, &operator.sizes()) < 0
                         && operator.applicable(state, &choice)
-                        && self.successor(operator, state, &choice) == *state
+                        && self.successor(operator, state, &choice).as_ref() == Some(state)
                 })
             })
         })

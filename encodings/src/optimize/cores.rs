@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 use rustc_hash::FxHashMap;
 
 use crate::encode::{Encoding, Family, Formula, Meaning};
+use crate::number::Int;
 use crate::optimize::tighten::Live;
 use crate::optimize::{Best, Run, Tightened};
 use crate::sat::{Answer, Lit, Totalizer};
@@ -26,9 +27,9 @@ const TRIMS: usize = 4;
 /// What plans pay.
 struct Search {
     /// Every plan of the formula pays this much.
-    lower: i64,
+    lower: Int,
     /// What a literal adds if it is true: all of them at least 1.
-    weights: BTreeMap<Lit, i64>,
+    weights: BTreeMap<Lit, Int>,
     totalizers: Vec<Totalizer>,
     /// For the literals of totalizers: which one's, and more than how many it says there are.
     outputs: FxHashMap<Lit, (usize, usize)>,
@@ -45,12 +46,12 @@ impl Search {
     }
 
     /// The literals that weigh at least so much, negated.
-    fn assumptions(&self, least: i64) -> Vec<Lit> {
+    fn assumptions(&self, least: Int) -> Vec<Lit> {
         self.weights.iter().filter(|(_, weight)| **weight >= least).map(|(literal, _)| !*literal).collect()
     }
 
     /// The next lighter weight to begin assumptions with: at most half of it, if there is one.
-    fn lighter(&self, than: i64) -> Option<i64> {
+    fn lighter(&self, than: Int) -> Option<Int> {
         let below = self.weights.values().copied().filter(|weight| *weight < than);
         let lightest = below.clone().min()?;
         Some(below.filter(|weight| *weight <= than / 2).max().unwrap_or(lightest))
@@ -79,7 +80,7 @@ impl Search {
     }
 
     /// More than so many of a totalizer's literals cost so much more.
-    fn output(&mut self, totalizer: usize, count: usize, weight: i64, formula: &mut Formula) {
+    fn output(&mut self, totalizer: usize, count: usize, weight: Int, formula: &mut Formula) {
         let mut variables = formula.variables() as u32;
         let mut clauses = Vec::new();
         let add = |clause: &[Lit]| clauses.push(clause.to_vec());
@@ -95,7 +96,7 @@ impl Search {
     }
 
     /// What would make a plan dearer than the limit is false.
-    fn harden(&mut self, limit: i64, formula: &mut Formula) {
+    fn harden(&mut self, limit: Int, formula: &mut Formula) {
         let lower = self.lower;
         let heavy: Vec<Lit> = self
             .weights
@@ -112,10 +113,10 @@ impl Search {
 
 impl Run<'_> {
     /// Raises the lower bound of a formula's plans until it is above their limit, or a plan is as cheap.
-    pub(super) fn raise(&mut self, mut encoding: Encoding<'_>, limit: i64, best: &mut Best) -> Tightened {
+    pub(super) fn raise(&mut self, mut encoding: Encoding<'_>, limit: Int, best: &mut Best) -> Tightened {
         let mut search = Search::new(&encoding);
         let mut live = self.live(u64::MAX);
-        let mut least = search.lighter(i64::MAX).unwrap_or(i64::MAX);
+        let mut least = search.lighter(Int::MAX).unwrap_or(Int::MAX);
         loop {
             let limit = limit.min(best.plan.cost - 1);
             if search.lower > limit {

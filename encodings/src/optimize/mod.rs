@@ -17,6 +17,7 @@ use std::time::Instant;
 use crate::bounds::Bounds;
 use crate::encode::{CostLimit, Counting, Encoding, Semantics};
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::plan::{GroundPlan, decode, metric};
 use crate::sat::{Answer, Backend};
 use crate::search::{Found, search};
@@ -32,7 +33,7 @@ const CONFIRM_CONFLICTS: u64 = 1_000;
 const CONFIRM_SIZE: usize = 5_000;
 /// The first formula is for plans within this part of the gap between the lower bound and the best plan known; each further one
 /// for twice as much of it.
-const STAGES: i64 = 8;
+const STAGES: Int = 8;
 /// Formulas with at most this many operator variables are solved once more without the help of bounds.
 const CONFIRM_LIMIT: usize = 400;
 
@@ -106,13 +107,13 @@ struct Best {
     /// The cheapest so far.
     plan: GroundPlan,
     /// No plan is cheaper than this.
-    lower: i64,
+    lower: Int,
 }
 
 /// What a formula covers.
 struct Extent {
     /// Plans that cost at most so much.
-    limit: i64,
+    limit: Int,
     /// For each step, whether each operator can be there.
     allowed: Vec<Vec<bool>>,
     /// That no such plan has more steps is known.
@@ -139,7 +140,7 @@ impl Run<'_> {
         self,
         status: Status,
         plan: Option<&GroundPlan>,
-        lower: Option<i64>,
+        lower: Option<Int>,
         horizon: usize,
         proof: Option<Proof>,
     ) -> Solution {
@@ -191,7 +192,7 @@ impl Run<'_> {
     }
 
     /// Improves a first plan to a cheapest one. `exact` says that the search has proved it cheapest already.
-    fn improve(mut self, incumbent: GroundPlan, lower: i64, exact: bool) -> Solution {
+    fn improve(mut self, incumbent: GroundPlan, lower: Int, exact: bool) -> Solution {
         let mut best = Best { plan: incumbent, lower };
         let Some(bounds) = self.bounds.take() else {
             return self.finish(Status::Feasible, Some(&best.plan), None, 0, None);
@@ -202,14 +203,14 @@ impl Run<'_> {
             return self.conclude(&best, 0, Some(proof));
         }
         let unproved = exact.then_some(Proof::Search);
-        let mut stage = if exact { i64::MAX } else { (best.plan.cost - lower) / STAGES };
+        let mut stage = if exact { Int::MAX } else { (best.plan.cost - lower) / STAGES };
         loop {
             let limit = (best.plan.cost - 1).min(lower.saturating_add(stage));
             let extent = self.extent(&bounds, limit, &best);
             let horizon = extent.allowed.len();
-            if extent.step_bound.is_none() && stage < i64::MAX {
+            if extent.step_bound.is_none() && stage < Int::MAX {
                 // That there is no such plan would prove nothing.
-                stage = i64::MAX;
+                stage = Int::MAX;
                 continue;
             }
             if extent.size() > if exact { CONFIRM_SIZE } else { FORMULA_LIMIT } {
@@ -247,7 +248,7 @@ impl Run<'_> {
     }
 
     /// What plans that cost at most so much can look like.
-    fn extent(&self, bounds: &Bounds, limit: i64, best: &Best) -> Extent {
+    fn extent(&self, bounds: &Bounds, limit: Int, best: &Best) -> Extent {
         let window = bounds.window(self.task, Some(limit), self.config.horizon);
         let complete = |steps: &usize| *steps <= window.allowed.len();
         let step_bound = window.steps.filter(complete);

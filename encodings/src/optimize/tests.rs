@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::optimize::{Config, Strategy, optimize};
 use crate::plan::{Exact, metric};
 use crate::sat::Backend;
@@ -14,7 +15,7 @@ use crate::tests::{built_in, depot, fleet, ground_text, optimum};
 const STRATEGIES: [Strategy; 3] = [Strategy::Auto, Strategy::Tighten, Strategy::Cores];
 
 /// Fleets and depots that have a plan, with its least cost.
-fn tasks(seeds: std::ops::Range<u64>) -> impl Iterator<Item = (String, Task, i64)> {
+fn tasks(seeds: std::ops::Range<u64>) -> impl Iterator<Item = (String, Task, Int)> {
     seeds.flat_map(|seed| [fleet(seed), depot(seed)]).filter_map(|text| {
         let problem = text.1.clone();
         let task = ground_text(text);
@@ -28,7 +29,7 @@ fn config(backend: &Backend, strategy: Strategy, limits: Limits) -> Config {
 }
 
 /// A plan, and what is claimed of it: a proof wherever plans have a step bound.
-fn check_optimum(context: &str, (task, best): (&Task, i64), config: &Config) -> bool {
+fn check_optimum(context: &str, (task, best): (&Task, Int), config: &Config) -> bool {
     let solution = optimize(task, config, &mut |_| {});
     let best = metric(task, best);
     let cost = solution.plan.as_ref().map(|plan| plan.cost);
@@ -70,7 +71,7 @@ fn every_strategy_finds_the_optimum_of_many() {
 
 /// Every report and the answer hold the optimum between them, and reports only get better. The run is stopped after some of
 /// them; returns whether it had come further than that.
-fn check_reports(context: &str, (task, best): (&Task, i64), config: &Config, stop_after: usize) -> bool {
+fn check_reports(context: &str, (task, best): (&Task, Int), config: &Config, stop_after: usize) -> bool {
     let interrupt = config.limits.interrupt();
     let best = metric(task, best);
     let mut last: Option<(Exact, Exact)> = None;

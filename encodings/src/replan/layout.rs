@@ -10,6 +10,7 @@ use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::lifted::ObjectId;
+use crate::number::Int;
 use crate::pddl::ast::{Atom, InitialElement, Name, Problem};
 use crate::replan::usage::{Usage, key};
 use crate::task::{Fact, State, Task};
@@ -113,7 +114,7 @@ impl Layout {
             self.read(element, &mut reading)?;
         }
         let is_complete = reading.fixed.iter().chain(&reading.fixed_values).all(|seen| *seen);
-        let numbers = reading.numbers.into_iter().collect::<Option<Vec<i64>>>()?;
+        let numbers = reading.numbers.into_iter().collect::<Option<Vec<Int>>>()?;
         let mut state = State { values: reading.values, numbers };
         task.close(&mut state);
         for objects in &mut reading.available {
@@ -163,9 +164,9 @@ impl Layout {
         (is_free && is_reached).then_some(())
     }
 
-    fn integer(&self, value: &BigRational) -> Option<i64> {
+    fn integer(&self, value: &BigRational) -> Option<Int> {
         let scaled = value * &self.scale;
-        scaled.is_integer().then(|| scaled.to_integer().to_i64()).flatten()
+        scaled.is_integer().then(|| scaled.to_integer().to_i128()).flatten()
     }
 
     /// The state after a step; none if it changes what must be as it was.
@@ -212,7 +213,7 @@ impl Layout {
 /// What is read of a problem.
 struct Reading {
     values: Vec<u32>,
-    numbers: Vec<Option<i64>>,
+    numbers: Vec<Option<Int>>,
     available: Vec<Vec<ObjectId>>,
     /// By position, whether it holds.
     fixed: Vec<bool>,

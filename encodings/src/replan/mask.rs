@@ -9,6 +9,7 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::lifted::ObjectId;
+use crate::number::Int;
 use crate::quantity::{Linear, Quantity, SlotSet, Table};
 use crate::task::{Argument, Forbidden, NumericEffect, Operator, SlotUse, Task};
 
@@ -22,7 +23,7 @@ type Left = (Kept, Arc<[SlotUse]>);
 #[derive(Default)]
 struct Shared {
     slots: FxHashMap<(*const SlotUse, u32), Left>,
-    tables: FxHashMap<(*const i64, *const Vec<u16>), Arc<[i64]>>,
+    tables: FxHashMap<(*const Int, *const Vec<u16>), Arc<[Int]>>,
     forbidden: FxHashMap<(*const Forbidden, *const Vec<u16>), Arc<[Forbidden]>>,
 }
 
@@ -93,15 +94,15 @@ impl Shared {
         Some(copy)
     }
 
-    fn linear(&mut self, linear: &Linear<i64>, kept: &Kept, sizes: &[usize]) -> Linear<i64> {
+    fn linear(&mut self, linear: &Linear<Int>, kept: &Kept, sizes: &[usize]) -> Linear<Int> {
         Linear {
             coefficients: linear.coefficients.clone(),
             quantity: self.quantity(&linear.quantity, kept, sizes),
         }
     }
 
-    fn quantity(&mut self, quantity: &Quantity<i64>, kept: &Kept, sizes: &[usize]) -> Quantity<i64> {
-        let table = |table: &Table<i64>| {
+    fn quantity(&mut self, quantity: &Quantity<Int>, kept: &Kept, sizes: &[usize]) -> Quantity<Int> {
+        let table = |table: &Table<Int>| {
             let entry = self.tables.entry((table.values.as_ptr(), kept.as_ptr()));
             let values = entry.or_insert_with(|| rows(table, kept, sizes)).clone();
             Table { slots: table.slots.clone(), values }
@@ -142,7 +143,7 @@ fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> b
 }
 
 /// The rows of a table that are left.
-fn rows(table: &Table<i64>, kept: &Kept, sizes: &[usize]) -> Arc<[i64]> {
+fn rows(table: &Table<Int>, kept: &Kept, sizes: &[usize]) -> Arc<[Int]> {
     let mut positions = vec![0_usize];
     for slot in &table.slots {
         let (size, kept) = (sizes[*slot as usize], &kept[*slot as usize]);

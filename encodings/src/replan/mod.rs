@@ -29,6 +29,7 @@ use crate::bounds::Bounds;
 use crate::ground::{Config, Generality, ground_for};
 use crate::lifted::ObjectId;
 use crate::limits::Limits;
+use crate::number::Int;
 use crate::pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
 use crate::pddl::types::TypeHierarchy;
 use crate::plan::Step;
@@ -40,7 +41,7 @@ use layout::{Layout, Situation};
 use usage::Usage;
 
 /// Numbers of the initial state have at most so many decimals, as a power of ten.
-const PRECISION: i64 = 1_000_000;
+const PRECISION: Int = 1_000_000;
 /// For so many sets of available designs what was found out about them is kept.
 const SETS: usize = 8;
 

@@ -8,6 +8,7 @@ use num_rational::BigRational;
 use rustc_hash::FxHashSet;
 
 use crate::lifted::ObjectId;
+use crate::number::Int;
 use crate::plan::{GroundPlan, GroundStep, decode, replay_from, resolve};
 use crate::replan::layout::Situation;
 use crate::replan::{Base, Query, Replanned, Set};
@@ -40,7 +41,7 @@ pub(super) fn solve(
     }
     let Some(prepared) = &set.prepared else { return Replanned::Unknown };
     let Some(starts) = starts(base, situation, query) else { return Replanned::Misfit };
-    let scale = |cost: i64| BigRational::new(cost.into(), set.task.objective.scale.into());
+    let scale = |cost: Int| BigRational::new(cost.into(), set.task.objective.scale.into());
     let promise = |start: Start| Some((&start.own + scale(set.bounds.estimate(&start.state)?), start));
     let mut open: Vec<(BigRational, Start)> = starts.into_iter().filter_map(promise).collect();
     open.sort_by(|left, right| left.0.cmp(&right.0).then_with(|| left.1.arguments.cmp(&right.1.arguments)));
@@ -57,7 +58,7 @@ pub(super) fn solve(
         if least.is_some_and(|least| bound > *least) {
             break;
         }
-        let limit = incumbent.map_or(i64::MAX, |known| known.plan.cost);
+        let limit = incumbent.map_or(Int::MAX, |known| known.plan.cost);
         let found = search_from(&set.task, &set.bounds, prepared, &start.state, limit, most, query.limits);
         let plan = match found {
             Found::Optimal(plan) => plan,

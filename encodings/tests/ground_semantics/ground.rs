@@ -121,6 +121,7 @@ pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize
         }
         let mut transitions: BTreeMap<_, _> = ground
             .transitions(&state)
+            .expect("numbers that fit")
             .into_iter()
             .map(|transition| ((transition.action, transition.arguments), transition.after))
             .collect();

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use crate::certificate::clausal::binary::{Bits, bit, width};
 use crate::certificate::clausal::formula::{Formula, Timeline, Var};
 use crate::certificate::model::{Linear, Model, Operator, Quantity};
+use crate::number::Int;
 
 /// The sums after the latest step.
 pub(super) struct Sums {
@@ -140,7 +141,7 @@ impl Sums {
 }
 
 /// Where a condition holds, a multiple of a number plus a constant is at least 0.
-fn compare(formula: &mut Formula, condition: &[Var], number: &Bits, factor: i64, constant: i64) {
+fn compare(formula: &mut Formula, condition: &[Var], number: &Bits, factor: Int, constant: Int) {
     let (factor, constant) = (i128::from(factor), i128::from(constant));
     match factor {
         0 if constant >= 0 => {}

@@ -1,0 +1,297 @@
+//! Exact numbers: rationals of any size while files are read and ground, and integers of a ground task.
+//!
+//! Nothing here rounds, wraps or saturates. A rational that no longer fits two machine integers goes on with big ones; an integer
+//! of a task that may outgrow its type is computed by the checked operations, whose users say what happens then.
+
+use std::cmp::Ordering;
+use std::iter::Sum;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+
+use num_bigint::BigInt;
+use num_rational::{BigRational, Ratio};
+use num_traits::{CheckedAdd, CheckedDiv, CheckedMul, CheckedSub, One, Signed, ToPrimitive, Zero};
+
+/// A number of a ground task, scaled to an integer.
+///
+/// Constants stay below [`LIMIT`] in magnitude. What can outgrow the type (products with fluents, fluents that grow with every
+/// step, sums of many costs) is computed by checked operations. `overflow-checks` are on in every profile.
+pub(crate) type Int = i128;
+
+/// Constants of a task stay below this once they are scaled.
+pub(crate) const LIMIT: Int = 1 << 118;
+
+/// What fluents may grow to, and sums of costs: a state beyond is left out, and the search knows that it is not complete then.
+pub(crate) const GROWTH_LIMIT: Int = 1 << 124;
+
+/// An exact rational of any size.
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub(crate) struct Rational(Repr);
+
+/// A number is `Small` whenever it fits, so that equal numbers are equal representations.
+#[derive(Clone, PartialEq, Eq, Hash)]
+enum Repr {
+    Small(Ratio<i128>),
+    Big(Box<BigRational>),
+}
+
+impl Rational {
+    pub(crate) const fn from_integer(integer: Int) -> Self {
+        Self(Repr::Small(Ratio::new_raw(integer, 1)))
+    }
+
+    /// `numerator / denominator`; the denominator must not be 0.
+    pub(crate) fn new(numerator: Int, denominator: Int) -> Self {
+        Self::from_big(BigRational::new(numerator.into(), denominator.into()))
+    }
+
+    pub(crate) fn from_big(big: BigRational) -> Self {
+        match (big.numer().to_i128(), big.denom().to_i128()) {
+            // The least integer has no negation.
+            (Some(numerator), Some(denominator)) if numerator > i128::MIN => {
+                Self(Repr::Small(Ratio::new_raw(numerator, denominator)))
+            }
+            _ => Self(Repr::Big(Box::new(big))),
+        }
+    }
+
+    pub(crate) fn to_big(&self) -> BigRational {
+        match &self.0 {
+            Repr::Small(small) => {
+                BigRational::new_raw(BigInt::from(*small.numer()), BigInt::from(*small.denom()))
+            }
+            Repr::Big(big) => (**big).clone(),
+        }
+    }
+
+    pub(crate) fn is_integer(&self) -> bool {
+        match &self.0 {
+            Repr::Small(small) => small.is_integer(),
+            Repr::Big(big) => big.is_integer(),
+        }
+    }
+
+    /// The denominator, positive; none if it does not fit.
+    pub(crate) fn denominator(&self) -> Option<Int> {
+        match &self.0 {
+            Repr::Small(small) => Some(*small.denom()),
+            Repr::Big(big) => big.denom().to_i128(),
+        }
+    }
+
+    /// This number as an integer; none if it is none, or does not fit.
+    pub(crate) fn to_int(&self) -> Option<Int> {
+        match &self.0 {
+            Repr::Small(small) => small.is_integer().then(|| *small.numer()),
+            Repr::Big(_) => None,
+        }
+    }
+
+    /// `1 / self`; it must not be 0.
+    pub(crate) fn recip(&self) -> Self {
+        Self::one() / self.clone()
+    }
+
+    pub(crate) fn is_positive(&self) -> bool {
+        match &self.0 {
+            Repr::Small(small) => small.is_positive(),
+            Repr::Big(big) => big.is_positive(),
+        }
+    }
+
+    pub(crate) fn is_negative(&self) -> bool {
+        !self.is_positive() && !self.is_zero()
+    }
+
+    fn combine(
+        &self,
+        other: &Self,
+        small: impl Fn(&Ratio<i128>, &Ratio<i128>) -> Option<Ratio<i128>>,
+        big: impl Fn(BigRational, BigRational) -> BigRational,
+    ) -> Self {
+        if let (Repr::Small(a), Repr::Small(b)) = (&self.0, &other.0)
+            && let Some(result) = small(a, b)
+            && *result.numer() > i128::MIN
+            && *result.denom() > 0
+        {
+            return Self(Repr::Small(result));
+        }
+        Self::from_big(big(self.to_big(), other.to_big()))
+    }
+}
+
+/// A number in words, for keys.
+pub(crate) fn words(number: Int) -> [u32; 4] {
+    let bytes = number.to_le_bytes();
+    std::array::from_fn(|word| u32::from_le_bytes(std::array::from_fn(|byte| bytes[4 * word + byte])))
+}
+
+/// The least common multiple of two positive integers; none if it does not fit.
+pub(crate) fn checked_lcm(a: Int, b: Int) -> Option<Int> {
+    (a / num_integer::gcd(a, b)).checked_mul(b)
+}
+
+impl Default for Rational {
+    fn default() -> Self {
+        Self::zero()
+    }
+}
+
+impl Zero for Rational {
+    fn zero() -> Self {
+        Self::from_integer(0)
+    }
+
+    fn is_zero(&self) -> bool {
+        matches!(&self.0, Repr::Small(small) if *small.numer() == 0)
+    }
+}
+
+impl One for Rational {
+    fn one() -> Self {
+        Self::from_integer(1)
+    }
+}
+
+impl Add<&Self> for Rational {
+    type Output = Self;
+
+    fn add(self, other: &Self) -> Self {
+        self.combine(other, |a, b| a.checked_add(b), |a, b| a + b)
+    }
+}
+
+impl Add for Rational {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        self + &other
+    }
+}
+
+impl AddAssign for Rational {
+    fn add_assign(&mut self, other: Self) {
+        *self = self.clone() + &other;
+    }
+}
+
+impl Sub<&Self> for Rational {
+    type Output = Self;
+
+    fn sub(self, other: &Self) -> Self {
+        self.combine(other, |a, b| a.checked_sub(b), |a, b| a - b)
+    }
+}
+
+impl Sub for Rational {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self - &other
+    }
+}
+
+impl Mul<&Self> for Rational {
+    type Output = Self;
+
+    fn mul(self, other: &Self) -> Self {
+        self.combine(other, |a, b| a.checked_mul(b), |a, b| a * b)
+    }
+}
+
+impl Mul for Rational {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        self * &other
+    }
+}
+
+/// Panics if the divisor is 0.
+impl Div for Rational {
+    type Output = Self;
+
+    fn div(self, other: Self) -> Self {
+        self.combine(&other, |a, b| a.checked_div(b), |a, b| a / b)
+    }
+}
+
+impl Neg for Rational {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        match self.0 {
+            Repr::Small(small) => Self(Repr::Small(-small)),
+            Repr::Big(big) => Self::from_big(-*big),
+        }
+    }
+}
+
+impl Sum for Rational {
+    fn sum<I: Iterator<Item = Self>>(numbers: I) -> Self {
+        numbers.fold(Self::zero(), |sum, number| sum + number)
+    }
+}
+
+impl PartialOrd for Rational {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Rational {
+    fn cmp(&self, other: &Self) -> Ordering {
+        match (&self.0, &other.0) {
+            (Repr::Small(a), Repr::Small(b)) => a.cmp(b),
+            _ => self.to_big().cmp(&other.to_big()),
+        }
+    }
+}
+
+/// As a fraction.
+impl std::fmt::Debug for Rational {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.to_big())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Numbers of every size, those at the borders of the small ones among them.
+    fn number() -> impl Strategy<Value = BigRational> {
+        let integer = prop_oneof![
+            (-20_i128..20).prop_map(BigInt::from),
+            any::<i64>().prop_map(BigInt::from),
+            any::<i128>().prop_map(BigInt::from),
+            (-2_i128..=2).prop_map(|offset| BigInt::from(i128::MAX) + offset),
+            (-2_i128..=2).prop_map(|offset| BigInt::from(i128::MIN) + offset),
+            any::<(i128, i128)>().prop_map(|(a, b)| BigInt::from(a) * b),
+        ];
+        (integer.clone(), integer).prop_map(|(numerator, denominator)| {
+            let denominator = if denominator.is_zero() { BigInt::from(1) } else { denominator };
+            BigRational::new(numerator, denominator)
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn arithmetic_is_that_of_big_rationals(a in number(), b in number()) {
+            let (x, y) = (Rational::from_big(a.clone()), Rational::from_big(b.clone()));
+            prop_assert_eq!((x.clone() + &y).to_big(), &a + &b);
+            prop_assert_eq!((x.clone() - &y).to_big(), &a - &b);
+            prop_assert_eq!((x.clone() * &y).to_big(), &a * &b);
+            prop_assert_eq!((-x.clone()).to_big(), -a.clone());
+            prop_assert_eq!(x.cmp(&y), a.cmp(&b));
+            prop_assert_eq!(x.is_positive(), a.is_positive());
+            prop_assert_eq!(x.is_integer(), a.is_integer());
+            if !b.is_zero() {
+                prop_assert_eq!((x.clone() / y.clone()).to_big(), &a / &b);
+                // Equal numbers are equal however they came about.
+                prop_assert_eq!((x.clone() / y.clone()) * &y, x);
+            }
+        }
+    }
+}
