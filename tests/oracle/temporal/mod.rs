@@ -2,9 +2,11 @@
 
 mod best;
 mod execute;
+mod graph;
 mod happening;
 mod make;
 mod model;
+mod overlap;
 mod reduce;
 mod sequence;
 
@@ -21,6 +23,7 @@ use model::{Measure, Q, big};
 
 /// How many nodes the oracle visits before it gives up.
 const CAP: usize = 400;
+const OVERLAP_CAP: usize = 1000;
 
 /// The oracle's terms for a plan.
 fn known(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
@@ -67,6 +70,34 @@ fn sequential(seed: u64) -> Case {
         certify: true,
         limit: Duration::from_secs(2),
     }
+}
+
+/// A task whose times are multiples of the separation.
+fn concurrent(seed: u64) -> Case {
+    let units = [Q::from_integer(1), Q::from_integer(1), Q::new(1, 1000), Q::new(1, 2), Q::from_integer(2)];
+    let unit = units[(seed % 5) as usize];
+    let task = Maker::make(seed, Some(unit));
+    let (domain, problem) = (task.domain(), task.problem());
+    let world = Rc::new(World::new(task));
+    let truth = overlap::best(&world, unit, OVERLAP_CAP);
+    Case {
+        name: format!("overlap-{seed}"),
+        domain,
+        problem,
+        mode: Mode::Concurrent(big(unit)),
+        maximize: false,
+        truth,
+        execute: Box::new(move |steps| {
+            overlap::execute(&world, &known(&world, steps)?, unit).map(big).map_err(obstacle)
+        }),
+        certify: false,
+        limit: Duration::from_secs(2),
+    }
+}
+
+#[test]
+fn overlapping_actions() {
+    run(2000, |seed| vec![concurrent(seed)]).finish();
 }
 
 #[test]
