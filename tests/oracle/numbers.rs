@@ -4,8 +4,10 @@
 //! that are hit exactly or missed by a hair; explicit search in rational numbers says what is true of them.
 
 mod arithmetic;
+mod deeds;
 mod draw;
 mod explore;
+mod fronts;
 mod ground;
 mod missions;
 mod model;
@@ -13,13 +15,14 @@ mod print;
 mod step;
 mod truth;
 mod tune;
+mod variants;
 
 use std::rc::Rc;
 use std::time::Duration;
 
 use fastrand::Rng;
 
-use crate::judge::{Case, Executor, Mode, Step, Truth};
+use crate::judge::{Case, Executor, Mode, Step, Tally, Truth, judge, setting};
 
 use explore::{Budget, Measures};
 use ground::Ground;
@@ -27,7 +30,7 @@ use model::{Expr, Number, Task};
 use truth::{Explored, Known};
 
 /// How much the oracle does for a task.
-const BUDGET: Budget = Budget { states: 600, attempts: 40_000 };
+const BUDGET: Budget = Budget { states: 300, attempts: 25_000 };
 
 /// A task, and what is known of it.
 struct Puzzle {
@@ -91,7 +94,7 @@ impl Puzzle {
             truth,
             execute: executor(Rc::clone(&self.ground)),
             certify,
-            limit: Duration::from_secs(2),
+            limit: Duration::from_millis(500),
         }
     }
 }
@@ -132,12 +135,45 @@ fn task(seed: u64) -> Task {
     if rng.u32(0..5) < 3 { missions::mission(&mut rng) } else { arithmetic::arithmetic(&mut rng) }
 }
 
-fn puzzle(seed: u64) -> Option<Puzzle> {
-    Puzzle::new(format!("numbers-{seed}"), task(seed), &[])
+fn puzzle(seed: u64, objectives: &[Expr]) -> Option<Puzzle> {
+    Puzzle::new(format!("numbers-{seed}"), task(seed), objectives)
+}
+
+/// Judges a task: always as the program plans it, every second time with a certificate, and on a share in other ways.
+fn judge_seed(seed: u64, tally: &mut Tally) {
+    let Some(puzzle) = puzzle(seed, &[]) else { return tally.count("oracle: too large") };
+    let case = puzzle.case(seed % 2 == 0);
+    judge(&case, tally);
+    let mut rng = Rng::with_seed(seed ^ 0x5eed);
+    if seed % 4 == 1 {
+        variants::check_variants(&puzzle, &case, &mut rng, tally);
+    }
+    if seed % 4 == 3 {
+        let objectives = variants::objectives(&puzzle, &mut rng);
+        if let Some(puzzle) = self::puzzle(seed, &objectives) {
+            variants::check_objectives(&puzzle, &objectives, &case, tally);
+        }
+    }
 }
 
 #[test]
 fn random_tasks_with_numbers() {
-    let cases = |seed| puzzle(seed).map(|puzzle| puzzle.case(seed % 2 == 0)).into_iter().collect();
-    crate::judge::run(2000, cases).finish();
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 2000));
+    let mut tally = Tally::default();
+    (from..from + tasks).for_each(|seed| judge_seed(seed, &mut tally));
+    tally.finish();
+}
+
+#[test]
+#[ignore = "writes the tasks of `ORACLE_FROM` and what follows to `ORACLE_SAVE`"]
+fn show() {
+    let directory = std::path::PathBuf::from(std::env::var_os("ORACLE_SAVE").expect("ORACLE_SAVE is set"));
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 1));
+    for seed in from..from + tasks {
+        let (domain, problem) = print::print(&task(seed));
+        let directory = directory.join(format!("numbers-{seed}"));
+        std::fs::create_dir_all(&directory).expect("a directory");
+        std::fs::write(directory.join("domain.pddl"), domain).expect("a file");
+        std::fs::write(directory.join("problem.pddl"), problem).expect("a file");
+    }
 }

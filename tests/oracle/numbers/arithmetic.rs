@@ -18,6 +18,9 @@ struct Builder<'r> {
     constants: Vec<usize>,
     /// A function of a thing that none changes, and one that actions change.
     of_thing: [usize; 2],
+    /// The fluent that metrics mention; usually it is changed by what never changes only, as the planner demands.
+    counted: usize,
+    wild: bool,
     flags: Vec<usize>,
     things: Vec<usize>,
     cost: usize,
@@ -47,13 +50,15 @@ impl<'r> Builder<'r> {
     fn new(rng: &'r mut Rng) -> Self {
         let mut task = Task { types: vec!["thing".to_owned()], ..Task::default() };
         let flags = (0..rng.usize(1..4)).map(|i| task.predicate(&format!("q{i}"), &[])).collect();
-        let fluents = (0..rng.usize(1..4)).map(|i| task.function(&format!("x{i}"), &[])).collect();
+        let fluents: Vec<usize> =
+            (0..rng.usize(1..4)).map(|i| task.function(&format!("x{i}"), &[])).collect();
         let constants = (0..3).map(|i| task.function(&format!("c{i}"), &[])).collect();
         let of_thing = [task.function("size", &[0]), task.function("level", &[0])];
         let things = (0..rng.usize(1..4)).map(|i| task.object(format!("t{i}"), 0)).collect();
         let cost = task.function("total-cost", &[]);
         let styles = palette(rng);
-        Self { task, rng, styles, fluents, constants, of_thing, flags, things, cost, open: 0 }
+        let (counted, wild) = (fluents[0], once_in(rng, 10));
+        Self { task, rng, styles, fluents, counted, wild, constants, of_thing, flags, things, cost, open: 0 }
     }
 
     fn draw(&mut self) -> Expr {
@@ -137,7 +142,8 @@ impl<'r> Builder<'r> {
             Some(thing) if once_in(self.rng, 3) => applied(self.of_thing[1], &[thing]),
             _ => applied(one(self.rng, &self.fluents), &[]),
         };
-        match self.rng.u32(0..10) {
+        let kinds = if target.symbol == self.counted && !self.wild { 6 } else { 10 };
+        match self.rng.u32(0..kinds) {
             0..=2 => Effect::Number(Change::Increase, target, self.fixed(thing)),
             3..=5 => Effect::Number(Change::Decrease, target, self.fixed(thing)),
             6 => Effect::Number(Change::Assign, target, self.fixed(thing)),
@@ -176,7 +182,15 @@ impl<'r> Builder<'r> {
         }
         for _ in 0..self.rng.usize(0..3) {
             let effect = self.change(thing);
-            happening.effects.push(effect);
+            let target = |effect: &Effect| match effect {
+                Effect::Number(_, target, _) => Some(target.clone()),
+                _ => None,
+            };
+            // Contradictions are rare.
+            if happening.effects.iter().all(|other| target(other) != target(&effect)) || once_in(self.rng, 6)
+            {
+                happening.effects.push(effect);
+            }
         }
         let flag = applied(one(self.rng, &self.flags), &[]);
         match self.rng.u32(0..4) {
@@ -218,7 +232,7 @@ impl<'r> Builder<'r> {
             Some(lasting) => lasting.end.effects.push(cost),
             None => start.effects.push(cost),
         }
-        if once_in(self.rng, 8) {
+        if self.wild && self.rng.bool() {
             // What an action costs may depend on the state.
             let cost = Effect::Number(Change::Increase, applied(self.cost, &[]), self.linear(thing));
             start.effects.push(cost);
@@ -228,6 +242,7 @@ impl<'r> Builder<'r> {
 
     fn metric(&mut self, timed: bool) -> Option<(bool, Expr)> {
         let cost = Expr::Function(applied(self.cost, &[]));
+        let counted = Expr::Function(applied(self.counted, &[]));
         let maximize = once_in(self.rng, 6);
         let metric = match self.rng.u32(0..8) {
             // Without a metric, durations of 0 and others would have to be told apart.
@@ -239,7 +254,7 @@ impl<'r> Builder<'r> {
                 Expr::Product(vec![self.draw(), self.fluent()]),
             ]),
             6 if timed => Expr::Sum(vec![Expr::Product(vec![self.draw(), Expr::TotalTime]), cost]),
-            _ => Expr::Minus(Box::new(cost), Box::new(self.fluent())),
+            _ => Expr::Minus(Box::new(cost), Box::new(counted)),
         };
         Some((maximize, metric))
     }

@@ -66,9 +66,15 @@ impl<'g> Measures<'g> {
     }
 
     /// The state after a step without its counters, and what the step adds to each measure.
-    pub fn step(&self, instance: &Instance, before: &State) -> Option<(State, Vec<Number>)> {
+    ///
+    /// `old` is what the measures are before it.
+    pub fn step(
+        &self,
+        instance: &Instance,
+        (before, old): (&State, &[Number]),
+    ) -> Option<(State, Vec<Number>)> {
         let mut after = execute(instance, before)?;
-        let (old, new) = (self.of(before, 0)?, self.of(&after, 1)?);
+        let new = self.of(&after, 1)?;
         let costs = new.into_iter().zip(old).map(|(new, old)| new - old).collect();
         after.time = Number::zero();
         for (fluent, counter) in self.counters.iter().enumerate() {
@@ -251,8 +257,9 @@ pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Opti
         let state = states.states[at].clone();
         space.goals.push(all_hold(&ground.goal, &state));
         let mut edges = Vec::new();
+        let old = measures.of(&state, 0)?;
         for (position, instance) in ground.instances.iter().enumerate() {
-            if let Some((after, costs)) = measures.step(instance, &state) {
+            if let Some((after, costs)) = measures.step(instance, (&state, &old)) {
                 let (to, new) = states.number(after);
                 if new {
                     space.depths.push(space.depths[at] + 1);

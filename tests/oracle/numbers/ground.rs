@@ -181,16 +181,27 @@ impl Grounder<'_> {
             arguments: bound.to_vec(),
             duration,
             start: self.moment(&schema.start, bound),
-            over_all: over_all.iter().map(|condition| self.test(condition, bound)).collect(),
+            over_all: self.tests(over_all, bound),
             end: end.map(|end| self.moment(end, bound)),
         })
     }
 
     fn moment(&mut self, happening: &Happening, bound: &[usize]) -> Moment {
         Moment {
-            tests: happening.conditions.iter().map(|condition| self.test(condition, bound)).collect(),
+            tests: self.tests(&happening.conditions, bound),
             acts: happening.effects.iter().map(|effect| self.act(effect, bound)).collect(),
         }
+    }
+
+    /// Conjuncts, without those that never change: they hold, or there were no instance.
+    fn tests(&mut self, conditions: &[Condition], bound: &[usize]) -> Vec<Test> {
+        let mut tests = Vec::new();
+        for condition in conditions {
+            if !self.is_static(condition) {
+                tests.push(self.test(condition, bound));
+            }
+        }
+        tests
     }
 
     fn act(&mut self, effect: &Effect, bound: &[usize]) -> Act {

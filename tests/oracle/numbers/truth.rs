@@ -189,8 +189,9 @@ fn dijkstra(ground: &Ground, measures: &Measures<'_>, maximize: bool, budget: Bu
         if attempts > budget.attempts || states.states.len() > 2 * budget.states {
             return None;
         }
+        let old = measures.of(&state, 0)?;
         for (position, instance) in ground.instances.iter().enumerate() {
-            let Some((after, mut costs)) = measures.step(instance, &state) else { continue };
+            let Some((after, mut costs)) = measures.step(instance, (&state, &old)) else { continue };
             let step = costs.swap_remove(0);
             let new = &cost + if maximize { -step } else { step };
             let (to, is_new) = states.number(after);
