@@ -6,6 +6,8 @@
 //!
 //! `ORACLE_FROM` is the first seed, `ORACLE_TASKS` how many follow, `ORACLE_SAVE` a directory for the files of what fails.
 
+mod enumerate;
+mod field;
 mod judge;
 mod numbers;
 mod temporal;

@@ -31,10 +31,17 @@ pub fn execute(world: &World, steps: &[(usize, Q, Q)]) -> Result<Q, Obstacle> {
         }
         total = fit(total + duration)?;
     }
-    if !world.holds(&world.task.goal, &run.state, &[])? {
-        return Err(Obstacle::Blocked("the goal does not hold"));
-    }
+    goal(world, &run.state)?;
     value(world, &run.state, total, steps.len())
+}
+
+/// The goal; undefined it does not hold.
+pub fn goal(world: &World, state: &State) -> Result<(), Obstacle> {
+    match world.holds(&world.task.goal, state, &[]) {
+        Ok(true) => Ok(()),
+        Ok(false) | Err(Obstacle::Blocked(_)) => Err(Obstacle::Blocked("the goal does not hold")),
+        Err(Obstacle::TooLarge) => Err(Obstacle::TooLarge),
+    }
 }
 
 /// The value of a plan.

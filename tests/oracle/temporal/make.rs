@@ -22,7 +22,6 @@ struct Flavour {
     /// For plans that overlap: every duration and time of an event is a multiple of this.
     unit: Option<Q>,
     durative: u8,
-    instantaneous: u8,
     conditional: u8,
     numeric: u8,
     events: u8,
@@ -51,7 +50,6 @@ impl Maker {
         let flavour = Flavour {
             unit,
             durative: percent(&mut random, &[0, 50, 70, 100]),
-            instantaneous: 0,
             conditional: percent(&mut random, if unit.is_some() { &[0, 0, 0, 0, 5] } else { &[0, 15, 40] }),
             numeric: percent(&mut random, &[0, 25, 60]),
             events: percent(&mut random, &[0, 100, 100]),
@@ -380,7 +378,11 @@ impl Maker {
         for _ in 0..self.random.usize(1..5) {
             let mut time = q(0);
             for _ in 0..self.random.usize(..3) {
-                time += if durations.is_empty() { q(1) } else { self.pick(&durations) };
+                time += if durations.is_empty() {
+                    self.flavour.unit.unwrap_or(q(1))
+                } else {
+                    self.pick(&durations)
+                };
             }
             time += match self.flavour.unit {
                 Some(unit) => unit * q(self.pick(&[0, 0, 1, 1, 2, -1])),

@@ -299,6 +299,17 @@ impl Task {
         }
     }
 
+    /// Whether anything but its own axiom mentions the last predicate.
+    pub fn domain_uses(&self, predicate: usize) -> bool {
+        let name = &self.predicates[predicate].0;
+        let mut others = self.clone();
+        others.axioms.retain(|axiom| axiom.predicate != predicate);
+        others.predicates.truncate(predicate);
+        let actions: String = self.actions.iter().map(|action| self.action(action)).collect();
+        let axioms: String = others.axioms.iter().map(|axiom| self.condition(&axiom.condition, 2)).collect();
+        (actions + &axioms + &self.condition(&self.goal, 0)).contains(&format!("({name}"))
+    }
+
     /// The PDDL domain.
     pub fn domain(&self) -> String {
         let mut text = "(define (domain d) (:requirements :adl :fluents :durative-actions \

@@ -148,6 +148,11 @@ impl Reduction {
         Ok((state, cost))
     }
 
+    /// Whether a number is part of the state.
+    pub fn keeps(&self, at: usize) -> bool {
+        self.roles[at] == Role::Kept
+    }
+
     /// What the metric has besides the costs of actions.
     pub fn rest(&self, state: &State) -> Result<Q, Obstacle> {
         let mut sum = self.offset;
