@@ -101,13 +101,32 @@ pub(crate) struct Schema {
     pub(crate) end_effects: Vec<Effect>,
     /// Duration in the domain's time unit; none for an instantaneous action.
     pub(crate) duration: Option<Expression>,
+    /// Set if the planner has chosen the duration, as short as it may be.
+    pub(crate) is_chosen: bool,
+    /// Set if start and end of a durative action are one happening, because its duration is 0.
+    pub(crate) joint: Option<Box<Joint>>,
+    /// The position of the action in the domain; several schemas may stand for one.
+    pub(crate) action: u32,
     pub(crate) place: Place,
+}
+
+/// What belongs to the start and what to the end of a happening that is both.
+#[derive(Debug, Clone)]
+pub(crate) struct Joint {
+    /// The condition of the start.
+    pub(crate) start: Formula,
+    /// The condition of the end.
+    pub(crate) end: Formula,
+    /// How many of the effects, the first ones, are those of the start.
+    pub(crate) start_effects: usize,
 }
 
 /// What stands for time in a task in which something happens by itself.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Time {
     pub(crate) clock: FunctionId,
+    /// A time so short that nothing that begins or ends later than something else does so less than twice this later.
+    pub(crate) moment: FunctionId,
     /// `(phase NUMBER)`: how many events have taken place.
     pub(crate) phase: PredicateId,
     /// The object for phase 0; those of the others follow.

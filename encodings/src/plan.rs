@@ -3,6 +3,7 @@
 use num_rational::{BigRational, Ratio};
 use num_traits::ToPrimitive;
 
+use crate::ground::events::Timing;
 use crate::lifted::ObjectId;
 use crate::number::Int;
 use crate::pddl::number::to_decimal;
@@ -89,7 +90,7 @@ pub struct Plan {
 /// The plan in the names of the task.
 pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
     let mut steps = Vec::new();
-    let mut clock = 0;
+    let mut clock: Int = 0;
     let mut current: Vec<(String, String)> = Vec::new();
     let sign = if task.objective.maximize { -1 } else { 1 };
     for step in &plan.steps {
@@ -101,6 +102,9 @@ pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
         let sizes = operator.sizes();
         let duration = operator.duration.at(&step.choice, &sizes);
         let cost = sign * operator.cost.at(&step.choice, &sizes);
+        let Timing { start, end } = operator.timing;
+        let earliest = start.into_iter().chain(end.map(|end| end - duration));
+        clock = earliest.fold(clock, Int::max);
         let mut step = Step::new(task, operator, &step.choice, (clock, duration, cost));
         step.note_reconfigured(&mut current);
         steps.push(step);

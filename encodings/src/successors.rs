@@ -216,6 +216,7 @@ mod tests {
             others: Vec::new(),
             duration: Quantity::constant(0),
             wait: None,
+            timing: crate::ground::events::Timing::free(),
         }
     }
 

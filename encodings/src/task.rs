@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use num_bigint::{BigInt, Sign};
 
+use crate::ground::events::Timing;
 use crate::lifted::ObjectId;
 use crate::number::{GROWTH_LIMIT, Int};
 pub use crate::quantity::NumericId;
@@ -160,6 +161,8 @@ pub(crate) struct Operator {
     pub(crate) duration: Quantity<Int>,
     /// Set if this is no action but a wait until that time, in the task's time unit from the start of the plan.
     pub(crate) wait: Option<Int>,
+    /// In the task's time unit from the start of the plan.
+    pub(crate) timing: Timing<Int>,
 }
 
 /// A state: a value for each variable.

@@ -176,7 +176,9 @@ fn temporal_plans_one_after_another() {
             ("0: (prepare)\n0: (work) [3.333]\n3.3: (light) [2]", "3 overlap"),
             // It is not day any more at the end, but it is at the start; then over all of an action.
             ("0: (prepare)\n18: (work) [3.333]", "2 at_end (day)"),
-            ("0: (prepare)\n16.667: (work) [3.333]", "valid time=10/3 metric=50/3 (level)=20/3"),
+            ("0: (prepare)\n16.666: (work) [3.333]", "valid time=10/3 metric=50/3 (level)=20/3"),
+            // It reads at its end whether it is day, so the night must not fall right then.
+            ("0: (prepare)\n16.667: (work) [3.333]", "2 interference"),
             ("18: (heat) [3]", "1 over_all (day)"),
             (
                 "0: (heat) [5.001]\n6: (prepare)\n6: (work)",

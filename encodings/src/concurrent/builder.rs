@@ -3,12 +3,13 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::concurrent::compile::{Happening, Instance, Role, Unit};
-use crate::concurrent::footprint::{Footprint, Footprints, Reads};
+use crate::concurrent::footprint::{Footprint, Footprints};
 use crate::concurrent::keys::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
 use crate::error::Error;
 use crate::ground::evaluate::{AtomId, Binding, World};
 use crate::ground::reach::Reached;
+use crate::ground::reads::Reads;
 use crate::lifted::{Change, Effect, ObjectId};
 use crate::number::Int;
 use crate::quantity::NumericId;

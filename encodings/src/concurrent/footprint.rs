@@ -5,14 +5,13 @@
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::ground::evaluate::{AtomId, Binding, Failure, World};
+use crate::ground::reads::Reads;
 use crate::ground::residual::Residual;
-use crate::lifted::{
-    Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Schema, Term,
-};
+use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId, Schema};
 use crate::pddl::ast::Assignment;
 use crate::quantity::NumericId;
 
@@ -39,111 +38,6 @@ impl Footprint {
     pub(super) fn conflicts(&self) -> bool {
         self.numbers.windows(2).any(|pair| pair[0].0 == pair[1].0)
     }
-}
-
-/// Atoms or functions with gaps where a quantifier runs through all objects; none for any arguments at all.
-type Pattern<S> = (S, Option<Vec<Option<ObjectId>>>);
-
-/// What is read, before it is looked up.
-#[derive(Default)]
-pub(super) struct Reads {
-    atoms: Vec<Pattern<PredicateId>>,
-    numbers: Vec<Pattern<FunctionId>>,
-}
-
-impl Reads {
-    /// Adds what a condition mentions under a binding of the parameters.
-    pub(super) fn condition(&mut self, lifted: &Lifted, formula: &Formula, binding: &Binding) {
-        match formula {
-            Formula::And(parts) | Formula::Or(parts) => {
-                for part in parts {
-                    self.condition(lifted, part, binding);
-                }
-            }
-            Formula::Exists(_, body) | Formula::ForAll(_, body) => self.condition(lifted, body, binding),
-            Formula::Literal { predicate, terms, .. } => {
-                if lifted.predicates[predicate.index()].derived {
-                    self.through_axioms(lifted, *predicate);
-                }
-                self.atoms.push((*predicate, Some(arguments(terms, binding))));
-            }
-            Formula::Equal { .. } => {}
-            Formula::Compare(_, left, right, _) => {
-                self.expression(left, binding);
-                self.expression(right, binding);
-            }
-        }
-    }
-
-    /// Adds what effects mention besides their targets.
-    pub(super) fn effects(&mut self, lifted: &Lifted, effects: &[Effect], binding: &Binding) {
-        for effect in effects {
-            self.condition(lifted, &effect.condition, binding);
-            if let Change::Assign { expression, .. } = &effect.change {
-                self.expression(expression, binding);
-            }
-        }
-    }
-
-    fn expression(&mut self, expression: &Expression, binding: &Binding) {
-        match expression {
-            Expression::Number(_) | Expression::TotalTime => {}
-            Expression::Function(function, terms, _) => {
-                self.numbers.push((*function, Some(arguments(terms, binding))));
-            }
-            Expression::Negate(inner) => self.expression(inner, binding),
-            Expression::Sum(parts) | Expression::Product(parts, _) => {
-                for part in parts {
-                    self.expression(part, binding);
-                }
-            }
-            Expression::Quotient(left, right, _) => {
-                self.expression(left, binding);
-                self.expression(right, binding);
-            }
-        }
-    }
-
-    fn through_axioms(&mut self, lifted: &Lifted, predicate: PredicateId) {
-        let (mut open, mut seen) = (vec![predicate], FxHashSet::default());
-        while let Some(predicate) = open.pop() {
-            for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
-                let mut below = Self::default();
-                below.literals(&axiom.condition);
-                for (predicate, _) in below.atoms {
-                    if seen.insert(predicate) {
-                        self.atoms.push((predicate, None));
-                        open.push(predicate);
-                    }
-                }
-                self.numbers.extend(below.numbers.into_iter().map(|(function, _)| (function, None)));
-            }
-        }
-    }
-
-    /// What a condition mentions, whatever the arguments are.
-    fn literals(&mut self, formula: &Formula) {
-        match formula {
-            Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| self.literals(part)),
-            Formula::Exists(_, body) | Formula::ForAll(_, body) => self.literals(body),
-            Formula::Literal { predicate, .. } => self.atoms.push((*predicate, None)),
-            Formula::Equal { .. } => {}
-            Formula::Compare(_, left, right, _) => {
-                let nothing = Binding::new();
-                self.expression(left, &nothing);
-                self.expression(right, &nothing);
-            }
-        }
-    }
-}
-
-/// Variables that nothing is bound to are gaps.
-fn arguments(terms: &[Term], binding: &Binding) -> Vec<Option<ObjectId>> {
-    let object = |term: &Term| match term {
-        Term::Object(object) => Some(*object),
-        Term::Parameter(parameter) => binding.get(*parameter as usize).copied().flatten(),
-    };
-    terms.iter().map(object).collect()
 }
 
 /// Collects what is written, then looks up what is read of it.

@@ -66,6 +66,7 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
             if !events.is_empty() && matches!(half, Half::End | Half::Whole) {
                 part.end_effects.push(effect(Change::Delete(waited, Vec::new())));
             }
+            part.action = lifted.schemas.len() as u32;
             lifted.schemas.push(part);
             origins.push(Origin { schema: index, half });
             designs.push(own.clone());
@@ -188,6 +189,9 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
         at_end: Formula::truth(),
         end_effects: effects,
         duration: None,
+        is_chosen: false,
+        joint: None,
+        action: lifted.schemas.len() as u32,
         place: Place { file: File::Problem, span: Span::default() },
     }
 }

@@ -1,71 +1,42 @@
 //! What an instance changes, by case and by moment.
 
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
 use crate::error::{Error, Place};
 use crate::ground::evaluate::{AtomId, Failure, World};
-use crate::ground::events::Passage;
+use crate::ground::events::{Interference, Passage};
 use crate::ground::frame::Operand;
-use crate::ground::instantiate::{Build, GroundConditional, GroundOperator};
+use crate::ground::instantiate::{Build, GroundConditional, GroundOperator, admit_some, forbid};
 use crate::ground::join::guards_of_exists;
+use crate::ground::numbers::{Numbers, numbers, substitute, way_of};
+use crate::ground::reads::{Reads, matches};
 use crate::ground::residual::{Residual, constant_comparison};
 use crate::lifted::{Change, Effect, Rational, Schema};
 use crate::pddl::ast::Assignment;
-use crate::quantity::{Linear, NumericId, Quantity};
+use crate::quantity::{Linear, NumericId};
+use crate::task::Forbidden;
 
 /// An instance becomes at most this many operators.
 const CASE_LIMIT: usize = 64;
 
-/// What numeric variables become; a list, because an operator changes few.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Numbers {
-    /// Ascending by variable.
-    changes: Vec<(NumericId, Linear<Rational>)>,
-}
-
-impl Numbers {
-    pub(crate) fn get(&self, variable: NumericId) -> Option<&Linear<Rational>> {
-        let position = self.changes.binary_search_by_key(&variable, |(own, _)| *own);
-        position.ok().map(|position| &self.changes[position].1)
-    }
-
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &(NumericId, Linear<Rational>)> {
-        self.changes.iter()
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.changes.is_empty()
-    }
-
-    pub(crate) fn retain(&mut self, keep: &dyn Fn(NumericId) -> bool) {
-        self.changes.retain(|(variable, _)| keep(*variable));
-    }
-
-    /// One variable that changes.
-    pub(super) fn one(variable: NumericId, value: Linear<Rational>) -> Self {
-        Self { changes: vec![(variable, value)] }
-    }
-
-    fn insert(&mut self, variable: NumericId, value: Linear<Rational>) {
-        match self.changes.binary_search_by_key(&variable, |(own, _)| *own) {
-            Ok(position) => self.changes[position].1 = value,
-            Err(position) => self.changes.insert(position, (variable, value)),
-        }
-    }
-}
-
 /// What the start or the end of an instance changes, each change under a condition.
 #[derive(Clone)]
 pub(super) struct Moment {
-    changes: Vec<(Residual, GroundChange)>,
+    pub(super) changes: Vec<(Residual, GroundChange)>,
 }
 
 #[derive(Clone)]
-enum GroundChange {
+pub(super) enum GroundChange {
     Atom(AtomId, bool),
     Number {
         variable: NumericId,
         assignment: Assignment,
         /// None if it is undefined: the operator does not exist where the change would be made.
         operand: Option<Linear<Rational>>,
+        /// Combinations of designs for which it is undefined.
+        undefined: Arc<[Forbidden]>,
         place: Place,
     },
 }
@@ -83,6 +54,8 @@ struct Start {
     adds: Vec<AtomId>,
     deletes: Vec<AtomId>,
     numbers: Numbers,
+    /// Combinations of designs for which a number has no value.
+    undefined: Vec<Forbidden>,
 }
 
 impl Build<'_, '_> {
@@ -121,13 +94,13 @@ impl Build<'_, '_> {
         self.world.in_effect = false;
         let condition = condition?;
         if condition != Residual::False {
-            let change = self.change(&effect.change, operand)?;
+            let change = self.change(&effect.change, operand, condition == Residual::True)?;
             changes.push((condition, change));
         }
         Ok(())
     }
 
-    fn change(&mut self, change: &Change, operand: &Operand) -> Result<GroundChange, Failure> {
+    fn change(&mut self, change: &Change, operand: &Operand, certain: bool) -> Result<GroundChange, Failure> {
         Ok(match change {
             Change::Add(predicate, terms) | Change::Delete(predicate, terms) => {
                 let atom = self.world.atom(*predicate, &World::arguments(terms, &self.binding));
@@ -136,24 +109,23 @@ impl Build<'_, '_> {
             Change::Assign { assignment, function, terms, expression, place } => {
                 let arguments = World::arguments(terms, &self.binding);
                 let variable = self.world.numeric(*function, &arguments, *place)?;
-                let operand = match operand {
-                    Operand::Undefined => None,
-                    Operand::Open(operand) => Some(operand.clone()),
-                    Operand::Closed => match self.open(expression) {
-                        Ok(operand) => Some(operand),
-                        Err(Failure::Undefined) => None,
-                        Err(error) => return Err(error),
-                    },
+                let nothing: Arc<[Forbidden]> = [].into();
+                let (operand, undefined) = match operand {
+                    Operand::Undefined => (None, nothing),
+                    Operand::Open(operand, undefined) => (Some(operand.clone()), undefined.clone()),
+                    Operand::Closed if certain => (possible(self.open(expression))?, nothing),
+                    Operand::Closed => self.open_apart(expression)?,
                 };
-                GroundChange::Number { variable, assignment: *assignment, operand, place: *place }
+                GroundChange::Number { variable, assignment: *assignment, operand, undefined, place: *place }
             }
         })
     }
 }
 
 impl Moment {
-    fn is_certain(&self) -> bool {
-        self.changes.iter().all(|(condition, _)| *condition == Residual::True)
+    /// Nothing changes.
+    pub(super) fn nothing() -> Self {
+        Self { changes: Vec::new() }
     }
 }
 
@@ -168,59 +140,66 @@ impl Start {
 
     fn new<'c, I: Iterator<Item = &'c GroundChange>>(changes: impl Fn() -> I) -> Result<Self, Failure> {
         let (adds, deletes) = atoms(changes());
-        Ok(Self { adds, deletes, numbers: numbers(changes(), &Numbers::default())? })
+        let undefined = changes().flat_map(GroundChange::undefined).cloned().collect();
+        Ok(Self { adds, deletes, numbers: numbers(changes(), &Numbers::default())?, undefined })
     }
 }
 
 /// What must hold between the start effects and the end effects, and what happens by itself in between.
 pub(super) struct Middle<'m> {
-    pub(super) conditions: &'m [Residual],
-    /// Those that hold all the time.
+    /// Hold all the time between start and end.
     pub(super) over_all: &'m [Residual],
-    pub(super) passage: Option<(Passage<'m>, &'m Quantity<Rational>)>,
+    /// Hold before the end.
+    pub(super) at_end: &'m [Residual],
+    /// If something happens by itself: when the action starts and ends, and what must not hold then.
+    pub(super) passage: Option<&'m (Passage<'m>, Interference)>,
 }
 
 impl Middle<'_> {
     /// Adds the conditions in terms of the state before the start, and to the start what happens until the end.
     fn pass(&self, start: &mut Start, parts: &mut Vec<Residual>) {
-        if let Some((passage, duration)) = &self.passage {
-            parts.extend(passage.conditions(duration));
-            for event in passage.events() {
-                parts.extend(self.over_all.iter().map(|residual| after_start(residual, start)));
-                start.change(event);
-            }
+        let Some((passage, interference)) = self.passage else {
+            let conditions = self.over_all.iter().chain(self.at_end);
+            parts.extend(conditions.map(|residual| after_start(residual, start)));
+            return;
+        };
+        parts.extend(passage.conditions());
+        parts.extend(interference.start.iter().map(Residual::negated));
+        parts.extend(self.over_all.iter().map(|residual| after_start(residual, start)));
+        for event in passage.events() {
+            start.change(event);
+            parts.extend(self.over_all.iter().map(|residual| after_start(residual, start)));
         }
-        parts.extend(self.conditions.iter().map(|residual| after_start(residual, start)));
-        if let Some((passage, duration)) = &self.passage {
-            start.change(&passage.changes());
-            let (clock, value) = passage.clock(duration);
+        parts.extend(self.at_end.iter().map(|residual| after_start(residual, start)));
+        parts.extend(interference.end.iter().map(|residual| after_start(residual, start).negated()));
+        start.change(passage.event_at_end().unwrap_or_default());
+        start.change(&passage.changes());
+        if let Some((clock, value)) = passage.clock() {
             start.numbers.insert(clock, value);
         }
     }
 }
 
-/// The cases of an instance: one, unless its start is conditional or its numbers are.
+/// The cases of an instance: one, unless its start is conditional or its numbers are. A case that contradicts itself, or in which
+/// a value is missing, is none; the others stay (PDDL 2.1, section 8: an effect whose condition does not hold is no effect).
 pub(super) fn cases(
     schema: &Schema,
-    before: Vec<Residual>,
+    before: &[Residual],
     start: &Moment,
     middle: &Middle<'_>,
-    end: Moment,
+    end: &Moment,
 ) -> Result<Vec<Case>, Failure> {
-    if start.is_certain() && end.is_certain() {
-        let mut start = Start::new(|| start.changes.iter().map(|(_, change)| change))?;
-        let mut parts = before;
-        middle.pass(&mut start, &mut parts);
-        return Ok(vec![Case { parts, start, end: end.changes }]);
-    }
     let mut all = Vec::new();
     for (decided, chosen) in split(schema, start.changes.iter().map(|(condition, _)| condition))? {
         let holds = |(condition, _): &&(Residual, GroundChange)| {
             *condition == Residual::True || chosen.contains(&condition)
         };
         let changes = || start.changes.iter().filter(holds).map(|(_, change)| change);
-        let mut start = Start::new(changes)?;
         let mut parts: Vec<_> = before.iter().cloned().chain(decided).collect();
+        if contradictory(&parts) {
+            continue;
+        }
+        let Some(mut start) = possible(Start::new(changes))? else { continue };
         middle.pass(&mut start, &mut parts);
         let after = |residual: &Residual| after_start(residual, &start);
         let end: Vec<_> = end
@@ -242,14 +221,91 @@ pub(super) fn cases(
                 };
                 (settled, change.clone())
             };
-            all.push(Case {
-                parts: parts.iter().cloned().chain(decided).collect(),
-                start: start.clone(),
-                end: end.iter().map(settle).filter(|(condition, _)| *condition != Residual::False).collect(),
-            });
+            let parts: Vec<_> = parts.iter().cloned().chain(decided).collect();
+            if !contradictory(&parts) {
+                let end = end.iter().map(settle).filter(|(condition, _)| *condition != Residual::False);
+                all.push(Case { parts, start: start.clone(), end: end.collect() });
+            }
         }
     }
     Ok(all)
+}
+
+/// Nothing where something cannot be.
+pub(super) fn possible<T>(result: Result<T, Failure>) -> Result<Option<T>, Failure> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(Failure::Undefined) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether parts cannot hold together, as far as their literals tell.
+fn contradictory(parts: &[Residual]) -> bool {
+    fn note(parts: &[Residual], known: &mut FxHashMap<AtomId, bool>) -> bool {
+        parts.iter().any(|part| match part {
+            Residual::False => true,
+            Residual::And(parts) => note(parts, known),
+            Residual::Literal { atom, positive } => known.insert(*atom, *positive) == Some(!positive),
+            _ => false,
+        })
+    }
+    note(parts, &mut FxHashMap::default())
+}
+
+/// Conditions under which two parts of one happening interfere: one changes what the other reads, they set an atom to
+/// different values, or they change a number in ways that do not commute.
+pub(super) fn clashes(
+    world: &World<'_>,
+    (first_reads, first): (&Reads, &Moment),
+    (second_reads, second): (&Reads, &Moment),
+) -> Vec<Residual> {
+    let mut clashes = Vec::new();
+    for (reads, moment) in [(first_reads, second), (second_reads, first)] {
+        let disturbing = moment.changes.iter().filter(|(_, change)| change.disturbs(world, reads));
+        clashes.extend(disturbing.map(|(condition, _)| condition.clone()));
+    }
+    for (one, earlier) in &first.changes {
+        for (other, later) in &second.changes {
+            let clash = match (earlier, later) {
+                (GroundChange::Atom(atom, holds), GroundChange::Atom(same, positive)) => {
+                    atom == same && holds != positive
+                }
+                (
+                    GroundChange::Number { variable, assignment: way, .. },
+                    GroundChange::Number { variable: same, assignment, .. },
+                ) => variable == same && (way_of(*way) != way_of(*assignment) || way_of(*way) == 0),
+                _ => false,
+            };
+            if clash {
+                clashes.push(Residual::junction([one.clone(), other.clone()], true));
+            }
+        }
+    }
+    clashes
+}
+
+impl GroundChange {
+    fn undefined(&self) -> &[Forbidden] {
+        match self {
+            Self::Atom(..) => &[],
+            Self::Number { undefined, .. } => undefined,
+        }
+    }
+
+    /// Whether it changes what is read.
+    fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
+        match self {
+            Self::Atom(atom, _) => {
+                let (predicate, arguments) = world.atom_key(*atom);
+                reads.atoms.iter().any(|pattern| matches(pattern, predicate, arguments))
+            }
+            Self::Number { variable, .. } => {
+                let (function, arguments) = world.numeric_key(*variable);
+                reads.numbers.iter().any(|pattern| matches(pattern, function, arguments))
+            }
+        }
+    }
 }
 
 /// Every way in which conditions can turn out: what must hold then, and which of them hold.
@@ -285,21 +341,36 @@ fn split<'r>(
 }
 
 impl Case {
+    /// The combinations of designs that the case cannot run with; `Failure::Undefined` if there is no other.
+    fn forbidden(&self, template: &GroundOperator) -> Result<Arc<[Forbidden]>, Failure> {
+        let end = self.end.iter().filter(|(condition, _)| *condition == Residual::True);
+        let rules = end.flat_map(|(_, change)| change.undefined()).chain(&self.start.undefined);
+        let mut rules = rules.peekable();
+        if rules.peek().is_none() {
+            return Ok(template.forbidden.clone());
+        }
+        let mut all = template.forbidden.to_vec();
+        for rule in rules {
+            for combination in &rule.combinations {
+                forbid(&mut all, &rule.slots, combination.clone());
+            }
+        }
+        let sizes: Vec<_> = template.slots.iter().map(|(_, designs)| designs.len()).collect();
+        if admit_some(&all, &sizes) { Ok(all.into()) } else { Err(Failure::Undefined) }
+    }
+
     /// The operator of this case; everything but conditions and effects is that of the template.
     pub(super) fn operator(
         self,
         world: &mut World<'_>,
         template: GroundOperator,
     ) -> Result<GroundOperator, Failure> {
+        let forbidden = self.forbidden(&template)?;
         let start = self.start;
         let certain = || self.end.iter().filter(|(condition, _)| *condition == Residual::True);
         let (end_adds, end_deletes) = atoms(certain().map(|(_, change)| change));
         let mut numeric_effects = numbers(certain().map(|(_, change)| change), &start.numbers)?;
-        for (variable, value) in start.numbers.changes {
-            if numeric_effects.get(variable).is_none() {
-                numeric_effects.insert(variable, value);
-            }
-        }
+        numeric_effects.complete(start.numbers);
         let mut conditional: Vec<GroundConditional> = Vec::new();
         for (condition, change) in self.end.iter().filter(|(condition, _)| *condition != Residual::True) {
             let GroundChange::Atom(atom, positive) = change else { continue };
@@ -331,7 +402,7 @@ impl Case {
         deletes.dedup();
         deletes.retain(|atom| !adds.contains(atom));
         let condition = world.condition(&self.parts)?;
-        Ok(GroundOperator { condition, adds, deletes, conditional, numeric_effects, ..template })
+        Ok(GroundOperator { condition, adds, deletes, conditional, numeric_effects, forbidden, ..template })
     }
 }
 
@@ -357,112 +428,8 @@ fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, V
     (adds, deletes)
 }
 
-/// Whether changes of one number at one time go together: additions, scalings, and assignments of the same value do.
-/// `Failure::Undefined` if they do not, which leaves the action inapplicable (PDDL 2.1, section 8).
-fn reconcile(earlier: &GroundChange, later: &GroundChange) -> Result<(), Failure> {
-    let (
-        GroundChange::Number { assignment: kind, operand: known, .. },
-        GroundChange::Number { assignment, operand, place, .. },
-    ) = (earlier, later)
-    else {
-        return Ok(());
-    };
-    let way = |assignment: &Assignment| match assignment {
-        Assignment::Assign => 0,
-        Assignment::Increase | Assignment::Decrease => 1,
-        Assignment::ScaleUp | Assignment::ScaleDown => 2,
-    };
-    match (known, operand) {
-        _ if way(kind) != way(assignment) => Err(Failure::Undefined),
-        (Some(known), Some(value)) if way(kind) == 0 && known != value => {
-            let is_constant =
-                |value: &Linear<Rational>| value.coefficients.is_empty() && value.quantity.tables.is_empty();
-            if is_constant(known) && is_constant(value) {
-                return Err(Failure::Undefined);
-            }
-            Err(Failure::Error(Error::Unsupported {
-                construct: "two different values assigned to one number at one time".into(),
-                instead: "one `assign` of each number".into(),
-                place: *place,
-            }))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// What numeric variables become, in terms of the state before the action; `before` are the changes that
-/// the action has made already.
-fn numbers<'c>(
-    changes: impl Iterator<Item = &'c GroundChange>,
-    before: &Numbers,
-) -> Result<Numbers, Failure> {
-    let mut changed = Numbers::default();
-    let mut last: Vec<(NumericId, &GroundChange)> = Vec::new();
-    for change in changes {
-        let GroundChange::Number { variable, assignment, operand, place } = change else { continue };
-        match last.iter_mut().find(|(known, _)| known == variable) {
-            Some((_, earlier)) => {
-                reconcile(earlier, change)?;
-                *earlier = change;
-            }
-            None => last.push((*variable, change)),
-        }
-        let mut operand = operand.clone().ok_or(Failure::Undefined)?;
-        substitute(&mut operand, before);
-        let current = || {
-            let old = changed.get(*variable).or_else(|| before.get(*variable));
-            old.cloned().unwrap_or_else(|| Linear::variable(*variable))
-        };
-        let value = match assignment {
-            Assignment::Assign => operand,
-            Assignment::Increase => sum(current(), &operand),
-            Assignment::Decrease => sum(current(), &operand.negated()),
-            Assignment::ScaleUp | Assignment::ScaleDown => {
-                scaled(current(), &operand, *assignment == Assignment::ScaleDown, *place)?
-            }
-        };
-        changed.insert(*variable, value);
-    }
-    Ok(changed)
-}
-
-fn sum(mut left: Linear<Rational>, right: &Linear<Rational>) -> Linear<Rational> {
-    left.add(right);
-    left
-}
-
-fn scaled(
-    mut value: Linear<Rational>,
-    factor: &Linear<Rational>,
-    inverse: bool,
-    place: Place,
-) -> Result<Linear<Rational>, Failure> {
-    if !factor.coefficients.is_empty() || !factor.quantity.tables.is_empty() {
-        return Err(Failure::Error(Error::NonLinear { place }));
-    }
-    let factor = factor.quantity.constant.clone();
-    if inverse && factor == Rational::from_integer(0) {
-        return Err(Failure::Undefined);
-    }
-    value.scale(&if inverse { factor.recip() } else { factor });
-    Ok(value)
-}
-
-fn substitute(linear: &mut Linear<Rational>, before: &Numbers) {
-    if !linear.coefficients.iter().any(|(variable, _)| before.get(*variable).is_some()) {
-        return;
-    }
-    let mut result = Linear { coefficients: Vec::new(), quantity: linear.quantity.clone() };
-    for (variable, factor) in &linear.coefficients {
-        let mut value = before.get(*variable).cloned().unwrap_or_else(|| Linear::variable(*variable));
-        value.scale(factor);
-        result.add(&value);
-    }
-    *linear = result;
-}
-
 /// A condition of the middle or end of a durative action in terms of the state before its start.
-fn after_start(residual: &Residual, Start { adds, deletes, numbers }: &Start) -> Residual {
+fn after_start(residual: &Residual, Start { adds, deletes, numbers, .. }: &Start) -> Residual {
     if adds.is_empty() && deletes.is_empty() && numbers.is_empty() {
         return residual.clone();
     }

@@ -131,6 +131,20 @@ impl<'a> World<'a> {
         AtomId(known.unwrap_or_else(|| self.atoms.insert_full((predicate, arguments.into()), ()).0) as u32)
     }
 
+    /// The predicate and the arguments of an atom.
+    pub(crate) fn atom_key(&self, atom: AtomId) -> (&PredicateId, &[ObjectId]) {
+        let ((predicate, arguments), ()) =
+            self.atoms.get_index(atom.index()).expect("invariant: an atom's number is its place");
+        (predicate, arguments)
+    }
+
+    /// The function and the arguments of a numeric variable.
+    pub(crate) fn numeric_key(&self, variable: NumericId) -> (&FunctionId, &[ObjectId]) {
+        let ((function, arguments), ()) =
+            self.numerics.get_index(variable.index()).expect("invariant: a variable's number is its place");
+        (function, arguments)
+    }
+
     /// The initial value of a numeric fluent, or the value of a static function.
     pub(crate) fn value(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<Rational> {
         self.values.get(&Key(function, arguments)).cloned()

@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::ground::Generality;
 use crate::ground::derived::components;
 use crate::ground::evaluate::AtomId;
+use crate::ground::events::Timing;
 use crate::ground::instantiate::{GroundOperator, GroundSlots, GroundTask};
 use crate::ground::integers::{Denominator, Integers};
 use crate::ground::metric::initial_value;
@@ -41,7 +42,8 @@ pub(crate) fn finish(
     let mut durations = Denominator::new("durations");
     for operator in &task.operators {
         durations.quantity(&operator.duration);
-        operator.wait.iter().for_each(|time| durations.number(time));
+        let bounds = [&operator.timing.start, &operator.timing.end].into_iter().flatten();
+        operator.wait.iter().chain(bounds.map(|(time, _)| time)).for_each(|time| durations.number(time));
     }
     let mut durations = durations.integers()?;
     let mut slots = Slots::new(&task.operators);
@@ -68,6 +70,10 @@ pub(crate) fn finish(
             configuration: ground.configuration,
             forbidden: ground.forbidden,
             wait: ground.wait.map(|time| durations.number(&time)).transpose()?,
+            timing: Timing {
+                start: ground.timing.start.map(|(time, _)| durations.number(&time)).transpose()?,
+                end: ground.timing.end.map(|(time, _)| durations.number(&time)).transpose()?,
+            },
         });
     }
     let goal = match &task.goal {

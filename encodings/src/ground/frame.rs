@@ -9,14 +9,13 @@ use std::sync::Arc;
 use crate::configuration::{
     SlotParameter, conjuncts, expression_terms, formula_terms, slots_of_expression, slots_of_formula,
 };
+use crate::ground::effects::possible;
 use crate::ground::evaluate::{Binding, Failure, Row, Slots, World};
 use crate::ground::instantiate::{Build, GroundSlots, admit_some};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::quantity::{Linear, Quantity, SlotSet};
 use crate::task::Forbidden;
-
-static NOTHING: Formula = Formula::truth();
 
 /// A schema with what mentions its slots apart from the rest.
 pub(super) struct Outline<'a> {
@@ -25,9 +24,8 @@ pub(super) struct Outline<'a> {
     /// The parameters on which the frame of an instance depends, ascending.
     key: Vec<u32>,
     pub(super) start: Conjuncts<'a>,
-    pub(super) middle: Conjuncts<'a>,
-    /// Empty if nothing happens by itself.
     pub(super) over_all: Conjuncts<'a>,
+    pub(super) at_end: Conjuncts<'a>,
 }
 
 /// The conjuncts of a condition.
@@ -45,8 +43,8 @@ pub(super) struct Frame<'a> {
     pub(super) forbidden: Arc<[Forbidden]>,
     /// What is left of the open conjuncts.
     pub(super) start: Vec<Residual>,
-    pub(super) middle: Vec<Residual>,
     pub(super) over_all: Vec<Residual>,
+    pub(super) at_end: Vec<Residual>,
     /// By the position of the effect.
     pub(super) start_operands: Vec<Operand>,
     pub(super) end_operands: Vec<Operand>,
@@ -58,7 +56,8 @@ pub(super) enum Operand {
     /// It mentions no slot, or the effect has bound variables, or none.
     Closed,
     Undefined,
-    Open(Linear<Rational>),
+    /// With the combinations of designs for which it is undefined, if the effect has a condition.
+    Open(Linear<Rational>, Arc<[Forbidden]>),
 }
 
 impl<'a> Conjuncts<'a> {
@@ -90,9 +89,8 @@ fn settled(lifted: &Lifted, conjunct: &Formula) -> bool {
 impl<'a> Outline<'a> {
     pub(super) fn new(lifted: &Lifted, schema: &'a Schema, parameters: &'a [SlotParameter]) -> Self {
         let start = Conjuncts::new(lifted, &schema.start_condition, parameters);
-        let middle = Conjuncts::new(lifted, &schema.middle_condition, parameters);
-        let over_all = if lifted.events.is_empty() { &NOTHING } else { &schema.over_all };
-        let over_all = Conjuncts::new(lifted, over_all, parameters);
+        let over_all = Conjuncts::new(lifted, &schema.over_all, parameters);
+        let at_end = Conjuncts::new(lifted, &schema.at_end, parameters);
         let mut key = Vec::new();
         let mut note = |term: Term| {
             if let Term::Parameter(parameter) = term
@@ -105,7 +103,7 @@ impl<'a> Outline<'a> {
         for slot in parameters {
             note(slot.function);
         }
-        for (conjunct, _) in start.open.iter().chain(&middle.open) {
+        for (conjunct, _) in start.open.iter().chain(&over_all.open).chain(&at_end.open) {
             formula_terms(conjunct, &mut note);
         }
         let effects = schema.start_effects.iter().chain(&schema.end_effects);
@@ -116,7 +114,7 @@ impl<'a> Outline<'a> {
         }
         key.sort_unstable();
         key.dedup();
-        Self { schema, parameters, key, start, middle, over_all }
+        Self { schema, parameters, key, start, over_all, at_end }
     }
 
     /// The objects on which the frame of an instance depends.
@@ -127,7 +125,7 @@ impl<'a> Outline<'a> {
     /// The conditions and expressions that mention one slot and no other.
     fn about(&self, position: u16) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
         let only = SlotSet::from_slice(&[position]);
-        let open = self.start.open.iter().chain(&self.middle.open);
+        let open = self.start.open.iter().chain(&self.over_all.open).chain(&self.at_end.open);
         let conditions = open.filter(|(_, mentioned)| *mentioned == only).map(|(conjunct, _)| *conjunct);
         let effects = self.schema.start_effects.iter().chain(&self.schema.end_effects);
         let unconditional = effects.filter(|effect| conjuncts(&effect.condition).is_empty());
@@ -169,8 +167,8 @@ impl<'a> Frame<'a> {
         let mut build = Build { world, binding, slots: &designs, forbidden: Vec::new() };
         let start = build.open_conditions(&outline.start.open)?;
         let start_operands = build.operands(&outline.schema.start_effects)?;
-        let middle = build.open_conditions(&outline.middle.open)?;
         let over_all = build.open_conditions(&outline.over_all.open)?;
+        let at_end = build.open_conditions(&outline.at_end.open)?;
         let end_operands = build.operands(&outline.schema.end_effects)?;
         let duration = match &outline.schema.duration {
             Some(duration) => build.static_quantity(duration, outline.schema)?,
@@ -184,15 +182,15 @@ impl<'a> Frame<'a> {
         let function = |slot: &SlotParameter| World::arguments(&[slot.function], core).first().copied();
         let slots = outline.parameters.iter().zip(&designs.designs);
         let slots: Option<_> = slots.map(|(slot, own)| Some((function(slot)?, own.clone()))).collect();
-        let Some(slots) = slots else { return Ok(None) };
+        let slots = slots.expect("invariant: the function of a slot is no slot");
         let forbidden = forbidden.into();
         Ok(Some(Self {
             designs,
             slots,
             forbidden,
             start,
-            middle,
             over_all,
+            at_end,
             start_operands,
             end_operands,
             duration,
@@ -206,11 +204,14 @@ impl Build<'_, '_> {
         for effect in effects {
             operands.push(match open_operand(effect, self.slots.parameters) {
                 None => Operand::Closed,
-                Some(expression) => match self.open(expression) {
-                    Ok(operand) => Operand::Open(operand),
-                    Err(Failure::Undefined) => Operand::Undefined,
-                    Err(error) => return Err(error),
-                },
+                Some(expression) => {
+                    let (operand, undefined) = if conjuncts(&effect.condition).is_empty() {
+                        (possible(self.open(expression))?, [].into())
+                    } else {
+                        self.open_apart(expression)?
+                    };
+                    operand.map_or(Operand::Undefined, |operand| Operand::Open(operand, undefined))
+                }
             });
         }
         Ok(operands)

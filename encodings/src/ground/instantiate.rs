@@ -16,15 +16,17 @@ use rustc_hash::FxHashMap;
 use crate::configuration::{SlotParameter, depends_on_own_start};
 use crate::error::{Error, File, Place};
 use crate::ground::derived;
-use crate::ground::effects::{Middle, Numbers, cases};
+use crate::ground::effects::{Middle, Moment, cases, clashes, possible};
 use crate::ground::evaluate::{AtomId, Binding, Failure, Row, Slots, World, for_each_combination};
-use crate::ground::events::Timeline;
+use crate::ground::events::{Conflicts, Timeline, Timing};
 use crate::ground::frame::{Frame, Outline};
 use crate::ground::metric::GroundObjective;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
+use crate::ground::numbers::Numbers;
 use crate::ground::reach::Reached;
+use crate::ground::reads::Reads;
 use crate::ground::residual::{Residual, compare};
-use crate::lifted::{Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
+use crate::lifted::{Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::limits::Limits;
 use crate::pddl::ast::Span;
 use crate::quantity::{Linear, Quantity, SlotSet};
@@ -53,6 +55,8 @@ pub(crate) struct GroundOperator {
     pub(crate) duration: Quantity<Rational>,
     /// Set if this is no action but a wait until that time.
     pub(crate) wait: Option<Rational>,
+    /// Each time with whether a moment later is meant, until all durations are known.
+    pub(crate) timing: Timing<(Rational, bool)>,
 }
 
 /// Atoms that change if a conjunction holds before the operator.
@@ -89,7 +93,7 @@ pub(crate) fn instantiate<'a>(
     let mut operators = Vec::with_capacity(reached.instances.iter().map(Vec::len).sum());
     let mut errors = Vec::new();
     for (((schema, slots), instances), index) in
-        lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0..)
+        lifted.schemas.iter().zip(slots).zip(&reached.instances).zip(0_usize..)
     {
         if depends_on_own_start(lifted, schema) {
             errors.push(Error::Unsupported {
@@ -117,8 +121,8 @@ pub(crate) fn instantiate<'a>(
             };
             let cases = frame.and_then(|frame| match frame {
                 Some(frame) => {
-                    let designs = &designs[index as usize];
-                    instance(&mut world, &outline, index, designs, &frame, timeline.as_ref(), binding)
+                    let designs = &designs[index];
+                    instance(&mut world, &outline, designs, &frame, timeline.as_ref(), binding)
                 }
                 None => Ok(Vec::new()),
             });
@@ -147,6 +151,9 @@ pub(crate) fn instantiate<'a>(
         return Err(errors);
     }
     operators.extend(timeline.iter().flat_map(|timeline| timeline.waits(lifted.schemas.len() as u32)));
+    if let Some(timeline) = &timeline {
+        timeline.settle(&mut operators).map_err(|error| vec![error])?;
+    }
     let mut task = GroundTask { world, operators, goal, objectives: Vec::new() };
     derived::simplify(&mut task);
     Ok(task)
@@ -156,16 +163,16 @@ pub(crate) fn instantiate<'a>(
 fn instance(
     world: &mut World<'_>,
     outline: &Outline<'_>,
-    index: u32,
     designs: &[SlotParameter],
     frame: &Frame,
     timeline: Option<&Timeline>,
     core: &Binding,
 ) -> Result<Vec<GroundOperator>, Failure> {
     let mut build = Build { world, binding: core.clone(), slots: &frame.designs, forbidden: Vec::new() };
-    let before = build.conditions(&outline.start.closed, &frame.start)?;
+    let mut before = build.conditions(&outline.start.closed, &frame.start)?;
     let start = build.moment(&outline.schema.start_effects, &frame.start_operands)?;
-    let middle = build.conditions(&outline.middle.closed, &frame.middle)?;
+    let over_all = build.conditions(&outline.over_all.closed, &frame.over_all)?;
+    let at_end = build.conditions(&outline.at_end.closed, &frame.at_end)?;
     let end = build.moment(&outline.schema.end_effects, &frame.end_operands)?;
     let mut forbidden = frame.forbidden.clone();
     if !build.forbidden.is_empty() {
@@ -182,7 +189,7 @@ fn instance(
     }
     let arguments = build.arguments(outline.schema);
     let template = GroundOperator {
-        schema: index,
+        schema: outline.schema.action,
         configuration: configuration(&arguments, designs, core),
         arguments,
         slots: frame.slots.clone(),
@@ -195,33 +202,57 @@ fn instance(
         costs: Vec::new(),
         duration: frame.duration.clone(),
         wait: None,
+        timing: Timing::free(),
     };
-    let cases = match timeline {
-        None => {
-            let middle = Middle { conditions: &middle, over_all: &[], passage: None };
-            cases(outline.schema, before, &start, &middle, end)?
-        }
-        Some(timeline) => {
-            let over_all = build.conditions(&outline.over_all.closed, &frame.over_all)?;
-            let mut all = Vec::new();
-            for passage in timeline.passages(&frame.duration) {
-                let passage = Some((passage, &frame.duration));
-                let middle = Middle { conditions: &middle, over_all: &over_all, passage };
-                all.extend(cases(outline.schema, before.clone(), &start, &middle, end.clone())?);
-            }
-            all
-        }
-    };
+    let lifted = build.world.lifted;
+    if let Some(joint) = &outline.schema.joint {
+        let (first, second) = outline.schema.end_effects.split_at(joint.start_effects);
+        let (first_reads, second_reads) =
+            (reads(lifted, &joint.start, first, core), reads(lifted, &joint.end, second, core));
+        let (own, others) = frame.end_operands.split_at(joint.start_effects);
+        let first = build.moment(first, own)?;
+        let second = build.moment(second, others)?;
+        let clashes = clashes(build.world, (&first_reads, &first), (&second_reads, &second));
+        before.extend(clashes.iter().map(Residual::negated));
+    }
+    let untimed = Middle { over_all: &over_all, at_end: &at_end, passage: None };
     let mut operators = Vec::new();
-    let templates = std::iter::repeat_n(template, cases.len());
-    for (case, template) in std::iter::zip(cases, templates) {
-        match case.operator(build.world, template) {
-            Ok(operator) => operators.push(operator),
-            Err(Failure::Undefined) => {}
-            Err(error) => return Err(error),
+    let Some(timeline) = timeline else {
+        let cases = cases(outline.schema, &before, &start, &untimed, &end)?;
+        // Most instances are one operator, to which the template goes.
+        let templates = std::iter::repeat_n(template, cases.len());
+        for (case, template) in std::iter::zip(cases, templates) {
+            operators.extend(possible(case.operator(build.world, template))?);
+        }
+        return Ok(operators);
+    };
+    let schema = outline.schema;
+    let at_start = reads(lifted, &schema.start_condition, &schema.start_effects, core);
+    let mut later = reads(lifted, &schema.at_end, &schema.end_effects, core);
+    let nothing = Moment::nothing();
+    let is_instant = schema.duration.is_none() || schema.joint.is_some();
+    let conflicts = if is_instant {
+        later.condition(lifted, &schema.start_condition, core);
+        Conflicts::new(build.world, timeline, (&later, &end), (&at_start, &nothing))
+    } else {
+        Conflicts::new(build.world, timeline, (&at_start, &start), (&later, &end))
+    };
+    for passage in timeline.passages(&frame.duration, &conflicts) {
+        let middle = Middle { passage: Some(&passage), ..untimed };
+        let template = GroundOperator { timing: passage.0.timing(), ..template.clone() };
+        for case in cases(schema, &before, &start, &middle, &end)? {
+            operators.extend(possible(case.operator(build.world, template.clone()))?);
         }
     }
     Ok(operators)
+}
+
+/// What a happening reads.
+fn reads(lifted: &Lifted, condition: &Formula, effects: &[Effect], binding: &Binding) -> Reads {
+    let mut reads = Reads::default();
+    reads.condition(lifted, condition, binding);
+    reads.effects(lifted, effects, binding);
+    reads
 }
 
 fn configuration(
@@ -271,6 +302,17 @@ impl Build<'_, '_> {
             }
         }
         Ok(parts)
+    }
+
+    /// The expression, or nothing where it is undefined, and apart the combinations of designs for which it is.
+    pub(super) fn open_apart(
+        &mut self,
+        expression: &Expression,
+    ) -> Result<(Option<Linear<Rational>>, Arc<[Forbidden]>), Failure> {
+        let own = std::mem::take(&mut self.forbidden);
+        let operand = possible(self.open(expression));
+        let undefined = std::mem::replace(&mut self.forbidden, own);
+        Ok((operand?, undefined.into()))
     }
 
     pub(super) fn open(&mut self, expression: &Expression) -> Result<Linear<Rational>, Failure> {
@@ -385,7 +427,7 @@ pub(super) fn admit_some(forbidden: &[Forbidden], sizes: &[usize]) -> bool {
     }
 }
 
-fn forbid(forbidden: &mut Vec<Forbidden>, slots: &SlotSet, combination: SlotSet) {
+pub(super) fn forbid(forbidden: &mut Vec<Forbidden>, slots: &SlotSet, combination: SlotSet) {
     match forbidden.iter_mut().find(|rule| rule.slots == *slots) {
         Some(rule) if rule.combinations.contains(&combination) => {}
         Some(rule) => rule.combinations.push(combination),

@@ -9,7 +9,7 @@
 mod derived;
 mod effects;
 pub(crate) mod evaluate;
-mod events;
+pub(crate) mod events;
 mod finish;
 mod frame;
 mod instantiate;
@@ -19,8 +19,10 @@ mod join;
 mod metric;
 mod mutex;
 mod normal_form;
+mod numbers;
 mod prune;
 pub(crate) mod reach;
+pub(crate) mod reads;
 mod relaxed;
 pub(crate) mod residual;
 
@@ -29,7 +31,7 @@ use crate::error::Error;
 use crate::ground::reach::Reached;
 use crate::lifted::Lifted;
 use crate::limits::Limits;
-use crate::normalize::normalize;
+use crate::normalize::{normalize, zero};
 use crate::number::Int;
 use crate::pddl::ast::{Domain, Metric, Name, Problem};
 use crate::task::Task;
@@ -79,7 +81,9 @@ pub(crate) fn ground_for(
     config: &Config,
     generality: &Generality,
 ) -> Result<Task, Vec<Error>> {
-    let lifted = normalize(domain, problem, &config.objectives)?;
+    let mut lifted = normalize(domain, problem, &config.objectives)?;
+    zero::split(&mut lifted)?;
+    events::begin(&mut lifted);
     let designs: Vec<_> =
         lifted.schemas.iter().map(|schema| design_parameters(&lifted, schema, &config.solves)).collect();
     let slots: Vec<_> = lifted

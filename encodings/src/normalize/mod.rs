@@ -7,6 +7,7 @@
 mod condition;
 pub(crate) mod duration;
 mod objects;
+pub(crate) mod zero;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -42,7 +43,8 @@ pub(crate) fn normalize(
     let has_events = problem.init.iter().any(|element| matches!(element, ast::InitialElement::Timed(..)));
     // What happens by itself may be worth waiting for, in the midst of an action, too.
     normalizer.longest = if has_events { None } else { duration::is_rewarded(&metrics) };
-    let schemas = domain.actions.iter().map(|action| normalizer.schema(action)).collect();
+    let schemas = domain.actions.iter().zip(0..);
+    let schemas = schemas.map(|(action, index)| normalizer.schema(action, index)).collect();
     let axioms = domain.derived.iter().map(|axiom| normalizer.axiom(axiom)).collect();
     let (mut facts, values) = normalizer.initial_state(problem);
     let events = normalizer.events(problem);
@@ -89,7 +91,10 @@ fn mark_fluents(lifted: &mut Lifted) {
         lifted.predicates[predicate.index()].fluent = true;
     }
     // The rule engine negates only what is complete; what recurs through a quantifier is evaluated by itself.
-    for predicate in recursive_through_forall(lifted) {
+    // So is a comparison below one: where a value is missing it does not hold, and neither does its negation.
+    let compares = lifted.axioms.iter().filter(|axiom| compares_for_all(&axiom.condition, false));
+    let compares: Vec<_> = compares.map(|axiom| axiom.predicate).collect();
+    for predicate in recursive_through_forall(lifted).into_iter().chain(compares) {
         lifted.predicates[predicate.index()].fluent = true;
     }
     loop {
@@ -103,6 +108,17 @@ fn mark_fluents(lifted: &mut Lifted) {
         for predicate in more {
             lifted.predicates[predicate.index()].fluent = true;
         }
+    }
+}
+
+/// Whether numbers are compared below a universal quantifier.
+fn compares_for_all(formula: &Formula, below: bool) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|part| compares_for_all(part, below)),
+        Formula::Exists(_, body) => compares_for_all(body, below),
+        Formula::ForAll(_, body) => compares_for_all(body, true),
+        Formula::Literal { .. } | Formula::Equal { .. } => false,
+        Formula::Compare(..) => below,
     }
 }
 
@@ -197,7 +213,7 @@ impl Normalizer {
         self.errors.push(Error::Unknown { kind, name: identifier.name.to_string(), place });
     }
 
-    fn schema(&mut self, action: &ast::Action) -> Schema {
+    fn schema(&mut self, action: &ast::Action, index: u32) -> Schema {
         let mut scope = Scope::new(File::Domain);
         let mut schema = Schema {
             name: action.identifier.name.clone(),
@@ -210,6 +226,9 @@ impl Normalizer {
             at_end: Formula::truth(),
             end_effects: Vec::new(),
             duration: None,
+            is_chosen: false,
+            joint: None,
+            action: index,
             place: scope.place(action.span),
         };
         match &action.body {
@@ -221,6 +240,7 @@ impl Normalizer {
                 let (mut start, mut middle) = (Vec::new(), Vec::new());
                 let (mut over_all, mut at_end) = (Vec::new(), Vec::new());
                 schema.duration = Some(self.duration(duration, action, &mut scope, &mut start));
+                schema.is_chosen = matches!(scope.duration, Duration::Open) && self.longest == Some(false);
                 for (time, condition) in conditions {
                     let formula = self.condition(condition, true, &mut scope);
                     match time {
@@ -326,6 +346,7 @@ impl Normalizer {
     fn time(&mut self, events: &[Event]) -> Time {
         let time = Time {
             clock: FunctionId(self.functions.len() as u32),
+            moment: FunctionId(self.functions.len() as u32 + 1),
             phase: PredicateId(self.predicates.len() as u32),
             first_phase: ObjectId(self.objects.len() as u32),
             waited: PredicateId(self.predicates.len() as u32 + 1),
@@ -338,7 +359,8 @@ impl Normalizer {
                 derived: false,
                 running: false,
             };
-            self.functions.push(Function { name: Name::new("the clock"), fluent: true });
+            let function = |name| Function { name: Name::new(name), fluent: true };
+            self.functions.extend([function("the clock"), function("a moment")]);
             self.predicates.extend([predicate("the phase", 1), predicate("has waited", 0)]);
             self.objects.extend((0..=events.len()).map(|number| Name::new(&format!("phase {number}"))));
         }

@@ -15,7 +15,8 @@ impl Run<'_> {
         let by_steps = self.task.with_costs(|_| Quantity::constant(1));
         let mut silent = |_: Improvement| {};
         let shortest = optimize(&by_steps, self.config, &mut silent);
-        let steps = match (&shortest.plan, shortest.status) {
+        // Waits are steps, too, which a plan in names does not show.
+        let steps = match (&shortest.ground, shortest.status) {
             (Some(plan), Status::Optimal) => plan.steps.len(),
             // The plan that there may be is measured by its steps, not by the metric: of no use to the user.
             (Some(_), _) => {

@@ -13,6 +13,7 @@ use super::Options;
 use super::effects::{Change, Changes, Ground};
 use super::evaluate::Evaluator;
 use super::execute::{Execution, is_durative};
+use super::happening::Part;
 use super::plan::PlanStep;
 use super::verdict::Violation;
 use super::world::{Arguments, State, Symbol, World};
@@ -80,17 +81,22 @@ fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advanc
     let running =
         if forced { execution.begin_anyway(&step, &start) } else { execution.begin(&step, &start) }?;
     let mut assigned = FxHashMap::default();
-    let changes = execution.changes(&running, EffectTime::AtStart, &start)?;
-    note(&changes, &mut assigned);
-    execution.apply(&step, &start, changes)?;
-    if is_durative(&running.instance) {
-        if !forced {
+    // Nothing interferes with what has been done: an end that is enforced comes after its start, however short the action is.
+    let has_two = running.first_part() == Part::Start || (forced && is_durative(&running.instance));
+    let parts: &[Part] = if has_two { &[Part::Start, Part::End] } else { &[Part::Whole] };
+    for part in parts {
+        let time = if *part == Part::End { &running.end } else { &start };
+        if *part == Part::End && !forced {
             execution.check(&running, ConditionTime::OverAll, &start)?;
-            execution.check(&running, ConditionTime::AtEnd, &running.end)?;
         }
-        let changes = execution.changes(&running, EffectTime::AtEnd, &running.end)?;
+        let changes = if forced {
+            let when = if *part == Part::End { EffectTime::AtEnd } else { EffectTime::AtStart };
+            execution.changes(&running, when, time)?
+        } else {
+            execution.happening(&running, *part, time)?.changes
+        };
         note(&changes, &mut assigned);
-        execution.apply(&step, &running.end, changes)?;
+        execution.apply(&step, time, changes)?;
     }
     let after = &execution.state;
     let values = assigned.into_iter().filter_map(|(target, assigned)| {

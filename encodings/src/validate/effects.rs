@@ -158,20 +158,30 @@ impl Changes {
             values.push((target, after));
         }
         state.values.extend(values);
-        for (predicate, arguments) in self.deleted {
-            if let Some(tuples) = state.facts.get_mut(&predicate) {
-                tuples.remove(&arguments);
-            }
-        }
-        for (predicate, arguments) in self.added {
-            state.facts.entry(predicate).or_default().insert(arguments);
-        }
+        change_facts(self.added, self.deleted, state);
         Ok(())
+    }
+
+    /// Changes the facts of the state, and no numbers.
+    pub(super) fn apply_facts(self, state: &mut State) {
+        change_facts(self.added, self.deleted, state);
     }
 
     /// Whether the state stays as it is, if the changes can be applied at all.
     pub(super) fn is_neutral(&self) -> bool {
         let is_zero = |change: &Change| matches!(change, Change::Add(value) if value.is_zero());
         self.added.is_empty() && self.deleted.is_empty() && self.numeric.values().all(is_zero)
+    }
+}
+
+/// Deletes, then adds.
+fn change_facts(added: FxHashSet<Ground>, deleted: FxHashSet<Ground>, state: &mut State) {
+    for (predicate, arguments) in deleted {
+        if let Some(tuples) = state.facts.get_mut(&predicate) {
+            tuples.remove(&arguments);
+        }
+    }
+    for (predicate, arguments) in added {
+        state.facts.entry(predicate).or_default().insert(arguments);
     }
 }

@@ -12,6 +12,7 @@ use super::derive::close;
 use super::effects::{Changes, EffectError, Ground};
 use super::evaluate::{Evaluator, Undefined};
 use super::explain::{undefined_text, unmet};
+use super::interference::Footprint;
 use super::step::{Instance, Step, unresolved};
 use super::verdict::{Violation, ViolationKind};
 use super::world::{State, World};
@@ -23,7 +24,9 @@ pub(super) struct Execution<'e, 'p> {
     pub(super) options: &'e Options,
     pub(super) state: State,
     /// The timed initial literals that are still to come, the last one first.
-    pending: Vec<(BigRational, Ground, bool)>,
+    pub(super) pending: Vec<(BigRational, Ground, bool)>,
+    /// The last events that took place, with their time.
+    pub(super) last_event: Option<(BigRational, Footprint)>,
 }
 
 /// An action that has started.
@@ -31,6 +34,7 @@ pub(super) struct Execution<'e, 'p> {
 pub(super) struct Running<'e, 'p> {
     pub(super) step: &'e Step<'p>,
     pub(super) instance: Instance<'p>,
+    pub(super) start: BigRational,
     /// The exact duration, in the domain's time unit.
     pub(super) duration: BigRational,
     /// When it ends on the plan's clock, where durations may be rounded.
@@ -55,7 +59,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         // Of two literals of one time about one atom, the later one in the file prevails.
         pending.reverse();
         pending.sort_by(|left, right| right.0.cmp(&left.0));
-        Self { world, options, state, pending }
+        Self { world, options, state, pending, last_event: None }
     }
 
     pub(super) fn evaluator<'s>(&'s self, duration: Option<&'s BigRational>) -> Evaluator<'s, 'p> {
@@ -65,21 +69,6 @@ impl<'e, 'p> Execution<'e, 'p> {
     /// When the next timed initial literal takes place.
     pub(super) fn next_timed(&self) -> Option<&BigRational> {
         self.pending.last().map(|(time, ..)| time)
-    }
-
-    /// Lets all timed initial literals of the next time take place.
-    pub(super) fn apply_next_timed(&mut self) {
-        let Some(time) = self.next_timed().cloned() else { return };
-        while self.next_timed() == Some(&time) {
-            let Some((_, (predicate, arguments), holds)) = self.pending.pop() else { return };
-            let tuples = self.state.facts.entry(predicate).or_default();
-            if holds {
-                tuples.insert(arguments);
-            } else {
-                tuples.remove(&arguments);
-            }
-        }
-        close(self.world, &mut self.state);
     }
 
     /// Chooses the schema of a step, checks what must hold at its start, and finds its duration.
@@ -112,7 +101,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         };
         let duration = self.duration(step, instance, time)?;
         let end = time + &duration;
-        Ok(Running { step, instance: instance.clone(), duration, end })
+        Ok(Running { step, instance: instance.clone(), start: time.clone(), duration, end })
     }
 
     fn begin_as(
@@ -122,9 +111,12 @@ impl<'e, 'p> Execution<'e, 'p> {
         time: &BigRational,
     ) -> Result<Running<'e, 'p>, Box<Violation>> {
         let duration = self.duration(step, instance, time)?;
-        let rounded = step.text.duration.as_ref().filter(|_| is_durative(instance)).unwrap_or(&duration);
+        // An action that takes time does not lose it by rounding, nor does another one gain it.
+        let is_rounded =
+            |stated: &&BigRational| is_durative(instance) && stated.is_zero() == duration.is_zero();
+        let rounded = step.text.duration.as_ref().filter(is_rounded).unwrap_or(&duration);
         let end = time + rounded;
-        let running = Running { step, instance: instance.clone(), duration, end };
+        let running = Running { step, instance: instance.clone(), start: time.clone(), duration, end };
         self.check(&running, ConditionTime::AtStart, time)?;
         Ok(running)
     }
@@ -176,7 +168,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         stated: &BigRational,
         bound: &BigRational,
     ) -> Result<(), Box<Violation>> {
-        let slack = &self.options.tolerance;
+        let slack = &self.options.slack();
         let (holds, sign) = match operator {
             Comparison::Equal => ((stated - bound).abs() <= *slack, "="),
             Comparison::LessOrEqual => (*stated <= bound + slack, "<="),

@@ -1,10 +1,12 @@
 //! When two happenings interfere: the mutex rule of PDDL 2.1 ("no moving targets").
 
+use std::rc::Rc;
+
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
 use crate::pddl::ast::{
-    ActionBody, Atom, Condition, ConditionTime, Effect, EffectTime, Expression, Name, Term,
+    ActionBody, Atom, Condition, ConditionTime, Effect, EffectTime, Expression, Name, Term, TypedName,
 };
 
 use super::effects::{Change, Changes, Ground};
@@ -12,19 +14,37 @@ use super::evaluate::Bindings;
 use super::execute::{Running, conditions, effects};
 use super::world::{Symbol, World};
 
-/// A fact or a function, with gaps where a quantifier runs through all objects.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A fact or a function, with gaps where a quantifier runs through its objects.
+#[derive(Debug, Clone)]
 struct Pattern {
     symbol: Symbol,
     /// Nothing: whatever the arguments are.
-    arguments: Option<SmallVec<[Option<Symbol>; 4]>>,
+    arguments: Option<SmallVec<[Slot; 4]>>,
+}
+
+/// An argument of a pattern.
+#[derive(Debug, Clone)]
+enum Slot {
+    Object(Symbol),
+    /// One of the objects that a quantifier runs through, by its position among those around: the same wherever it stands.
+    Each(usize, Rc<FxHashSet<Symbol>>),
 }
 
 impl Pattern {
     fn matches(&self, (symbol, arguments): &Ground) -> bool {
         let Some(pattern) = &self.arguments else { return self.symbol == *symbol };
-        let fits = |(wanted, given): (&Option<Symbol>, &Symbol)| wanted.is_none_or(|wanted| wanted == *given);
-        self.symbol == *symbol && pattern.len() == arguments.len() && pattern.iter().zip(arguments).all(fits)
+        let mut bound: SmallVec<[(usize, Symbol); 4]> = SmallVec::new();
+        let mut fits = |(wanted, given): (&Slot, &Symbol)| match wanted {
+            Slot::Object(wanted) => wanted == given,
+            Slot::Each(variable, objects) => {
+                bound.push((*variable, *given));
+                let same = bound.iter().all(|(other, object)| other != variable || object == given);
+                same && objects.contains(given)
+            }
+        };
+        self.symbol == *symbol
+            && pattern.len() == arguments.len()
+            && pattern.iter().zip(arguments).all(&mut fits)
     }
 }
 
@@ -50,7 +70,7 @@ impl Footprint {
         let mut footprint = Self::default();
         let mut predicates = Vec::new();
         let bindings = &running.instance.bindings;
-        let mut found = |found: Use<'p>, hidden: &[&'p Name]| match found {
+        let mut found = |found: Use<'p>, hidden: &[&'p TypedName]| match found {
             Use::Fact(atom) => {
                 predicates.push(&atom.predicate.name);
                 footprint.facts_read.push(pattern(world, bindings, atom, hidden));
@@ -87,6 +107,21 @@ impl Footprint {
         footprint
     }
 
+    /// The footprint of timed initial literals, which read nothing.
+    pub(super) fn of_event(changes: &Changes) -> Self {
+        let (added, deleted) = (changes.added.iter().cloned(), changes.deleted.iter().cloned());
+        Self { added: added.collect(), deleted: deleted.collect(), ..Self::default() }
+    }
+
+    /// Adds what another happening of the same action reads and writes.
+    pub(super) fn join(&mut self, other: Self) {
+        self.facts_read.extend(other.facts_read);
+        self.values_read.extend(other.values_read);
+        self.added.extend(other.added);
+        self.deleted.extend(other.deleted);
+        self.values_written.extend(other.values_written);
+    }
+
     /// Something that both touch, one of them writing, so that their order would matter.
     pub(super) fn interferes(&self, other: &Self) -> Option<Ground> {
         let one_way = self.disturbs(other).or_else(|| other.disturbs(self));
@@ -121,9 +156,9 @@ enum Use<'c> {
 }
 
 /// Is told of each use, with the variables of the quantifiers around it.
-type Found<'f, 'c> = &'f mut dyn FnMut(Use<'c>, &[&'c Name]);
+type Found<'f, 'c> = &'f mut dyn FnMut(Use<'c>, &[&'c TypedName]);
 
-fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c Name>, found: Found<'_, 'c>) {
+fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c TypedName>, found: Found<'_, 'c>) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
             for part in parts {
@@ -137,7 +172,7 @@ fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c Name>, f
         }
         Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
             let outer = hidden.len();
-            hidden.extend(variables.iter().map(|entry| &entry.identifier.name));
+            hidden.extend(variables);
             uses_of_condition(body, hidden, found);
             hidden.truncate(outer);
         }
@@ -150,7 +185,7 @@ fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c Name>, f
     }
 }
 
-fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c Name>, found: Found<'_, 'c>) {
+fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c TypedName>, found: Found<'_, 'c>) {
     match effect {
         Effect::And(parts) => {
             for part in parts {
@@ -159,7 +194,7 @@ fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c Name>, found: Fou
         }
         Effect::ForAll(variables, body) => {
             let outer = hidden.len();
-            hidden.extend(variables.iter().map(|entry| &entry.identifier.name));
+            hidden.extend(variables);
             uses_of_effect(body, hidden, found);
             hidden.truncate(outer);
         }
@@ -172,7 +207,7 @@ fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c Name>, found: Fou
     }
 }
 
-fn uses_of_expression<'c>(expression: &'c Expression, hidden: &[&'c Name], found: Found<'_, 'c>) {
+fn uses_of_expression<'c>(expression: &'c Expression, hidden: &[&'c TypedName], found: Found<'_, 'c>) {
     match expression {
         Expression::Fluent(atom) => found(Use::Value(atom), hidden),
         Expression::Operation(_, operands, _) => {
@@ -184,11 +219,17 @@ fn uses_of_expression<'c>(expression: &'c Expression, hidden: &[&'c Name], found
     }
 }
 
-fn pattern(world: &World<'_>, bindings: &Bindings<'_>, atom: &Atom, hidden: &[&Name]) -> Pattern {
+fn pattern(world: &World<'_>, bindings: &Bindings<'_>, atom: &Atom, hidden: &[&TypedName]) -> Pattern {
     let arguments = atom.arguments.iter().map(|term| match term {
-        Term::Variable(identifier) if hidden.contains(&&identifier.name) => None,
-        Term::Variable(identifier) => bindings.get(&identifier.name),
-        Term::Constant(identifier) => Some(world.symbol(&identifier.name)),
+        Term::Variable(identifier) => {
+            match hidden.iter().rposition(|entry| entry.identifier.name == identifier.name) {
+                Some(place) => Slot::Each(place, Rc::new(world.objects_of(&hidden[place].r#type).collect())),
+                None => {
+                    Slot::Object(bindings.get(&identifier.name).unwrap_or(world.symbol(&identifier.name)))
+                }
+            }
+        }
+        Term::Constant(identifier) => Slot::Object(world.symbol(&identifier.name)),
     });
     Pattern { symbol: world.symbol(&atom.predicate.name), arguments: Some(arguments.collect()) }
 }

@@ -1,12 +1,10 @@
-//! A plan to a verdict: executes it by the definition of PDDL 2.1 \[1\], with exact numbers.
+//! A plan to a verdict: executes it by the definition below, with exact numbers.
 //!
 //! Nothing here is shared with grounding and encoding: conditions are evaluated on the syntax tree.
-//! Derived predicates are the least fixpoint of their axioms, layer by layer \[2\]. Without
-//! [`Options::concurrent`], durative actions are executed one after another, which is how a robot with one
-//! executive does it, and `total-time` is the sum of their durations.
+//! Derived predicates are the least fixpoint of their axioms, layer by layer (S. Thiébaux, J. Hoffmann, B. Nebel: In
+//! defense of PDDL axioms, AIJ 168, 2005).
 //!
-//! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003. \[2\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL
-//! axioms, AIJ 168, 2005.
+#![doc = include_str!("definition.md")]
 
 mod advance;
 mod concurrent;
@@ -15,6 +13,7 @@ mod effects;
 mod evaluate;
 mod execute;
 mod explain;
+mod happening;
 mod interference;
 mod plan;
 mod sequential;
@@ -46,10 +45,19 @@ pub struct Options {
     /// Whether actions may overlap, by the rules of PDDL 2.1; otherwise each begins when the one before
     /// it has ended.
     pub concurrent: bool,
-    /// In the domain's time unit: how far a stated duration may lie from the exact one (planners
-    /// round), how far a step may reach into the next in sequence, and how far apart interfering actions
-    /// must be when they run concurrently.
+    /// In the domain's time unit, not negative. In sequence it is for plans that were rounded: how far a stated
+    /// duration may lie from the exact one, and how far a step may reach into the next. Concurrently it is the separation: how far
+    /// apart happenings that interfere must be; a stated duration may then lie as far from the exact one, but at most a
+    /// thousandth. Events are never forgiven for anything.
     pub tolerance: BigRational,
+}
+
+impl Options {
+    /// How far a stated duration may lie from the exact one.
+    fn slack(&self) -> BigRational {
+        let own = self.tolerance.clone();
+        if self.concurrent { own.min(Self::default().tolerance) } else { own }
+    }
 }
 
 impl Default for Options {

@@ -3,13 +3,15 @@
 use num_rational::BigRational;
 use num_traits::Zero;
 
-use crate::pddl::ast::{ConditionTime, EffectTime};
+use crate::pddl::ast::ConditionTime;
 
-use super::execute::{Execution, Running, is_durative};
+use super::execute::{Execution, Running};
+use super::happening::Part;
 use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
 
-/// Executes the steps; adds up their durations as long as nothing is wrong.
+/// Executes the steps; adds up their durations as long as nothing is wrong. In the end, all events up to the end of the last step
+/// have taken place.
 pub(super) fn run<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     steps: &'e [Step<'p>],
@@ -22,23 +24,21 @@ pub(super) fn run<'e, 'p>(
     }
     let mut clock = BigRational::zero();
     for step in order {
-        let time = match &step.text.start {
-            Some(start) if is_timed => start.clone(),
-            _ => clock.clone(),
-        };
-        starts_late_enough(execution, step, &time, &clock)?;
-        while execution.next_timed().is_some_and(|next| *next <= time) {
-            execution.apply_next_timed();
-        }
+        let stated = step.text.start.as_ref().filter(|_| is_timed).unwrap_or(&clock);
+        starts_late_enough(execution, step, stated, &clock)?;
+        // What the tolerance forgives is put off.
+        let time = stated.max(&clock).clone();
+        execution.pass(&time, false);
         let running = execution.begin(step, &time)?;
-        let changes = execution.changes(&running, EffectTime::AtStart, &time)?;
-        execution.apply(step, &time, changes)?;
-        if is_durative(&running.instance) {
-            finish(execution, &running, &time)?;
+        let part = running.first_part();
+        execution.execute(&running, part, &time)?;
+        if part == Part::Start {
+            finish(execution, &running)?;
         }
         *total_time += &running.duration;
         clock = running.end;
     }
+    execution.pass(&clock, true);
     Ok(())
 }
 
@@ -46,16 +46,13 @@ pub(super) fn run<'e, 'p>(
 fn finish<'e, 'p>(
     execution: &mut Execution<'e, 'p>,
     running: &Running<'e, 'p>,
-    start: &BigRational,
 ) -> Result<(), Box<Violation>> {
-    execution.check(running, ConditionTime::OverAll, start)?;
+    execution.check(running, ConditionTime::OverAll, &running.start)?;
     while let Some(next) = execution.next_timed().filter(|next| **next < running.end).cloned() {
         execution.apply_next_timed();
         execution.check(running, ConditionTime::OverAll, &next)?;
     }
-    execution.check(running, ConditionTime::AtEnd, &running.end)?;
-    let changes = execution.changes(running, EffectTime::AtEnd, &running.end)?;
-    execution.apply(running.step, &running.end, changes)
+    execution.execute(running, Part::End, &running.end)
 }
 
 /// No step starts before the one before it has ended, up to the tolerance.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::Ratio;
 
+use crate::interfere::Touch;
 use crate::model::{
     Action, Atom, DERIVED, Effect, Expression, Formula, Number, PREDICATES, Task, Term, UPPER, Way,
 };
@@ -47,7 +48,7 @@ struct View<'a> {
     duration: Option<Number>,
 }
 
-fn objects(terms: &[Term], scope: &[usize]) -> Vec<usize> {
+pub fn objects(terms: &[Term], scope: &[usize]) -> Vec<usize> {
     let object = |term: &Term| match term {
         Term::Object(object) => *object,
         Term::Variable(variable) => scope[*variable],
@@ -55,7 +56,7 @@ fn objects(terms: &[Term], scope: &[usize]) -> Vec<usize> {
     terms.iter().map(object).collect()
 }
 
-fn with(scope: &[usize], object: usize) -> Vec<usize> {
+pub fn with(scope: &[usize], object: usize) -> Vec<usize> {
     scope.iter().copied().chain([object]).collect()
 }
 
@@ -179,17 +180,17 @@ impl<'a> View<'a> {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Change {
+pub enum Change {
     Assign(Number),
     Add(Number),
     Scale(Number),
 }
 
 #[derive(Debug, Default)]
-struct Changes {
-    added: BTreeSet<Atom>,
-    deleted: BTreeSet<Atom>,
-    values: BTreeMap<Atom, Change>,
+pub struct Changes {
+    pub added: BTreeSet<Atom>,
+    pub deleted: BTreeSet<Atom>,
+    pub values: BTreeMap<Atom, Change>,
 }
 
 impl Changes {
@@ -206,14 +207,15 @@ impl Changes {
     }
 }
 
+/// The start or the end of an action: its condition, its effects, and what bounds its duration.
+type Half<'a> = (&'a Formula, &'a [Effect], Vec<&'a Expression>);
+
 impl State {
     pub fn initial(task: &Task) -> Self {
-        Self {
-            facts: task.facts.clone(),
-            values: task.values.clone(),
-            time: Ratio::from_integer(0),
-            timed: 0,
-        }
+        let (facts, values, time) = (task.facts.clone(), task.values.clone(), Ratio::from_integer(0));
+        let mut state = Self { facts, values, time, timed: 0 };
+        state.pass(task, |due| due <= time);
+        state
     }
 
     fn changed(
@@ -282,20 +284,80 @@ impl State {
         View::new(task, self, None).value(expression, scope)
     }
 
+    /// The state after a happening: all its effects read this state, and neither its halves nor an event of its time interfere with it.
+    fn happen(
+        &self,
+        task: &Task,
+        halves: &[Half<'_>],
+        scope: &[usize],
+        duration: Number,
+        time: Number,
+    ) -> Option<Self> {
+        let view = View::new(task, self, Some(duration));
+        if !halves.iter().all(|(condition, ..)| view.holds(condition, scope)) {
+            return None;
+        }
+        let mut touched = Vec::new();
+        for (condition, effects, bounds) in halves {
+            let mut touch = Touch::default();
+            touch.reads_of_formula(task, condition, scope);
+            bounds.iter().for_each(|value| touch.reads_of_expression(value, scope));
+            for effect in *effects {
+                touch.reads_of_effect(task, effect, scope);
+            }
+            let mut changes = Changes::default();
+            effects.iter().try_for_each(|effect| view.collect(effect, scope, &mut changes))?;
+            touch.writes(&changes);
+            touched.push(touch);
+        }
+        for (_, atom, holds) in task.timed.iter().filter(|(due, ..)| *due == time) {
+            let mut event = Touch::default();
+            if *holds { &mut event.added } else { &mut event.deleted }.insert(atom.clone());
+            touched.push(event);
+        }
+        let disturbs =
+            |one: &Touch| touched.iter().any(|other| one.disturbs(other) && !std::ptr::eq(one, other));
+        if touched.iter().any(disturbs) {
+            return None;
+        }
+        let effects: Vec<_> = halves.iter().flat_map(|(_, effects, _)| effects.iter().cloned()).collect();
+        let mut after = self.changed(task, &effects, scope, Some(duration))?;
+        after.pass(task, |due| due <= time);
+        Some(after)
+    }
+
     /// The state after a step, begun as soon as the one before has ended; nothing if it cannot be executed.
     pub fn after(&self, task: &Task, (action, scope, stated): &Step) -> Option<Self> {
         let action = &task.actions[*action];
         let start = self.time;
+        let zero = Ratio::from_integer(0);
         let mut state = self.clone();
-        state.pass(task, |time| time <= start);
+        state.pass(task, |time| time < start);
         let duration = state.duration(task, action, scope, *stated)?;
         let end = start + duration;
-        if !View::new(task, &state, Some(duration)).holds(&action.at_start, scope) {
-            return None;
-        }
-        state = state.changed(task, &action.start_effects, scope, Some(duration))?;
-        if let Some(bounds) = &action.duration {
+        let bounds = |end: bool| {
+            let bounds = action.duration.iter().flatten().filter(move |(at_end, ..)| *at_end == end);
+            bounds.map(|(.., value)| value).collect()
+        };
+        let first = (&action.at_start, action.start_effects.as_slice(), bounds(false));
+        let last = (&action.at_end, action.end_effects.as_slice(), bounds(true));
+        let is_as_long_as_wanted = |state: &Self| {
+            let view = View::new(task, state, Some(duration));
+            let mut bounds = action.duration.iter().flatten().filter(|(at_end, ..)| *at_end);
+            bounds.all(|(_, sign, value)| {
+                view.value(value, scope).is_some_and(|value| sign.holds(duration, value))
+            })
+        };
+        if action.duration.is_none() {
+            state = state.happen(task, &[first], scope, duration, start)?;
+        } else if duration == zero {
+            if !is_as_long_as_wanted(&state) {
+                return None;
+            }
+            state = state.happen(task, &[first, last], scope, duration, start)?;
+        } else {
             let holds = |state: &Self, formula| View::new(task, state, Some(duration)).holds(formula, scope);
+            state = state.happen(task, &[first], scope, duration, start)?;
             if !holds(&state, &action.over_all) {
                 return None;
             }
@@ -305,16 +367,10 @@ impl State {
                     return None;
                 }
             }
-            if !holds(&state, &action.at_end) {
+            if !is_as_long_as_wanted(&state) {
                 return None;
             }
-            let view = View::new(task, &state, Some(duration));
-            for (_, sign, value) in bounds.iter().filter(|(at_end, ..)| *at_end) {
-                if !sign.holds(duration, view.value(value, scope)?) {
-                    return None;
-                }
-            }
-            state = state.changed(task, &action.end_effects, scope, Some(duration))?;
+            state = state.happen(task, &[last], scope, duration, end)?;
         }
         state.time = end;
         Some(state)

@@ -3,6 +3,7 @@
 
 mod generate;
 mod ground;
+mod interfere;
 mod interpret;
 mod model;
 mod mutate;
