@@ -9,5 +9,6 @@
 mod enumerate;
 mod field;
 mod judge;
+mod magnify;
 mod numbers;
 mod temporal;

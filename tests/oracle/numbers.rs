@@ -12,6 +12,8 @@ mod ground;
 mod missions;
 mod model;
 mod print;
+mod shrink;
+mod special;
 mod step;
 mod truth;
 mod tune;
@@ -42,9 +44,13 @@ struct Puzzle {
 
 impl Puzzle {
     fn new(name: String, task: Task, objectives: &[Expr]) -> Option<Self> {
-        let ground = Rc::new(ground::ground(&task, objectives, BUDGET.attempts)?);
+        Self::within(name, task, objectives, BUDGET)
+    }
+
+    fn within(name: String, task: Task, objectives: &[Expr], budget: Budget) -> Option<Self> {
+        let ground = Rc::new(ground::ground(&task, objectives, budget.attempts)?);
         let maximize = task.metric.as_ref().is_some_and(|(maximize, _)| *maximize);
-        let explored = truth::truth(&ground, maximize, BUDGET)?;
+        let explored = truth::truth(&ground, maximize, budget)?;
         Some(Self { name, task, ground, explored })
     }
 
@@ -135,14 +141,15 @@ fn task(seed: u64) -> Task {
     if rng.u32(0..5) < 3 { missions::mission(&mut rng) } else { arithmetic::arithmetic(&mut rng) }
 }
 
-fn puzzle(seed: u64, objectives: &[Expr]) -> Option<Puzzle> {
-    Puzzle::new(format!("numbers-{seed}"), task(seed), objectives)
-}
-
 /// Judges a task: always as the program plans it, every second time with a certificate, and on a share in other ways.
 fn judge_seed(seed: u64, tally: &mut Tally) {
-    let Some(puzzle) = puzzle(seed, &[]) else { return tally.count("oracle: too large") };
-    let case = puzzle.case(seed % 2 == 0);
+    judge_task(seed, &task(seed), tally);
+}
+
+fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
+    let of = |objectives: &[Expr]| Puzzle::new(format!("numbers-{seed}"), task.clone(), objectives);
+    let Some(puzzle) = of(&[]) else { return tally.count("oracle: too large") };
+    let case = puzzle.case(seed.is_multiple_of(2));
     judge(&case, tally);
     let mut rng = Rng::with_seed(seed ^ 0x5eed);
     if seed % 4 == 1 {
@@ -150,7 +157,7 @@ fn judge_seed(seed: u64, tally: &mut Tally) {
     }
     if seed % 4 == 3 {
         let objectives = variants::objectives(&puzzle, &mut rng);
-        if let Some(puzzle) = self::puzzle(seed, &objectives) {
+        if let Some(puzzle) = of(&objectives) {
             variants::check_objectives(&puzzle, &objectives, &case, tally);
         }
     }
@@ -175,5 +182,26 @@ fn show() {
         std::fs::create_dir_all(&directory).expect("a directory");
         std::fs::write(directory.join("domain.pddl"), domain).expect("a file");
         std::fs::write(directory.join("problem.pddl"), problem).expect("a file");
+    }
+}
+
+#[test]
+#[ignore = "makes the tasks of `ORACLE_FROM` and what follows smaller, where they fail, and prints them"]
+#[allow(clippy::print_stdout)]
+fn smaller() {
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 1));
+    for seed in from..from + tasks {
+        let kinds = |task: &Task| {
+            let mut tally = Tally::default();
+            judge_task(seed, task, &mut tally);
+            tally.failures.iter().map(|failure| failure.kind).collect::<Vec<_>>()
+        };
+        for kind in kinds(&task(seed)) {
+            let small = shrink::shrink(task(seed), &|task| kinds(task).contains(&kind));
+            let mut tally = Tally::default();
+            judge_task(seed, &small, &mut tally);
+            let texts = tally.failures.iter().filter(|failure| failure.kind == kind);
+            texts.for_each(|failure| println!("{}", failure.text));
+        }
     }
 }

@@ -57,7 +57,7 @@ impl Builder<'_> {
             if action.lasting.is_some() && once_in(self.rng, 3) {
                 action.start.effects.push(effect);
             } else {
-                self.finally(action).push(effect);
+                Self::finally(action).push(effect);
             }
         }
     }
@@ -71,7 +71,7 @@ impl Builder<'_> {
         }
         if self.fluent_availability && once_in(self.rng, 2) {
             let lost = Effect::Delete(applied(names.available, &[design]));
-            self.finally(action).push(lost);
+            Self::finally(action).push(lost);
         }
         if !self.side_effects {
             return;
@@ -80,25 +80,25 @@ impl Builder<'_> {
             0 => {
                 let marked = applied(names.marked, &[design]);
                 action.start.conditions.push(Condition::Not(Box::new(Condition::Holds(marked.clone()))));
-                self.finally(action).push(Effect::Add(marked));
+                Self::finally(action).push(Effect::Add(marked));
             }
             1 => {
                 let worn = applied(names.worn, &[function]);
                 let amount = self.static_expression(slots, None);
                 let limit = self.open(Relation::AtMost, Expr::Function(worn.clone()));
                 action.start.conditions.push(limit);
-                self.finally(action).push(Effect::Number(Change::Increase, worn, amount));
+                Self::finally(action).push(Effect::Number(Change::Increase, worn, amount));
             }
             2 => {
                 let marked = Condition::Holds(applied(names.marked, &[design]));
                 let dear = Expr::Number(self.draw_positive());
                 let effect = Effect::Number(Change::Increase, applied(names.cost, &[]), dear);
-                self.finally(action).push(Effect::When(vec![marked], vec![effect]));
+                Self::finally(action).push(Effect::When(vec![marked], vec![effect]));
                 action.start.effects.push(Effect::Add(applied(names.marked, &[design])));
             }
             _ => {
                 let done = applied(names.done, &way[way.len() - 1..]);
-                self.finally(action).push(Effect::When(
+                Self::finally(action).push(Effect::When(
                     vec![Condition::Holds(applied(names.marked, &[design]))],
                     vec![Effect::Add(done)],
                 ));
@@ -132,7 +132,7 @@ impl Builder<'_> {
         action.start.conditions.push(Condition::Holds(applied(names.at, &place)));
         self.demand(&mut action, &slots, None);
         let done = Effect::Add(applied(names.done, &place));
-        self.finally(&mut action).push(done);
+        Self::finally(&mut action).push(done);
         self.use_up(&mut action, &slots, None);
         self.touch(&mut action, &slots, &place);
         action
@@ -156,9 +156,9 @@ impl Builder<'_> {
             let low = self.open(Relation::AtMost, Self::number(names.battery));
             action.start.conditions.push(low);
         }
-        self.finally(&mut action).push(Effect::Number(change, battery, Expr::Number(value)));
+        Self::finally(&mut action).push(Effect::Number(change, battery, Expr::Number(value)));
         let cost = Expr::Number(self.draw_positive());
-        self.finally(&mut action).push(Effect::Number(Change::Increase, applied(names.cost, &[]), cost));
+        Self::finally(&mut action).push(Effect::Number(Change::Increase, applied(names.cost, &[]), cost));
         action
     }
 
@@ -169,9 +169,9 @@ impl Builder<'_> {
         action.parameters.push(("fd".to_owned(), DESIGN));
         let available = applied(names.available, &[Term::Parameter(0)]);
         action.start.conditions.push(Condition::Not(Box::new(Condition::Holds(available.clone()))));
-        self.finally(&mut action).push(Effect::Add(available));
+        Self::finally(&mut action).push(Effect::Add(available));
         let cost = Expr::Number(self.draw_positive());
-        self.finally(&mut action).push(Effect::Number(Change::Increase, applied(names.cost, &[]), cost));
+        Self::finally(&mut action).push(Effect::Number(Change::Increase, applied(names.cost, &[]), cost));
         action
     }
 

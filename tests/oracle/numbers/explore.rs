@@ -138,8 +138,12 @@ fn counters(ground: &Ground) -> Vec<bool> {
         instance.over_all.iter().for_each(|test| mark_test(test, &mut counters));
         for moment in std::iter::once(&instance.start).chain(&instance.end) {
             let Moment { tests, acts } = moment;
-            tests.iter().for_each(|test| mark_test(test, &mut counters));
-            acts.iter().for_each(|act| mark_act(act, &mut counters));
+            for test in tests {
+                mark_test(test, &mut counters);
+            }
+            for act in acts {
+                mark_act(act, &mut counters);
+            }
         }
     }
     counters
@@ -155,8 +159,12 @@ fn mark_act(act: &Act, counters: &mut [bool]) {
             mark(value, counters);
         }
         Act::When(tests, inner) => {
-            tests.iter().for_each(|test| mark_test(test, counters));
-            inner.iter().for_each(|act| mark_act(act, counters));
+            for test in tests {
+                mark_test(test, counters);
+            }
+            for act in inner {
+                mark_act(act, counters);
+            }
         }
     }
 }
@@ -190,7 +198,7 @@ fn mark(value: &Value, counters: &mut [bool]) {
 /// Gives equal states one number.
 #[derive(Default)]
 pub struct States {
-    pub states: Vec<State>,
+    pub all: Vec<State>,
     known: HashMap<(Vec<bool>, Vec<u32>), usize>,
     numbers: HashMap<(BigInt, BigInt), u32>,
 }
@@ -205,10 +213,10 @@ impl States {
                 *self.numbers.entry((value.numer().clone(), value.denom().clone())).or_insert(next)
             }));
         }
-        let next = self.states.len();
+        let next = self.all.len();
         let number = *self.known.entry((state.atoms.clone(), ids)).or_insert(next);
         if number == next {
-            self.states.push(state);
+            self.all.push(state);
         }
         (number, number == next)
     }
@@ -247,14 +255,14 @@ pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Opti
     };
     states.number(first);
     let mut attempts = 0;
-    while space.edges.len() < states.states.len() {
+    while space.edges.len() < states.all.len() {
         let at = space.edges.len();
         attempts += ground.instances.len();
         if at >= budget.states || attempts > budget.attempts {
             space.complete = false;
             break;
         }
-        let state = states.states[at].clone();
+        let state = states.all[at].clone();
         space.goals.push(all_hold(&ground.goal, &state));
         let mut edges = Vec::new();
         let old = measures.of(&state, 0)?;
@@ -269,7 +277,7 @@ pub fn explore(ground: &Ground, measures: &Measures<'_>, budget: Budget) -> Opti
         }
         space.edges.push(edges);
     }
-    for state in &states.states[space.goals.len()..] {
+    for state in &states.all[space.goals.len()..] {
         space.goals.push(all_hold(&ground.goal, state));
         space.edges.push(Vec::new());
     }

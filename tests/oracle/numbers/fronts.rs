@@ -37,9 +37,9 @@ pub fn front(space: &Space) -> Option<Vec<Vec<Number>>> {
     let mut front = Vec::new();
     for (state, labels) in labels.iter().enumerate() {
         if space.goals[state] {
-            labels.iter().for_each(|label| {
+            for label in labels {
                 insert(&mut front, label);
-            });
+            }
         }
     }
     front.sort();

@@ -4,7 +4,7 @@
 //! 2), or where its duration is negative or has no value (1). Nothing else is simplified: what a condition reads counts even
 //! where it makes no difference (6).
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use num_traits::{Signed as _, Zero as _};
 
@@ -83,7 +83,7 @@ pub struct Ground {
 pub struct Grounder<'t> {
     task: &'t Task,
     changing: (Vec<bool>, Vec<bool>),
-    true_atoms: HashMap<(usize, Vec<usize>), ()>,
+    true_atoms: HashSet<(usize, Vec<usize>)>,
     values: HashMap<(usize, Vec<usize>), Number>,
     atoms: HashMap<(usize, Vec<usize>), usize>,
     fluents: HashMap<(usize, Vec<usize>), usize>,
@@ -95,7 +95,7 @@ pub fn ground(task: &Task, objectives: &[Expr], most: usize) -> Option<Ground> {
     let mut grounder = Grounder {
         task,
         changing: task.changing(),
-        true_atoms: task.atoms.iter().map(|atom| (atom.clone(), ())).collect(),
+        true_atoms: task.atoms.iter().cloned().collect(),
         values: task
             .values
             .iter()
@@ -226,7 +226,7 @@ impl Grounder<'_> {
                 if self.changing.0[key.0] {
                     Test::Atom(self.changing_atom(key))
                 } else {
-                    Test::Known(self.true_atoms.contains_key(&key))
+                    Test::Known(self.true_atoms.contains(&key))
                 }
             }
             Condition::Not(inner) => Test::Not(Box::new(self.test(inner, bound))),
@@ -270,7 +270,7 @@ impl Grounder<'_> {
     }
 
     fn changing_atom(&mut self, key: (usize, Vec<usize>)) -> usize {
-        let holds = self.true_atoms.contains_key(&key);
+        let holds = self.true_atoms.contains(&key);
         let atoms = &mut self.ground.atoms;
         *self.atoms.entry(key).or_insert_with(|| {
             atoms.push(holds);

@@ -38,6 +38,7 @@ pub struct Names {
 }
 
 /// A mission under construction.
+#[allow(clippy::struct_excessive_bools)]
 pub struct Builder<'r> {
     pub task: Task,
     pub names: Names,
@@ -317,7 +318,7 @@ impl<'r> Builder<'r> {
         self.demand(&mut action, &slots, Some(way));
         action.start.effects.push(Effect::Delete(applied(names.at, &way[..1])));
         let arrive = Effect::Add(applied(names.at, &way[1..]));
-        self.finally(&mut action).push(arrive);
+        Self::finally(&mut action).push(arrive);
         self.use_up(&mut action, &slots, Some(way));
         self.touch(&mut action, &slots, &way);
         action
@@ -335,7 +336,7 @@ impl<'r> Builder<'r> {
     }
 
     /// Effects at the end, if the action lasts.
-    pub fn finally<'a>(&mut self, action: &'a mut Action) -> &'a mut Vec<Effect> {
+    pub fn finally(action: &mut Action) -> &mut Vec<Effect> {
         match &mut action.lasting {
             Some(lasting) => &mut lasting.end.effects,
             None => &mut action.start.effects,

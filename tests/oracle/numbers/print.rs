@@ -9,31 +9,38 @@ use super::model::{
 
 /// The domain and the problem.
 pub fn print(task: &Task) -> (String, String) {
-    (domain(task), problem(task))
+    let problem = problem(task);
+    (domain(task, &problem), problem)
 }
 
-fn domain(task: &Task) -> String {
+/// Symbols that are mentioned nowhere are not declared.
+fn domain(task: &Task, problem: &str) -> String {
+    let mut actions = String::new();
+    for action in &task.actions {
+        actions += &Printer { task, parameters: &action.parameters }.action(action);
+    }
+    let used = |symbol: &&Symbol| {
+        let forms = [format!("({} ", symbol.name), format!("({})", symbol.name)];
+        forms.iter().any(|form| actions.contains(form) || problem.contains(form))
+    };
     let timed = if task.is_timed() { " :durative-actions" } else { "" };
     let mut text = format!(
         "(define (domain d)\n  (:requirements :typing :fluents :negative-preconditions :disjunctive-preconditions \
          :equality :conditional-effects{timed})\n  (:types {})\n  (:predicates",
         task.types.join(" ")
     );
-    for predicate in &task.predicates {
+    for predicate in task.predicates.iter().filter(used) {
         text += &declaration(task, predicate);
     }
     text += ")\n";
-    if !task.functions.is_empty() {
+    if task.functions.iter().any(|function| used(&function)) {
         text += "  (:functions";
-        for function in &task.functions {
+        for function in task.functions.iter().filter(used) {
             text += &declaration(task, function);
         }
         text += ")\n";
     }
-    for action in &task.actions {
-        text += &Printer { task, parameters: &action.parameters }.action(action);
-    }
-    text + ")\n"
+    text + &actions + ")\n"
 }
 
 fn declaration(task: &Task, symbol: &Symbol) -> String {

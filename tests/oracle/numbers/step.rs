@@ -196,8 +196,12 @@ impl Touch {
             Act::Add(_) | Act::Delete(_) => {}
             Act::Number(_, _, value) => self.value(value),
             Act::When(tests, inner) => {
-                tests.iter().for_each(|test| self.test(test));
-                inner.iter().for_each(|act| self.operands(act));
+                for test in tests {
+                    self.test(test);
+                }
+                for act in inner {
+                    self.operands(act);
+                }
             }
         }
     }

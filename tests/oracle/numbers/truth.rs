@@ -73,7 +73,9 @@ fn by_states(space: &Space, maximize: bool) -> Known {
 fn leads_to_goal(space: &Space) -> Vec<bool> {
     let mut before = vec![Vec::new(); space.edges.len()];
     for (from, edges) in space.edges.iter().enumerate() {
-        edges.iter().for_each(|edge| before[edge.to].push(from));
+        for edge in edges {
+            before[edge.to].push(from);
+        }
     }
     let mut useful = space.goals.clone();
     let mut waiting: Vec<usize> = (0..useful.len()).filter(|state| useful[*state]).collect();
@@ -180,13 +182,13 @@ fn dijkstra(ground: &Ground, measures: &Measures<'_>, maximize: bool, budget: Bu
         if std::mem::replace(&mut closed[at], true) {
             continue;
         }
-        let state = states.states[at].clone();
+        let state = states.all[at].clone();
         if all_hold(&ground.goal, &state) {
             let cost = if maximize { -cost } else { cost };
             return Some((start + cost, way_to(at, &parent)));
         }
         attempts += ground.instances.len();
-        if attempts > budget.attempts || states.states.len() > 2 * budget.states {
+        if attempts > budget.attempts || states.all.len() > 2 * budget.states {
             return None;
         }
         let old = measures.of(&state, 0)?;
@@ -237,10 +239,10 @@ pub fn within(space: &Space, maximize: bool, steps: usize) -> Option<Found> {
     let mut best: Option<(Number, usize, usize)> = None;
     for (layer, costs) in layers.iter().enumerate() {
         for (state, cost) in costs.iter().enumerate().filter(|(state, _)| space.goals[*state]) {
-            if let Some((cost, ..)) = cost {
-                if best.as_ref().is_none_or(|(old, ..)| better(cost, old)) {
-                    best = Some((cost.clone(), layer, state));
-                }
+            if let Some((cost, ..)) = cost
+                && best.as_ref().is_none_or(|(old, ..)| better(cost, old))
+            {
+                best = Some((cost.clone(), layer, state));
             }
         }
     }

@@ -57,11 +57,11 @@ fn walk(ground: &Ground, seen: &mut Vec<Vec<Number>>, rng: &mut Rng) -> State {
         });
         let Some((instance, after)) = next else { break };
         for test in &instance.start.tests {
-            if let Test::Open(position, value) = test {
-                if let Some(value) = number(value, &state) {
-                    seen.resize((*position + 1).max(seen.len()), Vec::new());
-                    seen[*position].push(value);
-                }
+            if let Test::Open(position, value) = test
+                && let Some(value) = number(value, &state)
+            {
+                seen.resize((*position + 1).max(seen.len()), Vec::new());
+                seen[*position].push(value);
             }
         }
         state = after;
@@ -83,7 +83,7 @@ fn close(task: &mut Task, seen: &[Vec<Number>], rng: &mut Rng) {
                     Relation::AtLeast if once_in(rng, 3) => draw::relation(rng),
                     other => *other,
                 };
-                *condition = compare(rng, relation, expression.clone(), value);
+                *condition = compare(rng, relation, expression.clone(), &value);
             }
         }
     };
@@ -97,8 +97,8 @@ fn close(task: &mut Task, seen: &[Vec<Number>], rng: &mut Rng) {
 }
 
 /// A comparison of an expression with a value or one next to it, in one of the ways to write it.
-fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: Number) -> Condition {
-    let value = near(rng, &value);
+fn compare(rng: &mut Rng, relation: Relation, expression: Expr, value: &Number) -> Condition {
+    let value = near(rng, value);
     let reversed = match relation {
         Relation::Less => Relation::Greater,
         Relation::AtMost => Relation::AtLeast,
@@ -149,7 +149,7 @@ fn goal(wishes: &Wishes, open: &Ground, state: &State, rng: &mut Rng) -> Vec<Con
         }
         if let Some(value) = number(&open.objectives[position], state) {
             let relation = draw::relation(rng);
-            goal.push(compare(rng, relation, wishes.numbers[position].clone(), value));
+            goal.push(compare(rng, relation, wishes.numbers[position].clone(), &value));
         }
     }
     goal

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use encodings::{Backend, Config, Limits, Semantics, Solution, Status, Strategy};
+use encodings::{Backend, Config, Limits, Semantics, Solution, Status, Strategy, Unbounded};
 use fastrand::Rng;
 
 use crate::judge::{Case, Tally, rational, read, steps_of};
@@ -74,10 +74,11 @@ fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, said: &str, tally: &
     let wrong = match (solution.status, &puzzle.explored.known) {
         (Status::Optimal, Known::Best((best, _))) => cost.as_ref() != Some(best),
         (Status::Optimal, Known::Open(Some((found, _)))) => worse(found),
-        (Status::Optimal, Known::NoBest(_)) => true,
-        (Status::Optimal | Status::Feasible, Known::NoPlan) => true,
+        (Status::Feasible, Known::Best(_)) => solution.unbounded == Some(Unbounded::Proved),
         (Status::Unsolvable, known) => !matches!(known, Known::NoPlan | Known::Open(None)),
-        (Status::UnsolvableWithinHorizon, _) => true,
+        (Status::Optimal, Known::NoBest(_))
+        | (Status::Optimal | Status::Feasible, Known::NoPlan)
+        | (Status::UnsolvableWithinHorizon, _) => true,
         _ => false,
     };
     if wrong {
@@ -112,10 +113,8 @@ fn check_horizon(
     }
     let best = within(space, puzzle.maximize(), horizon);
     let reached = config.limits.reached();
-    if let Some((best, _)) = best.filter(|_| space.complete && !reached) {
-        if rational(plan.cost) != best {
-            tally.count("NOTE: not the best plan within the horizon");
-        }
+    if best.is_some_and(|(best, _)| space.complete && !reached && rational(plan.cost) != best) {
+        tally.count("NOTE: not the best plan within the horizon");
     }
 }
 
