@@ -57,6 +57,9 @@ fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, said: &str, tally: &
     let mut cost = None;
     if let Some(plan) = &solution.plan {
         let claimed = rational(plan.cost);
+        if plan.steps.iter().any(|step| !step.configuration.is_empty()) {
+            tally.count("variant: a plan with designs in slots");
+        }
         match (case.execute)(&steps_of(plan)) {
             Ok(value) if value == claimed => {}
             other => {
