@@ -8,6 +8,7 @@ use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
 use crate::lifted::{Change, Expression, Formula, Lifted, PredicateId, Schema, Term};
+use crate::number::dense;
 use crate::pddl::ast::Name;
 use crate::quantity::SlotSet;
 
@@ -28,9 +29,12 @@ pub(crate) fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name
             && solves.contains(&lifted.predicates[predicate.index()].name)
             && let [Term::Parameter(parameter), function] = terms[..]
             && function != Term::Parameter(parameter)
-            && designs
-                .iter()
-                .all(|slot| slot.parameter != parameter && Term::Parameter(slot.parameter) != function)
+            && designs.iter().all(|slot| {
+                // No function is a design itself: it has to be known before the designs are chosen.
+                slot.parameter != parameter
+                    && Term::Parameter(slot.parameter) != function
+                    && slot.function != Term::Parameter(parameter)
+            })
         {
             designs.push(SlotParameter { parameter, function });
         }
@@ -142,9 +146,9 @@ pub(crate) fn slots_of_expression(expression: &Expression, slots: &[SlotParamete
 fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     if let Term::Parameter(parameter) = term
         && let Some(position) = slots.iter().position(|slot| slot.parameter == parameter)
-        && let Err(place) = set.binary_search(&(position as u16))
+        && let Err(place) = set.binary_search(&dense(position))
     {
-        set.insert(place, position as u16);
+        set.insert(place, dense(position));
     }
 }
 

@@ -1,5 +1,6 @@
 //! What can go wrong between a checked PDDL task and its ground task, each cause with a stable code.
 
+use crate::limits::Interrupted;
 use crate::pddl::ast::Span;
 
 /// Which of the two PDDL files a place lies in.
@@ -62,6 +63,12 @@ pub enum Error {
     /// A rule of the relaxed reachability program that the rule engine refuses.
     #[error("grounding: {0}")]
     Rules(String),
+}
+
+impl From<Interrupted> for Error {
+    fn from(Interrupted: Interrupted) -> Self {
+        Self::Interrupted
+    }
 }
 
 impl Error {

@@ -23,6 +23,7 @@ mod alternatives;
 mod bounds;
 mod certificate;
 mod concurrent;
+mod earliest;
 mod encode;
 mod limits;
 mod objectives;

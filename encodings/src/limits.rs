@@ -1,4 +1,8 @@
 //! When a long search has to stop: a deadline, and a flag that Ctrl-C sets.
+//!
+//! What takes long goes through its items by [`Limits::watch`], or beats a [`Pulse`] each time round. Both yield [`Interrupted`] when
+//! a limit is reached, which has to be handed on (`?`): a function that was cut short has no result that could be taken for an
+//! answer. Where to stop is thus seen at each loop, and that the callers stop, too, is checked by the compiler.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,9 +33,120 @@ impl Limits {
         Arc::clone(&self.interrupt)
     }
 
+    /// An error once a limit is reached.
+    pub(crate) fn check(&self) -> Result<(), Interrupted> {
+        if self.reached() { Err(Interrupted) } else { Ok(()) }
+    }
+
+    /// Each item, as long as no limit is reached; then the error, and nothing more.
+    pub(crate) fn watch<I: IntoIterator>(&self, items: I) -> Watched<'_, I::IntoIter> {
+        Watched { items: items.into_iter(), pulse: self.pulse(), is_over: false }
+    }
+
+    /// For loops that go through nothing that could be watched.
+    pub(crate) fn pulse(&self) -> Pulse<'_> {
+        Pulse { limits: self, left: 0, stride: 1, last: None }
+    }
+
     /// Whether the run has to stop.
     pub fn reached(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
             || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
+
+/// That a limit was reached: what was being worked out is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Interrupted;
+
+/// Looks at the limits every so many beats: often where a beat takes long, seldom where looking would take longer than
+/// what lies between.
+#[derive(Debug)]
+pub(crate) struct Pulse<'a> {
+    limits: &'a Limits,
+    /// Beats until the clock is looked at again.
+    left: u32,
+    stride: u32,
+    last: Option<Instant>,
+}
+
+/// Beats between two looks at the clock, at most.
+const LONGEST_STRIDE: u32 = 1 << 14;
+/// The time between two looks at the clock that is aimed at.
+const BETWEEN: Duration = Duration::from_millis(2);
+
+impl Pulse<'_> {
+    /// An error once a limit is reached.
+    pub(crate) fn beat(&mut self) -> Result<(), Interrupted> {
+        if self.left > 0 {
+            self.left -= 1;
+            return Ok(());
+        }
+        if self.limits.interrupt.load(Ordering::Relaxed) {
+            return Err(Interrupted);
+        }
+        let now = Instant::now();
+        if self.limits.deadline.is_some_and(|deadline| now >= deadline) {
+            return Err(Interrupted);
+        }
+        self.stride = match self.last.map(|last| now.duration_since(last)) {
+            Some(passed) if passed > BETWEEN => (self.stride / 4).max(1),
+            Some(passed) if passed < BETWEEN / 4 => (self.stride * 2).min(LONGEST_STRIDE),
+            _ => self.stride,
+        };
+        self.last = Some(now);
+        self.left = self.stride;
+        Ok(())
+    }
+}
+
+/// Items under limits; see [`Limits::watch`].
+#[derive(Debug)]
+pub(crate) struct Watched<'a, I> {
+    items: I,
+    pulse: Pulse<'a>,
+    is_over: bool,
+}
+
+impl<I: Iterator> Iterator for Watched<'_, I> {
+    type Item = Result<I::Item, Interrupted>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.is_over {
+            return None;
+        }
+        if let Err(interrupted) = self.pulse.beat() {
+            self.is_over = true;
+            return Some(Err(interrupted));
+        }
+        self.items.next().map(Ok)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_watched_ends_with_an_error_and_never_early_without_one() {
+        let limits = Limits::none();
+        assert_eq!(limits.watch(0..100_000).filter_map(Result::ok).count(), 100_000);
+        let mut watched = limits.watch(0..);
+        assert_eq!(watched.next(), Some(Ok(0)));
+        limits.interrupt().store(true, Ordering::Relaxed);
+        // A stride of beats may pass before the flag is looked at; then there is the error, once.
+        let rest: Vec<_> = watched.collect();
+        assert_eq!(rest.iter().filter(|item| item.is_err()).count(), 1);
+        assert_eq!(rest.last(), Some(&Err(Interrupted)));
+        let late = Limits::none().with_time(Duration::ZERO);
+        assert_eq!(late.watch(0..3).collect::<Vec<_>>(), [Err(Interrupted)]);
+    }
+
+    #[test]
+    fn slow_items_are_watched_one_by_one() {
+        let limits = Limits::none().with_time(Duration::from_millis(60));
+        let slow = |_| std::thread::sleep(Duration::from_millis(5));
+        let passed = limits.watch(0..1_000).map_while(Result::ok).map(slow).count();
+        assert!((1..=14).contains(&passed), "{passed}");
     }
 }

@@ -102,6 +102,12 @@ impl Rational {
         !self.is_positive() && !self.is_zero()
     }
 
+    /// The result if both are small integers, which most are: no common divisor has to be found.
+    fn integers(&self, other: &Self, operation: impl Fn(i128, i128) -> Option<i128>) -> Option<Self> {
+        let (a, b) = (self.to_int()?, other.to_int()?);
+        operation(a, b).filter(|result| *result > i128::MIN).map(Self::from_integer)
+    }
+
     fn combine(
         &self,
         other: &Self,
@@ -117,6 +123,11 @@ impl Rational {
         }
         Self::from_big(big(self.to_big(), other.to_big()))
     }
+}
+
+/// An index as a number of 32 bits: of operators, atoms, values, designs or steps, of which there are fewer than fit into memory.
+pub(crate) fn dense(index: usize) -> u32 {
+    u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }
 
 /// A number in words, for keys.
@@ -156,7 +167,8 @@ impl Add<&Self> for Rational {
     type Output = Self;
 
     fn add(self, other: &Self) -> Self {
-        self.combine(other, |a, b| a.checked_add(b), |a, b| a + b)
+        self.integers(other, i128::checked_add)
+            .unwrap_or_else(|| self.combine(other, CheckedAdd::checked_add, |a, b| a + b))
     }
 }
 
@@ -178,7 +190,8 @@ impl Sub<&Self> for Rational {
     type Output = Self;
 
     fn sub(self, other: &Self) -> Self {
-        self.combine(other, |a, b| a.checked_sub(b), |a, b| a - b)
+        self.integers(other, i128::checked_sub)
+            .unwrap_or_else(|| self.combine(other, CheckedSub::checked_sub, |a, b| a - b))
     }
 }
 
@@ -194,7 +207,8 @@ impl Mul<&Self> for Rational {
     type Output = Self;
 
     fn mul(self, other: &Self) -> Self {
-        self.combine(other, |a, b| a.checked_mul(b), |a, b| a * b)
+        self.integers(other, i128::checked_mul)
+            .unwrap_or_else(|| self.combine(other, CheckedMul::checked_mul, |a, b| a * b))
     }
 }
 
@@ -211,7 +225,7 @@ impl Div for Rational {
     type Output = Self;
 
     fn div(self, other: Self) -> Self {
-        self.combine(&other, |a, b| a.checked_div(b), |a, b| a / b)
+        self.combine(&other, CheckedDiv::checked_div, |a, b| a / b)
     }
 }
 
@@ -241,6 +255,7 @@ impl PartialOrd for Rational {
 impl Ord for Rational {
     fn cmp(&self, other: &Self) -> Ordering {
         match (&self.0, &other.0) {
+            (Repr::Small(a), Repr::Small(b)) if a.denom() == b.denom() => a.numer().cmp(b.numer()),
             (Repr::Small(a), Repr::Small(b)) => a.cmp(b),
             _ => self.to_big().cmp(&other.to_big()),
         }

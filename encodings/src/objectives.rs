@@ -143,7 +143,7 @@ impl Task {
 
     /// Admits only plans that cost at most so much by an objective.
     fn limit(&mut self, objective: usize, budget: Int) {
-        let variable = NumericId(self.initial.numbers.len() as u32);
+        let variable = NumericId::of(self.initial.numbers.len());
         self.initial.numbers.push(budget);
         self.number_names.push(String::new());
         let always = self.operators.iter().all(|operator| Self::cost(operator, objective).minimum() >= 0);

@@ -3,7 +3,7 @@
 use num_rational::{BigRational, Ratio};
 use num_traits::ToPrimitive;
 
-use crate::ground::events::Timing;
+use crate::earliest::{earliest, starts};
 use crate::lifted::ObjectId;
 use crate::number::Int;
 use crate::pddl::number::to_decimal;
@@ -14,7 +14,7 @@ use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 pub(crate) struct GroundStep {
     pub(crate) operator: OperatorId,
     /// An index into `SlotUse::designs` for each slot of the operator.
-    pub(crate) choice: Vec<u16>,
+    pub(crate) choice: Vec<u32>,
 }
 
 /// A plan and the sum of its operators' costs, in the task's integer unit.
@@ -89,26 +89,19 @@ pub struct Plan {
 
 /// The plan in the names of the task.
 pub(crate) fn decode(task: &Task, plan: &GroundPlan) -> Plan {
+    let plan = earliest(task, plan);
     let mut steps = Vec::new();
-    let mut clock: Int = 0;
     let mut current: Vec<(String, String)> = Vec::new();
     let sign = if task.objective.maximize { -1 } else { 1 };
-    for step in &plan.steps {
+    let actions = plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none());
+    for (step, start) in actions.zip(starts(task, &plan.steps)) {
         let operator = &task.operators[step.operator.index()];
-        if let Some(time) = operator.wait {
-            clock = time;
-            continue;
-        }
         let sizes = operator.sizes();
         let duration = operator.duration.at(&step.choice, &sizes);
         let cost = sign * operator.cost.at(&step.choice, &sizes);
-        let Timing { start, end } = operator.timing;
-        let earliest = start.into_iter().chain(end.map(|end| end - duration));
-        clock = earliest.fold(clock, Int::max);
-        let mut step = Step::new(task, operator, &step.choice, (clock, duration, cost));
+        let mut step = Step::new(task, operator, &step.choice, (start, duration, cost));
         step.note_reconfigured(&mut current);
         steps.push(step);
-        clock += duration;
     }
     Plan { steps, cost: metric(task, plan.cost) }
 }
@@ -130,7 +123,7 @@ impl Step {
     pub(crate) fn new(
         task: &Task,
         operator: &Operator,
-        choice: &[u16],
+        choice: &[u32],
         (start, duration, cost): (Int, Int, Int),
     ) -> Self {
         Self {
@@ -173,7 +166,7 @@ impl Objective {
 }
 
 /// The object that an argument stands for, with a combination of designs.
-pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u16], argument: Argument) -> ObjectId {
+pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u32], argument: Argument) -> ObjectId {
     match argument {
         Argument::Object(object) => object,
         Argument::Slot(position) => {
@@ -184,15 +177,15 @@ pub(crate) fn resolve(task: &Task, operator: &Operator, choice: &[u16], argument
     }
 }
 
-fn argument(task: &Task, operator: &Operator, choice: &[u16], argument: Argument) -> String {
+fn argument(task: &Task, operator: &Operator, choice: &[u32], argument: Argument) -> String {
     task.object_names[resolve(task, operator, choice, argument).index()].clone()
 }
 
-fn arguments(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<String> {
+fn arguments(task: &Task, operator: &Operator, choice: &[u32]) -> Vec<String> {
     operator.arguments.iter().map(|a| argument(task, operator, choice, *a)).collect()
 }
 
-fn configuration(task: &Task, operator: &Operator, choice: &[u16]) -> Vec<(String, String)> {
+fn configuration(task: &Task, operator: &Operator, choice: &[u32]) -> Vec<(String, String)> {
     let name = |function: ObjectId| task.object_names[function.index()].clone();
     let pairs = operator.configuration.iter();
     pairs.map(|(function, design)| (name(*function), argument(task, operator, choice, *design))).collect()

@@ -3,14 +3,14 @@
 //! A quantity is a constant plus tables over slots. The tables are what keeps the encoding factored: a sum over
 //! k functions of m designs each is k tables of m entries, not one of m^k.
 
-use crate::number::Int;
+use crate::number::{Int, dense};
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use smallvec::SmallVec;
 
 /// Positions in an operator's slot list, ascending.
-pub(crate) type SlotSet = SmallVec<[u16; 2]>;
+pub(crate) type SlotSet = SmallVec<[u32; 2]>;
 
 /// One value for each combination of the admitted designs of some slots.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,6 +49,16 @@ pub struct NumericId(pub(crate) u32);
 impl NumericId {
     pub(crate) fn index(self) -> usize {
         self.0 as usize
+    }
+
+    /// The id of what stands at an index.
+    pub(crate) fn of(index: usize) -> Self {
+        Self(dense(index))
+    }
+
+    /// The first ids, so many.
+    pub(crate) fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
+        (0..dense(count)).map(Self)
     }
 }
 
@@ -128,14 +138,14 @@ impl<N: Number> Quantity<N> {
     }
 
     /// What tables over no other slots than these contribute.
-    pub(crate) fn part(&self, slots: &[u16], choice: &[u16], sizes: &[usize]) -> N {
+    pub(crate) fn part(&self, slots: &[u32], choice: &[u32], sizes: &[usize]) -> N {
         let own = self.tables.iter().filter(|table| table.slots.iter().all(|slot| slots.contains(slot)));
         own.map(|table| table.values[table.index(choice, sizes)].clone())
             .fold(N::zero(), |sum, value| sum + value)
     }
 
     /// The value when the slot at position `i` has its `choice[i]`-th admitted design; `sizes` counts those designs.
-    pub(crate) fn at(&self, choice: &[u16], sizes: &[usize]) -> N {
+    pub(crate) fn at(&self, choice: &[u32], sizes: &[usize]) -> N {
         let chosen = self.tables.iter().map(|table| table.values[table.index(choice, sizes)].clone());
         chosen.fold(self.constant.clone(), |sum, value| sum + value)
     }
@@ -156,7 +166,7 @@ impl Quantity<Int> {
 }
 
 impl<N> Table<N> {
-    fn index(&self, choice: &[u16], sizes: &[usize]) -> usize {
+    fn index(&self, choice: &[u32], sizes: &[usize]) -> usize {
         self.slots
             .iter()
             .fold(0, |index, slot| index * sizes[*slot as usize] + choice[*slot as usize] as usize)

@@ -16,10 +16,10 @@ use std::collections::hash_map::Entry;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
-use crate::limits::Limits;
-use crate::number::{GROWTH_LIMIT, Int};
+use crate::limits::{Interrupted, Limits, Pulse};
+use crate::number::{GROWTH_LIMIT, Int, dense};
 use crate::plan::{GroundPlan, GroundStep};
-use crate::successors::{OperatorIndex, undominated};
+use crate::successors::{OperatorIndex, Priced, undominated};
 use crate::task::{Fact, OperatorId, State, Task};
 
 /// How many states are stored at most.
@@ -49,7 +49,7 @@ struct Node {
 /// What a search needs to know of a task, whatever state it begins in.
 pub(crate) struct Prepared {
     /// For each operator its combinations of designs that no other one dominates, with their costs.
-    choices: Vec<Vec<(Vec<u16>, Int)>>,
+    choices: Vec<Priced>,
     index: OperatorIndex,
     /// Whether more of any numeric variable never hurts.
     monotone: bool,
@@ -57,10 +57,14 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     /// None if some operator has too many combinations of designs.
-    pub(crate) fn new(task: &Task) -> Option<Self> {
+    pub(crate) fn new(task: &Task, limits: &Limits) -> Result<Option<Self>, Interrupted> {
         let monotone = is_monotone(task);
-        let choices = task.operators.iter().map(|operator| undominated(operator, monotone, false));
-        Some(Self { choices: choices.collect::<Option<_>>()?, index: OperatorIndex::new(task), monotone })
+        let mut choices = Vec::with_capacity(task.operators.len());
+        for operator in limits.watch(&task.operators) {
+            let Some(own) = undominated(operator?, monotone, false, limits)? else { return Ok(None) };
+            choices.push(own);
+        }
+        Ok(Some(Self { choices, index: OperatorIndex::new(task), monotone }))
     }
 }
 
@@ -83,10 +87,12 @@ struct Search<'a> {
 
 /// Searches a task whose operators all cost at least 0.
 pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
-    let prepared = Prepared::new(task);
-    let found = prepared
-        .map(|prepared| search_from(task, bounds, &prepared, &task.initial, Int::MAX, STATE_LIMIT, limits));
-    found.unwrap_or(Found::Unknown(None))
+    match Prepared::new(task, limits) {
+        Ok(Some(prepared)) => {
+            search_from(task, bounds, &prepared, &task.initial, Int::MAX, STATE_LIMIT, limits)
+        }
+        Ok(None) | Err(Interrupted) => Found::Unknown(None),
+    }
 }
 
 /// Searches it from a state of its own, storing at most so many states, for a plan that costs at most `limit`: what a known one
@@ -134,7 +140,7 @@ pub(crate) fn closed_labels(
     limits: &Limits,
     cost: Option<Int>,
 ) -> Option<Vec<ClosedLabel>> {
-    let prepared = Prepared::new(task)?;
+    let prepared = Prepared::new(task, limits).ok()??;
     let mut search = Search::new(task, bounds, &prepared, &task.initial, false);
     match (search.run(limits, STATE_LIMIT)?, cost) {
         (Found::Optimal(plan), Some(cost)) if plan.cost >= cost => {}
@@ -176,7 +182,7 @@ impl<'a> Search<'a> {
 
     /// None if there are more states than `most` before anything is known; it may be called again.
     fn run(&mut self, limits: &Limits, most: usize) -> Option<Found> {
-        let mut expanded = 0_usize;
+        let mut pulse = limits.pulse();
         while self.nodes.len() <= most {
             let Some(Reverse((_, steps, id))) = self.open.pop() else {
                 return Some(if self.incomplete { Found::Unknown(self.best_plan()) } else { Found::None });
@@ -190,11 +196,9 @@ impl<'a> Search<'a> {
                 }
                 return Some(Found::Optimal(self.plan(id)));
             }
-            expanded += 1;
-            if expanded.is_multiple_of(256) && limits.reached() {
+            if self.expand(id, steps, &mut pulse).is_err() {
                 return Some(Found::Unknown(self.best_plan()));
             }
-            self.expand(id, steps);
         }
         None
     }
@@ -203,7 +207,9 @@ impl<'a> Search<'a> {
         self.best.map(|goal| self.plan(goal))
     }
 
-    fn expand(&mut self, id: u32, steps: u32) {
+    /// Adds all that can be reached from a node by one step. A node whose expansion is interrupted is not expanded, so that the
+    /// search must end there.
+    fn expand(&mut self, id: u32, steps: u32, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
         let state = self.nodes[id as usize].state.clone();
         let cost = self.nodes[id as usize].cost;
         let prepared = self.prepared;
@@ -211,8 +217,9 @@ impl<'a> Search<'a> {
             let operator = &self.task.operators[operator_id.index()];
             let sizes = operator.sizes();
             for (index, (choice, step)) in prepared.choices[operator_id.index()].iter().enumerate() {
+                pulse.beat()?;
                 if operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
-                    let parent = Some((id, operator_id, index as u32));
+                    let parent = Some((id, operator_id, dense(index)));
                     match (self.task.successor(operator, &state, choice), cost.checked_add(*step)) {
                         (Some(next), Some(cost)) => self.push(next, cost, steps + 1, parent),
                         _ => self.incomplete = true,
@@ -220,6 +227,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
+        Ok(())
     }
 
     fn push(&mut self, state: State, cost: Int, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
@@ -231,7 +239,7 @@ impl<'a> Search<'a> {
         if total > self.limit {
             return;
         }
-        let id = self.nodes.len() as u32;
+        let id = dense(self.nodes.len());
         match self.seen.entry(state.values[..self.task.basic].into()) {
             Entry::Vacant(entry) => {
                 entry.insert(vec![id]);

@@ -81,6 +81,8 @@ pub struct Statistics {
     pub calls: usize,
     /// Why a SAT solver gave up, if not at a limit.
     pub failure: Option<String>,
+    /// Two parts of the planner contradict each other: a fault of ours, and nothing is claimed to be proved.
+    pub contradiction: Option<String>,
     /// Time for bounds and the quick search.
     pub search: Duration,
     /// Time for building formulas.

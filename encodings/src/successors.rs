@@ -1,9 +1,12 @@
 //! What can be done in a state: operators by what they require, and the designs worth choosing.
 
-use rustc_hash::FxHashMap;
+use std::collections::hash_map::Entry;
 
-use crate::number::Int;
-use crate::quantity::Quantity;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::limits::{Interrupted, Limits};
+use crate::number::{Int, dense};
+use crate::quantity::{Quantity, SlotSet};
 use crate::task::{Operator, OperatorId, State, Task};
 
 /// Operators by that fact of their condition whose variable has the most values.
@@ -14,7 +17,7 @@ pub(crate) struct OperatorIndex {
 
 impl OperatorIndex {
     pub(crate) fn new(task: &Task) -> Self {
-        Self::over(task, (0..task.operators.len() as u32).map(OperatorId))
+        Self::over(task, OperatorId::all(task.operators.len()))
     }
 
     /// An index of some operators, ascending.
@@ -38,7 +41,7 @@ impl OperatorIndex {
     pub(crate) fn applicable(&self, task: &Task, state: &State) -> Vec<OperatorId> {
         let mut found = self.always.clone();
         for (variable, value) in state.values.iter().enumerate() {
-            found.extend(self.by_fact.get(&(variable as u32, *value)).into_iter().flatten());
+            found.extend(self.by_fact.get(&(dense(variable), *value)).into_iter().flatten());
         }
         found.retain(|id| task.operators[id.index()].condition.holds_propositionally(&state.values));
         found.sort_unstable();
@@ -46,63 +49,99 @@ impl OperatorIndex {
     }
 }
 
-/// As many combinations of designs are compared at most.
+/// As many combinations of designs are looked at for one operator at most…
+const COMBINATION_LIMIT: usize = 2_000_000;
+/// … and as many of them are kept, none of which dominates another.
 const CHOICE_LIMIT: usize = 100_000;
 
 /// Designs for some slots of an operator, with what they add to its cost and to the numbers in its conditions and effects.
 struct Partial {
-    choice: Vec<u16>,
+    choice: Vec<u32>,
     cost: Int,
     profile: Vec<Int>,
 }
 
+/// Combinations of designs, each with its cost.
+pub(crate) type Priced = Vec<(Vec<u32>, Int)>;
+
 /// The combinations of an operator's designs that no other one dominates, with their costs: none is cheaper or
 /// leaves more of the numeric variables. Of equal ones the first stands for all, unless `all` are asked for. None if there
-/// are too many.
+/// are too many: then nothing is known.
 ///
 /// Slots that no table and no exclusion joins contribute by themselves, so what is dominated among the combinations of some of
 /// them is dominated in all combinations that extend it: k functions of m designs cost no m^k comparisons.
-pub(crate) fn undominated(operator: &Operator, monotone: bool, all: bool) -> Option<Vec<(Vec<u16>, Int)>> {
+pub(crate) fn undominated(
+    operator: &Operator,
+    monotone: bool,
+    all: bool,
+    limits: &Limits,
+) -> Result<Option<Priced>, Interrupted> {
     let sizes = operator.sizes();
     let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
     let conditions = operator.condition.comparisons.iter().map(|linear| &linear.quantity);
-    let quantities: Vec<&Quantity<Int>> = effects.chain(conditions).collect();
+    // A resource is usually compared and reduced by the same quantity.
+    let mut quantities: Vec<&Quantity<Int>> = Vec::new();
+    for quantity in effects.chain(conditions) {
+        if !quantities.contains(&quantity) {
+            quantities.push(quantity);
+        }
+    }
     let profile = quantities.iter().map(|quantity| quantity.constant).collect();
     let mut front = vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant, profile }];
     for slots in independent(operator, &quantities) {
-        let mut own = Vec::new();
-        each_combination(&slots, &sizes, &mut |choice| {
-            let excluded = operator.forbidden.iter().any(|rule| {
-                let joins = rule.slots.iter().all(|slot| slots.contains(slot));
-                joins
-                    && rule
-                        .combinations
-                        .iter()
-                        .any(|bad| rule.slots.iter().zip(bad).all(|(s, d)| choice[*s as usize] == *d))
-            });
-            let sum = |quantity: &Quantity<Int>| quantity.part(&slots, choice, &sizes);
-            if !excluded {
-                own.push(Partial {
-                    choice: choice.to_vec(),
-                    cost: sum(&operator.cost),
-                    profile: quantities.iter().map(|quantity| sum(quantity)).collect(),
-                });
-            }
-            own.len() <= CHOICE_LIMIT
-        });
-        let own = best(own, monotone, all);
-        if own.len().saturating_mul(front.len()) > CHOICE_LIMIT {
-            return None;
+        let Some(own) = own_front(operator, &quantities, &slots, (monotone, all), limits)? else {
+            return Ok(None);
+        };
+        if own.len().checked_mul(front.len()).is_none_or(|pairs| pairs > CHOICE_LIMIT) {
+            return Ok(None);
         }
         let slots = &slots;
         let pairs = front.iter().flat_map(|known| own.iter().map(move |own| known.with(own, slots)));
-        front = best(pairs.collect(), monotone, all);
+        front = best(pairs.collect(), monotone, all, limits)?;
     }
-    Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect())
+    Ok(Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect()))
+}
+
+/// Those combinations of designs for some slots that no other one dominates; none if there are too many.
+fn own_front(
+    operator: &Operator,
+    quantities: &[&Quantity<Int>],
+    slots: &[u32],
+    (monotone, all): (bool, bool),
+    limits: &Limits,
+) -> Result<Option<Vec<Partial>>, Interrupted> {
+    let sizes = operator.sizes();
+    let mut counts = slots.iter().map(|slot| sizes[*slot as usize]);
+    let count = counts.try_fold(1_usize, usize::checked_mul);
+    if count.is_none_or(|count| count > COMBINATION_LIMIT) {
+        return Ok(None);
+    }
+    let rules = operator.forbidden.iter().filter(|rule| rule.slots.iter().all(|slot| slots.contains(slot)));
+    let rules: Vec<(&SlotSet, FxHashSet<&SlotSet>)> =
+        rules.map(|rule| (&rule.slots, rule.combinations.iter().collect())).collect();
+    let mut own = Vec::new();
+    for choice in limits.watch(Combinations::new(slots, &sizes)) {
+        let choice = choice?;
+        let part = |slots: &SlotSet| slots.iter().map(|slot| choice[*slot as usize]).collect::<SlotSet>();
+        if rules.iter().any(|(slots, bad)| bad.contains(&part(slots))) {
+            continue;
+        }
+        let sum = |quantity: &Quantity<Int>| quantity.part(slots, &choice, &sizes);
+        let cost = sum(&operator.cost);
+        let profile = quantities.iter().map(|quantity| sum(quantity)).collect();
+        own.push(Partial { choice, cost, profile });
+        if own.len() > 2 * CHOICE_LIMIT {
+            own = best(own, monotone, all, limits)?;
+            if own.len() > CHOICE_LIMIT {
+                return Ok(None);
+            }
+        }
+    }
+    best(own, monotone, all, limits).map(Some)
 }
 
 impl Partial {
-    fn with(&self, other: &Self, slots: &[u16]) -> Self {
+    fn with(&self, other: &Self, slots: &[u32]) -> Self {
         let mut choice = self.choice.clone();
         for slot in slots {
             choice[*slot as usize] = other.choice[*slot as usize];
@@ -113,34 +152,59 @@ impl Partial {
 }
 
 /// Those that none dominates, in lexicographic order of the designs.
-fn best(mut all_of_them: Vec<Partial>, monotone: bool, all: bool) -> Vec<Partial> {
+fn best(
+    mut all_of_them: Vec<Partial>,
+    monotone: bool,
+    all: bool,
+    limits: &Limits,
+) -> Result<Vec<Partial>, Interrupted> {
+    limits.check()?;
     // What dominates comes before what it dominates.
     all_of_them.sort_by(|a, b| {
         a.cost.cmp(&b.cost).then_with(|| b.profile.cmp(&a.profile)).then_with(|| a.choice.cmp(&b.choice))
     });
     let mut front: Vec<Partial> = Vec::new();
+    // Where profiles have to be equal, the first with each: none that comes later is cheaper.
+    let mut cheapest: FxHashMap<Vec<Int>, Int> = FxHashMap::default();
+    let mut pulse = limits.pulse();
     for new in all_of_them {
-        let dominates = |old: &Partial| {
-            let no_worse = if monotone {
-                old.profile.iter().zip(&new.profile).all(|(old, new)| old >= new)
-            } else {
-                old.profile == new.profile
-            };
-            no_worse && !(all && old.cost == new.cost && old.profile == new.profile)
+        let is_equal = |cost: Int, profile: &[Int]| all && cost == new.cost && profile == new.profile;
+        let is_dominated = if !monotone {
+            pulse.beat()?;
+            match cheapest.entry(new.profile.clone()) {
+                Entry::Occupied(known) => !is_equal(*known.get(), known.key()),
+                Entry::Vacant(entry) => {
+                    entry.insert(new.cost);
+                    false
+                }
+            }
+        } else {
+            // In one dimension the last one has the most of all that are as cheap.
+            let candidates = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
+            let mut is_dominated = false;
+            for old in &front[candidates..] {
+                pulse.beat()?;
+                let no_worse = old.profile.iter().zip(&new.profile).all(|(old, new)| old >= new);
+                if no_worse && !is_equal(old.cost, &old.profile) {
+                    is_dominated = true;
+                    break;
+                }
+            }
+            is_dominated
         };
-        if !front.iter().any(dominates) {
+        if !is_dominated {
             front.push(new);
         }
     }
     front.sort_by(|a, b| a.choice.cmp(&b.choice));
-    front
+    Ok(front)
 }
 
 /// The slots of an operator in groups that no table and no exclusion joins.
-fn independent(operator: &Operator, quantities: &[&Quantity<Int>]) -> Vec<Vec<u16>> {
+fn independent(operator: &Operator, quantities: &[&Quantity<Int>]) -> Vec<Vec<u32>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
     let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));
-    let mut groups: Vec<Vec<u16>> = (0..operator.slots.len() as u16).map(|slot| vec![slot]).collect();
+    let mut groups: Vec<Vec<u32>> = (0..dense(operator.slots.len())).map(|slot| vec![slot]).collect();
     for slots in joined {
         let (mut together, apart): (Vec<_>, Vec<_>) =
             groups.into_iter().partition(|group| group.iter().any(|slot| slots.contains(slot)));
@@ -154,19 +218,35 @@ fn independent(operator: &Operator, quantities: &[&Quantity<Int>]) -> Vec<Vec<u1
     groups
 }
 
-/// Calls `visit` with every combination of designs for some slots until it returns false; the other slots stay at 0.
-fn each_combination(slots: &[u16], sizes: &[usize], visit: &mut dyn FnMut(&[u16]) -> bool) {
-    if slots.iter().any(|slot| sizes[*slot as usize] == 0) {
-        return;
+/// Every combination of designs for some slots, in lexicographic order; the other slots stay at 0.
+struct Combinations<'a> {
+    slots: &'a [u32],
+    sizes: &'a [usize],
+    next: Option<Vec<u32>>,
+}
+
+impl<'a> Combinations<'a> {
+    fn new(slots: &'a [u32], sizes: &'a [usize]) -> Self {
+        let is_empty = slots.iter().any(|slot| sizes[*slot as usize] == 0);
+        Self { slots, sizes, next: (!is_empty).then(|| vec![0; sizes.len()]) }
     }
-    let mut choice = vec![0; sizes.len()];
-    while visit(&choice) {
-        let grows = |slot: &&u16| choice[**slot as usize] as usize + 1 < sizes[**slot as usize];
-        let Some(position) = slots.iter().rposition(|slot| grows(&slot)) else { return };
-        choice[slots[position] as usize] += 1;
-        for slot in &slots[position + 1..] {
-            choice[*slot as usize] = 0;
+}
+
+impl Iterator for Combinations<'_> {
+    type Item = Vec<u32>;
+
+    fn next(&mut self) -> Option<Vec<u32>> {
+        let current = self.next.take()?;
+        let grows = |slot: &u32| (current[*slot as usize] as usize) + 1 < self.sizes[*slot as usize];
+        if let Some(position) = self.slots.iter().rposition(grows) {
+            let mut following = current.clone();
+            following[self.slots[position] as usize] += 1;
+            for slot in &self.slots[position + 1..] {
+                following[*slot as usize] = 0;
+            }
+            self.next = Some(following);
         }
+        Some(current)
     }
 }
 
@@ -181,7 +261,7 @@ mod tests {
     const SIZES: [usize; 4] = [2, 3, 2, 2];
 
     /// A quantity with a table over each list of slots, filled with small numbers.
-    fn quantity(tables: &[Vec<u16>], numbers: &mut impl Iterator<Item = Int>) -> Quantity<Int> {
+    fn quantity(tables: &[Vec<u32>], numbers: &mut impl Iterator<Item = Int>) -> Quantity<Int> {
         let mut quantity = Quantity::constant(numbers.next().unwrap_or(0));
         for slots in tables {
             let size = slots.iter().map(|slot| SIZES[*slot as usize]).product();
@@ -191,14 +271,14 @@ mod tests {
         quantity
     }
 
-    fn operator(costs: &[Vec<u16>], uses: &[Vec<u16>], excluded: &[(u16, u16)], numbers: &[Int]) -> Operator {
+    fn operator(costs: &[Vec<u32>], uses: &[Vec<u32>], excluded: &[(u32, u32)], numbers: &[Int]) -> Operator {
         let mut numbers = numbers.iter().copied().cycle();
         let cost = quantity(costs, &mut numbers);
         let variable = NumericId(0);
         let value = Linear { coefficients: vec![(variable, 1)], quantity: quantity(uses, &mut numbers) };
         let slot = |(size, slot): (&usize, u32)| SlotUse {
             slot: SlotId(slot),
-            designs: (0..*size as u16).collect(),
+            designs: (0..*size as u32).collect(),
         };
         // Slots 0 and 1 exclude each other's designs.
         let combinations = excluded.iter().map(|(a, b)| [*a, *b].into()).collect();
@@ -221,13 +301,13 @@ mod tests {
     }
 
     /// By definition: every combination against every other one.
-    fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u16>, Int)> {
+    fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u32>, Int)> {
         let sizes = operator.sizes();
-        let value = |choice: &Vec<u16>| {
+        let value = |choice: &Vec<u32>| {
             (operator.cost.at(choice, &sizes), operator.numeric_effects[0].value.quantity.at(choice, &sizes))
         };
-        let choices: Vec<Vec<u16>> = operator.choices().collect();
-        let beaten = |choice: &Vec<u16>| {
+        let choices: Vec<Vec<u32>> = operator.choices().collect();
+        let beaten = |choice: &Vec<u32>| {
             let (cost, left) = value(choice);
             choices.iter().any(|other| {
                 let (own, more) = value(other);
@@ -245,21 +325,22 @@ mod tests {
         fn independent_slots_lose_nothing(
             costs in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![1, 2]], 0..=5),
             uses in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![0, 3]], 0..=5),
-            excluded in proptest::collection::vec((0_u16..2, 0_u16..3), 0..4),
+            excluded in proptest::collection::vec((0_u32..2, 0_u32..3), 0..4),
             numbers in proptest::collection::vec(-4_i128..5, 1..40),
             monotone: bool,
         ) {
             let operator = operator(&costs, &uses, &excluded, &numbers);
-            prop_assert_eq!(undominated(&operator, monotone, true), Some(expected(&operator, monotone, true)));
+            let limits = Limits::none();
+            prop_assert_eq!(undominated(&operator, monotone, true, &limits), Ok(Some(expected(&operator, monotone, true))));
             // Of equal ones one stands for all.
-            let values = |choices: Vec<(Vec<u16>, Int)>| {
+            let values = |choices: Vec<(Vec<u32>, Int)>| {
                 let sizes = operator.sizes();
-                let left = |choice: &[u16]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);
+                let left = |choice: &[u32]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);
                 let mut values: Vec<_> = choices.iter().map(|(choice, cost)| (*cost, left(choice))).collect();
                 values.sort_unstable();
                 values
             };
-            let found = undominated(&operator, monotone, false).unwrap_or_default();
+            let found = undominated(&operator, monotone, false, &limits).expect("no limit").unwrap_or_default();
             prop_assert!(found.iter().all(|(choice, _)| operator.admits(choice)));
             prop_assert_eq!(values(found), values(expected(&operator, monotone, false)));
         }

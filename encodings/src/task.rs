@@ -13,7 +13,7 @@ use num_bigint::{BigInt, Sign};
 
 use crate::ground::events::Timing;
 use crate::lifted::ObjectId;
-use crate::number::{GROWTH_LIMIT, Int};
+use crate::number::{GROWTH_LIMIT, Int, dense};
 pub use crate::quantity::NumericId;
 use crate::quantity::{Linear, Quantity, SlotSet};
 
@@ -33,17 +33,42 @@ impl VariableId {
     pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
+
+    /// The id of what stands at an index.
+    pub(crate) fn of(index: usize) -> Self {
+        Self(dense(index))
+    }
+
+    /// The first ids, so many.
+    pub(crate) fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
+        (0..dense(count)).map(Self)
+    }
 }
 
 impl OperatorId {
     pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
+
+    /// The first ids, so many.
+    pub(crate) fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
+        (0..dense(count)).map(Self)
+    }
 }
 
 impl SlotId {
     pub(crate) fn index(self) -> usize {
         self.0 as usize
+    }
+
+    /// The id of what stands at an index.
+    pub(crate) fn of(index: usize) -> Self {
+        Self(dense(index))
+    }
+
+    /// The first ids, so many.
+    pub(crate) fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
+        (0..dense(count)).map(Self)
     }
 }
 
@@ -90,7 +115,7 @@ pub(crate) struct Slot {
 pub(crate) struct SlotUse {
     pub(crate) slot: SlotId,
     /// Indices into the slot's designs, ascending: those that suit this operator.
-    pub(crate) designs: Vec<u16>,
+    pub(crate) designs: Vec<u32>,
 }
 
 /// Combinations of designs that an operator must not run with.
@@ -134,7 +159,7 @@ pub(crate) struct Layer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Argument {
     Object(ObjectId),
-    Slot(u16),
+    Slot(u32),
 }
 
 /// An operator. What depends on its designs is shared with other operators of the same schema.
@@ -199,6 +224,9 @@ pub struct Task {
     pub(crate) variables: Vec<Variable>,
     /// How many variables are basic.
     pub(crate) basic: usize,
+    /// Groups of facts over several variables, of which at most one holds in the initial state and in every state that follows. The
+    /// operators do what the files say only in states of which that is true.
+    pub(crate) exclusive: Vec<Vec<Fact>>,
     /// The numeric variables as PDDL writes them.
     pub(crate) number_names: Vec<String>,
     /// Numbers are this many times the values of the files.
@@ -232,7 +260,7 @@ impl Operator {
     }
 
     /// Whether the combination (an index into `SlotUse::designs` for each slot) is not forbidden.
-    pub(crate) fn admits(&self, choice: &[u16]) -> bool {
+    pub(crate) fn admits(&self, choice: &[u32]) -> bool {
         self.forbidden.iter().all(|rule| {
             rule.combinations
                 .iter()
@@ -241,7 +269,7 @@ impl Operator {
     }
 
     /// The cost with a combination of designs.
-    pub(crate) fn cost_of(&self, choice: &[u16]) -> Int {
+    pub(crate) fn cost_of(&self, choice: &[u32]) -> Int {
         self.cost.at(choice, &self.sizes())
     }
 
@@ -256,13 +284,13 @@ impl Operator {
 pub(crate) struct Choices<'a> {
     operator: &'a Operator,
     sizes: Vec<usize>,
-    next: Option<Vec<u16>>,
+    next: Option<Vec<u32>>,
 }
 
 impl Iterator for Choices<'_> {
-    type Item = Vec<u16>;
+    type Item = Vec<u32>;
 
-    fn next(&mut self) -> Option<Vec<u16>> {
+    fn next(&mut self) -> Option<Vec<u32>> {
         loop {
             let current = self.next.take()?;
             let mut following = current.clone();
@@ -283,13 +311,13 @@ impl Iterator for Choices<'_> {
 
 impl Linear<Int> {
     /// The value in a state, for a combination of designs; none if it does not fit.
-    pub(crate) fn value(&self, numbers: &[Int], choice: &[u16], sizes: &[usize]) -> Option<Int> {
+    pub(crate) fn value(&self, numbers: &[Int], choice: &[u32], sizes: &[usize]) -> Option<Int> {
         let mut terms = self.coefficients.iter().map(|(v, factor)| factor.checked_mul(numbers[v.index()]));
         terms.try_fold(self.quantity.at(choice, sizes), |sum, term| sum.checked_add(term?))
     }
 
     /// Whether the value is at least 0, however large the numbers in between.
-    fn is_at_least_zero(&self, numbers: &[Int], choice: &[u16], sizes: &[usize]) -> bool {
+    fn is_at_least_zero(&self, numbers: &[Int], choice: &[u32], sizes: &[usize]) -> bool {
         if let Some(value) = self.value(numbers, choice, sizes) {
             return value >= 0;
         }
@@ -307,7 +335,7 @@ impl Condition {
     }
 
     /// Whether the numeric part holds.
-    pub(crate) fn holds_numerically(&self, numbers: &[Int], choice: &[u16], sizes: &[usize]) -> bool {
+    pub(crate) fn holds_numerically(&self, numbers: &[Int], choice: &[u32], sizes: &[usize]) -> bool {
         self.comparisons.iter().all(|comparison| comparison.is_at_least_zero(numbers, choice, sizes))
     }
 }
@@ -328,7 +356,7 @@ impl Literal {
 
 impl Operator {
     /// Whether the operator may be applied with this combination of designs.
-    pub(crate) fn applicable(&self, state: &State, choice: &[u16]) -> bool {
+    pub(crate) fn applicable(&self, state: &State, choice: &[u32]) -> bool {
         self.condition.holds_propositionally(&state.values)
             && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())
     }
@@ -349,7 +377,7 @@ impl Task {
 
     /// The state after an operator, which must be applicable with this combination of designs; none if its numbers grow
     /// beyond [`GROWTH_LIMIT`].
-    pub(crate) fn successor(&self, operator: &Operator, state: &State, choice: &[u16]) -> Option<State> {
+    pub(crate) fn successor(&self, operator: &Operator, state: &State, choice: &[u32]) -> Option<State> {
         let mut next = state.clone();
         for effect in &operator.effects {
             next.values[effect.variable.index()] = effect.value;
@@ -381,7 +409,7 @@ impl Task {
             return;
         }
         for (value, variable) in state.values[self.basic..].iter_mut().zip(&self.variables[self.basic..]) {
-            *value = variable.values.len() as u32 - 1;
+            *value = dense(variable.values.len()) - 1;
         }
         for layer in &self.axioms {
             loop {

@@ -5,6 +5,7 @@ pub(crate) mod missions;
 #[path = "../tests/random/mod.rs"]
 pub(crate) mod random;
 
+use std::cell::OnceCell;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fmt::Write as _;
@@ -41,10 +42,11 @@ fn is_solvable(
     semantics: Semantics,
     backend: &Backend,
 ) -> bool {
-    let window = bounds.window(task, Some(limit), Some(steps));
+    let window = bounds.window(task, Some(limit), Some(steps), &Limits::none()).expect("no limit");
     let cost = CostLimit { limit, bounds, counting: Counting::Sum };
     let encoding =
-        Encoding::new(task, &window.allowed, Some(cost), semantics, &Limits::none()).expect("no limit");
+        Encoding::new(task, &window.allowed, Some(cost), semantics, &OnceCell::new(), &Limits::none())
+            .expect("no limit");
     let mut solver = backend.start(&Limits::none(), u64::MAX);
     for (_, clause) in encoding.formula.clauses() {
         solver.add_clause(clause);
@@ -70,16 +72,17 @@ fn check(seed: u64, backend: &Backend) {
         return;
     }
     let (scale, offset) = (task.objective.scale, task.objective.offset);
-    let bounds = Bounds::new(&task, &Limits::none());
+    let bounds = Bounds::new(&task, &Limits::none()).expect("no limit");
     let below = optimum.map_or(MUCH, |optimum| optimum * scale - offset - 1);
-    let step_bound = bounds.window(&task, Some(below), None).steps.unwrap_or(STEPS);
+    let step_bound =
+        bounds.window(&task, Some(below), None, &Limits::none()).expect("no limit").steps.unwrap_or(STEPS);
     let costs = mission.oracle_by_steps(step_bound.clamp(STEPS, MOST_STEPS));
     let costs: Vec<_> = costs.into_iter().map(|cost| cost.map(Int::from)).collect();
     assert!(
         costs.iter().flatten().all(|cost| optimum.is_some_and(|optimum| optimum <= *cost)),
         "seed {seed}"
     );
-    for bounds in [&bounds, &Bounds::trivial(&task)] {
+    for bounds in [&bounds, &Bounds::trivial(&task, &Limits::none()).expect("no limit")] {
         for (steps, cost) in costs.iter().enumerate() {
             let solvable = |limit| is_solvable(&task, bounds, steps, limit, Semantics::Sequential, backend);
             let context = || format!("seed {seed}, {backend:?}, {steps} steps: {mission:?}");
@@ -282,8 +285,10 @@ fn check_estimates(text: &(String, String)) -> bool {
     if task.unreachable.is_some() {
         return false;
     }
-    let (bounds, alone) =
-        (Bounds::new(&task, &Limits::none()), Bounds::of_projections(&task, &Limits::none()));
+    let (bounds, alone) = (
+        Bounds::new(&task, &Limits::none()).expect("no limit"),
+        Bounds::of_projections(&task, &Limits::none()).expect("no limit"),
+    );
     let mut seen = rustc_hash::FxHashSet::from_iter([task.initial.clone()]);
     let mut open = vec![task.initial.clone()];
     while let Some(state) = open.pop() {
@@ -329,9 +334,9 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
     }
     let most = 4;
     let (costs, optimum) = (costs_by_steps(&task, most), optimum(&task));
-    let bounds = Bounds::new(&task, &Limits::none());
+    let bounds = Bounds::new(&task, &Limits::none()).expect("no limit");
     let mut together = false;
-    for bounds in [&bounds, &Bounds::trivial(&task)] {
+    for bounds in [&bounds, &Bounds::trivial(&task, &Limits::none()).expect("no limit")] {
         for (steps, cost) in costs.iter().enumerate() {
             let context = |semantics| format!("{backend:?}, {steps} steps, {semantics:?}, {cost:?}: {text}");
             for semantics in [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep] {
@@ -352,7 +357,8 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
         }
     }
     let allowed = vec![vec![true; task.operators.len()]; most];
-    let encoding = Encoding::new(&task, &allowed, None, Semantics::Sequential, &Limits::none());
+    let encoding =
+        Encoding::new(&task, &allowed, None, Semantics::Sequential, &OnceCell::new(), &Limits::none());
     let counts = encoding.expect("no limit").formula.counts();
     (together, !counts.contains(&("symmetry", 0)))
 }

@@ -9,7 +9,7 @@
 //! reconfigurations, then one in depth, in model order, whose first plan is the one. Where that is not enough to keep it small,
 //! the choice stays what it is then: deterministic, but not in this order.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::OnceLock;
@@ -18,7 +18,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::bounds::{Bounds, Projection};
 use crate::lifted::ObjectId;
-use crate::limits::Limits;
+use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::Int;
 use crate::plan::{GroundPlan, GroundStep, resolve};
 use crate::search::is_monotone;
@@ -51,7 +51,7 @@ pub(crate) type Changes = (usize, usize);
 
 /// A combination of designs of an operator.
 struct Choice {
-    designs: Vec<u16>,
+    designs: Vec<u32>,
     cost: Int,
     /// Functions, by position, and their designs.
     configuration: Vec<(usize, ObjectId)>,
@@ -92,24 +92,31 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    pub(crate) fn new(task: &Task, bounds: &Bounds) -> Self {
+    pub(crate) fn new(task: &Task, bounds: &Bounds, limits: &Limits) -> Result<Self, Interrupted> {
         let configurations = task.operators.iter().flat_map(|operator| &operator.configuration);
         let mut functions: Vec<ObjectId> = configurations.map(|(function, _)| *function).collect();
         functions.sort_unstable();
         functions.dedup();
-        Self {
-            steps_to_go: bounds.projections.iter().map(Projection::steps_to_go).collect(),
+        let steps = bounds.projections.iter().map(|projection| projection.steps_to_go(limits));
+        Ok(Self {
+            steps_to_go: steps.collect::<Result<_, _>>()?,
             index: OperatorIndex::new(task),
             monotone: is_monotone(task),
             functions,
             choices: task.operators.iter().map(|_| OnceLock::new()).collect(),
-        }
+        })
     }
 
     /// The combinations that no other one is strictly better than, and those of the steps to stay close to.
-    fn choices_of(&self, task: &Task, id: OperatorId, close_to: &FxHashSet<GroundStep>) -> Choices {
+    fn choices_of(
+        &self,
+        task: &Task,
+        id: OperatorId,
+        close_to: &FxHashSet<GroundStep>,
+        limits: &Limits,
+    ) -> Result<Choices, Interrupted> {
         let operator = &task.operators[id.index()];
-        let mut choices = undominated(operator, self.monotone, true)?;
+        let Some(mut choices) = undominated(operator, self.monotone, true, limits)? else { return Ok(None) };
         for step in close_to.iter().filter(|step| step.operator == id) {
             if choices.iter().all(|(choice, _)| *choice != step.choice) {
                 choices.push((step.choice.clone(), operator.cost_of(&step.choice)));
@@ -126,7 +133,7 @@ impl Prepared {
             let is_kept = close_to.is_empty() || close_to.contains(&step);
             Choice { designs: step.choice, cost, configuration, is_kept }
         });
-        Some(choices.collect())
+        Ok(Some(choices.collect()))
     }
 }
 
@@ -141,13 +148,14 @@ struct Ties<'a> {
     cost: Int,
     steps: usize,
     made: Cell<usize>,
+    pulse: RefCell<Pulse<'a>>,
 }
 
 /// The chosen one among the plans that cost as much as a cheapest plan with fewest steps.
 pub(crate) fn choose(task: &Task, bounds: &Bounds, limits: &Limits, plan: GroundPlan) -> GroundPlan {
     let close_to = FxHashSet::default();
     let beginning = Beginning { state: &task.initial, designs: &[], close_to: &close_to };
-    let prepared = Prepared::new(task, bounds);
+    let Ok(prepared) = Prepared::new(task, bounds, limits) else { return plan };
     choose_from(task, bounds, &prepared, limits, plan, (usize::MAX, usize::MAX), &beginning).0
 }
 
@@ -179,6 +187,7 @@ pub(crate) fn choose_from(
         cost: plan.cost,
         steps: plan.steps.len(),
         made: Cell::new(0),
+        pulse: RefCell::new(limits.pulse()),
     };
     let start = Label { state: beginning.state.clone(), designs, cost: 0, steps: 0, changes: (0, 0) };
     match ties.first(start, most) {
@@ -203,11 +212,15 @@ impl Ties<'_> {
         (steps.len() == self.steps).then_some((steps, changes))
     }
 
-    /// None if there are too many.
+    /// None if there are too many, or if a limit was reached, which is not kept.
     fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
-        let choices = self.choices.as_ref().unwrap_or(&self.prepared.choices);
-        let own = || self.prepared.choices_of(self.task, operator, self.close_to);
-        choices[operator.index()].get_or_init(own).as_deref()
+        let choices = &self.choices.as_ref().unwrap_or(&self.prepared.choices)[operator.index()];
+        if choices.get().is_none() {
+            let own = self.prepared.choices_of(self.task, operator, self.close_to, self.limits).ok()?;
+            // If another thread was first, its choices are the same.
+            let _ = choices.set(own);
+        }
+        choices.get()?.as_deref()
     }
 
     /// The label after a step; none if it leads beyond the limits.
@@ -251,6 +264,7 @@ impl Ties<'_> {
             }
             for operator in self.prepared.index.applicable(self.task, &labels.all[id].state) {
                 for choice in self.choices(operator)? {
+                    self.beat()?;
                     let Some(next) = self.successor(&labels.all[id], operator, choice) else { continue };
                     if next.changes <= most && !self.is_beaten(&labels, &next, false) {
                         open.push(Reverse((next.changes, Reverse(next.steps), labels.all.len())));
@@ -288,6 +302,7 @@ impl Ties<'_> {
                 continue;
             };
             let operator = *operator;
+            self.beat()?;
             let Some(choice) = choices.next() else {
                 last.current = None;
                 continue;
@@ -318,14 +333,18 @@ impl Ties<'_> {
         })
     }
 
-    /// Keeps a label; none if there are too many, or a limit is reached.
+    /// None if a limit is reached.
+    fn beat(&self) -> Option<()> {
+        self.pulse.borrow_mut().beat().ok()
+    }
+
+    /// Keeps a label; none if there are too many.
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
         labels.fronts.entry(label.place(self.task)).or_default().push(labels.all.len());
         labels.all.push(label);
         let made = self.made.get() + 1;
         self.made.set(made);
-        let stop = made >= LABEL_LIMIT || (made.is_multiple_of(256) && self.limits.reached());
-        (!stop).then_some(())
+        (made < LABEL_LIMIT).then_some(())
     }
 
     fn no_worse(&self, a: &Label, b: &Label) -> bool {

@@ -60,10 +60,10 @@ impl Task {
     }
 
     fn ids(&self) -> impl Iterator<Item = OperatorId> {
-        (0..self.operators.len() as u32).map(OperatorId)
+        OperatorId::all(self.operators.len())
     }
 
-    fn step(&self, operator: OperatorId, choice: Vec<u16>) -> Option<Step> {
+    fn step(&self, operator: OperatorId, choice: Vec<u32>) -> Option<Step> {
         let plan = GroundPlan { steps: vec![GroundStep { operator, choice }], cost: 0 };
         decode(self, &plan).steps.pop()
     }

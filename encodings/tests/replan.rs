@@ -441,3 +441,35 @@ fn live_planning_beside_planning_anew() {
         );
     }
 }
+
+/// A state in which two atoms hold that exclude each other in the mission, though they are values of different variables.
+#[test]
+fn a_state_that_breaks_what_the_mission_excludes_is_planned_for_anew() {
+    let moves = [("t1", "c", "a"), ("x1", "a", "b"), ("x2", "b", "a"), ("u1", "c", "d"), ("u2", "d", "e")];
+    let moves = moves.into_iter().chain([("u3", "e", "f"), ("u4", "f", "d")]);
+    let actions: String = moves
+        .map(|(name, from, to)| {
+            format!(
+                "(:action {name} :parameters () :precondition ({from}) :effect (and (not ({from})) ({to})))"
+            )
+        })
+        .collect();
+    let domain = format!(
+        "(define (domain x) (:predicates (a) (b) (c) (d) (e) (f) (g)) (:functions (total-cost)) {actions}
+          (:action w :parameters () :precondition (a) :effect (and (g) (increase (total-cost) 1))))"
+    );
+    let problem = |init: &str, goal: &str| {
+        format!(
+            "(define (problem p) (:domain x) (:init (= (total-cost) 0) {init}) (:goal (and {goal}))
+          (:metric minimize (total-cost)))"
+        )
+    };
+    for (goal, steps) in [("(a) (b)", 1), ("(b) (g)", 2)] {
+        let (tree, base) = parse(&domain, &problem("(c)", goal));
+        let mut replanner = new(&tree, &base);
+        let (tree, both) = parse(&domain, &problem("(c) (b)", goal));
+        assert_eq!(live(&mut replanner, &tree, &both), Replanned::Misfit, "{goal}");
+        let anew = from_scratch(&tree, &both);
+        assert_eq!(anew.plan.map(|plan| plan.steps.len()), Some(steps), "{goal}");
+    }
+}

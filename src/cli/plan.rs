@@ -213,6 +213,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     let point = encodings::lexicographic(&task, &config, &mut report);
     progress.finish_and_clear();
+    if let Some(reason) = &point.solution.statistics.contradiction {
+        return Err(fault(reason));
+    }
     objectives.confirm(&mission, &problem, &point, &Reading::sequential(&task))?;
     if let Some(directory) = &arguments.certificate {
         certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
@@ -371,8 +374,13 @@ pub(super) fn confirm(
         }
         (None, _) => return Ok(()),
     };
+    Err(fault(&reason))
+}
+
+/// A fault of ours.
+fn fault(reason: &str) -> Failure {
     let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
-    Err(Failure { exit: Exit::Fault, messages: vec![Message::error("M170", text)] })
+    Failure { exit: Exit::Fault, messages: vec![Message::error("M170", text)] }
 }
 
 fn exit(status: Status) -> Exit {

@@ -12,6 +12,7 @@ mod tests;
 
 use crate::bounds::Bounds;
 use crate::encode::{CostLimit, Counting, Encoding, Meaning, Semantics};
+use crate::number::dense;
 use crate::optimize::Config;
 use crate::plan::{GroundPlan, GroundStep, Plan, decode, replay};
 use crate::sat::{Answer, Lit, Solver};
@@ -43,18 +44,20 @@ pub struct Forced {
 /// could not be built within the limits.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
-    let bounds = Bounds::new(task, &config.limits);
-    let window = bounds.window(task, Some(first.cost), config.horizon);
+    let bounds = Bounds::new(task, &config.limits).ok()?;
+    let window = bounds.window(task, Some(first.cost), config.horizon, &config.limits).ok()?;
     let complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
     let allowed = if complete || config.horizon.is_some() {
         window.allowed
     } else {
-        bounds.window(task, Some(first.cost), Some(first.steps.len())).allowed
+        bounds.window(task, Some(first.cost), Some(first.steps.len()), &config.limits).ok()?.allowed
     };
     let cost = CostLimit { limit: first.cost, bounds: &bounds, counting: Counting::Sum };
     let encoding = Encoding::with_equals(task, &allowed, Some(cost), Semantics::Sequential, &config.limits)?;
     let mut solver = config.backend.start(&config.limits, u64::MAX);
-    encoding.formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));
+    for clause in config.limits.watch(encoding.formula.clauses()) {
+        solver.add_clause(clause.ok()?.1);
+    }
     let mut run = Run { task, encoding, solver };
     let mut found = vec![first.steps.clone()];
     let mut exhausted = false;
@@ -83,7 +86,7 @@ struct Run<'a> {
 }
 
 /// A choice of the first plan: an operator at a step, or the design of one of its slots (by position).
-type Choice = (usize, Option<u16>);
+type Choice = (usize, Option<u32>);
 
 impl Run<'_> {
     /// Excludes a plan if the literal holds.
@@ -110,7 +113,7 @@ impl Run<'_> {
         let mut choices: Vec<Choice> = Vec::new();
         for (at, step) in first.iter().enumerate() {
             choices.push((at, None));
-            choices.extend((0..step.choice.len() as u16).map(|slot| (at, Some(slot))));
+            choices.extend((0..dense(step.choice.len())).map(|slot| (at, Some(slot))));
         }
         for plan in known {
             choices.retain(|choice| self.shares(first, plan, *choice));
@@ -143,7 +146,7 @@ impl Run<'_> {
     }
 
     /// Slot and design in the task's numbering.
-    fn design(&self, step: &GroundStep, position: usize) -> (usize, u16) {
+    fn design(&self, step: &GroundStep, position: usize) -> (usize, u32) {
         let usage = &self.task.operators[step.operator.index()].slots[position];
         (usage.slot.index(), usage.designs[step.choice[position] as usize])
     }

@@ -18,7 +18,7 @@ use resources::Resource;
 
 use smallvec::SmallVec;
 
-use crate::limits::Limits;
+use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
 use crate::quantity::NumericId;
 use crate::task::{State, Task};
@@ -50,26 +50,24 @@ pub(crate) struct Window {
 }
 
 impl Bounds {
-    pub(crate) fn new(task: &Task, limits: &Limits) -> Self {
-        let mut bounds = Self::of_projections(task, limits);
+    pub(crate) fn new(task: &Task, limits: &Limits) -> Result<Self, Interrupted> {
+        let mut bounds = Self::of_projections(task, limits)?;
         bounds.projections.append(&mut bounds.further);
-        if !limits.reached() {
-            bounds.partitions = partition::partitions(task, &bounds.projections);
-        }
+        bounds.partitions = partition::partitions(task, &bounds.projections, limits)?;
         let kept = bounds.projections.len().min(KEPT);
         bounds.further = bounds.projections.split_off(kept);
         if bounds.partitions.is_empty() {
             bounds.further.clear();
         }
-        bounds
+        Ok(bounds)
     }
 
     /// Bounds that each rest on one projection.
-    pub(crate) fn of_projections(task: &Task, limits: &Limits) -> Self {
+    pub(crate) fn of_projections(task: &Task, limits: &Limits) -> Result<Self, Interrupted> {
         let basic = |variable: &crate::task::VariableId| variable.index() < task.basic;
         let goal_variables: Vec<_> = task.goal.facts.iter().map(|fact| fact.variable).filter(basic).collect();
         let mut patterns: Vec<Vec<_>> = goal_variables.iter().map(|variable| vec![*variable]).collect();
-        let mut others: Vec<_> = (0..task.basic as u32).map(crate::task::VariableId).collect();
+        let mut others: Vec<_> = crate::task::VariableId::all(task.basic).collect();
         others.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
         for other in &others {
             for goal in &goal_variables {
@@ -88,25 +86,18 @@ impl Bounds {
         }
         let mut projections: Vec<Projection> = Vec::new();
         for pattern in patterns {
-            // Any one projection will do if time is short.
-            if projections.is_empty() || !limits.reached() {
-                projections.push(Projection::new(task, pattern));
-            }
+            projections.push(Projection::new(task, pattern, limits)?);
         }
         projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
         let further = projections.split_off(projections.len().min(KEPT));
-        let resources = resources::resources(task, &projections);
-        Self { projections, resources, partitions: Vec::new(), further }
+        let resources = resources::resources(task, &projections, limits)?;
+        Ok(Self { projections, resources, partitions: Vec::new(), further })
     }
 
     /// Bounds that say nothing: the projection to no variable at all.
-    pub(crate) fn trivial(task: &Task) -> Self {
-        Self {
-            projections: vec![Projection::new(task, Vec::new())],
-            resources: Vec::new(),
-            partitions: Vec::new(),
-            further: Vec::new(),
-        }
+    pub(crate) fn trivial(task: &Task, limits: &Limits) -> Result<Self, Interrupted> {
+        let projections = vec![Projection::new(task, Vec::new(), limits)?];
+        Ok(Self { projections, resources: Vec::new(), partitions: Vec::new(), further: Vec::new() })
     }
 
     /// A lower bound on the cost from a state to the goal; none if the goal cannot be reached.
@@ -139,11 +130,17 @@ impl Bounds {
     }
 
     /// What is known of plans with cost at most `limit` and at most `horizon` steps, where either is given.
-    pub(crate) fn window(&self, task: &Task, limit: Option<Int>, horizon: Option<usize>) -> Window {
+    pub(crate) fn window(
+        &self,
+        task: &Task,
+        limit: Option<Int>,
+        horizon: Option<usize>,
+        limits: &Limits,
+    ) -> Result<Window, Interrupted> {
         let mut steps: Option<usize> = None;
         if let Some(limit) = limit {
             for projection in &self.projections {
-                if let Some(bound) = projection.step_bound(limit, STEP_LIMIT) {
+                if let Some(bound) = projection.step_bound(limit, STEP_LIMIT, limits)? {
                     steps = Some(steps.map_or(bound, |known| known.min(bound)));
                 }
             }
@@ -154,8 +151,8 @@ impl Bounds {
         };
         let mut allowed = vec![vec![true; task.operators.len()]; length];
         for projection in &self.projections {
-            projection.restrict(limit, &mut allowed);
+            projection.restrict(limit, &mut allowed, limits)?;
         }
-        Window { steps, allowed }
+        Ok(Window { steps, allowed })
     }
 }

@@ -12,6 +12,7 @@ use std::cmp::Reverse;
 use num_bigint::BigInt;
 
 use crate::bounds::Projection;
+use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
 use crate::task::Task;
 
@@ -34,11 +35,16 @@ impl Partition {
         shares.map(|share| share.unwrap_or(0)).sum()
     }
 
-    fn new(projections: &[Projection], costs: &[Int], order: &[usize]) -> Self {
+    fn new(
+        projections: &[Projection],
+        costs: &[Int],
+        order: &[usize],
+        limits: &Limits,
+    ) -> Result<Self, Interrupted> {
         let mut left = costs.to_vec();
         let mut parts = Vec::new();
         for position in order {
-            let to_go = projections[*position].costs_to_go(&left);
+            let to_go = projections[*position].costs_to_go(&left, limits)?;
             if to_go.iter().any(|cost| cost.is_some_and(|cost| cost > 0)) {
                 for (left, taken) in left.iter_mut().zip(projections[*position].saturated(&to_go)) {
                     *left -= taken;
@@ -46,51 +52,56 @@ impl Partition {
                 parts.push((*position, to_go));
             }
         }
-        Self { parts }
+        Ok(Self { parts })
     }
 }
 
 /// Sums of shares for the projections of a task, the one with the highest estimate of the initial state first; none where one
 /// projection alone is as good.
-pub(super) fn partitions(task: &Task, projections: &[Projection]) -> Vec<Partition> {
+pub(super) fn partitions(
+    task: &Task,
+    projections: &[Projection],
+    limits: &Limits,
+) -> Result<Vec<Partition>, Interrupted> {
     let costs: Vec<Int> = task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect();
     let initial: Vec<u32> = projections.iter().map(|projection| projection.state(&task.initial)).collect();
     let alone = |position: usize| projections[position].to_go(initial[position]).unwrap_or(0);
     let useful: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
     let transitions: usize = useful.iter().map(|position| projections[*position].effort()).sum();
     if useful.len() < 2 || transitions > EFFORT {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let mut budget = (EFFORT / transitions.max(1)).clamp(1, ORDERS);
     let mut tried: Vec<(Int, Vec<usize>, Partition)> = Vec::new();
     let mut attempt = |order: Vec<usize>, tried: &mut Vec<(Int, Vec<usize>, Partition)>| {
         if budget == 0 || tried.iter().any(|(_, known, _)| *known == order) {
-            return;
+            return Ok(());
         }
         budget -= 1;
-        let partition = Partition::new(projections, &costs, &order);
+        let partition = Partition::new(projections, &costs, &order, limits)?;
         tried.push((partition.estimate(&initial), order, partition));
         // Stable: of equal ones the earlier stays first.
         tried.sort_by_key(|(estimate, ..)| Reverse(*estimate));
+        Ok(())
     };
     let greedy = by_yield(projections, &useful, alone);
-    attempt(greedy.clone(), &mut tried);
+    attempt(greedy.clone(), &mut tried)?;
     for first in &useful {
         let rest = greedy.iter().filter(|position| *position != first);
-        attempt(std::iter::once(first).chain(rest).copied().collect(), &mut tried);
+        attempt(std::iter::once(first).chain(rest).copied().collect(), &mut tried)?;
     }
     // Then the best order, with two neighbours exchanged.
     for place in 1..useful.len() {
         let mut order = tried[0].1.clone();
         order.swap(place - 1, place);
-        attempt(order, &mut tried);
+        attempt(order, &mut tried)?;
     }
     let best = useful.iter().map(|position| alone(*position)).max().unwrap_or(0);
     if tried[0].0 <= best {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     tried.truncate(KEPT);
-    tried.into_iter().map(|(.., partition)| partition).collect()
+    Ok(tried.into_iter().map(|(.., partition)| partition).collect())
 }
 
 /// Projections that give much and take little come first.

@@ -3,7 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::number::Int;
+use crate::limits::{Interrupted, Limits};
+use crate::number::{Int, dense};
 use crate::task::{ConditionalEffect, Literal, OperatorId, State, Task, VariableId};
 
 /// An operator leads from one abstract state to another.
@@ -29,7 +30,7 @@ pub(crate) struct Projection {
 }
 
 impl Projection {
-    pub(crate) fn new(task: &Task, pattern: Vec<VariableId>) -> Self {
+    pub(crate) fn new(task: &Task, pattern: Vec<VariableId>, limits: &Limits) -> Result<Self, Interrupted> {
         let sizes: Vec<_> =
             pattern.iter().map(|variable| task.variables[variable.index()].values.len()).collect();
         let mut projection = Self {
@@ -44,7 +45,8 @@ impl Projection {
         projection.initial = projection.state(&task.initial);
         let goal = projection.required(&task.goal.facts);
         projection.goals = projection.matching(&goal);
-        for operator in &task.operators {
+        for operator in limits.watch(&task.operators) {
+            let operator = operator?;
             // Rewards (negative costs) have no place in Dijkstra's algorithm; counting them as 0 serves reachability.
             let cost = operator.cost.minimum().max(0);
             let before = projection.required(&operator.condition.facts);
@@ -69,8 +71,8 @@ impl Projection {
             projection.operators.push((cost, transitions));
         }
         let costs: Vec<Int> = projection.operators.iter().map(|(cost, _)| *cost).collect();
-        projection.to_go = projection.costs_to_go(&costs);
-        projection
+        projection.to_go = projection.costs_to_go(&costs, limits)?;
+        Ok(projection)
     }
 
     fn size(&self) -> usize {
@@ -80,7 +82,7 @@ impl Projection {
     /// The abstract state of a state.
     pub(crate) fn state(&self, state: &State) -> u32 {
         let values = self.pattern.iter().map(|variable| state.values[variable.index()] as usize);
-        self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * size + value) as u32
+        dense(self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * size + value))
     }
 
     /// The value of each pattern variable in an abstract state.
@@ -93,7 +95,7 @@ impl Projection {
             .map(|size| {
                 let value = rest % size;
                 rest /= size;
-                value as u32
+                dense(value)
             })
             .collect();
         values.reverse();
@@ -108,10 +110,10 @@ impl Projection {
     fn matching(&self, required: &[Option<u32>]) -> Vec<u32> {
         let mut states = vec![0_u32];
         for (size, value) in self.sizes.iter().zip(required) {
-            let range = value.map_or(0..*size as u32, |value| value..value + 1);
+            let range = value.map_or(0..dense(*size), |value| value..value + 1);
             states = states
                 .iter()
-                .flat_map(|s| range.clone().map(move |value| s * *size as u32 + value))
+                .flat_map(|s| range.clone().map(move |value| s * dense(*size) + value))
                 .collect();
         }
         states
@@ -149,14 +151,18 @@ impl Projection {
             }
         }
         let index = |values: Vec<u32>| {
-            self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * *size as u32 + value)
+            self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * dense(*size) + value)
         };
         reached.into_iter().map(index).collect()
     }
 
     /// The cost to go from each abstract state, if operators cost so much.
-    pub(crate) fn costs_to_go(&self, costs: &[Int]) -> Vec<Option<Int>> {
-        self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)))
+    pub(crate) fn costs_to_go(
+        &self,
+        costs: &[Int],
+        limits: &Limits,
+    ) -> Result<Vec<Option<Int>>, Interrupted> {
+        self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
     /// The least costs of operators with which the cost to go is as given.
@@ -175,17 +181,22 @@ impl Projection {
     }
 
     /// The least number of steps from each abstract state to the goal.
-    pub(crate) fn steps_to_go(&self) -> Vec<Option<Int>> {
-        self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)))
+    pub(crate) fn steps_to_go(&self, limits: &Limits) -> Result<Vec<Option<Int>>, Interrupted> {
+        self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
     /// What of a resource is used up at least until it is replenished or a goal state is reached. `used` is what
     /// each operator uses, none if it may replenish; `left` is what a goal state must have left.
-    pub(crate) fn needs(&self, used: &[Option<Int>], left: Int) -> Vec<Option<Int>> {
+    pub(crate) fn needs(
+        &self,
+        used: &[Option<Int>],
+        left: Int,
+        limits: &Limits,
+    ) -> Result<Vec<Option<Int>>, Interrupted> {
         let replenishing = self.operators.iter().zip(used).filter(|(_, used)| used.is_none());
         let free = replenishing.flat_map(|((_, transitions), _)| transitions).map(|t| (t.source, 0));
         let goals = self.goals.iter().map(|goal| (*goal, left));
-        self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free))
+        self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free), limits)
     }
 
     /// Whether an operator changes or reads the pattern.
@@ -198,16 +209,20 @@ impl Projection {
         &self,
         cost: impl Fn(usize) -> Int,
         targets: impl Iterator<Item = (u32, Int)>,
-    ) -> Vec<Option<Int>> {
+        limits: &Limits,
+    ) -> Result<Vec<Option<Int>>, Interrupted> {
         let mut incoming: Vec<Vec<(u32, Int)>> = vec![Vec::new(); self.size()];
-        for (operator, (_, transitions)) in self.operators.iter().enumerate() {
+        for item in limits.watch(self.operators.iter().enumerate()) {
+            let (operator, (_, transitions)) = item?;
             for transition in transitions.iter().filter(|t| t.source != t.target) {
                 incoming[transition.target as usize].push((transition.source, cost(operator)));
             }
         }
         let mut to_go = vec![None; self.size()];
         let mut heap: BinaryHeap<_> = targets.map(|(target, own)| Reverse((own, target))).collect();
+        let mut pulse = limits.pulse();
         while let Some(Reverse((cost, state))) = heap.pop() {
+            pulse.beat()?;
             if to_go[state as usize].is_some() {
                 continue;
             }
@@ -218,7 +233,7 @@ impl Projection {
                 }
             }
         }
-        to_go
+        Ok(to_go)
     }
 
     /// The cost to go from the abstract state of a state; none if the goal is out of reach.
@@ -269,31 +284,43 @@ impl Projection {
     }
 
     /// The most steps that a plan with cost at most `limit` can have; none if there is no such bound, or one above `most`.
-    pub(crate) fn step_bound(&self, limit: Int, most: usize) -> Option<usize> {
+    pub(crate) fn step_bound(
+        &self,
+        limit: Int,
+        most: usize,
+        limits: &Limits,
+    ) -> Result<Option<usize>, Interrupted> {
         let fits = |costs: &[Option<Int>]| {
             costs.iter().zip(&self.to_go).any(|(c, h)| matches!((c, h), (Some(c), Some(h)) if c + h <= limit))
         };
         let mut costs = self.start();
         let mut bound = 0;
-        for step in 0..=most {
+        for step in limits.watch(0..=most) {
+            let step = step?;
             if !fits(&costs) {
-                return Some(bound);
+                return Ok(Some(bound));
             }
             bound = step;
             let next = self.advance(&costs);
             if next == costs {
-                return None;
+                return Ok(None);
             }
             costs = next;
         }
-        None
+        Ok(None)
     }
 
     /// Clears `allowed[step][operator]` wherever no plan with cost at most `limit` has the operator at that step.
-    pub(crate) fn restrict(&self, limit: Option<Int>, allowed: &mut [Vec<bool>]) {
+    pub(crate) fn restrict(
+        &self,
+        limit: Option<Int>,
+        allowed: &mut [Vec<bool>],
+        limits: &Limits,
+    ) -> Result<(), Interrupted> {
         let within = |cost: Int| limit.is_none_or(|limit| cost <= limit);
         let mut costs = self.start();
-        for row in allowed {
+        for row in limits.watch(allowed) {
+            let row = row?;
             let through = |(c, h): (&Option<Int>, &Option<Int>)| Some((*c)? + (*h)?);
             let cheapest = costs.iter().zip(&self.to_go).filter_map(through).min();
             for (flag, (cost, transitions)) in row.iter_mut().zip(&self.operators) {
@@ -310,5 +337,6 @@ impl Projection {
             }
             costs = self.advance(&costs);
         }
+        Ok(())
     }
 }

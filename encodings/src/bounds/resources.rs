@@ -8,6 +8,7 @@
 //! path problem, Networks 42(3), 2003.
 
 use crate::bounds::Projection;
+use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
 use crate::quantity::NumericId;
 use crate::task::{Operator, State, Task};
@@ -31,9 +32,14 @@ impl Resource {
 }
 
 /// The resources of a task.
-pub(super) fn resources(task: &Task, projections: &[Projection]) -> Vec<Resource> {
+pub(super) fn resources(
+    task: &Task,
+    projections: &[Projection],
+    limits: &Limits,
+) -> Result<Vec<Resource>, Interrupted> {
     let mut found = Vec::new();
-    for variable in (0..task.initial.numbers.len() as u32).map(NumericId) {
+    for variable in limits.watch(NumericId::all(task.initial.numbers.len())) {
+        let variable = variable?;
         let Some(used) = task.operators.iter().map(|o| used(o, variable)).collect::<Option<Vec<_>>>() else {
             continue;
         };
@@ -43,12 +49,12 @@ pub(super) fn resources(task: &Task, projections: &[Projection]) -> Vec<Resource
         for (projection, position) in projections.iter().zip(0..) {
             let anywhere = |operator: usize| used[operator].is_none() && !projection.touches(operator);
             if !(0..used.len()).any(anywhere) {
-                needs.push((position, projection.needs(&used, left)));
+                needs.push((position, projection.needs(&used, left, limits)?));
             }
         }
         found.push(Resource { variable, needs });
     }
-    found
+    Ok(found)
 }
 
 /// What an operator uses at least (none if it may replenish); nothing if it may lower the variable below 0.

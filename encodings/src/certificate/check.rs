@@ -157,7 +157,7 @@ fn cost(model: &Model, metric: &BigRational) -> Result<i128, Fault> {
 }
 
 /// A combination of designs with what it costs.
-type Choice = (Vec<u16>, i128);
+type Choice = (Vec<u32>, i128);
 
 struct Checker<'c> {
     model: &'c Model,

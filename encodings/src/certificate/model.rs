@@ -25,7 +25,7 @@ pub(super) struct Model {
     /// The designs that may fill each slot, as objects.
     pub(super) slots: Vec<Vec<u32>>,
     /// Lists of slots that operators fill, each with the designs that suit.
-    pub(super) uses: Vec<Vec<(u32, Vec<u16>)>>,
+    pub(super) uses: Vec<Vec<(u32, Vec<u32>)>>,
     pub(super) exclusions: Vec<Vec<Exclusion>>,
     pub(super) tables: Vec<Vec<Int>>,
     pub(super) operators: Vec<Operator>,
@@ -41,8 +41,8 @@ pub(super) struct Model {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Exclusion {
-    pub(super) slots: Vec<u16>,
-    pub(super) combinations: Vec<Vec<u16>>,
+    pub(super) slots: Vec<u32>,
+    pub(super) combinations: Vec<Vec<u32>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -69,7 +69,7 @@ pub(super) struct Operator {
 #[serde(rename_all = "snake_case")]
 pub(super) enum Argument {
     Object(u32),
-    Slot(u16),
+    Slot(u32),
 }
 
 /// All facts, one literal of every clause, and every comparison ≥ 0.
@@ -100,7 +100,7 @@ pub(super) struct Conditional {
 pub(super) struct Quantity {
     pub(super) constant: Int,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(super) tables: Vec<(Vec<u16>, u32)>,
+    pub(super) tables: Vec<(Vec<u32>, u32)>,
 }
 
 /// Numbers times factors, plus a quantity.

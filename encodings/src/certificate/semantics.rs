@@ -56,18 +56,18 @@ impl Model {
     }
 
     /// All combinations of designs that an operator admits.
-    pub(super) fn choices(&self, operator: &Operator) -> Vec<Vec<u16>> {
-        let mut all: Vec<Vec<u16>> = vec![Vec::new()];
+    pub(super) fn choices(&self, operator: &Operator) -> Vec<Vec<u32>> {
+        let mut all: Vec<Vec<u32>> = vec![Vec::new()];
         for size in self.sizes(operator) {
-            let longer = |choice: Vec<u16>| {
-                (0..size as u16).map(move |design| choice.iter().copied().chain([design]).collect())
+            let longer = |choice: Vec<u32>| {
+                (0..size as u32).map(move |design| choice.iter().copied().chain([design]).collect())
             };
             all = all.into_iter().flat_map(longer).collect();
         }
         let exclusions = &self.exclusions[operator.exclusions as usize];
         all.retain(|choice| {
             !exclusions.iter().any(|exclusion| {
-                let chosen: Vec<u16> = exclusion.slots.iter().map(|slot| choice[*slot as usize]).collect();
+                let chosen: Vec<u32> = exclusion.slots.iter().map(|slot| choice[*slot as usize]).collect();
                 exclusion.combinations.contains(&chosen)
             })
         });
@@ -75,7 +75,7 @@ impl Model {
     }
 
     /// The value of a quantity for a combination of designs.
-    pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u16], sizes: &[usize]) -> i128 {
+    pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> i128 {
         let mut sum = i128::from(quantity.constant);
         for (slots, table) in &quantity.tables {
             let mut row = 0;
@@ -101,7 +101,7 @@ impl Model {
         i128::from(quantity.constant) + tables.sum::<i128>()
     }
 
-    pub(super) fn linear(&self, linear: &Linear, state: &State, choice: &[u16], sizes: &[usize]) -> i128 {
+    pub(super) fn linear(&self, linear: &Linear, state: &State, choice: &[u32], sizes: &[usize]) -> i128 {
         let numbers = linear.factors.iter();
         let numbers = numbers.map(|(number, factor)| state.numbers[*number as usize] * i128::from(*factor));
         self.quantity(&linear.quantity, choice, sizes) + numbers.sum::<i128>()
@@ -112,7 +112,7 @@ impl Model {
         &self,
         condition: &Condition,
         state: &State,
-        choice: &[u16],
+        choice: &[u32],
         sizes: &[usize],
     ) -> bool {
         holds_without_numbers(condition, state)
@@ -124,7 +124,7 @@ impl Model {
         &self,
         operator: &Operator,
         state: &State,
-        choice: &[u16],
+        choice: &[u32],
         sizes: &[usize],
     ) -> Option<State> {
         let mut next = state.clone();

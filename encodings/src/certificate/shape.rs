@@ -114,13 +114,13 @@ impl Model {
         let uses = self.uses.get(operator.uses as usize).ok_or("no such list of slots")?;
         let sizes: Vec<usize> = uses.iter().map(|(_, designs)| designs.len()).collect();
         let exclusions = self.exclusions.get(operator.exclusions as usize).ok_or("no such exclusions")?;
-        let exists = |slot: &u16| (*slot as usize) < sizes.len();
+        let exists = |slot: &u32| (*slot as usize) < sizes.len();
         require(exclusions.iter().all(|exclusion| exclusion.slots.iter().all(exists)), || {
             "no such slot".into()
         })?;
         for Exclusion { slots, combinations } in exclusions {
-            let suits = |(slot, design): (&u16, &u16)| (*design as usize) < sizes[*slot as usize];
-            let fits = |combination: &Vec<u16>| {
+            let suits = |(slot, design): (&u32, &u32)| (*design as usize) < sizes[*slot as usize];
+            let fits = |combination: &Vec<u32>| {
                 combination.len() == slots.len() && slots.iter().zip(combination).all(suits)
             };
             require(combinations.iter().all(fits), || "no such combination of designs".into())?;

@@ -186,9 +186,9 @@ impl Writer<'_> {
     fn quantity(&self, quantity: &Quantity, sizes: &[usize]) -> String {
         let tables = quantity.tables.iter().map(|(slots, table)| {
             let rows = &self.model.tables[*table as usize];
-            let row = |slots: &[u16]| {
+            let row = |slots: &[u32]| {
                 let key =
-                    |row: String, slot: &u16| format!("(+ (* {} {row}) c{slot})", sizes[*slot as usize]);
+                    |row: String, slot: &u32| format!("(+ (* {} {row}) c{slot})", sizes[*slot as usize]);
                 slots.iter().fold("0".to_owned(), key)
             };
             let key = row(slots);

@@ -42,7 +42,7 @@ pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Cert
         let argument = Argument { format: ARGUMENT_FORMAT.into(), ..Argument::default() };
         return written(&model(task), &argument);
     }
-    let bounds = Bounds::of_projections(task, limits);
+    let bounds = Bounds::of_projections(task, limits).ok()?;
     let cost = solution.ground.as_ref().map(|plan| plan.cost);
     let labels = closed_labels(task, &bounds, limits, cost)?;
     let label = |(values, numbers, cost): (Vec<u32>, Vec<Int>, Int)| Label(values, numbers, cost);
@@ -99,7 +99,7 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
 }
 
 /// Slots, each with the designs that suit.
-type Uses = Vec<(u32, Vec<u16>)>;
+type Uses = Vec<(u32, Vec<u32>)>;
 
 struct Writer {
     tables: Pool<Arc<[Int]>, Vec<Int>>,

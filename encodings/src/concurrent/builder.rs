@@ -13,7 +13,7 @@ use crate::ground::reads::Reads;
 use crate::lifted::{Change, Effect, ObjectId};
 use crate::number::Int;
 use crate::quantity::NumericId;
-use crate::task::{Argument, OperatorId, Task};
+use crate::task::{Argument, Operator, OperatorId, Task};
 
 /// The halves of an instance that the ground task has.
 #[derive(Clone, Copy, Default)]
@@ -35,6 +35,13 @@ fn designs(task: &Task, operator: OperatorId) -> Designs {
     designs
 }
 
+/// The objects of an operator, and a gap for each variable of a quantifier.
+fn binding(operator: &Operator, variables: usize) -> Binding {
+    let mut binding: Binding = operator.arguments.iter().copied().map(object).collect();
+    binding.resize(variables, None);
+    binding
+}
+
 /// A schema of the domain with arguments.
 type InstanceKey = (usize, Vec<ObjectId>);
 
@@ -45,6 +52,8 @@ pub(super) struct Builder<'a> {
     separation: Int,
     /// What each operator writes.
     written: Vec<Footprint>,
+    /// What the start and the end of an operator write that are one happening.
+    joined: Vec<(OperatorId, [Footprint; 2])>,
     instances: FxHashMap<InstanceKey, Halves>,
     order: Vec<InstanceKey>,
     /// The schemas that have a condition over all which can change.
@@ -59,6 +68,7 @@ impl<'a> Builder<'a> {
             split,
             separation,
             written: Vec::new(),
+            joined: Vec::new(),
             instances: FxHashMap::default(),
             order: Vec::new(),
             held: held.map(|origin| origin.schema).collect(),
@@ -75,23 +85,26 @@ impl<'a> Builder<'a> {
             let arguments: Vec<ObjectId> = operator.arguments.iter().copied().filter_map(object).collect();
             let mut binding: Binding = arguments.iter().map(|object| Some(*object)).collect();
             binding.resize(schema.variables, None);
-            let effects = match origin.half {
-                Half::Start | Half::End | Half::Whole => &schema.end_effects[..],
-                Half::OverAll | Half::Timed(_) => &[],
-            };
-            // What is under way, and whether a plan has waited, has no place in the files.
-            let waited = (!self.split.events.is_empty()).then_some(self.split.lifted.time.waited);
+            let effects = if origin.half == Half::OverAll { &[] } else { &schema.end_effects[..] };
+            // What is under way, and how many events there were, has no place in the files.
+            let phase = (!self.split.events.is_empty()).then_some(self.split.lifted.time.phase);
             let effects: Vec<Effect> = effects
                 .iter()
                 .filter(|effect| match effect.change {
                     Change::Add(predicate, _) | Change::Delete(predicate, _) => {
-                        Some(predicate) != waited && !self.split.lifted.predicates[predicate.index()].running
+                        Some(predicate) != phase && !self.split.lifted.predicates[predicate.index()].running
                     }
                     Change::Assign { .. } => true,
                 })
                 .cloned()
                 .collect();
-            match self.footprints.writes(schema, &effects, &binding) {
+            let written = self.footprints.writes(schema, &effects, &binding).and_then(|footprint| {
+                if origin.half == Half::Whole {
+                    self.join(id, origin.schema, &binding)?;
+                }
+                Ok(footprint)
+            });
+            match written {
                 Ok(footprint) => self.written.push(footprint),
                 Err(error) => {
                     if refused.insert(origin.schema) {
@@ -129,8 +142,8 @@ impl<'a> Builder<'a> {
             let Halves { start: Some(start), over_all, end: Some(end) } = self.instances[key] else {
                 continue;
             };
-            let conflicts = |id: OperatorId| self.written[id.index()].conflicts();
-            if self.held.contains(&key.0) && over_all.is_none() || conflicts(start) || conflicts(end) {
+            // What must hold over all is out of reach.
+            if self.held.contains(&key.0) && over_all.is_none() {
                 continue;
             }
             let duration = unit.duration(task, start)?;
@@ -149,9 +162,35 @@ impl<'a> Builder<'a> {
         Ok(instances)
     }
 
-    /// What each operator writes.
-    pub(super) fn written(&self) -> &[Footprint] {
-        &self.written
+    /// Notes what the start and the end of a durative action write that takes no time.
+    fn join(&mut self, id: OperatorId, schema: usize, binding: &Binding) -> Result<(), Error> {
+        let schema = &self.split.schemas[schema];
+        if schema.duration.is_some() {
+            let start = self.footprints.writes(schema, &schema.start_effects, binding)?;
+            let end = self.footprints.writes(schema, &schema.end_effects, binding)?;
+            self.joined.push((id, [start, end]));
+        }
+        Ok(())
+    }
+
+    /// The operators whose start and end are one happening although they interfere.
+    pub(super) fn contradictory(&self, task: &Task) -> FxHashSet<OperatorId> {
+        let index = self.footprints.index();
+        let contradicts = |(id, [start, end]): &(OperatorId, [Footprint; 2])| {
+            let operator = &task.operators[id.index()];
+            let schema = &self.split.schemas[self.split.origins[operator.schema as usize].schema];
+            let binding = binding(operator, schema.variables);
+            let complete = |written: &Footprint, condition, effects| {
+                let mut reads = Reads::default();
+                reads.condition(&self.split.lifted, condition, &binding);
+                reads.effects(&self.split.lifted, effects, &binding);
+                let (reads, reads_numbers) = index.look_up(&reads);
+                Footprint { reads, reads_numbers, ..written.clone() }
+            };
+            let start = complete(start, &schema.start_condition, &schema.start_effects);
+            start.interferes(&complete(end, &schema.at_end, &schema.end_effects)).then_some(*id)
+        };
+        self.joined.iter().filter_map(contradicts).collect()
     }
 
     /// What each operator waits for and lets others wait for, and how many kinds of access there are.
@@ -171,14 +210,15 @@ impl<'a> Builder<'a> {
             (0..).map(OperatorId).zip(roles.iter().zip(std::mem::take(&mut self.written)))
         {
             let mut happening = Happening { role: *role, ..Happening::default() };
-            if let Some((reads, over_all)) = self.reads(task, id, *role) {
+            if let Role::Timed(_) = role {
+                happening.accesses = keys.of(&written);
+                happening.writes = writes(&written);
+            } else if let Some((reads, over_all)) = self.reads(task, id, *role) {
                 (written.reads, written.reads_numbers) = index.look_up(&reads);
                 let over_all = index.look_up(&over_all);
                 happening.accesses = keys.of(&written);
                 join(&mut happening, &mut keys, &over_all, instances, (task, id));
-                let atoms: Vec<AtomId> = written.added.iter().chain(&written.deleted).copied().collect();
-                let numbers = written.numbers.iter().map(|(number, _)| *number);
-                happening.writes = ids(&atoms, numbers);
+                happening.writes = writes(&written);
             }
             happenings.push(happening);
         }
@@ -192,8 +232,7 @@ impl<'a> Builder<'a> {
         let origin = self.split.origins[operator.schema as usize];
         let schema = self.split.schemas.get(origin.schema).filter(|_| role != Role::Never)?;
         let lifted = &self.split.lifted;
-        let mut binding: Binding = operator.arguments.iter().copied().map(object).collect();
-        binding.resize(schema.variables, None);
+        let binding = binding(operator, schema.variables);
         let (mut reads, mut over_all) = (Reads::default(), Reads::default());
         if !matches!(role, Role::End(_)) {
             reads.condition(lifted, &schema.start_condition, &binding);
@@ -247,6 +286,11 @@ fn is_joint(task: &Task, over_all: OperatorId) -> bool {
     !condition.clauses.is_empty()
         || !condition.comparisons.is_empty()
         || condition.facts.iter().any(|fact| fact.variable.index() >= task.basic)
+}
+
+fn writes(written: &Footprint) -> Vec<u32> {
+    let atoms: Vec<AtomId> = written.added.iter().chain(&written.deleted).copied().collect();
+    ids(&atoms, written.numbers.iter().map(|(number, _)| *number))
 }
 
 fn ids(atoms: &[AtomId], numbers: impl Iterator<Item = NumericId>) -> Vec<u32> {

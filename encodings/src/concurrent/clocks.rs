@@ -9,7 +9,7 @@
 //! [1] R. Dechter, I. Meiri, J. Pearl: Temporal constraint networks, Artificial Intelligence 49, 1991.
 //! [2] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
 
-use crate::concurrent::time::{Float, Time};
+use crate::concurrent::time::{Float, Time, place};
 use crate::number::{Int, words};
 
 /// A kind of access to an atom or a number.
@@ -28,7 +28,7 @@ pub(super) struct Open {
 #[derive(Debug, Clone)]
 struct Start {
     lower: Time,
-    /// The start is before this.
+    /// The start is not after this.
     upper: Int,
 }
 
@@ -77,6 +77,18 @@ pub(super) struct Happening<'h> {
     pub(super) settled: bool,
 }
 
+/// Timed initial literals, as far as their time is concerned.
+pub(super) struct Event<'h> {
+    pub(super) time: Int,
+    /// They lie this much after the last access of these kinds.
+    pub(super) after: &'h [(Key, Int)],
+    pub(super) marks: &'h [Key],
+    /// The variables that get another value.
+    pub(super) changes: &'h [u32],
+    /// Whether every condition over all holds afterwards.
+    pub(super) settled: bool,
+}
+
 impl Clocks {
     pub(super) fn opens(&self) -> &[Open] {
         &self.opens
@@ -89,6 +101,22 @@ impl Clocks {
 
     pub(super) fn is_open(&self, instance: u32) -> bool {
         self.opens.binary_search_by_key(&instance, |open| open.instance).is_ok()
+    }
+
+    /// The time of the last timed initial literals; negative before.
+    pub(super) fn floor(&self) -> Int {
+        self.floor
+    }
+
+    /// Whether timed initial literals took place after everything else, with nothing under way.
+    pub(super) fn waits(&self) -> bool {
+        self.opens.is_empty() && self.floor > self.latest()
+    }
+
+    /// Whether timed initial literals to come lie far enough after the accesses that they interfere with, if everything so far
+    /// happens as early as it can.
+    pub(super) fn are_apart(&self, time: Int, after: &[(Key, Int)]) -> bool {
+        after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
     }
 
     /// When nothing has happened yet.
@@ -111,7 +139,7 @@ impl Clocks {
 
     /// The least time at which an action under way has started.
     pub(super) fn start(&self, open: &Open) -> Int {
-        self.floats[usize::from(open.float)].lower.base + open.offset
+        self.floats[place(open.float)].lower.base + open.offset
     }
 
     /// The least time at which a variable got its value; none if it has had it from the beginning.
@@ -132,11 +160,11 @@ impl Clocks {
     /// What must agree between clocks that can be compared.
     pub(super) fn signature(&self, out: &mut Vec<u32>) {
         for open in &self.opens {
-            out.extend([open.instance, u32::from(open.float)]);
+            out.extend([open.instance, open.float]);
             out.extend(words(open.offset));
         }
         if let Some((float, offset)) = self.group {
-            out.extend([u32::MAX, u32::from(float)]);
+            out.extend([u32::MAX, float]);
             out.extend(words(offset));
         }
     }
@@ -191,7 +219,11 @@ impl Clocks {
             return Some((float, offset));
         }
         self.floats.push(Start { lower, upper: Int::MAX });
-        Some((Float::try_from(self.floats.len() - 1).ok()?, 0))
+        Some((self.last_float(), 0))
+    }
+
+    fn last_float(&self) -> Float {
+        Float::try_from(self.floats.len() - 1).expect("invariant: fewer actions under way than operators")
     }
 
     fn open(&mut self, instance: u32, float: Float, offset: Int) {
@@ -201,7 +233,7 @@ impl Clocks {
 
     /// The time that lies so much after a float.
     fn at(&self, float: Float, offset: Int) -> Time {
-        let mut time = self.floats[usize::from(float)].lower.shifted(offset);
+        let mut time = self.floats[place(float)].lower.shifted(offset);
         time.put_off_after(float, offset);
         time
     }
@@ -248,14 +280,14 @@ impl Clocks {
         }
         let before = bound.clone();
         for (other, lag) in &before.lags {
-            let mut further = self.floats[usize::from(*other)].lower.shifted(*lag);
+            let mut further = self.floats[place(*other)].lower.shifted(*lag);
             if further.forget(float).is_some_and(|lag| lag > 0) {
                 return None;
             }
             bound.put_off(&further, 0);
         }
-        self.floats[usize::from(float)].lower.put_off(&bound, 0);
-        let own = self.floats[usize::from(float)].lower.clone();
+        self.floats[place(float)].lower.put_off(&bound, 0);
+        let own = self.floats[place(float)].lower.clone();
         for time in self.times() {
             if let Some(lag) = time.lag(float) {
                 time.put_off(&own, lag);
@@ -280,19 +312,21 @@ impl Clocks {
             for index in 0..self.floats.len() {
                 let Start { lower, upper } = self.floats[index].clone();
                 for (other, lag) in lower.lags.iter().filter(|_| upper < Int::MAX) {
-                    let known = &mut self.floats[usize::from(*other)].upper;
+                    let known = &mut self.floats[place(*other)].upper;
                     *known = (*known).min(upper - lag);
                 }
             }
         }
-        self.floats.iter().all(|start| start.lower.base < start.upper).then_some(())
+        self.floats.iter().all(|start| start.lower.base <= start.upper).then_some(())
     }
 
     /// One float is another one and so much more.
     fn unify(&mut self, float: Float, other: Float, by: Int) -> Option<()> {
-        let Start { mut lower, upper } = self.floats[usize::from(float)].clone();
-        let target = &mut self.floats[usize::from(other)];
-        target.upper = target.upper.min(upper.saturating_sub(by));
+        let Start { mut lower, upper } = self.floats[place(float)].clone();
+        let target = &mut self.floats[place(other)];
+        if upper < Int::MAX {
+            target.upper = target.upper.min(upper - by);
+        }
         if target.lower.forget(float).is_some_and(|lag| lag + by > 0) {
             return None;
         }
@@ -328,41 +362,68 @@ impl Clocks {
                 order.push(float);
             }
         }
-        let number = |float| order.iter().position(|other| *other == float).map(|position| position as Float);
-        let numbers: Vec<_> = (0..self.floats.len()).map(|float| number(float as Float)).collect();
+        let mut numbers: Vec<Option<Float>> = vec![None; self.floats.len()];
+        for (number, float) in (0..).zip(&order) {
+            numbers[place(*float)] = Some(number);
+        }
         for time in self.times() {
             time.renumber(&numbers);
         }
-        let mut floats: Vec<Start> =
-            order.iter().map(|float| self.floats[usize::from(*float)].clone()).collect();
+        let mut floats: Vec<Start> = order.iter().map(|float| self.floats[place(*float)].clone()).collect();
         for start in &mut floats {
             start.lower.renumber(&numbers);
         }
         self.floats = floats;
-        let renamed = |float: Float| numbers[usize::from(float)].unwrap_or(float);
+        let renamed = |float: Float| numbers[place(float)].unwrap_or(float);
         for open in &mut self.opens {
             open.float = renamed(open.float);
         }
         self.group = self.group.map(|(float, offset)| (renamed(float), offset));
     }
 
-    /// The clocks after timed initial literals that change some variables: all so far was before them, and nothing from now
-    /// on is. None if that cannot be.
-    pub(super) fn timed(&self, time: Int, changes: &[u32]) -> Option<Self> {
-        if self.latest.base >= time || self.unsettled() {
-            return None;
-        }
+    /// The clocks after timed initial literals: nothing so far was after them, and nothing from now on is before. None if that cannot be.
+    pub(super) fn timed(&self, event: &Event<'_>) -> Option<Self> {
         let mut next = self.clone();
-        for (float, lag) in &self.latest.lags {
-            let upper = &mut next.floats[usize::from(*float)].upper;
-            *upper = (*upper).min(time - lag);
+        next.bound(&self.latest, event.time)?;
+        for (key, by) in event.after {
+            if let Some(time) = self.entry(*key) {
+                next.bound(time, event.time - by)?;
+            }
         }
-        next.floor = time;
-        for variable in changes {
-            next.set_changed(*variable, Time::constant(time));
+        let now = Time::constant(event.time);
+        next.floor = event.time;
+        for key in event.marks {
+            match next.entries.binary_search_by_key(key, |(own, _)| *own) {
+                Ok(position) => next.entries[position].1 = now.clone(),
+                Err(position) => next.entries.insert(position, (*key, now.clone())),
+            }
+        }
+        for variable in event.changes {
+            next.set_changed(*variable, now.clone());
+        }
+        if let Some((float, offset)) = self.group {
+            next.raise(float, &now, offset)?;
+            let upper = &mut next.floats[place(float)].upper;
+            *upper = (*upper).min(event.time - offset);
+        } else if !event.settled {
+            next.floats.push(Start { lower: now, upper: event.time });
+            next.group = Some((next.last_float(), 0));
+        }
+        if event.settled {
+            next.group = None;
         }
         next.spread()?;
+        next.tidy();
         Some(next)
+    }
+
+    /// A time is not after some moment. None if that cannot be.
+    fn bound(&mut self, time: &Time, moment: Int) -> Option<()> {
+        for (float, lag) in &time.lags {
+            let upper = &mut self.floats[place(*float)].upper;
+            *upper = (*upper).min(moment - lag);
+        }
+        (time.base <= moment).then_some(())
     }
 
     /// Forgets accesses that put nothing off any more: everything that heeds one comes after its guard has changed.
@@ -389,6 +450,7 @@ impl Clocks {
             _ => true,
         };
         if self.floor > other.floor
+            || (self.waits() && !other.waits())
             || !self.latest.precedes(&other.latest, 0)
             || !floats().all(|(own, other)| own.lower.precedes(&other.lower, 0) && own.upper >= other.upper)
             || !lasts().all(last)

@@ -15,7 +15,7 @@ use crate::pddl::ast::Span;
 use crate::task::{OperatorId, Task};
 
 /// Times and durations stay below this.
-const LIMIT: Int = 1 << 46;
+const LIMIT: Int = 1 << 90;
 
 /// What a happening is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,6 +65,8 @@ pub struct Concurrent {
     /// By operator.
     pub(super) happenings: Vec<Happening>,
     pub(super) instances: Vec<Instance>,
+    /// The timed initial literals by their time.
+    pub(super) events: Vec<(Int, OperatorId)>,
     /// For each kind of access a variable whose current value everything reads that waits for such accesses.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure,
@@ -117,18 +119,24 @@ pub(super) fn compile(
     let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(one)?;
     let mut roles = vec![Role::Never; task.operators.len()];
     let mut instances = builder.instances(&task, unit, &mut roles).map_err(one)?;
-    for ((operator, role), written) in task.operators.iter().zip(&mut roles).zip(builder.written()) {
+    let contradictory = builder.contradictory(&task);
+    for ((operator, role), id) in task.operators.iter().zip(&mut roles).zip((0..).map(OperatorId)) {
         match split.origins[operator.schema as usize].half {
-            Half::Whole if !written.conflicts() => *role = Role::Whole,
+            Half::Whole if !contradictory.contains(&id) => *role = Role::Whole,
             Half::Timed(event) => *role = Role::Timed(unit.of(&split.events[event].time).map_err(one)?),
             _ => {}
         }
     }
     let (happenings, keys) = builder.happenings(&task, &roles, &mut instances);
+    let mut events: Vec<(Int, OperatorId)> = Vec::new();
+    for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
+        events.extend(if let Role::Timed(time) = role { Some((*time, id)) } else { None });
+    }
+    events.sort_unstable();
     task.time_scale = unit.0;
     drop_held(&mut task, &instances);
     let guards = vec![None; keys];
-    let mut concurrent = Concurrent { task, happenings, instances, guards, measure, separation };
+    let mut concurrent = Concurrent { task, happenings, instances, events, guards, measure, separation };
     concurrent.guard();
     Ok(concurrent)
 }
@@ -157,7 +165,12 @@ impl Concurrent {
                 .filter(|variable| variable.index() < self.task.basic)
                 .map(|variable| variable.0)
                 .collect();
-            for (key, _) in &happening.accesses.after {
+            // What happens by itself is put off by nothing: it bounds what was before, the change of a guard like any access.
+            let heeded = match happening.role {
+                Role::Timed(_) => &[][..],
+                _ => &happening.accesses.after,
+            };
+            for (key, _) in heeded {
                 match &mut common[*key as usize] {
                     Some(known) => known.retain(|variable| facts.contains(variable)),
                     none => *none = Some(facts.clone()),

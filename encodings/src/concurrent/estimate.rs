@@ -46,7 +46,8 @@ impl Estimate {
 
     /// None if the goal is out of reach.
     pub(super) fn left(&self, concurrent: &Concurrent, state: &State, clocks: &Clocks) -> Option<Left> {
-        let mut left = Left { makespan: clocks.latest(), sum: 0 };
+        // No plan ends with waiting for what happens by itself.
+        let mut left = Left { makespan: clocks.latest().max(clocks.floor()), sum: 0 };
         for open in clocks.opens() {
             let end = clocks.start(open) + concurrent.instances[open.instance as usize].duration;
             left.makespan = left.makespan.max(end);
@@ -95,11 +96,15 @@ fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
     let task = &concurrent.task;
     let operators = || task.operators.iter().zip(&concurrent.happenings);
     let of = |facts: &[Fact]| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
-    let by_itself = operators().any(|(operator, happening)| {
-        matches!(happening.role, Role::Timed(_)) && of(&operator.effects).is_some()
-    });
-    // What happens by itself keeps no separation.
-    let apart = if by_itself { 0 } else { concurrent.separation };
+    let apart = concurrent.separation;
+    let setters = |value: u32| {
+        let sets = move |operator: &Operator| {
+            let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+            let mut effects = operator.effects.iter().chain(conditional);
+            effects.any(|fact| fact.variable == variable && fact.value == value)
+        };
+        task.operators.iter().filter(move |operator| sets(operator)).count()
+    };
     let mut edges = Vec::new();
     for (operator, happening) in operators() {
         let Some(to) = of(&operator.effects) else { continue };
@@ -112,30 +117,23 @@ fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
                 let instance = &concurrent.instances[instance as usize];
                 let start = &task.operators[instance.start.index()];
                 let held = instance.over_all.map(|id| &task.operators[id.index()]);
-                edges.push(end(instance.duration, (of(&start.effects), from, to), apart, || {
+                let kept = held.and_then(|over_all| of(&over_all.condition.facts));
+                edges.push(match (of(&start.effects), from) {
+                    // The value that the start has set stays until the end: it is required all along, or nothing else sets it.
+                    (Some(set), Some(from)) if set == from && (kept == Some(set) || setters(set) == 1) => {
+                        (Some(from), to, instance.duration)
+                    }
                     // The value stays from before the start to the end.
-                    let kept = |over_all: &Operator| of(&over_all.condition.facts);
-                    let required = of(&start.condition.facts);
-                    required.filter(|_| held.and_then(kept) == required)
-                }));
+                    (None, None) => {
+                        match of(&start.condition.facts).filter(|required| kept == Some(*required)) {
+                            Some(value) => (Some(value), to, instance.duration + apart),
+                            None => (None, to, 0),
+                        }
+                    }
+                    (_, from) => (from, to, from.map_or(0, |_| apart)),
+                });
             }
         }
     }
     edges
-}
-
-fn end(
-    duration: Int,
-    (set, from, to): (Option<u32>, Option<u32>, u32),
-    apart: Int,
-    kept: impl FnOnce() -> Option<u32>,
-) -> Edge {
-    match (set, from) {
-        (Some(set), Some(from)) if set == from => (Some(from), to, duration),
-        (None, None) => match kept() {
-            Some(value) => (Some(value), to, duration + apart),
-            None => (None, to, 0),
-        },
-        (_, from) => (from, to, from.map_or(0, |_| apart)),
-    }
 }

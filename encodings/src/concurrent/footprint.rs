@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::ground::evaluate::{AtomId, Binding, Failure, World};
-use crate::ground::reads::Reads;
+use crate::ground::reads::{Reads, Slot, fits};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId, Schema};
 use crate::pddl::ast::Assignment;
@@ -34,9 +34,21 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Whether it changes a number in two ways at once, which cannot be done.
-    pub(super) fn conflicts(&self) -> bool {
-        self.numbers.windows(2).any(|pair| pair[0].0 == pair[1].0)
+    /// Whether the order of two happenings would matter: one writes what the other reads, or both write in ways that do not commute.
+    pub(super) fn interferes(&self, other: &Self) -> bool {
+        let clash = |(number, way): &(NumericId, Way)| {
+            let mut others = other.numbers.iter().filter(|(other, _)| other == number);
+            others.any(|(_, other)| other != way || *way == Way::Assign)
+        };
+        self.disturbs(other) || other.disturbs(self) || self.numbers.iter().any(clash)
+    }
+
+    /// Whether this writes what the other one reads, or adds what it deletes.
+    fn disturbs(&self, other: &Self) -> bool {
+        let mut written = self.added.iter().chain(&self.deleted);
+        written.any(|atom| other.reads.binary_search(atom).is_ok())
+            || self.added.iter().any(|atom| other.deleted.binary_search(atom).is_ok())
+            || self.numbers.iter().any(|(number, _)| other.reads_numbers.binary_search(number).is_ok())
     }
 }
 
@@ -93,7 +105,8 @@ impl<'a> Footprints<'a> {
             atoms.dedup();
         }
         numbers.sort_unstable();
-        numbers.dedup_by(|a, b| a == b && a.1 != Way::Assign);
+        // The ground operator exists, so its changes of one number go together.
+        numbers.dedup();
         Ok(footprint)
     }
 
@@ -159,8 +172,9 @@ impl Written {
     pub(super) fn look_up(&self, reads: &Reads) -> (Vec<AtomId>, Vec<NumericId>) {
         let (mut atoms, mut numbers) = (Vec::new(), Vec::new());
         for (predicate, pattern) in &reads.atoms {
+            let object = |slot: &Slot| if let Slot::Object(object) = slot { Some(*object) } else { None };
             let whole =
-                pattern.as_ref().and_then(|pattern| pattern.iter().copied().collect::<Option<Vec<_>>>());
+                pattern.as_ref().and_then(|pattern| pattern.iter().map(object).collect::<Option<Vec<_>>>());
             match whole {
                 Some(arguments) => atoms.extend(self.exact.get(&(*predicate, arguments))),
                 None => matching(self.atoms.get(predicate), pattern.as_deref(), &mut atoms),
@@ -177,11 +191,7 @@ impl Written {
     }
 }
 
-fn matching<V: Copy>(rows: Option<&Rows<V>>, pattern: Option<&[Option<ObjectId>]>, into: &mut Vec<V>) {
-    let fits = |arguments: &[ObjectId]| {
-        pattern.is_none_or(|pattern| {
-            pattern.iter().zip(arguments).all(|(wanted, given)| wanted.is_none_or(|wanted| wanted == *given))
-        })
-    };
+fn matching<V: Copy>(rows: Option<&Rows<V>>, pattern: Option<&[Slot]>, into: &mut Vec<V>) {
+    let fits = |arguments: &[ObjectId]| pattern.is_none_or(|pattern| fits(pattern, arguments));
     into.extend(rows.into_iter().flatten().filter(|(arguments, _)| fits(arguments)).map(|(_, value)| *value));
 }

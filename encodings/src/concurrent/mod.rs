@@ -139,7 +139,8 @@ pub fn optimize_concurrent(
         return solution(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())));
     }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
-    let bounds = (costs || !task.initial.numbers.is_empty()).then(|| Bounds::new(task, limits));
+    let bounds =
+        (costs || !task.initial.numbers.is_empty()).then(|| Bounds::new(task, limits).ok()).flatten();
     let estimate = Estimate::new(concurrent);
     let mut hear = |sequence: &Sequence, lower: Int| {
         report(Improvement {

@@ -17,6 +17,7 @@ use crate::bounds::Bounds;
 use crate::concurrent::clocks::{self, Clocks, Kind};
 use crate::concurrent::compile::{Concurrent, Role};
 use crate::concurrent::estimate::Estimate;
+use crate::concurrent::keys::Accesses;
 use crate::limits::Limits;
 use crate::number::{GROWTH_LIMIT, Int, words};
 use crate::search::is_monotone;
@@ -67,8 +68,8 @@ pub(super) struct Search<'a> {
     seen: FxHashMap<Box<[u32]>, Vec<u32>>,
     open: BinaryHeap<Reverse<Priority>>,
     pub(super) incumbent: Option<Sequence>,
-    /// Whether something was left out because its numbers do not fit.
-    incomplete: bool,
+    /// What was left out because its numbers do not fit: no plan of it has a lower metric than this, in integers.
+    left_out: Option<Int>,
 }
 
 /// Numbers of a node do not fit their type.
@@ -97,10 +98,12 @@ impl<'a> Search<'a> {
             seen: FxHashMap::default(),
             open: BinaryHeap::new(),
             incumbent,
-            incomplete: false,
+            left_out: None,
         };
         let state = concurrent.task.initial.clone();
-        search.push(Node { state, clocks: Clocks::new(), cost: 0, depth: 0, parent: None, dominated: false });
+        // Costs and times are not negative.
+        let root = Node { state, clocks: Clocks::new(), cost: 0, depth: 0, parent: None, dominated: false };
+        search.push(root, 0);
         search
     }
 
@@ -129,12 +132,19 @@ impl<'a> Search<'a> {
                 continue;
             }
             if expanded == most || (expanded.is_multiple_of(64) && limits.reached()) {
-                return Ended::Stopped(if self.greedy { 0 } else { value.0 });
+                // Greedily, others that are still open may be better.
+                let lower = if self.greedy { 0 } else { value.0 };
+                return Ended::Stopped(self.left_out.map_or(lower, |left_out| left_out.min(lower)));
             }
             expanded += 1;
-            self.expand(id);
+            self.expand(id, value.0);
         }
-        if self.incomplete { Ended::Stopped(0) } else { Ended::Exhausted }
+        self.left_out.map_or(Ended::Exhausted, Ended::Stopped)
+    }
+
+    /// Leaves out something below a node in which no plan has a lower metric than `lower`.
+    fn leave_out(&mut self, lower: Int) {
+        self.left_out = Some(self.left_out.map_or(lower, |known| known.min(lower)));
     }
 
     fn is_better(&self, value: (Int, Int)) -> bool {
@@ -143,27 +153,31 @@ impl<'a> Search<'a> {
 
     fn is_goal(&self, id: u32) -> bool {
         let Node { state, clocks, .. } = &self.nodes[id as usize];
-        let role = |id: OperatorId| self.concurrent.happenings[id.index()].role;
+        let concurrent = self.concurrent;
+        // What happens by itself up to the end has taken place, and nothing after the end; what comes soon after keeps apart.
+        let mut to_come = concurrent.events.iter().filter(|(time, _)| *time > clocks.floor());
+        let is_apart = |(time, event): &(Int, OperatorId)| {
+            let after = &concurrent.happenings[event.index()].accesses.after;
+            *time > clocks.latest() && clocks.are_apart(*time, after)
+        };
         clocks.opens().is_empty()
             && !clocks.unsettled()
-            && self.concurrent.task.is_goal(state)
-            && self.index.applicable(&self.concurrent.task, state).into_iter().all(|id| match role(id) {
-                // It takes place before the plan ends.
-                Role::Timed(time) => clocks.latest() < time,
-                _ => true,
-            })
+            && !clocks.waits()
+            && concurrent.task.is_goal(state)
+            && to_come.all(is_apart)
     }
 
-    fn expand(&mut self, id: u32) {
+    /// Adds what can follow a node in which no plan has a lower metric than `lower`.
+    fn expand(&mut self, id: u32, lower: Int) {
         let concurrent = self.concurrent;
         let Node { state, clocks, .. } = &self.nodes[id as usize];
         let mut next = self.index.applicable(&concurrent.task, state);
         next.extend(clocks.opens().iter().map(|open| concurrent.instances[open.instance as usize].end));
         for operator in next {
             match self.successor(id, operator) {
-                Ok(Some(node)) => self.push(node),
+                Ok(Some(node)) => self.push(node, lower),
                 Ok(None) => {}
-                Err(Unfit) => self.incomplete = true,
+                Err(Unfit) => self.leave_out(lower),
             }
         }
     }
@@ -180,6 +194,7 @@ impl<'a> Search<'a> {
         let (kind, instance) = match happening.role {
             Role::Start(instance) => (Kind::Start, instance),
             Role::End(instance) => (Kind::End, instance),
+            // Those that happen by themselves are told apart below.
             Role::Whole | Role::Timed(_) => (Kind::Whole, u32::MAX),
             Role::Never => return Ok(None),
         };
@@ -196,7 +211,8 @@ impl<'a> Search<'a> {
             .filter(|variable| state.values[*variable as usize] != after.values[*variable as usize])
             .collect();
         let clocks = if let Role::Timed(time) = happening.role {
-            if settled { clocks.timed(time, &changes) } else { None }
+            let Accesses { after, marks } = &happening.accesses;
+            clocks.timed(&clocks::Event { time, after, marks, changes: &changes, settled })
         } else {
             let own = concurrent.instances.get(instance as usize);
             clocks.after(&clocks::Happening {
@@ -228,7 +244,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn push(&mut self, node: Node) {
+    /// Adds a node, below one in which no plan has a lower metric than `lower`.
+    fn push(&mut self, node: Node, lower: Int) {
         let concurrent = self.concurrent;
         let Some(left) = self.estimate.left(concurrent, &node.state, &node.clocks) else { return };
         let costs = match self.bounds {
@@ -241,7 +258,7 @@ impl<'a> Search<'a> {
         let total =
             node.cost.checked_add(costs).and_then(|cost| concurrent.measure.total(left.makespan, cost));
         let Some(total) = total.filter(|total| *total < GROWTH_LIMIT) else {
-            self.incomplete = true;
+            self.leave_out(lower);
             return;
         };
         let value = (total, left.makespan);

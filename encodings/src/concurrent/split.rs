@@ -2,8 +2,8 @@
 //!
 //! A durative action becomes two instantaneous ones, after Fox and Long's *snap actions* [1], joined by an atom that says
 //! that the instance is under way. What must hold over all becomes a third schema, which never happens: its condition is looked
-//! up while the instance is under way. An instance that takes no time is one happening. Timed initial literals become
-//! schemas without parameters, one after another.
+//! up while the instance is under way. An instance that takes no time is one happening, and nothing holds over all of it. Timed
+//! initial literals become schemas without parameters, one after another.
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
 
@@ -53,19 +53,9 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
     let schemas = std::mem::take(&mut lifted.schemas);
     let events = std::mem::take(&mut lifted.events);
     let (mut origins, mut designs) = (Vec::new(), Vec::new());
-    let waited = lifted.time.waited;
-    if !events.is_empty() {
-        // A plan lasts until its last action ends, so it does not end with what happens by itself.
-        let done = Formula::Literal { positive: false, predicate: waited, terms: Vec::new() };
-        let goal = std::mem::replace(&mut lifted.goal, Formula::truth());
-        lifted.goal = Formula::And(vec![goal, done]);
-    }
     for (index, schema) in schemas.iter().enumerate() {
         let own = design_parameters(&lifted, schema, solves);
         for (half, mut part) in parts(&mut lifted, schema) {
-            if !events.is_empty() && matches!(half, Half::End | Half::Whole) {
-                part.end_effects.push(effect(Change::Delete(waited, Vec::new())));
-            }
             part.action = lifted.schemas.len() as u32;
             lifted.schemas.push(part);
             origins.push(Origin { schema: index, half });
@@ -175,7 +165,6 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
             effect(if holds { Change::Add(predicate, terms) } else { Change::Delete(predicate, terms) })
         })
         .collect();
-    effects.push(effect(Change::Add(lifted.time.waited, Vec::new())));
     effects.push(effect(Change::Delete(lifted.time.phase, phase(index))));
     effects.push(effect(Change::Add(lifted.time.phase, phase(index + 1))));
     Schema {

@@ -4,7 +4,12 @@ use crate::number::Int;
 use smallvec::SmallVec;
 
 /// A moment that can still be put off: the start of an action under way, by its position in the clocks.
-pub(super) type Float = u16;
+pub(super) type Float = u32;
+
+/// The position of a float.
+pub(super) fn place(float: Float) -> usize {
+    float as usize
+}
 
 /// The least time of a happening: at least `base`, and at least so long after each of some floats.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -57,7 +62,7 @@ impl Time {
 
     /// Gives the floats other numbers.
     pub(super) fn renumber(&mut self, numbers: &[Option<Float>]) {
-        let renamed = self.lags.iter().filter_map(|(float, lag)| Some((numbers[usize::from(*float)]?, *lag)));
+        let renamed = self.lags.iter().filter_map(|(float, lag)| Some((numbers[place(*float)]?, *lag)));
         self.lags = renamed.collect();
         self.lags.sort_unstable();
     }

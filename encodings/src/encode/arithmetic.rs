@@ -1,7 +1,7 @@
 //! Binary numbers in clauses: two's complement, ripple-carry addition, constants folded.
 
 use crate::encode::formula::{Family, Formula, Meaning};
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::sat::Lit;
 
 /// Bits of a number, the lowest first; the last one is the sign.
@@ -23,7 +23,7 @@ pub(crate) struct Arithmetic<'f> {
 
 impl Arithmetic<'_> {
     fn bit(&mut self) -> Lit {
-        let bit = self.formula.variables() as u32;
+        let bit = dense(self.formula.variables());
         self.formula.fresh(Meaning::Bit { bit })
     }
 

@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 use crate::encode::Encoding;
 use crate::encode::arithmetic::Bits;
 use crate::encode::formula::{Family, Formula, Meaning};
+use crate::number::dense;
 use crate::sat::Lit;
 use crate::task::{Layer, VariableId};
 
@@ -32,7 +33,7 @@ impl Encoding<'_> {
                 for comparison in &rule.body.comparisons {
                     premises.push(self.is_at_least_zero(comparison, numbers, Family::Axiom)?);
                 }
-                let meaning = Meaning::Body { layer: index, rule: position, step: step as u32 };
+                let meaning = Meaning::Body { layer: index, rule: position, step: dense(step) };
                 let body = self.equivalent(meaning, &premises, Family::Axiom);
                 let own = rule.body.facts.iter().filter(|fact| fact.value == 0).map(|fact| fact.variable);
                 let own = own.filter(|variable| heads.contains(variable)).collect();
@@ -59,13 +60,13 @@ impl Encoding<'_> {
         layer: &Layer,
         bodies: &BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>>,
     ) {
-        let rounds = bodies.len() as u32;
+        let rounds = dense(bodies.len());
         // `later[v][k]`: v follows in more than k + 1 rounds; it follows in at most `rounds`.
         let mut later: BTreeMap<VariableId, Vec<Lit>> = BTreeMap::new();
         for variable in bodies.keys() {
             let literals: Vec<_> = (1..rounds)
                 .map(|rounds| {
-                    self.formula.fresh(Meaning::Later { variable: variable.0, rounds, step: step as u32 })
+                    self.formula.fresh(Meaning::Later { variable: variable.0, rounds, step: dense(step) })
                 })
                 .collect();
             for pair in literals.windows(2) {

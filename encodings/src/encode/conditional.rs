@@ -5,6 +5,7 @@
 
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
+use crate::number::dense;
 use crate::sat::Lit;
 use crate::task::{Fact, OperatorId};
 
@@ -28,7 +29,7 @@ impl Encoding<'_> {
                 let literal = if premises.contains(&!Formula::truth()) {
                     !Formula::truth()
                 } else {
-                    let meaning = Meaning::Fires { operator: id.0, effect: position, step: step as u32 };
+                    let meaning = Meaning::Fires { operator: id.0, effect: position, step: dense(step) };
                     self.equivalent(meaning, &premises, Family::Conditional)
                 };
                 let effects = effect.effects.clone();

@@ -15,7 +15,7 @@ use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::selection::global;
 use crate::encode::{CostLimit, Counting, Encoding};
 use crate::limits::Limits;
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::sat::Lit;
 use crate::task::{Operator, OperatorId};
 
@@ -89,7 +89,7 @@ impl Encoding<'_> {
         let steps = steps?;
         let spent = if cost.counting == Counting::Apart {
             let sources = steps.iter().enumerate().flat_map(|(step, sources)| {
-                sources.iter().enumerate().map(move |(stage, source)| (source, step as u32, stage as u32))
+                sources.iter().enumerate().map(move |(stage, source)| (source, dense(step), dense(stage)))
             });
             Spent::Apart(
                 sources.flat_map(|(source, step, stage)| self.apart(source, gap, step, stage)).collect(),
@@ -195,7 +195,7 @@ impl Encoding<'_> {
                 if limits.reached() {
                     return None;
                 }
-                spent = self.add_amounts(source, &spent, gap, step as u32, stage as u32);
+                spent = self.add_amounts(source, &spent, gap, dense(step), dense(stage));
             }
         }
         Some(spent)
@@ -302,10 +302,10 @@ fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<In
 }
 
 /// All combinations of designs of some slots in the order of `Table::values`, in the task's numbering.
-pub(super) fn combinations(operator: &Operator, slots: &[u16]) -> Vec<Vec<(usize, usize)>> {
+pub(super) fn combinations(operator: &Operator, slots: &[u32]) -> Vec<Vec<(usize, usize)>> {
     let mut all = vec![Vec::new()];
     for slot in slots {
-        let designs = 0..operator.slots[*slot as usize].designs.len() as u16;
+        let designs = 0..dense(operator.slots[*slot as usize].designs.len());
         all = all
             .iter()
             .flat_map(|known: &Vec<(usize, usize)>| {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::sat::Lit;
 
 /// What a clause is for. The documentation of each family stands in the file that writes it.
@@ -89,7 +89,7 @@ pub(crate) enum Meaning {
     /// The finite-domain variable has the value before the step.
     Value { variable: u32, value: u32, step: u32 },
     /// The slot is filled with its design at the step.
-    Design { slot: u32, design: u16, step: u32 },
+    Design { slot: u32, design: u32, step: u32 },
     /// The operator at the step is one of a group.
     Group { group: u32, step: u32 },
     /// The accumulated cost before the step, less its lower bound, is at least the amount.
@@ -119,6 +119,8 @@ pub(crate) struct Formula {
     literals: Vec<Lit>,
     /// End of each clause in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
+    /// For each literal the last clause that it stood in, as its number plus 1.
+    last: Vec<u32>,
 }
 
 impl Formula {
@@ -137,23 +139,34 @@ impl Formula {
     }
 
     pub(crate) fn fresh(&mut self, meaning: Meaning) -> Lit {
+        let literal = Lit::positive(dense(self.meanings.len()));
         self.meanings.push(meaning);
-        Lit::positive(self.meanings.len() as u32 - 1)
+        self.last.extend([0, 0]);
+        literal
     }
 
     /// Adds a clause; one that is true for constants' sake is dropped, false constants are left out.
     pub(crate) fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
         let start = self.literals.len();
+        let number = dense(self.clauses.len() + 1);
         for literal in clause {
-            if literal == Self::truth() || self.literals[start..].contains(&!literal) {
-                self.literals.truncate(start);
+            if literal == Self::truth() || self.last[(!literal).index()] == number {
+                self.forget(start);
                 return;
             }
-            if literal != !Self::truth() && !self.literals[start..].contains(&literal) {
+            if literal != !Self::truth() && self.last[literal.index()] != number {
+                self.last[literal.index()] = number;
                 self.literals.push(literal);
             }
         }
-        self.clauses.push((self.literals.len() as u32, family));
+        self.clauses.push((dense(self.literals.len()), family));
+    }
+
+    /// Drops the literals of a clause that was begun, so that the next one can have its number.
+    fn forget(&mut self, start: usize) {
+        for literal in self.literals.drain(start..) {
+            self.last[literal.index()] = 0;
+        }
     }
 
     /// A literal that is true if one of the given ones is; itself one of them where that is enough. One

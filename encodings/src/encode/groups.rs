@@ -7,10 +7,11 @@ use std::collections::BTreeMap;
 
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
+use crate::number::dense;
 use crate::sat::Lit;
 use crate::task::{Operator, OperatorId};
 
-impl Encoding<'_> {
+impl<'a> Encoding<'a> {
     /// The variable of a group of operators at a step; members that cannot be at the step are left out.
     pub(super) fn group(&mut self, step: usize, members: &[OperatorId], family: Family) -> Lit {
         let present: Vec<_> = {
@@ -28,7 +29,7 @@ impl Encoding<'_> {
         if let Some(known) = self.groups.get(&key) {
             return *known;
         }
-        let group = self.formula.fresh(Meaning::Group { group: self.groups.len() as u32, step: step as u32 });
+        let group = self.formula.fresh(Meaning::Group { group: dense(self.groups.len()), step: dense(step) });
         for (_, literal) in &present {
             self.formula.add(family, [!*literal, group]);
         }
@@ -41,7 +42,7 @@ impl Encoding<'_> {
     pub(super) fn partition<K: Ord>(
         &self,
         step: usize,
-        property: impl Fn(&Operator) -> Vec<K>,
+        property: impl Fn(&'a Operator) -> Vec<K>,
     ) -> BTreeMap<K, Vec<OperatorId>> {
         let mut parts: BTreeMap<K, Vec<OperatorId>> = BTreeMap::new();
         for (id, _) in &self.operators[step] {

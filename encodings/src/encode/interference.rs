@@ -21,6 +21,7 @@ use std::collections::BTreeMap;
 use crate::bounds::Projection;
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
+use crate::limits::{Interrupted, Limits};
 use crate::sat::Lit;
 use crate::task::{Condition, OperatorId, Task, VariableId};
 
@@ -65,16 +66,22 @@ struct Uses {
 
 impl Interference {
     /// The interferences of a task; none if operators stand alone. Costs are reduced by the potential.
-    pub(super) fn new(task: &Task, semantics: Semantics, potential: Option<&Projection>) -> Option<Self> {
+    pub(super) fn new(
+        task: &Task,
+        semantics: Semantics,
+        potential: Option<&Projection>,
+        limits: &Limits,
+    ) -> Result<Option<Self>, Interrupted> {
         if semantics == Semantics::Sequential {
-            return None;
+            return Ok(None);
         }
         let support = Support::new(task);
         let mut variables: Vec<Uses> = (0..task.basic).map(|_| Uses::default()).collect();
         let mut slots = vec![Vec::new(); task.slots.len()];
         let mut numbers = vec![Vec::new(); task.initial.numbers.len()];
         let (mut constant, mut changers) = (Vec::new(), Vec::new());
-        for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+        for item in limits.watch(task.operators.iter().zip(OperatorId::all(task.operators.len()))) {
+            let (operator, id) = item?;
             for usage in operator.slots.iter() {
                 slots[usage.slot.index()].push(id);
             }
@@ -116,8 +123,11 @@ impl Interference {
                 classes[id.index()].get_or_insert(position);
             }
         }
-        let conflicts = variables.iter().flat_map(Uses::conflicts).collect();
-        Some(Self { both_orders: semantics == Semantics::ForAllStep, exclusions, conflicts, classes })
+        let mut conflicts = Vec::new();
+        for uses in &variables {
+            uses.conflicts(&mut conflicts, limits)?;
+        }
+        Ok(Some(Self { both_orders: semantics == Semantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
     /// Operators of the same class never stand at the same step; those without one may stand with any.
@@ -127,7 +137,7 @@ impl Interference {
 }
 
 impl Uses {
-    fn conflicts(&self) -> Vec<Conflict> {
+    fn conflicts(&self, out: &mut Vec<Conflict>, limits: &Limits) -> Result<(), Interrupted> {
         let mut found = Vec::new();
         let required: BTreeMap<OperatorId, u32> =
             self.require.iter().flat_map(|(value, all)| all.iter().map(|id| (*id, *value))).collect();
@@ -135,7 +145,8 @@ impl Uses {
         for (id, set) in &self.write {
             writers.entry(required.get(id).copied()).or_default().push((*id, *set));
         }
-        for (value, need) in &self.require {
+        for item in limits.watch(&self.require) {
+            let (value, need) = item?;
             // What needs another value of the variable cannot stand at the step anyway.
             let possible = [None, Some(*value)].into_iter().filter_map(|required| writers.get(&required));
             let erase = possible.flatten().filter(|(_, set)| set != value);
@@ -148,7 +159,8 @@ impl Uses {
         erase.dedup();
         found.push(Conflict { erase, need: self.read.clone() });
         found.retain(|conflict| !conflict.erase.is_empty() && !conflict.need.is_empty());
-        found
+        out.append(&mut found);
+        Ok(())
     }
 }
 
@@ -214,13 +226,14 @@ fn sorted(numbers: &mut Vec<usize>) -> &[usize] {
 
 impl Encoding<'_> {
     /// The operators at a step do not interfere.
-    pub(super) fn interfere(&mut self, step: usize) {
-        let Some(interference) = self.interference.take() else { return };
+    pub(super) fn interfere(&mut self, step: usize, limits: &Limits) -> Result<(), Interrupted> {
+        let Some(interference) = self.interference.take() else { return Ok(()) };
         for group in &interference.exclusions {
             let literals: Vec<_> = group.iter().filter_map(|id| self.operator(step, *id)).collect();
             self.formula.at_most_one(Family::Interference, &literals);
         }
-        for conflict in &interference.conflicts {
+        for conflict in limits.watch(&interference.conflicts) {
+            let conflict = conflict?;
             let mut users: BTreeMap<OperatorId, (bool, bool)> = BTreeMap::new();
             for id in &conflict.erase {
                 users.entry(*id).or_default().0 = true;
@@ -237,6 +250,7 @@ impl Encoding<'_> {
             }
         }
         self.interference = Some(interference);
+        Ok(())
     }
 
     /// The variable of an operator at a step, if it can stand there.
@@ -247,12 +261,13 @@ impl Encoding<'_> {
 
     /// After an operator that erases there is none that needs.
     fn ladder(&mut self, chain: &[(Lit, (bool, bool))]) {
+        let last = chain.iter().rposition(|(_, (_, needs))| *needs);
         let mut erased = !Formula::truth();
         for (index, (literal, (erases, needs))) in chain.iter().enumerate() {
             if *needs {
                 self.formula.add(Family::Interference, [!erased, !*literal]);
             }
-            if *erases && chain[index + 1..].iter().any(|(_, (_, needs))| *needs) {
+            if *erases && last.is_some_and(|last| index < last) {
                 if erased == !Formula::truth() {
                     erased = *literal;
                 } else {

@@ -10,6 +10,7 @@ mod arithmetic;
 mod axioms;
 mod conditional;
 mod cost;
+mod equal_designs;
 mod formula;
 mod groups;
 mod interference;
@@ -21,11 +22,13 @@ mod symmetry;
 #[cfg(test)]
 mod tests;
 
+use std::cell::OnceCell;
+
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
-use crate::limits::Limits;
-use crate::number::Int;
+use crate::limits::{Interrupted, Limits};
+use crate::number::{Int, dense};
 use crate::plan::GroundStep;
 use crate::sat::{Lit, Solver};
 use crate::task::{Fact, Literal, OperatorId, Task};
@@ -34,6 +37,7 @@ use cost::Cost;
 pub(crate) use formula::{Family, Formula, Meaning};
 use interference::Interference;
 pub use interference::Semantics;
+pub(crate) use symmetry::Symmetry;
 
 /// A formula and what its variables mean.
 pub(crate) struct Encoding<'a> {
@@ -74,16 +78,22 @@ pub(crate) enum Counting {
 
 impl<'a> Encoding<'a> {
     /// Encodes plans of at most `allowed.len()` steps, with the operators allowed at each step; of plans that differ by
-    /// exchanging what is equal only some. None if a limit was reached meanwhile, or if numbers are too large for a formula.
+    /// exchanging what is equal only some; what is equal is found out once for a task, and kept in `symmetry`. None if a limit was reached meanwhile, or if numbers are too large for a formula.
     pub(crate) fn new(
         task: &'a Task,
         allowed: &[Vec<bool>],
         cost: Option<CostLimit<'_>>,
         semantics: Semantics,
+        symmetry: &OnceCell<Symmetry>,
         limits: &Limits,
     ) -> Option<Self> {
         let mut encoding = Self::with_equals(task, allowed, cost, semantics, limits)?;
-        encoding.break_symmetries();
+        if encoding.horizon > 0 {
+            if symmetry.get().is_none() {
+                let _ = symmetry.set(Symmetry::new(task, limits).ok()?);
+            }
+            encoding.break_symmetries(symmetry.get()?, limits).ok()?;
+        }
         Some(encoding)
     }
 
@@ -101,7 +111,7 @@ impl<'a> Encoding<'a> {
             task,
             formula: Formula::new(),
             horizon,
-            interference: Interference::new(task, semantics, potential),
+            interference: Interference::new(task, semantics, potential, limits).ok()?,
             operators: Vec::new(),
             busy: Vec::new(),
             values: Vec::new(),
@@ -110,23 +120,14 @@ impl<'a> Encoding<'a> {
             fires: Vec::new(),
             cost: None,
         };
-        encoding.declare(allowed);
+        encoding.declare(allowed, limits).ok()?;
         for step in 0..horizon {
-            if limits.reached() {
-                return None;
-            }
-            encoding.domain(step);
-            encoding.sequence(step);
-            encoding.interfere(step);
-            encoding.conditions(step);
-            encoding.conditional(step);
-            encoding.effects(step);
-            encoding.frame(step);
-            encoding.selection(step);
+            encoding.step(step, limits).ok()?;
         }
         encoding.domain(horizon);
         let numbers = encoding.numeric(limits)?;
-        for (step, numbers) in numbers.iter().enumerate() {
+        for item in limits.watch(numbers.iter().enumerate()) {
+            let (step, numbers) = item.ok()?;
             encoding.axioms(step, numbers)?;
         }
         encoding.goal(&numbers[horizon])?;
@@ -134,6 +135,18 @@ impl<'a> Encoding<'a> {
             encoding.cost = Some(encoding.accumulate(&cost, limits)?);
         }
         Some(encoding)
+    }
+
+    /// What concerns one step apart from numbers, derived variables and costs.
+    fn step(&mut self, step: usize, limits: &Limits) -> Result<(), Interrupted> {
+        self.domain(step);
+        self.sequence(step);
+        self.interfere(step, limits)?;
+        for family in [Self::conditions, Self::conditional, Self::effects, Self::frame] {
+            limits.check()?;
+            family(self, step);
+        }
+        self.selection(step, limits)
     }
 
     /// The variable of a fact before a step.
@@ -181,7 +194,7 @@ impl<'a> Encoding<'a> {
     }
 
     /// The variable of an operator of a plan at its step, or that of the design of one of its slots.
-    pub(crate) fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u16>)) -> Lit {
+    pub(crate) fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u32>)) -> Lit {
         let step = &plan[at];
         match slot {
             None => self.operator(at, step.operator).unwrap_or(!Formula::truth()),
@@ -197,7 +210,7 @@ impl<'a> Encoding<'a> {
     pub(crate) fn other_than(&self, plan: &[GroundStep]) -> Vec<Lit> {
         let longer = self.busy.get(plan.len()).copied();
         let choices = plan.iter().enumerate().flat_map(|(at, step)| {
-            let slots = (0..step.choice.len() as u16).map(Some);
+            let slots = (0..dense(step.choice.len())).map(Some);
             std::iter::once(None).chain(slots).map(move |slot| !self.choice(plan, (at, slot)))
         });
         choices.chain(longer).collect()
@@ -216,7 +229,7 @@ impl<'a> Encoding<'a> {
                 let choice = operator.slots.iter().map(|slot| {
                     let designs = &self.designs[step][slot.slot.index()];
                     let chosen = slot.designs.iter().position(|design| holds(designs[*design as usize]));
-                    chosen.unwrap_or(0) as u16
+                    dense(chosen.unwrap_or(0))
                 });
                 steps.push(GroundStep { operator: *id, choice: choice.collect() });
             }

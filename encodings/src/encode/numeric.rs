@@ -13,7 +13,7 @@ use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::cost::combinations;
 use crate::encode::formula::{Family, Formula};
 use crate::limits::Limits;
-use crate::number::{GROWTH_LIMIT, Int};
+use crate::number::{GROWTH_LIMIT, Int, dense};
 use crate::quantity::{Linear, Quantity};
 use crate::sat::Lit;
 use crate::task::{NumericId, Operator, OperatorId};
@@ -124,7 +124,7 @@ impl Encoding<'_> {
         }
         let base: Bits = (0..length)
             .map(|_| {
-                let bit = self.formula.variables() as u32;
+                let bit = dense(self.formula.variables());
                 self.formula.fresh(crate::encode::formula::Meaning::Bit { bit })
             })
             .collect();

@@ -6,6 +6,7 @@
 
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
+use crate::number::dense;
 
 impl Encoding<'_> {
     /// One operator at most, where operators stand alone, and none after an idle step.
@@ -15,7 +16,7 @@ impl Encoding<'_> {
             [] => !Formula::truth(),
             [only] => only,
             _ => {
-                let busy = self.formula.fresh(Meaning::Busy { step: step as u32 });
+                let busy = self.formula.fresh(Meaning::Busy { step: dense(step) });
                 for literal in &literals {
                     self.formula.add(Family::Sequence, [!*literal, busy]);
                 }

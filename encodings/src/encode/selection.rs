@@ -6,24 +6,26 @@
 
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula};
+use crate::limits::{Interrupted, Limits};
 use crate::sat::Lit;
 use crate::task::SlotUse;
 
 impl Encoding<'_> {
     /// Each function in use has exactly one design, and one that suits.
-    pub(super) fn selection(&mut self, step: usize) {
+    pub(super) fn selection(&mut self, step: usize, limits: &Limits) -> Result<(), Interrupted> {
         for slot in 0..self.task.slots.len() {
             let uses = self.partition(step, |operator| {
                 let own = operator.slots.iter().filter(|usage| usage.slot.index() == slot);
-                own.map(|usage| usage.designs.clone()).collect()
+                own.map(|usage| &usage.designs[..]).collect()
             });
             let literals = self.designs[step][slot].clone();
             let mut users: Vec<Vec<Lit>> = vec![Vec::new(); literals.len()];
-            for (designs, members) in uses {
+            for item in limits.watch(uses) {
+                let (designs, members) = item?;
                 let group = self.group(step, &members, Family::Selection);
                 let suitable = designs.iter().map(|design| literals[*design as usize]);
                 self.formula.add(Family::Selection, suitable.chain([!group]));
-                for design in &designs {
+                for design in designs {
                     users[*design as usize].push(group);
                 }
             }
@@ -34,10 +36,10 @@ impl Encoding<'_> {
             let possible: Vec<_> = literals.into_iter().filter(|literal| *literal != falsum).collect();
             self.formula.at_most_one(Family::Selection, &possible);
         }
-        self.forbidden(step);
+        self.forbidden(step, limits)
     }
 
-    fn forbidden(&mut self, step: usize) {
+    fn forbidden(&mut self, step: usize, limits: &Limits) -> Result<(), Interrupted> {
         let parts = self.partition(step, |operator| {
             let rules = operator.forbidden.iter().flat_map(|rule| {
                 rule.combinations.iter().map(|combination| {
@@ -47,17 +49,19 @@ impl Encoding<'_> {
             });
             rules.collect()
         });
-        for (combination, members) in parts {
+        for item in limits.watch(parts) {
+            let (combination, members) = item?;
             let group = self.group(step, &members, Family::Selection);
             let chosen: Vec<_> =
                 combination.iter().map(|(slot, design)| !self.designs[step][*slot][*design]).collect();
             self.formula.add(Family::Selection, chosen.into_iter().chain([!group]));
         }
+        Ok(())
     }
 }
 
 /// Slot and design in the task's numbering, from positions in an operator.
-pub(super) fn global(slots: &[SlotUse], slot: u16, design: u16) -> (usize, usize) {
+pub(super) fn global(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {
     let usage = &slots[slot as usize];
     (usage.slot.index(), usage.designs[design as usize] as usize)
 }

@@ -10,11 +10,13 @@
 
 use crate::encode::Encoding;
 use crate::encode::formula::{Family, Formula, Meaning};
+use crate::limits::{Interrupted, Limits};
+use crate::number::dense;
 use crate::task::{Fact, OperatorId, VariableId};
 
 impl Encoding<'_> {
     /// Makes the variables for operators, values and designs.
-    pub(super) fn declare(&mut self, allowed: &[Vec<bool>]) {
+    pub(super) fn declare(&mut self, allowed: &[Vec<bool>], limits: &Limits) -> Result<(), Interrupted> {
         let task = self.task;
         let mut possible: Vec<Vec<bool>> =
             task.variables.iter().map(|v| vec![false; v.values.len()]).collect();
@@ -31,10 +33,11 @@ impl Encoding<'_> {
         self.declare_values(&possible, 0);
         for (step, allowed) in allowed.iter().enumerate() {
             let mut present = Vec::new();
-            for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+            for item in limits.watch(task.operators.iter().zip(OperatorId::all(task.operators.len()))) {
+                let (operator, id) = item?;
                 let is_possible = |fact: &Fact| possible[fact.variable.index()][fact.value as usize];
                 if allowed[id.index()] && operator.condition.facts.iter().all(is_possible) {
-                    let meaning = Meaning::Operator { operator: id.0, step: step as u32 };
+                    let meaning = Meaning::Operator { operator: id.0, step: dense(step) };
                     present.push((id, self.formula.fresh(meaning)));
                 }
             }
@@ -49,6 +52,7 @@ impl Encoding<'_> {
             self.declare_designs(step);
             self.declare_values(&possible, step + 1);
         }
+        Ok(())
     }
 
     fn declare_values(&mut self, possible: &[Vec<bool>], step: usize) {
@@ -61,7 +65,7 @@ impl Encoding<'_> {
                     (false, _) => !Formula::truth(),
                     (true, true) => Formula::truth(),
                     (true, false) => {
-                        let (variable, value, step) = (variable as u32, value as u32, step as u32);
+                        let (variable, value, step) = (dense(variable), dense(value), dense(step));
                         self.formula.fresh(Meaning::Value { variable, value, step })
                     }
                 });
@@ -85,7 +89,7 @@ impl Encoding<'_> {
         for (slot, used) in used.into_iter().enumerate() {
             let mut literals = Vec::with_capacity(used.len());
             for (design, used) in used.into_iter().enumerate() {
-                let meaning = Meaning::Design { slot: slot as u32, design: design as u16, step: step as u32 };
+                let meaning = Meaning::Design { slot: dense(slot), design: dense(design), step: dense(step) };
                 literals.push(if used { self.formula.fresh(meaning) } else { !Formula::truth() });
             }
             all.push(literals);
@@ -122,7 +126,7 @@ impl Encoding<'_> {
         }
         for (variable, producers) in producers.iter().enumerate().take(self.task.basic) {
             for (value, producers) in producers.iter().enumerate() {
-                let fact = Fact { variable: VariableId(variable as u32), value: value as u32 };
+                let fact = Fact { variable: VariableId::of(variable), value: dense(value) };
                 let (before, after) = (self.fact(fact, step), self.fact(fact, step + 1));
                 if after != !Formula::truth() {
                     let clause = [!after, before].into_iter().chain(producers.iter().copied());

@@ -16,10 +16,10 @@ use std::collections::BTreeMap;
 use rustc_hash::FxHashMap;
 
 use crate::encode::Encoding;
+use crate::encode::equal_designs::equal_designs;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::lifted::ObjectId;
-use crate::number::Int;
-use crate::quantity::Quantity;
+use crate::limits::{Interrupted, Limits};
 use crate::sat::Lit;
 use crate::task::{
     Argument, Condition, ConditionalEffect, Fact, Operator, OperatorId, SlotId, Task, VariableId,
@@ -29,90 +29,34 @@ use crate::task::{
 const WORK_LIMIT: usize = 2_000_000;
 
 /// What of a task is equal.
-pub(super) struct Symmetry {
+pub(crate) struct Symmetry {
     /// Designs of a slot that are equal to an earlier one.
-    designs: Vec<(SlotId, u16)>,
+    designs: Vec<(SlotId, u32)>,
     /// For pairs of equal objects: the operators that use the first, and those that use only the second.
     objects: Vec<(Vec<OperatorId>, Vec<OperatorId>)>,
 }
 
 impl Symmetry {
-    pub(super) fn new(task: &Task) -> Self {
-        let slots = (0..task.slots.len() as u32).map(SlotId);
-        Self {
-            designs: slots
-                .flat_map(|slot| equal_designs(task, slot).into_iter().map(move |design| (slot, design)))
-                .collect(),
-            objects: equal_objects(task),
+    pub(crate) fn new(task: &Task, limits: &Limits) -> Result<Self, Interrupted> {
+        let mut designs = Vec::new();
+        for slot in SlotId::all(task.slots.len()) {
+            designs.extend(equal_designs(task, slot, limits)?.into_iter().map(|design| (slot, design)));
         }
+        Ok(Self { designs, objects: equal_objects(task, limits)? })
     }
-}
-
-/// Designs of a slot that are equal to an earlier one.
-fn equal_designs(task: &Task, slot: SlotId) -> Vec<u16> {
-    let users: Vec<(&Operator, usize)> = task
-        .operators
-        .iter()
-        .flat_map(|operator| {
-            let positions = operator.slots.iter().enumerate().filter(|(_, usage)| usage.slot == slot);
-            positions.map(move |(position, _)| (operator, position))
-        })
-        .collect();
-    let mut different: Vec<u16> = Vec::new();
-    let mut equal = Vec::new();
-    for design in 0..task.slots[slot.index()].designs.len() as u16 {
-        let same =
-            |other: &u16| users.iter().all(|(operator, p)| no_difference(operator, *p, *other, design));
-        if different.iter().any(same) { equal.push(design) } else { different.push(design) }
-    }
-    equal
-}
-
-/// Whether an operator does not tell two designs of the slot at a position apart.
-fn no_difference(operator: &Operator, position: usize, a: u16, b: u16) -> bool {
-    let designs = &operator.slots[position].designs;
-    let (a, b) = match (designs.binary_search(&a), designs.binary_search(&b)) {
-        (Ok(a), Ok(b)) => (a, b),
-        (Err(_), Err(_)) => return true,
-        _ => return false,
-    };
-    let sizes = operator.sizes();
-    let same = |quantity: &Quantity<Int>| {
-        quantity.tables.iter().all(|table| {
-            let Some(own) = table.slots.iter().position(|slot| *slot as usize == position) else {
-                return true;
-            };
-            let stride: usize = table.slots[own + 1..].iter().map(|slot| sizes[*slot as usize]).product();
-            let with_a = |index: &usize| index / stride % sizes[position] == a;
-            (0..table.values.len())
-                .filter(with_a)
-                .all(|index| table.values[index] == table.values[index - a * stride + b * stride])
-        })
-    };
-    let forbidden = operator.forbidden.iter().all(|rule| {
-        let Some(own) = rule.slots.iter().position(|slot| *slot as usize == position) else { return true };
-        rule.combinations.iter().all(|combination| {
-            let mut swapped = combination.clone();
-            if swapped[own] as usize == a {
-                swapped[own] = b as u16;
-            } else if swapped[own] as usize == b {
-                swapped[own] = a as u16;
-            }
-            rule.combinations.contains(&swapped)
-        })
-    });
-    let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
-    let comparisons = operator.condition.comparisons.iter().map(|comparison| &comparison.quantity);
-    forbidden && effects.chain(comparisons).chain([&operator.cost]).all(same)
 }
 
 /// Pairs of neighbours in classes of equal objects.
-fn equal_objects(task: &Task) -> Vec<(Vec<OperatorId>, Vec<OperatorId>)> {
+fn equal_objects(
+    task: &Task,
+    limits: &Limits,
+) -> Result<Vec<(Vec<OperatorId>, Vec<OperatorId>)>, Interrupted> {
     if !task.axioms.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let mut uses: BTreeMap<ObjectId, Vec<(u32, usize)>> = BTreeMap::new();
-    for operator in &task.operators {
+    for operator in limits.watch(&task.operators) {
+        let operator = operator?;
         for (argument, position) in operator.arguments.iter().zip(0..) {
             if let Argument::Object(object) = argument {
                 uses.entry(*object).or_default().push((operator.schema, position));
@@ -124,7 +68,11 @@ fn equal_objects(task: &Task) -> Vec<(Vec<OperatorId>, Vec<OperatorId>)> {
         places.sort_unstable();
         alike.entry(places).or_default().push(object);
     }
-    let operators = Calls::new(task);
+    alike.retain(|_, objects| objects.len() > 1);
+    if alike.is_empty() || task.operators.len() > WORK_LIMIT {
+        return Ok(Vec::new());
+    }
+    let parts = Parts::new(task, limits)?;
     let mut work = 0;
     let mut pairs = Vec::new();
     for mut rest in alike.into_values() {
@@ -132,11 +80,16 @@ fn equal_objects(task: &Task) -> Vec<(Vec<OperatorId>, Vec<OperatorId>)> {
             let (mut last, mut others) = (first, Vec::new());
             for object in rest.drain(1..) {
                 work += task.operators.len();
-                let equal = work <= WORK_LIMIT
-                    && Exchange::new(task, last, object).is_some_and(|e| e.keeps(task, &operators));
+                let exchange =
+                    if work <= WORK_LIMIT { Exchange::new(&parts, last, object, limits)? } else { None };
+                let equal = match exchange {
+                    Some(exchange) => exchange.keeps(&parts, limits)?,
+                    None => false,
+                };
                 if equal {
-                    let only = uses_of(task, object).filter(|id| !uses_of(task, last).any(|own| own == *id));
-                    pairs.push((uses_of(task, last).collect(), only.collect()));
+                    let (own, all) = (uses_of(task, last), uses_of(task, object));
+                    let only = all.into_iter().filter(|id| own.binary_search(id).is_err()).collect();
+                    pairs.push((own, only));
                     last = object;
                 } else {
                     others.push(object);
@@ -145,25 +98,69 @@ fn equal_objects(task: &Task) -> Vec<(Vec<OperatorId>, Vec<OperatorId>)> {
             rest = others;
         }
     }
-    pairs
+    Ok(pairs)
 }
 
-fn uses_of(task: &Task, object: ObjectId) -> impl Iterator<Item = OperatorId> + '_ {
-    let all = task.operators.iter().zip((0..).map(OperatorId));
-    all.filter(move |(operator, _)| operator.arguments.contains(&Argument::Object(object))).map(|(_, id)| id)
+/// Ascending.
+fn uses_of(task: &Task, object: ObjectId) -> Vec<OperatorId> {
+    let all = task.operators.iter().zip(OperatorId::all(task.operators.len()));
+    let own = all.filter(|(operator, _)| operator.arguments.contains(&Argument::Object(object)));
+    own.map(|(_, id)| id).collect()
 }
 
-/// Operators by schema and arguments; none where there are several.
-struct Calls(FxHashMap<(u32, Vec<Argument>), Option<OperatorId>>);
+/// A task taken apart, so that images of its parts are found at once.
+struct Parts<'t> {
+    task: &'t Task,
+    /// By variable and value: the words of the atom, as positions among all words; none for values that are no atoms.
+    words: Vec<Vec<Option<Vec<usize>>>>,
+    /// What atoms are in the task.
+    facts: FxHashMap<Vec<usize>, Fact>,
+    all_words: FxHashMap<&'t str, usize>,
+    /// Operators by schema and arguments; none where there are several.
+    calls: FxHashMap<(u32, Vec<Argument>), Option<OperatorId>>,
+    /// By operator, in the normal form of [`Exchange::operator`].
+    normal: Vec<Operator>,
+    goal: Condition,
+}
 
-impl Calls {
-    fn new(task: &Task) -> Self {
-        let mut calls = FxHashMap::default();
-        for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+impl<'t> Parts<'t> {
+    fn new(task: &'t Task, limits: &Limits) -> Result<Self, Interrupted> {
+        let mut all_words: FxHashMap<&str, usize> = FxHashMap::default();
+        let mut facts = FxHashMap::default();
+        let mut words = Vec::with_capacity(task.variables.len());
+        for (variable, id) in task.variables.iter().zip(VariableId::all(task.variables.len())) {
+            let mut own = Vec::with_capacity(variable.values.len());
+            for (name, value) in limits.watch(&variable.values).zip(0..) {
+                let name = name?.as_str();
+                own.push(name.starts_with('(').then(|| {
+                    let atom: Vec<usize> = name
+                        .trim_matches(['(', ')'])
+                        .split(' ')
+                        .map(|word| {
+                            let next = all_words.len();
+                            *all_words.entry(word).or_insert(next)
+                        })
+                        .collect();
+                    facts.insert(atom.clone(), Fact { variable: id, value });
+                    atom
+                }));
+            }
+            words.push(own);
+        }
+        let identity = Exchange::identity(task);
+        let (mut calls, mut normal) = (FxHashMap::default(), Vec::with_capacity(task.operators.len()));
+        for (operator, id) in limits.watch(&task.operators).zip(OperatorId::all(task.operators.len())) {
+            let operator = operator?;
             let call = (operator.schema, operator.arguments.clone());
             calls.entry(call).and_modify(|known| *known = None).or_insert(Some(id));
+            normal.push(identity.operator(operator));
         }
-        Self(calls)
+        let goal = identity.condition(&task.goal);
+        Ok(Self { task, words, facts, all_words, calls, normal, goal })
+    }
+
+    fn word(&self, object: ObjectId) -> Option<usize> {
+        self.all_words.get(self.task.object_names[object.index()].as_str()).copied()
     }
 }
 
@@ -175,51 +172,47 @@ struct Exchange {
 
 impl Exchange {
     /// None if the variables do not match.
-    fn new(task: &Task, a: ObjectId, b: ObjectId) -> Option<Self> {
-        let mut by_name: FxHashMap<&str, Fact> = FxHashMap::default();
-        let is_atom = |name: &str| name.starts_with('(');
-        for (variable, id) in task.variables.iter().zip((0..).map(VariableId)) {
-            for (name, value) in variable.values.iter().zip(0..) {
-                if is_atom(name) {
-                    by_name.insert(name, Fact { variable: id, value });
-                }
-            }
-        }
-        let (a_name, b_name) = (&task.object_names[a.index()], &task.object_names[b.index()]);
-        let exchanged = |name: &str| {
-            let words =
-                name.trim_matches(['(', ')']).split(' ').enumerate().map(|(position, word)| match word {
-                    word if position > 0 && word == a_name => b_name,
-                    word if position > 0 && word == b_name => a_name,
+    fn new(
+        parts: &Parts<'_>,
+        a: ObjectId,
+        b: ObjectId,
+        limits: &Limits,
+    ) -> Result<Option<Self>, Interrupted> {
+        let task = parts.task;
+        let (a_word, b_word) = (parts.word(a), parts.word(b));
+        let exchanged = |atom: &Vec<usize>| {
+            let mut image = atom.clone();
+            // The first word is the predicate.
+            for word in image.iter_mut().skip(1) {
+                let other = match Some(*word) {
+                    word if word == a_word => b_word,
+                    word if word == b_word => a_word,
                     word => word,
-                });
-            format!("({})", words.collect::<Vec<_>>().join(" "))
+                };
+                *word = other?;
+            }
+            parts.facts.get(&image).copied()
         };
         let mut facts = Vec::with_capacity(task.variables.len());
-        for variable in &task.variables {
-            let mut target = None;
-            for name in variable.values.iter().filter(|name| is_atom(name)) {
-                let image = by_name.get(exchanged(name).as_str())?;
-                if *target.get_or_insert(image.variable) != image.variable {
-                    return None;
-                }
+        for own in limits.watch(&parts.words) {
+            let own = own?;
+            let images: Option<Vec<Fact>> = own.iter().flatten().map(exchanged).collect();
+            let Some(images) = images else { return Ok(None) };
+            let Some(target) = images.first().map(|image| image.variable) else { return Ok(None) };
+            let others = &parts.words[target.index()];
+            if images.iter().any(|image| image.variable != target) || others.len() != own.len() {
+                return Ok(None);
             }
-            let target = target?;
-            let image = &task.variables[target.index()];
-            if image.values.len() != variable.values.len() {
-                return None;
-            }
-            let other = image.values.iter().position(|name| !is_atom(name));
-            let value = |name: &String| {
-                if is_atom(name) {
-                    by_name.get(exchanged(name).as_str()).copied()
-                } else {
-                    Some(Fact { variable: target, value: other? as u32 })
-                }
+            let none = others.iter().zip(0..).find(|(atom, _)| atom.is_none()).map(|(_, value)| value);
+            let mut images = images.into_iter();
+            let image = |atom: &Option<Vec<usize>>| match atom {
+                Some(_) => images.next(),
+                None => Some(Fact { variable: target, value: none? }),
             };
-            facts.push(variable.values.iter().map(value).collect::<Option<Vec<_>>>()?);
+            let Some(own) = own.iter().map(image).collect() else { return Ok(None) };
+            facts.push(own);
         }
-        Some(Self { objects: (a, b), facts })
+        Ok(Some(Self { objects: (a, b), facts }))
     }
 
     fn fact(&self, fact: Fact) -> Fact {
@@ -263,26 +256,30 @@ impl Exchange {
     }
 
     /// Whether the task with the objects exchanged is the same task.
-    fn keeps(&self, task: &Task, operators: &Calls) -> bool {
+    fn keeps(&self, parts: &Parts<'_>, limits: &Limits) -> Result<bool, Interrupted> {
+        let task = parts.task;
         let initial = |(variable, value): (usize, &u32)| {
             let image = self.facts[variable][*value as usize];
             task.initial.values[image.variable.index()] == image.value
         };
-        let identity = Self::identity(task);
-        task.initial.values.iter().enumerate().all(initial)
-            && self.condition(&task.goal) == identity.condition(&task.goal)
-            && task.operators.iter().all(|operator| {
-                let arguments = operator.arguments.iter().map(|argument| self.argument(*argument)).collect();
-                let image = operators.0.get(&(operator.schema, arguments)).copied().flatten();
-                image.is_some_and(|image| {
-                    self.operator(operator) == identity.operator(&task.operators[image.index()])
-                })
-            })
+        if !task.initial.values.iter().enumerate().all(initial) || self.condition(&task.goal) != parts.goal {
+            return Ok(false);
+        }
+        for operator in limits.watch(&task.operators) {
+            let operator = operator?;
+            let arguments = operator.arguments.iter().map(|argument| self.argument(*argument)).collect();
+            let image = parts.calls.get(&(operator.schema, arguments)).copied().flatten();
+            if image.is_none_or(|image| self.operator(operator) != parts.normal[image.index()]) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     fn identity(task: &Task) -> Self {
-        let facts = task.variables.iter().zip((0..).map(VariableId)).map(|(own, variable)| {
-            (0..own.values.len() as u32).map(|value| Fact { variable, value }).collect()
+        let all = task.variables.iter().zip(VariableId::all(task.variables.len()));
+        let facts = all.map(|(own, variable)| {
+            own.values.iter().zip(0..).map(|(_, value)| Fact { variable, value }).collect()
         });
         Self { objects: (ObjectId(u32::MAX), ObjectId(u32::MAX)), facts: facts.collect() }
     }
@@ -316,17 +313,22 @@ impl Exchange {
 
 impl Encoding<'_> {
     /// Equal designs and objects are used in their order.
-    pub(super) fn break_symmetries(&mut self) {
-        let symmetry = Symmetry::new(self.task);
+    pub(super) fn break_symmetries(
+        &mut self,
+        symmetry: &Symmetry,
+        limits: &Limits,
+    ) -> Result<(), Interrupted> {
         for step in 0..self.horizon {
-            for (slot, design) in &symmetry.designs {
+            for design in limits.watch(&symmetry.designs) {
+                let (slot, design) = design?;
                 let literal = self.designs[step][slot.index()][*design as usize];
                 self.formula.add(Family::Symmetry, [!literal]);
             }
         }
         for (first, only_second) in &symmetry.objects {
             let mut seen: Lit = !Formula::truth();
-            for step in 0..self.horizon {
+            for step in limits.watch(0..self.horizon) {
+                let step = step?;
                 let used = self.group(step, first, Family::Symmetry);
                 let longer = self.formula.fresh(Meaning::Ladder);
                 self.formula.add(Family::Symmetry, [!longer, seen, used]);
@@ -338,5 +340,6 @@ impl Encoding<'_> {
                 }
             }
         }
+        Ok(())
     }
 }

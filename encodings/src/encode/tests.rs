@@ -1,5 +1,6 @@
 //! The clauses of a small task, symbolic and sorted, by family.
 
+use std::cell::OnceCell;
 use std::fmt::Write as _;
 
 use insta::assert_snapshot;
@@ -91,11 +92,12 @@ fn clauses(encoding: &Encoding<'_>, family: Family) -> String {
 
 fn check(family: Family) -> String {
     let task = task();
-    let bounds = Bounds::new(&task, &Limits::none());
+    let bounds = Bounds::new(&task, &Limits::none()).expect("no limit");
     let allowed = vec![vec![true; task.operators.len()]; 2];
     let cost = CostLimit { limit: 6, bounds: &bounds, counting: Counting::Sum };
     let encoding =
-        Encoding::new(&task, &allowed, Some(cost), Semantics::Sequential, &Limits::none()).expect("no limit");
+        Encoding::new(&task, &allowed, Some(cost), Semantics::Sequential, &OnceCell::new(), &Limits::none())
+            .expect("no limit");
     clauses(&encoding, family)
 }
 
@@ -115,7 +117,8 @@ fn lamps(semantics: Semantics, family: Family) -> String {
         read(&Source::new("domain", LAMPS.0), &Source::new("problem", LAMPS.1)).expect("PDDL");
     let task = ground(&domain, &problem, &Config::default()).expect("a task");
     let allowed = vec![vec![true; task.operators.len()]; 2];
-    let encoding = Encoding::new(&task, &allowed, None, semantics, &Limits::none()).expect("no limit");
+    let encoding =
+        Encoding::new(&task, &allowed, None, semantics, &OnceCell::new(), &Limits::none()).expect("no limit");
     clauses(&encoding, family)
 }
 

@@ -15,6 +15,7 @@ use crate::ground::instantiate::GroundTask;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::residual::Residual;
 use crate::lifted::{ObjectId, PredicateId};
+use crate::number::dense;
 
 /// A rule: the head holds where the body does. The body has no clauses.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -39,8 +40,8 @@ impl Definitions {
 impl World<'_> {
     /// A fresh atom for a part of a condition.
     pub(crate) fn name(&mut self, residual: Residual) -> AtomId {
-        let predicate = PredicateId(self.lifted.predicates.len() as u32);
-        let number = ObjectId(self.definitions.named.len() as u32);
+        let predicate = PredicateId(dense(self.lifted.predicates.len()));
+        let number = ObjectId(dense(self.definitions.named.len()));
         let atom = self.atom(predicate, &[number]);
         self.definitions.named.insert(residual, atom);
         atom
@@ -59,7 +60,7 @@ impl World<'_> {
         let lifted = self.lifted;
         let mut next = 0;
         while let Some(((predicate, arguments), ())) = self.atoms.get_index(next) {
-            let (predicate, arguments, head) = (*predicate, arguments.clone(), AtomId(next as u32));
+            let (predicate, arguments, head) = (*predicate, arguments.clone(), AtomId(dense(next)));
             next += 1;
             for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
                 let suits = axiom.parameters.iter().zip(arguments.iter());
@@ -104,7 +105,7 @@ pub(crate) fn simplify(task: &mut GroundTask<'_>) {
 fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) {
     let world = &task.world;
     let derived: Vec<AtomId> =
-        (0..world.atoms.len() as u32).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
+        (0..dense(world.atoms.len())).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
     let mut known: FxHashMap<AtomId, bool> = FxHashMap::default();
     loop {
         let before = known.len();

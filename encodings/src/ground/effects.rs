@@ -8,7 +8,7 @@ use crate::error::{Error, Place};
 use crate::ground::evaluate::{AtomId, Failure, World};
 use crate::ground::events::{Interference, Passage};
 use crate::ground::frame::Operand;
-use crate::ground::instantiate::{Build, GroundConditional, GroundOperator, admit_some, forbid};
+use crate::ground::instantiate::{Apart, Build, GroundConditional, GroundOperator, admit_some, forbid};
 use crate::ground::join::guards_of_exists;
 use crate::ground::numbers::{Numbers, numbers, substitute, way_of};
 use crate::ground::reads::{Reads, matches};
@@ -110,10 +110,14 @@ impl Build<'_, '_> {
                 let arguments = World::arguments(terms, &self.binding);
                 let variable = self.world.numeric(*function, &arguments, *place)?;
                 let nothing: Arc<[Forbidden]> = [].into();
-                let (operand, undefined) = match operand {
-                    Operand::Undefined => (None, nothing),
-                    Operand::Open(operand, undefined) => (Some(operand.clone()), undefined.clone()),
-                    Operand::Closed if certain => (possible(self.open(expression))?, nothing),
+                let Apart { operand, undefined } = match operand {
+                    Operand::Undefined => Apart { operand: None, undefined: nothing },
+                    Operand::Open(operand, undefined) => {
+                        Apart { operand: Some(operand.clone()), undefined: undefined.clone() }
+                    }
+                    Operand::Closed if certain => {
+                        Apart { operand: possible(self.open(expression))?, undefined: nothing }
+                    }
                     Operand::Closed => self.open_apart(expression)?,
                 };
                 GroundChange::Number { variable, assignment: *assignment, operand, undefined, place: *place }
@@ -402,7 +406,7 @@ impl Case {
         deletes.dedup();
         deletes.retain(|atom| !adds.contains(atom));
         let condition = world.condition(&self.parts)?;
-        Ok(GroundOperator { condition, adds, deletes, conditional, numeric_effects, forbidden, ..template })
+        Ok(GroundOperator { forbidden, condition, adds, deletes, conditional, numeric_effects, ..template })
     }
 }
 

@@ -16,6 +16,7 @@ use crate::ground::residual::Residual;
 use crate::lifted::{
     Arguments, Bound, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term,
 };
+use crate::number::dense;
 use crate::pddl::ast::Name;
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet, Table};
 
@@ -128,7 +129,7 @@ impl<'a> World<'a> {
 
     pub(crate) fn atom(&mut self, predicate: PredicateId, arguments: &[ObjectId]) -> AtomId {
         let known = self.atoms.get_index_of(&Key(predicate, arguments));
-        AtomId(known.unwrap_or_else(|| self.atoms.insert_full((predicate, arguments.into()), ()).0) as u32)
+        AtomId(dense(known.unwrap_or_else(|| self.atoms.insert_full((predicate, arguments.into()), ()).0)))
     }
 
     /// The predicate and the arguments of an atom.
@@ -158,7 +159,7 @@ impl<'a> World<'a> {
         place: Place,
     ) -> Result<NumericId, Failure> {
         if let Some(known) = self.numerics.get_index_of(&Key(function, arguments)) {
-            return Ok(NumericId(known as u32));
+            return Ok(NumericId::of(known));
         }
         let name = &self.lifted.functions[function.index()].name;
         if self.value(function, arguments).is_none() && *name != Name::new("total-cost") {
@@ -168,12 +169,12 @@ impl<'a> World<'a> {
                 place,
             }));
         }
-        Ok(NumericId(self.numerics.insert_full((function, arguments.into()), ()).0 as u32))
+        Ok(NumericId(dense(self.numerics.insert_full((function, arguments.into()), ()).0)))
     }
 
     /// The clock, which begins at 0.
     pub(crate) fn clock(&mut self, function: FunctionId) -> NumericId {
-        NumericId(self.numerics.insert_full((function, Box::default()), ()).0 as u32)
+        NumericId(dense(self.numerics.insert_full((function, Box::default()), ()).0))
     }
 
     /// The arguments under a binding that covers them.
@@ -310,17 +311,17 @@ impl<'a> World<'a> {
 
 /// Binds the mentioned slots to every combination of their designs, the last one fastest.
 pub(crate) fn for_each_combination(
-    mentioned: &[u16],
+    mentioned: &[u32],
     slots: &Slots<'_>,
     binding: &mut Binding,
-    visit: &mut dyn FnMut(&Binding, &[u16]),
+    visit: &mut dyn FnMut(&Binding, &[u32]),
 ) {
     fn go(
-        mentioned: &[u16],
+        mentioned: &[u32],
         slots: &Slots<'_>,
         binding: &mut Binding,
-        chosen: &mut Vec<u16>,
-        visit: &mut dyn FnMut(&Binding, &[u16]),
+        chosen: &mut Vec<u32>,
+        visit: &mut dyn FnMut(&Binding, &[u32]),
     ) {
         let Some((slot, rest)) = mentioned.split_first() else {
             visit(binding, chosen);

@@ -19,7 +19,8 @@ use crate::ground::mutex;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::prune::{atom_name, numeric_name, read_atoms};
 use crate::lifted::{Lifted, ObjectId, Rational};
-use crate::number::{Int, LIMIT, checked_lcm};
+use crate::limits::{Interrupted, Limits};
+use crate::number::{Int, LIMIT, checked_lcm, dense};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
     Axiom, Condition, ConditionalEffect, Fact, Layer, Literal, NumericEffect, Objective, Operator, Slot,
@@ -35,12 +36,14 @@ pub(crate) fn finish(
     mut task: GroundTask<'_>,
     unreachable: Option<String>,
     generality: &Generality,
+    limits: &Limits,
 ) -> Result<Task, Error> {
-    let atoms = Atoms::new(lifted, &task);
+    let atoms = Atoms::new(lifted, &task, limits)?;
     let mut numbers = Numbers::new(lifted, &task, generality)?;
     let (mut objectives, mut costs) = objectives(&task)?;
     let mut durations = Denominator::new("durations");
-    for operator in &task.operators {
+    for operator in limits.watch(&task.operators) {
+        let operator = operator?;
         durations.quantity(&operator.duration);
         let bounds = [&operator.timing.start, &operator.timing.end].into_iter().flatten();
         operator.wait.iter().chain(bounds.map(|(time, _)| time)).for_each(|time| durations.number(time));
@@ -49,7 +52,8 @@ pub(crate) fn finish(
     let mut slots = Slots::new(&task.operators);
 
     let mut operators = Distinct::with_capacity(task.operators.len());
-    for ground in std::mem::take(&mut task.operators) {
+    for ground in limits.watch(std::mem::take(&mut task.operators)) {
+        let ground = ground?;
         let condition = condition(&ground.condition, &atoms, &mut numbers)?;
         if contradictory(&condition) {
             continue;
@@ -89,6 +93,7 @@ pub(crate) fn finish(
         schema_names: lifted.schemas.iter().map(|schema| schema.name.to_string()).collect(),
         basic: atoms.basic,
         variables: atoms.variables,
+        exclusive: atoms.exclusive,
         number_names: std::mem::take(&mut numbers.names),
         number_scale: numbers.integers.scale,
         axioms,
@@ -124,7 +129,7 @@ impl Distinct {
     fn insert(&mut self, operator: Operator) {
         let positions = self.positions.entry(FxBuildHasher.hash_one(&operator)).or_default();
         if positions.iter().all(|position| self.operators[*position as usize] != operator) {
-            positions.push(self.operators.len() as u32);
+            positions.push(dense(self.operators.len()));
             self.operators.push(operator);
         }
     }
@@ -155,16 +160,25 @@ struct Atoms {
     facts: Vec<Option<Fact>>,
     /// The value of each variable that stands for none of its atoms.
     none: Vec<u32>,
+    /// See [`Task::exclusive`].
+    exclusive: Vec<Vec<Fact>>,
 }
 
 impl Atoms {
-    fn new(lifted: &Lifted, task: &GroundTask<'_>) -> Self {
+    fn new(lifted: &Lifted, task: &GroundTask<'_>, limits: &Limits) -> Result<Self, Interrupted> {
         let mut relevant = read_atoms(task);
         let mut derived: Vec<AtomId> =
             relevant.iter().copied().filter(|atom| task.world.is_derived(*atom)).collect();
         derived.sort_unstable();
         relevant.retain(|atom| !task.world.is_derived(*atom));
-        let mut groups = mutex::groups(task, &relevant);
+        let mut exclusive = Vec::new();
+        let mut groups = Vec::new();
+        for group in mutex::groups(task, &relevant, limits)? {
+            if group.exclusive.len() > group.atoms.len() {
+                exclusive.push(group.exclusive);
+            }
+            groups.push(group.atoms);
+        }
         let grouped: FxHashSet<AtomId> = groups.iter().flatten().copied().collect();
         groups.extend(relevant.iter().filter(|atom| !grouped.contains(atom)).map(|atom| vec![*atom]));
         groups.sort_unstable();
@@ -174,12 +188,14 @@ impl Atoms {
             initial: Vec::new(),
             facts: vec![None; task.world.atoms.len()],
             none: Vec::new(),
+            exclusive: Vec::new(),
         };
         groups.extend(derived.into_iter().map(|atom| vec![atom]));
-        for group in groups {
-            let variable = VariableId(atoms.variables.len() as u32);
+        for group in limits.watch(groups) {
+            let group = group?;
+            let variable = VariableId::of(atoms.variables.len());
             let mut values: Vec<String> = group.iter().map(|atom| atom_name(lifted, task, *atom)).collect();
-            let none = values.len() as u32;
+            let none = dense(values.len());
             values.push("none of these".into());
             let mut initial = none;
             for (atom, value) in group.iter().zip(0..) {
@@ -194,7 +210,9 @@ impl Atoms {
             atoms.initial.push(initial);
             atoms.none.push(none);
         }
-        atoms
+        let facts = |group: Vec<AtomId>| group.into_iter().filter_map(|atom| atoms.fact(atom)).collect();
+        atoms.exclusive = exclusive.into_iter().map(facts).collect();
+        Ok(atoms)
     }
 
     fn literal(&self, (atom, positive): (AtomId, bool)) -> Literal {
@@ -311,7 +329,7 @@ impl Numbers {
             denominator.number(number);
         }
         if let Some(precision) = generality.numbers {
-            denominator.number(&Rational::new(1, i128::from(precision)));
+            denominator.number(&Rational::new(1, precision));
         }
         let names = used.iter().map(|variable| numeric_name(lifted, task, *variable)).collect();
         let integers = denominator.integers()?;
@@ -410,7 +428,7 @@ impl Slots {
         for (key, mut designs) in designs {
             designs.sort_unstable();
             designs.dedup();
-            slots.ids.insert(key, SlotId(slots.all.len() as u32));
+            slots.ids.insert(key, SlotId::of(slots.all.len()));
             slots.all.push(Slot { designs });
         }
         slots
@@ -425,7 +443,7 @@ impl Slots {
                 let slot = self.ids[&key];
                 let all = &self.all[slot.index()].designs;
                 let designs = suitable.iter().filter_map(|design| all.binary_search(design).ok());
-                SlotUse { slot, designs: designs.map(|index| index as u16).collect() }
+                SlotUse { slot, designs: designs.map(dense).collect() }
             })
             .collect();
         self.uses.insert(ground.as_ptr(), uses.clone());

@@ -11,7 +11,7 @@ use crate::configuration::{
 };
 use crate::ground::effects::possible;
 use crate::ground::evaluate::{Binding, Failure, Row, Slots, World};
-use crate::ground::instantiate::{Build, GroundSlots, admit_some};
+use crate::ground::instantiate::{Apart, Build, GroundSlots, admit_some};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::quantity::{Linear, Quantity, SlotSet};
@@ -123,7 +123,7 @@ impl<'a> Outline<'a> {
     }
 
     /// The conditions and expressions that mention one slot and no other.
-    fn about(&self, position: u16) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
+    fn about(&self, position: u32) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
         let only = SlotSet::from_slice(&[position]);
         let open = self.start.open.iter().chain(&self.over_all.open).chain(&self.at_end.open);
         let conditions = open.filter(|(_, mentioned)| *mentioned == only).map(|(conjunct, _)| *conjunct);
@@ -158,7 +158,7 @@ impl<'a> Frame<'a> {
         let mut binding = core.clone();
         let mut designs = Slots { parameters: outline.parameters, designs: Vec::new() };
         for position in 0..outline.parameters.len() {
-            let suitable = suitable_designs(world, outline, position as u16, &mut binding)?;
+            let suitable = suitable_designs(world, outline, position as u32, &mut binding)?;
             if suitable.is_empty() {
                 return Ok(None);
             }
@@ -205,8 +205,8 @@ impl Build<'_, '_> {
             operands.push(match open_operand(effect, self.slots.parameters) {
                 None => Operand::Closed,
                 Some(expression) => {
-                    let (operand, undefined) = if conjuncts(&effect.condition).is_empty() {
-                        (possible(self.open(expression))?, [].into())
+                    let Apart { operand, undefined } = if conjuncts(&effect.condition).is_empty() {
+                        Apart { operand: possible(self.open(expression))?, undefined: [].into() }
                     } else {
                         self.open_apart(expression)?
                     };
@@ -222,7 +222,7 @@ impl Build<'_, '_> {
 fn suitable_designs(
     world: &mut World<'_>,
     outline: &Outline<'_>,
-    position: u16,
+    position: u32,
     binding: &mut Binding,
 ) -> Result<Vec<ObjectId>, Failure> {
     let parameter = outline.parameters[position as usize].parameter as usize;

@@ -267,6 +267,14 @@ fn configuration(
         .collect()
 }
 
+/// An expression of a conditional effect.
+pub(super) struct Apart {
+    /// None where it is undefined.
+    pub(super) operand: Option<Linear<Rational>>,
+    /// The combinations of designs for which it is undefined.
+    pub(super) undefined: Arc<[Forbidden]>,
+}
+
 /// An instance under construction.
 pub(super) struct Build<'w, 'a> {
     pub(super) world: &'w mut World<'a>,
@@ -305,14 +313,11 @@ impl Build<'_, '_> {
     }
 
     /// The expression, or nothing where it is undefined, and apart the combinations of designs for which it is.
-    pub(super) fn open_apart(
-        &mut self,
-        expression: &Expression,
-    ) -> Result<(Option<Linear<Rational>>, Arc<[Forbidden]>), Failure> {
+    pub(super) fn open_apart(&mut self, expression: &Expression) -> Result<Apart, Failure> {
         let own = std::mem::take(&mut self.forbidden);
         let operand = possible(self.open(expression));
         let undefined = std::mem::replace(&mut self.forbidden, own);
-        Ok((operand?, undefined.into()))
+        Ok(Apart { operand: operand?, undefined: undefined.into() })
     }
 
     pub(super) fn open(&mut self, expression: &Expression) -> Result<Linear<Rational>, Failure> {
@@ -337,7 +342,7 @@ impl Build<'_, '_> {
         }
     }
 
-    fn forbid_where(&mut self, mentioned: &SlotSet, fails: &dyn Fn(&[u16]) -> bool) {
+    fn forbid_where(&mut self, mentioned: &SlotSet, fails: &dyn Fn(&[u32]) -> bool) {
         let mut choice = vec![0; self.slots.designs.len()];
         let forbidden = &mut self.forbidden;
         for_each_combination(mentioned, self.slots, &mut self.binding, &mut |_, combination| {
@@ -357,7 +362,7 @@ impl Build<'_, '_> {
         if least.fold(duration.constant.clone(), |sum, value| sum + value) >= zero {
             return;
         }
-        let slots: BTreeSet<u16> =
+        let slots: BTreeSet<u32> =
             duration.tables.iter().flat_map(|table| table.slots.iter().copied()).collect();
         let sizes = self.slots.sizes();
         self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero);
@@ -404,7 +409,7 @@ impl Build<'_, '_> {
             .enumerate()
             .filter_map(|(parameter, object)| match object {
                 Some(object) => Some(Argument::Object(*object)),
-                None => slot(parameter).map(|position| Argument::Slot(position as u16)),
+                None => slot(parameter).map(|position| Argument::Slot(position as u32)),
             })
             .collect()
     }
@@ -412,7 +417,7 @@ impl Build<'_, '_> {
 
 /// Whether some combination of designs is not forbidden.
 pub(super) fn admit_some(forbidden: &[Forbidden], sizes: &[usize]) -> bool {
-    let mut choice = vec![0_u16; sizes.len()];
+    let mut choice = vec![0_u32; sizes.len()];
     loop {
         let hits = |rule: &Forbidden, bad: &SlotSet| {
             rule.slots.iter().zip(bad).all(|(slot, design)| choice[*slot as usize] == *design)

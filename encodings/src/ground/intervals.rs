@@ -12,6 +12,7 @@ use crate::ground::instantiate::GroundTask;
 use crate::ground::metric::initial_value;
 use crate::ground::normal_form::GroundCondition;
 use crate::lifted::Rational;
+use crate::limits::{Interrupted, Limits};
 use crate::quantity::{Linear, NumericId, Quantity};
 
 /// Ends of intervals move freely for this many rounds.
@@ -25,27 +26,29 @@ struct Interval {
 }
 
 /// Removes operators and rules whose comparisons can never hold. Returns whether there were any.
-pub(crate) fn prune_by_numbers(task: &mut GroundTask<'_>) -> bool {
+pub(crate) fn prune_by_numbers(task: &mut GroundTask<'_>, limits: &Limits) -> Result<bool, Interrupted> {
     let conditions = task.operators.iter().map(|operator| &operator.condition);
     let bodies = task.world.definitions.axioms.iter().map(|axiom| &axiom.body);
     if conditions.chain(bodies).all(|condition| condition.comparisons.is_empty()) {
-        return false;
+        return Ok(false);
     }
-    let intervals = reachable(task);
+    let intervals = reachable(task, limits)?;
     let (operators, axioms) = (task.operators.len(), task.world.definitions.axioms.len());
     task.operators.retain(|operator| can_hold(&operator.condition, &intervals));
     task.world.definitions.axioms.retain(|axiom| can_hold(&axiom.body, &intervals));
-    operators != task.operators.len() || axioms != task.world.definitions.axioms.len()
+    Ok(operators != task.operators.len() || axioms != task.world.definitions.axioms.len())
 }
 
 /// Whether the numeric part of the goal can hold.
-pub(crate) fn goal_can_hold(task: &GroundTask<'_>) -> bool {
-    let Some(goal) = task.goal.as_ref().filter(|goal| !goal.comparisons.is_empty()) else { return true };
-    can_hold(goal, &reachable(task))
+pub(crate) fn goal_can_hold(task: &GroundTask<'_>, limits: &Limits) -> Result<bool, Interrupted> {
+    let Some(goal) = task.goal.as_ref().filter(|goal| !goal.comparisons.is_empty()) else {
+        return Ok(true);
+    };
+    Ok(can_hold(goal, &reachable(task, limits)?))
 }
 
-fn reachable(task: &GroundTask<'_>) -> Vec<Interval> {
-    let variables = (0..task.world.numerics.len() as u32).map(NumericId);
+fn reachable(task: &GroundTask<'_>, limits: &Limits) -> Result<Vec<Interval>, Interrupted> {
+    let variables = NumericId::all(task.world.numerics.len());
     let mut intervals: Vec<Interval> = variables
         .map(|variable| {
             let initial = initial_value(&task.world, variable);
@@ -57,7 +60,11 @@ fn reachable(task: &GroundTask<'_>) -> Vec<Interval> {
     let mut round = 0;
     loop {
         let before = intervals.clone();
-        for operator in changing.iter().filter(|operator| can_hold(&operator.condition, &before)) {
+        for operator in limits.watch(&changing) {
+            let operator = operator?;
+            if !can_hold(&operator.condition, &before) {
+                continue;
+            }
             for (variable, value) in operator.numeric_effects.iter() {
                 let range = range(value, &before);
                 let own = &mut intervals[variable.index()];
@@ -66,7 +73,7 @@ fn reachable(task: &GroundTask<'_>) -> Vec<Interval> {
             }
         }
         if intervals == before {
-            return intervals;
+            return Ok(intervals);
         }
         round += 1;
         if round > ROUNDS {

@@ -112,7 +112,9 @@ pub(crate) fn ground_lifted(
     if limits.reached() {
         return Err(vec![Error::Interrupted]);
     }
-    let unreachable = prune::prune(lifted, &mut ground, generality);
-    let task = finish::finish(lifted, ground, unreachable, generality).map_err(|error| vec![error])?;
+    let unreachable =
+        prune::prune(lifted, &mut ground, generality, limits).map_err(|error| vec![error.into()])?;
+    let task =
+        finish::finish(lifted, ground, unreachable, generality, limits).map_err(|error| vec![error])?;
     Ok((task, reached))
 }

@@ -7,7 +7,8 @@
 //!
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009, section 5.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -16,6 +17,7 @@ use crate::ground::evaluate::AtomId;
 use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::normal_form::GroundLiteral;
 use crate::lifted::{ObjectId, PredicateId};
+use crate::limits::{Interrupted, Limits};
 
 /// One predicate of a candidate: argument positions that make up the key, in order; one more may be counted.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -30,12 +32,25 @@ type Key = SmallVec<[ObjectId; 4]>;
 /// How many candidates are tried before the search gives up refining.
 const CANDIDATE_LIMIT: usize = 500;
 
-/// Disjoint groups of at least two atoms, at most one of each true at any time, largest first.
-pub(crate) fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Vec<Vec<AtomId>> {
+/// Atoms that become the values of a variable.
+pub(crate) struct Group {
+    /// At least two, in no other group.
+    pub(crate) atoms: Vec<AtomId>,
+    /// These and others: at most one of all of them is true at any time. Operators on the variable are right only if that is so.
+    pub(crate) exclusive: Vec<AtomId>,
+}
+
+/// Disjoint groups, largest first.
+pub(crate) fn groups(
+    task: &GroundTask<'_>,
+    relevant: &FxHashSet<AtomId>,
+    limits: &Limits,
+) -> Result<Vec<Group>, Interrupted> {
     let mut instances: Vec<Vec<AtomId>> = Vec::new();
-    for candidate in invariants(task, relevant) {
+    for candidate in invariants(task, relevant, limits)? {
         let mut by_key: BTreeMap<Key, (usize, Vec<AtomId>)> = BTreeMap::new();
-        for atom in sorted(relevant) {
+        for atom in limits.watch(sorted(relevant)) {
+            let atom = atom?;
             if let Some(key) = key_of(task, &candidate, atom) {
                 let entry = by_key.entry(key).or_default();
                 entry.0 += usize::from(initially(task, atom));
@@ -44,25 +59,32 @@ pub(crate) fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Vec
         }
         instances.extend(by_key.into_values().filter(|(weight, _)| *weight <= 1).map(|(_, atoms)| atoms));
     }
-    cover(instances)
+    cover(&instances, limits)
 }
 
 /// Greedy: the group that covers most uncovered atoms first; of equal ones the one that comes first.
-fn cover(mut instances: Vec<Vec<AtomId>>) -> Vec<Vec<AtomId>> {
-    let mut covered = FxHashSet::default();
+fn cover(instances: &[Vec<AtomId>], limits: &Limits) -> Result<Vec<Group>, Interrupted> {
+    let mut covered: FxHashSet<AtomId> = FxHashSet::default();
     let mut chosen = Vec::new();
-    loop {
-        for instance in &mut instances {
-            instance.retain(|atom| !covered.contains(atom));
+    // What a group covers only shrinks, so one whose turn comes with as much as it was filed under is the best.
+    let filed = |(index, atoms): (usize, &Vec<AtomId>)| (atoms.len(), Reverse(index));
+    let mut open: BinaryHeap<(usize, Reverse<usize>)> = instances.iter().enumerate().map(filed).collect();
+    let mut pulse = limits.pulse();
+    while let Some((size, Reverse(index))) = open.pop() {
+        pulse.beat()?;
+        let own = &instances[index];
+        let atoms: Vec<AtomId> = own.iter().filter(|atom| !covered.contains(*atom)).copied().collect();
+        if atoms.len() < 2 {
+            continue;
         }
-        instances.retain(|instance| instance.len() > 1);
-        let best =
-            (0..instances.len()).max_by_key(|index| (instances[*index].len(), std::cmp::Reverse(*index)));
-        let Some(best) = best else { return chosen };
-        let group = instances.remove(best);
-        covered.extend(group.iter().copied());
-        chosen.push(group);
+        if atoms.len() < size {
+            open.push((atoms.len(), Reverse(index)));
+            continue;
+        }
+        covered.extend(&atoms);
+        chosen.push(Group { atoms, exclusive: own.clone() });
     }
+    Ok(chosen)
 }
 
 fn sorted(atoms: &FxHashSet<AtomId>) -> Vec<AtomId> {
@@ -84,7 +106,11 @@ fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<
 }
 
 /// The candidates that hold up.
-fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Vec<Candidate> {
+fn invariants(
+    task: &GroundTask<'_>,
+    relevant: &FxHashSet<AtomId>,
+    limits: &Limits,
+) -> Result<Vec<Candidate>, Interrupted> {
     let mut arities: BTreeMap<PredicateId, usize> = BTreeMap::new();
     for atom in relevant {
         if let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index()) {
@@ -106,7 +132,14 @@ fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Vec<Candid
     while next < open.len() && next < CANDIDATE_LIMIT {
         let candidate = open[next].clone();
         next += 1;
-        match task.operators.iter().find_map(|operator| broken_by(task, &candidate, operator)) {
+        let mut broken = None;
+        for operator in limits.watch(&task.operators) {
+            broken = broken_by(task, &candidate, operator?);
+            if broken.is_some() {
+                break;
+            }
+        }
+        match broken {
             None => found.push(candidate),
             Some((operator, key)) => {
                 for refined in refinements(task, &candidate, operator, &key, &arities) {
@@ -117,7 +150,7 @@ fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Vec<Candid
             }
         }
     }
-    found
+    Ok(found)
 }
 
 /// Conjuncts under which atoms are added and deleted together.

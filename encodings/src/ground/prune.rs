@@ -13,37 +13,42 @@ use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::intervals::{goal_can_hold, prune_by_numbers};
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Rational};
+use crate::limits::{Interrupted, Limits};
 use crate::pddl::ast::Name;
 use crate::quantity::{NumericId, Quantity};
 
 /// Prunes the task in place; returns a reason if the goal cannot be reached even if nothing is ever deleted.
-pub(crate) fn prune(lifted: &Lifted, task: &mut GroundTask<'_>, generality: &Generality) -> Option<String> {
+pub(crate) fn prune(
+    lifted: &Lifted,
+    task: &mut GroundTask<'_>,
+    generality: &Generality,
+    limits: &Limits,
+) -> Result<Option<String>, Interrupted> {
     let initially: Vec<bool> = task
         .world
         .atoms
         .keys()
         .map(|(predicate, arguments)| task.world.holds_initially(*predicate, arguments))
         .collect();
-    let mut reached = forward(task, &initially);
-    while generality.numbers.is_none() && prune_by_numbers(task) {
+    let mut reached = forward(task, &initially, limits)?;
+    while generality.numbers.is_none() && prune_by_numbers(task, limits)? {
         simplify(task);
-        reached = forward(task, &initially);
+        reached = forward(task, &initially, limits)?;
     }
     let goal_atoms: Vec<AtomId> = match &task.goal {
-        None => return Some(why_goal_is_false(lifted, task)),
+        None => return Ok(Some(why_goal_is_false(lifted, task))),
         Some(goal) => goal.literals.iter().filter(|(_, positive)| *positive).map(|(atom, _)| *atom).collect(),
     };
     if let Some(atom) = goal_atoms.into_iter().find(|atom| !reached[atom.index()]) {
-        return Some(never_true(&atom_name(lifted, task, atom)));
+        return Ok(Some(never_true(&atom_name(lifted, task, atom))));
     }
-    if generality.numbers.is_none() && !goal_can_hold(task) {
-        return Some(
-            "the numbers that the goal asks for are out of reach, even if nothing is ever deleted".into(),
-        );
+    if generality.numbers.is_none() && !goal_can_hold(task, limits)? {
+        let reason = "the numbers that the goal asks for are out of reach, even if nothing is ever deleted";
+        return Ok(Some(reason.into()));
     }
     drop_unread_numerics(task);
-    backward(task);
-    None
+    backward(task, limits)?;
+    Ok(None)
 }
 
 fn never_true(atom: &str) -> String {
@@ -97,7 +102,7 @@ fn applied(lifted: &Lifted, symbol: &Name, arguments: &[ObjectId]) -> String {
 }
 
 /// Removes operators and rules that are not reachable in the delete relaxation; returns the atoms that are.
-fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
+fn forward(task: &mut GroundTask<'_>, initially: &[bool], limits: &Limits) -> Result<Vec<bool>, Interrupted> {
     let axioms = &task.world.definitions.axioms;
     let operators = task.operators.iter().map(|operator| &operator.condition);
     let conditions = operators.chain(axioms.iter().map(|axiom| &axiom.body));
@@ -105,7 +110,8 @@ fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
     let mut missing = Vec::with_capacity(task.operators.len() + axioms.len());
     let mut reached = initially.to_vec();
     let mut open: Vec<usize> = Vec::new();
-    for (index, condition) in conditions.enumerate() {
+    for item in limits.watch(conditions.enumerate()) {
+        let (index, condition) = item?;
         let needs = condition.literals.iter().filter(|(atom, positive)| *positive && !reached[atom.index()]);
         let count = needs.map(|(atom, _)| readers.entry(*atom).or_default().push(index)).count();
         missing.push(count);
@@ -113,7 +119,9 @@ fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
             open.push(index);
         }
     }
+    let mut pulse = limits.pulse();
     while let Some(index) = open.pop() {
+        pulse.beat()?;
         let mut reach = |atom: AtomId| {
             if std::mem::replace(&mut reached[atom.index()], true) {
                 return;
@@ -146,7 +154,7 @@ fn forward(task: &mut GroundTask<'_>, initially: &[bool]) -> Vec<bool> {
             effect.deletes.retain(|atom| reached[atom.index()]);
         }
     }
-    reached
+    Ok(reached)
 }
 
 /// Removes effects on numeric variables that no condition depends on; the metric has been made of them already.
@@ -172,8 +180,9 @@ fn drop_unread_numerics(task: &mut GroundTask<'_>) {
 }
 
 /// Removes rules of atoms that nothing reads, effects on such atoms, and operators that do nothing and earn nothing.
-fn backward(task: &mut GroundTask<'_>) {
+fn backward(task: &mut GroundTask<'_>, limits: &Limits) -> Result<(), Interrupted> {
     loop {
+        limits.check()?;
         let read = read_atoms(task);
         let before = task.operators.len();
         task.world.definitions.axioms.retain(|axiom| read.contains(&axiom.head));
@@ -188,7 +197,7 @@ fn backward(task: &mut GroundTask<'_>) {
         }
         task.operators.retain(|operator| !is_idle(operator));
         if task.operators.len() == before {
-            return;
+            return Ok(());
         }
     }
 }

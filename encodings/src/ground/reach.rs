@@ -19,6 +19,7 @@ use crate::ground::relaxed::{Builder, Candidates};
 use crate::lifted::{
     Arguments, Axiom, Bound, Change, Effect, Formula, Lifted, ObjectId, PredicateId, Schema, Term,
 };
+use crate::number::dense;
 
 /// What relaxed reachability finds.
 #[derive(Default)]
@@ -86,7 +87,7 @@ pub(crate) fn reach(lifted: &Lifted, slots: &[Vec<SlotParameter>]) -> Result<Rea
 impl Builder<'_> {
     /// Adds the rules of a derived predicate: exact if it is static, else relaxed.
     fn axiom(&mut self, axiom: &Axiom) {
-        let parameters: Vec<u32> = (0..axiom.parameters.len() as u32).collect();
+        let parameters: Vec<u32> = (0..dense(axiom.parameters.len())).collect();
         let candidates: Candidates =
             parameters.iter().copied().zip(axiom.parameters.iter().map(|p| p.candidates.clone())).collect();
         let is_static = !self.lifted.predicates[axiom.predicate.index()].fluent;
@@ -101,7 +102,7 @@ impl Builder<'_> {
     fn schema(&mut self, schema: &Schema, slots: &[SlotParameter]) -> (Symbol, Vec<u32>) {
         let number = self.fresh("applicable");
         let is_slot = |parameter: &u32| slots.iter().any(|slot| slot.parameter == *parameter);
-        let all: Vec<u32> = (0..schema.parameters.len() as u32).collect();
+        let all: Vec<u32> = (0..dense(schema.parameters.len())).collect();
         let core: Vec<u32> = all.iter().copied().filter(|p| !is_slot(p)).collect();
         let candidates: Candidates =
             all.iter().copied().zip(schema.parameters.iter().map(|p| p.candidates.clone())).collect();

@@ -5,31 +5,54 @@
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashSet;
 
 use crate::ground::evaluate::Binding;
-use crate::lifted::{Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Term};
+use crate::lifted::{
+    Bound, Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Term,
+};
 
-/// Atoms or functions with gaps where a quantifier runs through all objects; none for any arguments at all.
-pub(crate) type Pattern<S> = (S, Option<Vec<Option<ObjectId>>>);
+/// Atoms or functions with gaps where a quantifier runs through its objects; none for any arguments at all.
+pub(crate) type Pattern<S> = (S, Option<Vec<Slot>>);
+
+/// An argument of a pattern.
+#[derive(Debug, Clone)]
+pub(crate) enum Slot {
+    Object(ObjectId),
+    /// Each object that a quantifier runs through: the same wherever its variable stands.
+    Each(u32, Arc<[ObjectId]>),
+    /// Any object: a parameter that has none yet.
+    Any,
+}
+
+/// Whether objects fit into the slots of a pattern.
+pub(crate) fn fits(pattern: &[Slot], arguments: &[ObjectId]) -> bool {
+    let same = |variable: u32, object: ObjectId| {
+        let mut all = pattern.iter().zip(arguments);
+        all.all(|(slot, other)| !matches!(slot, Slot::Each(own, _) if *own == variable) || *other == object)
+    };
+    let slot_fits = |(slot, object): (&Slot, &ObjectId)| match slot {
+        Slot::Object(own) => own == object,
+        Slot::Each(variable, objects) => objects.contains(object) && same(*variable, *object),
+        Slot::Any => true,
+    };
+    pattern.len() == arguments.len() && pattern.iter().zip(arguments).all(slot_fits)
+}
 
 /// What is read, before it is looked up.
 #[derive(Debug, Default)]
 pub(crate) struct Reads {
     pub(crate) atoms: Vec<Pattern<PredicateId>>,
     pub(crate) numbers: Vec<Pattern<FunctionId>>,
+    /// The variables of the quantifiers around, innermost last.
+    scope: Vec<Bound>,
 }
 
 /// Whether a pattern stands for a symbol with arguments.
 pub(crate) fn matches<S: PartialEq>(pattern: &Pattern<S>, symbol: &S, arguments: &[ObjectId]) -> bool {
-    pattern.0 == *symbol
-        && pattern.1.as_ref().is_none_or(|wanted| {
-            wanted.len() == arguments.len()
-                && wanted
-                    .iter()
-                    .zip(arguments)
-                    .all(|(wanted, own)| wanted.is_none_or(|wanted| wanted == *own))
-        })
+    pattern.0 == *symbol && pattern.1.as_ref().is_none_or(|wanted| fits(wanted, arguments))
 }
 
 impl Reads {
@@ -41,12 +64,18 @@ impl Reads {
                     self.condition(lifted, part, binding);
                 }
             }
-            Formula::Exists(_, body) | Formula::ForAll(_, body) => self.condition(lifted, body, binding),
+            Formula::Exists(bound, body) | Formula::ForAll(bound, body) => {
+                let outer = self.scope.len();
+                self.scope.extend(bound.iter().cloned());
+                self.condition(lifted, body, binding);
+                self.scope.truncate(outer);
+            }
             Formula::Literal { predicate, terms, .. } => {
                 if lifted.predicates[predicate.index()].derived {
                     self.through_axioms(lifted, *predicate);
                 }
-                self.atoms.push((*predicate, Some(arguments(terms, binding))));
+                let arguments = self.arguments(terms, binding);
+                self.atoms.push((*predicate, Some(arguments)));
             }
             Formula::Equal { .. } => {}
             Formula::Compare(_, left, right, _) => {
@@ -59,10 +88,13 @@ impl Reads {
     /// Adds what effects mention besides their targets.
     pub(crate) fn effects(&mut self, lifted: &Lifted, effects: &[Effect], binding: &Binding) {
         for effect in effects {
+            let outer = self.scope.len();
+            self.scope.extend(effect.bound.iter().cloned());
             self.condition(lifted, &effect.condition, binding);
             if let Change::Assign { expression, .. } = &effect.change {
                 self.expression(expression, binding);
             }
+            self.scope.truncate(outer);
         }
     }
 
@@ -70,7 +102,8 @@ impl Reads {
         match expression {
             Expression::Number(_) | Expression::TotalTime => {}
             Expression::Function(function, terms, _) => {
-                self.numbers.push((*function, Some(arguments(terms, binding))));
+                let arguments = self.arguments(terms, binding);
+                self.numbers.push((*function, Some(arguments)));
             }
             Expression::Negate(inner) => self.expression(inner, binding),
             Expression::Sum(parts) | Expression::Product(parts, _) => {
@@ -116,13 +149,18 @@ impl Reads {
             }
         }
     }
-}
 
-/// Variables that nothing is bound to are gaps.
-fn arguments(terms: &[Term], binding: &Binding) -> Vec<Option<ObjectId>> {
-    let object = |term: &Term| match term {
-        Term::Object(object) => Some(*object),
-        Term::Parameter(parameter) => binding.get(*parameter as usize).copied().flatten(),
-    };
-    terms.iter().map(object).collect()
+    fn arguments(&self, terms: &[Term], binding: &Binding) -> Vec<Slot> {
+        let slot = |term: &Term| match term {
+            Term::Object(object) => Slot::Object(*object),
+            Term::Parameter(parameter) => match binding.get(*parameter as usize).copied().flatten() {
+                Some(object) => Slot::Object(object),
+                None => match self.scope.iter().rfind(|bound| bound.variable == *parameter) {
+                    Some(bound) => Slot::Each(*parameter, bound.candidates.clone()),
+                    None => Slot::Any,
+                },
+            },
+        };
+        terms.iter().map(slot).collect()
+    }
 }

@@ -12,6 +12,7 @@ use rustc_hash::FxHashMap;
 use crate::configuration::{has_numbers, is_static};
 use crate::ground::reach::{free, with_bound};
 use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Term};
+use crate::number::dense;
 
 /// What variables range over.
 pub(super) type Candidates = BTreeMap<u32, Arc<[ObjectId]>>;
@@ -107,7 +108,7 @@ impl<'a> Builder<'a> {
     }
 
     pub(super) fn rule(&mut self, head: Vec<Atom>, body: Vec<Atom>) {
-        let identity = RuleIdentity::new("relaxed reachability", self.rules.len() as u32);
+        let identity = RuleIdentity::new("relaxed reachability", dense(self.rules.len()));
         self.rules.push(Rule::new(identity, head, body));
     }
 

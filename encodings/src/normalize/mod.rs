@@ -18,6 +18,7 @@ use crate::lifted::{
     PredicateId, Rational, Schema, Term, Time,
 };
 use crate::normalize::duration::Duration;
+use crate::number::dense;
 use crate::pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypedName};
 
 /// Resolves and simplifies a domain and a problem, to be measured by `objectives` (the most important first) or, if
@@ -345,11 +346,11 @@ impl Normalizer {
     /// Symbols for time. Their names have a space, so that no file can mean them.
     fn time(&mut self, events: &[Event]) -> Time {
         let time = Time {
-            clock: FunctionId(self.functions.len() as u32),
-            moment: FunctionId(self.functions.len() as u32 + 1),
-            phase: PredicateId(self.predicates.len() as u32),
-            first_phase: ObjectId(self.objects.len() as u32),
-            waited: PredicateId(self.predicates.len() as u32 + 1),
+            clock: FunctionId(dense(self.functions.len())),
+            moment: FunctionId(dense(self.functions.len() + 1)),
+            phase: PredicateId(dense(self.predicates.len())),
+            first_phase: ObjectId(dense(self.objects.len())),
+            waited: PredicateId(dense(self.predicates.len() + 1)),
         };
         if !events.is_empty() {
             let predicate = |name, arity| Predicate {

@@ -6,6 +6,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::lifted::ObjectId;
 use crate::normalize::Normalizer;
+use crate::number::dense;
 use crate::pddl::ast::{self, Identifier, Name, Span, TypeExpression};
 
 impl Normalizer {
@@ -19,7 +20,7 @@ impl Normalizer {
             let name = &entry.identifier.name;
             let id = *self.object_ids.entry(name.clone()).or_insert_with(|| {
                 self.objects.push(name.clone());
-                ObjectId(self.objects.len() as u32 - 1)
+                ObjectId(dense(self.objects.len()) - 1)
             });
             let mut open: Vec<Name> = entry.r#type.alternatives.iter().map(|t| t.name.clone()).collect();
             open.push(Name::new("object"));

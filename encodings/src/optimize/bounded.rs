@@ -1,6 +1,9 @@
 //! The bounded reading of a metric that actions improve: fewest steps first, then the metric.
 
+use std::cell::OnceCell;
+
 use crate::bounds::Bounds;
+use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
 use crate::optimize::{Best, Config, Run, Tightened, optimize};
 use crate::plan::{GroundStep, decode, replay};
@@ -44,22 +47,38 @@ impl Run<'_> {
             report: &mut silent,
             statistics: self.statistics,
             bounds: None,
+            symmetry: OnceCell::new(),
         };
-        let bounds = Bounds::new(&shifted, &self.config.limits);
+        let Ok(bounds) = Bounds::new(&shifted, &self.config.limits) else {
+            return Solution {
+                status: Status::Unknown,
+                plan: None,
+                ground: None,
+                lower_bound: None,
+                ..shortest
+            };
+        };
         let plan = match run.first_plan(&bounds) {
             Ok(plan) => plan,
             Err(solution) => return *solution,
         };
         let mut best = Best { plan, lower: 0 };
-        let mut extent = run.extent(&bounds, best.plan.cost - 1, &best);
-        extent.allowed.truncate(steps);
-        let tightened = run.within(&bounds, &extent, &mut best, false);
+        let tightened = match run.extent(&bounds, best.plan.cost - 1, &best) {
+            Ok(mut extent) => {
+                extent.allowed.truncate(steps);
+                run.within(&bounds, &extent, &mut best, false)
+            }
+            Err(Interrupted) => Tightened::Interrupted,
+        };
         let proof = matches!(tightened, Tightened::Exhausted).then_some(Proof::Sat { step_bound: steps });
         let mut plan = best.plan;
         let statistics = run.statistics;
         plan.cost += lowest * steps as Int;
-        let unbounded =
-            if self.task.can_repeat_reward(&plan.steps) { Unbounded::Proved } else { Unbounded::Suspected };
+        let unbounded = if self.task.can_repeat_reward(&plan.steps, &self.config.limits) {
+            Unbounded::Proved
+        } else {
+            Unbounded::Suspected
+        };
         Solution {
             status: Status::Feasible,
             plan: Some(decode(self.task, &plan)),
@@ -84,12 +103,13 @@ impl Task {
         task
     }
 
-    /// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is.
-    fn can_repeat_reward(&self, plan: &[GroundStep]) -> bool {
+    /// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is; no if a
+    /// limit is reached before one is found.
+    fn can_repeat_reward(&self, plan: &[GroundStep], limits: &Limits) -> bool {
         let Some((states, _)) = replay(self, plan) else { return false };
         states.iter().any(|state| {
             self.operators.iter().filter(|operator| operator.cost.minimum() < 0).any(|operator| {
-                operator.choices().any(|choice| {
+                operator.choices().take_while(|_| !limits.reached()).any(|choice| {
                     operator.cost.at(&choice, &operator.sizes()) < 0
                         && operator.applicable(state, &choice)
                         && self.successor(operator, state, &choice).as_ref() == Some(state)

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use rustc_hash::FxHashMap;
 
 use crate::encode::{Encoding, Family, Formula, Meaning};
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::optimize::tighten::Live;
 use crate::optimize::{Best, Run, Tightened};
 use crate::sat::{Answer, Lit, Totalizer};
@@ -81,7 +81,7 @@ impl Search {
 
     /// More than so many of a totalizer's literals cost so much more.
     fn output(&mut self, totalizer: usize, count: usize, weight: Int, formula: &mut Formula) {
-        let mut variables = formula.variables() as u32;
+        let mut variables = dense(formula.variables());
         let mut clauses = Vec::new();
         let add = |clause: &[Lit]| clauses.push(clause.to_vec());
         let Some(literal) = self.totalizers[totalizer].more_than(count, &mut variables, add) else { return };

@@ -12,11 +12,12 @@ mod cores;
 mod tests;
 mod tighten;
 
+use std::cell::OnceCell;
 use std::time::Instant;
 
 use crate::bounds::Bounds;
-use crate::encode::{CostLimit, Counting, Encoding, Semantics};
-use crate::limits::Limits;
+use crate::encode::{CostLimit, Counting, Encoding, Semantics, Symmetry};
+use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
 use crate::plan::{GroundPlan, decode, metric};
 use crate::sat::{Answer, Backend};
@@ -83,7 +84,14 @@ impl Default for Config {
 
 /// Finds a cheapest plan; `report` hears of every improvement.
 pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Solution {
-    let mut run = Run { task, config, report, statistics: Statistics::default(), bounds: None };
+    let mut run = Run {
+        task,
+        config,
+        report,
+        statistics: Statistics::default(),
+        bounds: None,
+        symmetry: OnceCell::new(),
+    };
     run.statistics.operators = task.operators.len();
     if let Some(reason) = &task.unreachable {
         return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.clone())));
@@ -100,6 +108,8 @@ struct Run<'a> {
     report: &'a mut dyn FnMut(Improvement),
     statistics: Statistics,
     bounds: Option<Bounds>,
+    /// Found out when it is first needed.
+    symmetry: OnceCell<Symmetry>,
 }
 
 /// What is known of the cheapest plan.
@@ -135,7 +145,13 @@ enum Tightened {
     Interrupted,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
+    /// Notes that two parts of the planner contradict each other. It fails loudly where that is tested.
+    fn contradicted(&mut self, what: &str) {
+        debug_assert!(false, "{what}");
+        self.statistics.contradiction = Some(what.to_owned());
+    }
+
     fn finish(
         self,
         status: Status,
@@ -144,6 +160,13 @@ impl Run<'_> {
         horizon: usize,
         proof: Option<Proof>,
     ) -> Solution {
+        let doubtful = self.statistics.contradiction.is_some();
+        let status = match status {
+            Status::Optimal if doubtful => Status::Feasible,
+            Status::Unsolvable if doubtful => Status::Unknown,
+            other => other,
+        };
+        let (lower, proof) = if doubtful { (None, None) } else { (lower, proof) };
         Solution {
             status,
             plan: plan.map(|plan| decode(self.task, plan)),
@@ -158,7 +181,9 @@ impl Run<'_> {
 
     fn solve(mut self) -> Solution {
         let started = Instant::now();
-        let bounds = Bounds::new(self.task, &self.config.limits);
+        let Ok(bounds) = Bounds::new(self.task, &self.config.limits) else {
+            return self.finish(Status::Unknown, None, None, 0, None);
+        };
         let Some(lower) = bounds.estimate(&self.task.initial) else {
             let reason =
                 "no path leads to the goal in a projection of the task to one or two of its variables";
@@ -206,7 +231,9 @@ impl Run<'_> {
         let mut stage = if exact { Int::MAX } else { (best.plan.cost - lower) / STAGES };
         loop {
             let limit = (best.plan.cost - 1).min(lower.saturating_add(stage));
-            let extent = self.extent(&bounds, limit, &best);
+            let Ok(extent) = self.extent(&bounds, limit, &best) else {
+                return self.conclude(&best, 0, unproved);
+            };
             let horizon = extent.allowed.len();
             if extent.step_bound.is_none() && stage < Int::MAX {
                 // That there is no such plan would prove nothing.
@@ -216,7 +243,11 @@ impl Run<'_> {
             if extent.size() > if exact { CONFIRM_SIZE } else { FORMULA_LIMIT } {
                 return self.conclude(&best, horizon, unproved);
             }
-            match (self.within(&bounds, &extent, &mut best, exact), extent.step_bound) {
+            let tightened = self.within(&bounds, &extent, &mut best, exact);
+            if exact && best.plan.cost <= limit {
+                self.contradicted("a formula has a cheaper plan than the one that the search calls cheapest");
+            }
+            match (tightened, extent.step_bound) {
                 (Tightened::Exhausted, Some(step_bound)) => {
                     best.lower = best.plan.cost.min(limit + 1);
                     if best.lower == best.plan.cost {
@@ -237,7 +268,7 @@ impl Run<'_> {
         let counting = if cores { Counting::Apart } else { Counting::Sum };
         let cost = CostLimit { limit: extent.limit, bounds, counting };
         let semantics = self.semantics(Semantics::Sequential);
-        let encoding = Encoding::new(self.task, &extent.allowed, Some(cost), semantics, &self.config.limits);
+        let encoding = self.encoding(&extent.allowed, Some(cost), semantics);
         self.statistics.encode += started.elapsed();
         let Some(encoding) = encoding else { return Tightened::Interrupted };
         if cores {
@@ -247,9 +278,20 @@ impl Run<'_> {
         }
     }
 
+    /// None if a limit was reached.
+    fn encoding(
+        &self,
+        allowed: &[Vec<bool>],
+        cost: Option<CostLimit<'_>>,
+        semantics: Semantics,
+    ) -> Option<Encoding<'a>> {
+        Encoding::new(self.task, allowed, cost, semantics, &self.symmetry, &self.config.limits)
+    }
+
     /// What plans that cost at most so much can look like.
-    fn extent(&self, bounds: &Bounds, limit: Int, best: &Best) -> Extent {
-        let window = bounds.window(self.task, Some(limit), self.config.horizon);
+    fn extent(&self, bounds: &Bounds, limit: Int, best: &Best) -> Result<Extent, Interrupted> {
+        let limits = &self.config.limits;
+        let window = bounds.window(self.task, Some(limit), self.config.horizon, limits)?;
         let complete = |steps: &usize| *steps <= window.allowed.len();
         let step_bound = window.steps.filter(complete);
         let allowed = if window.steps.is_some() {
@@ -257,9 +299,9 @@ impl Run<'_> {
         } else {
             // Without a step bound longer plans are worth a try, though they prove nothing.
             let longer = self.config.horizon.unwrap_or(2 * best.plan.steps.len() + 4);
-            bounds.window(self.task, Some(limit), Some(longer)).allowed
+            bounds.window(self.task, Some(limit), Some(longer), limits)?.allowed
         };
-        Extent { limit, allowed, step_bound }
+        Ok(Extent { limit, allowed, step_bound })
     }
 
     /// That a plan's cost equals a lower bound is proof enough. On small tasks the SAT solver has to find the same on
@@ -274,19 +316,15 @@ impl Run<'_> {
         }
         let started = Instant::now();
         let allowed = vec![vec![true; self.task.operators.len()]; steps];
-        let bounds = Bounds::trivial(self.task);
+        let bounds = Bounds::trivial(self.task, &self.config.limits).ok()?;
         let cost = CostLimit { limit, bounds: &bounds, counting: Counting::Sum };
-        let encoding = Encoding::new(
-            self.task,
-            &allowed,
-            Some(cost),
-            self.semantics(Semantics::Sequential),
-            &self.config.limits,
-        );
+        let encoding = self.encoding(&allowed, Some(cost), self.semantics(Semantics::Sequential));
         self.statistics.encode += started.elapsed();
         let mut live = self.live(u64::MAX);
         let (answer, _) = self.call(&mut live, &encoding?, &[]);
-        debug_assert_ne!(answer, Answer::Satisfiable, "a plan is cheaper than the lower bound");
+        if answer == Answer::Satisfiable {
+            self.contradicted("a formula has a plan that is cheaper than the lower bound");
+        }
         (answer == Answer::Unsatisfiable).then_some(Proof::Sat { step_bound: steps })
     }
 
@@ -321,14 +359,10 @@ impl Run<'_> {
         let mut horizon = 0;
         loop {
             let started = Instant::now();
-            let window = bounds.window(self.task, None, Some(horizon));
-            let encoding = Encoding::new(
-                self.task,
-                &window.allowed,
-                None,
-                self.semantics(Semantics::ExistsStep),
-                &self.config.limits,
-            );
+            let window = bounds.window(self.task, None, Some(horizon), &self.config.limits);
+            let encoding = window.ok().and_then(|window| {
+                self.encoding(&window.allowed, None, self.semantics(Semantics::ExistsStep))
+            });
             self.statistics.encode += started.elapsed();
             let answer = encoding.map_or((Answer::Interrupted, None), |encoding| {
                 let mut live = self.live(u64::MAX);

@@ -30,7 +30,8 @@ impl Run<'_> {
     ) -> (Answer, Option<GroundPlan>) {
         let started = Instant::now();
         let formula = &encoding.formula;
-        for (_, clause) in formula.clauses_from(live.known) {
+        for item in self.config.limits.watch(formula.clauses_from(live.known)) {
+            let Ok((_, clause)) = item else { return (Answer::Interrupted, None) };
             live.solver.add_clause(clause);
         }
         live.known = formula.len();
@@ -56,10 +57,11 @@ impl Run<'_> {
     }
 
     /// A plan of the solver, replayed. That it is applicable is what the encoding is for; that it is, is checked.
-    fn check(&self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
-        let replayed = replay(self.task, &steps);
-        debug_assert!(replayed.is_some(), "the encoding admits a sequence that is no plan");
-        let (_, cost) = replayed?;
+    fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
+        let Some((_, cost)) = replay(self.task, &steps) else {
+            self.contradicted("a formula admits a sequence of actions that is not a plan");
+            return None;
+        };
         Some(GroundPlan { steps, cost })
     }
 

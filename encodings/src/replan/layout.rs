@@ -2,7 +2,7 @@
 //!
 //! Two problems of one domain lead to the same operators if they differ in three respects only: in what is available, in
 //! numbers that actions change, and in facts that actions change and that the task has variables for, of which none holds that the
-//! relaxed reachability of the task has not met. For then all that is reachable from the one state is among what is reachable
+//! relaxed reachability of the task has not met, and no two that its operators take to exclude each other. For then all that is reachable from the one state is among what is reachable
 //! from the other. Facts and values that nothing reads may differ at will. Everything else must be the same.
 
 use num_rational::BigRational;
@@ -10,7 +10,7 @@ use num_traits::ToPrimitive;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::lifted::ObjectId;
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::pddl::ast::{Atom, InitialElement, Name, Problem};
 use crate::replan::usage::{Usage, key};
 use crate::task::{Fact, State, Task};
@@ -60,7 +60,7 @@ impl Layout {
             scale: BigRational::from_integer(task.number_scale.into()),
             fixed: FxHashMap::default(),
             values: FxHashMap::default(),
-            nothing: task.variables.iter().map(|variable| variable.values.len() as u32 - 1).collect(),
+            nothing: task.variables.iter().map(|variable| dense(variable.values.len()) - 1).collect(),
         };
         for element in &problem.init {
             match element {
@@ -116,6 +116,9 @@ impl Layout {
         let is_complete = reading.fixed.iter().chain(&reading.fixed_values).all(|seen| *seen);
         let numbers = reading.numbers.into_iter().collect::<Option<Vec<Int>>>()?;
         let mut state = State { values: reading.values, numbers };
+        if !respects_exclusion(task, &state) {
+            return None;
+        }
         task.close(&mut state);
         for objects in &mut reading.available {
             objects.sort_unstable();
@@ -200,6 +203,9 @@ impl Layout {
                 None => {}
             }
         }
+        if !respects_exclusion(task, &next) {
+            return None;
+        }
         task.close(&mut next);
         Some(next)
     }
@@ -208,6 +214,11 @@ impl Layout {
     pub(super) fn object(&self, name: &str) -> Option<ObjectId> {
         self.objects.get(&name.to_ascii_lowercase()).copied()
     }
+}
+
+/// Whether no two facts hold of which the operators take for granted that at most one does.
+fn respects_exclusion(task: &Task, state: &State) -> bool {
+    task.exclusive.iter().all(|group| group.iter().filter(|fact| fact.holds(&state.values)).count() <= 1)
 }
 
 /// What is read of a problem.

@@ -9,12 +9,13 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::lifted::ObjectId;
-use crate::number::Int;
+use crate::limits::{Interrupted, Limits};
+use crate::number::{Int, dense};
 use crate::quantity::{Linear, Quantity, SlotSet, Table};
 use crate::task::{Argument, Forbidden, NumericEffect, Operator, SlotUse, Task};
 
 /// For each slot of an operator the positions of its designs that are left.
-type Kept = Arc<[Vec<u16>]>;
+type Kept = Arc<[Vec<u32>]>;
 
 /// What is left of an operator's slots: which positions of the designs before, and the uses that they make.
 type Left = (Kept, Arc<[SlotUse]>);
@@ -23,29 +24,37 @@ type Left = (Kept, Arc<[SlotUse]>);
 #[derive(Default)]
 struct Shared {
     slots: FxHashMap<(*const SlotUse, u32), Left>,
-    tables: FxHashMap<(*const Int, *const Vec<u16>), Arc<[Int]>>,
-    forbidden: FxHashMap<(*const Forbidden, *const Vec<u16>), Arc<[Forbidden]>>,
+    tables: FxHashMap<(*const Int, *const Vec<u32>), Arc<[Int]>>,
+    forbidden: FxHashMap<(*const Forbidden, *const Vec<u32>), Arc<[Forbidden]>>,
 }
 
 /// The task with the operators for which `is_allowed` answers with yes, asked with their schema, a position among its parameters, and
 /// the object there.
-pub(super) fn restrict(task: &Task, is_allowed: &dyn Fn(u32, usize, ObjectId) -> bool) -> Task {
+pub(super) fn restrict(
+    task: &Task,
+    is_allowed: &dyn Fn(u32, usize, ObjectId) -> bool,
+    limits: &Limits,
+) -> Result<Task, Interrupted> {
     let mut shared = Shared::default();
-    let operators = task.operators.iter().filter_map(|operator| {
+    let mut operators = Vec::with_capacity(task.operators.len());
+    for operator in limits.watch(&task.operators) {
+        let operator = operator?;
         let allowed = |position: usize, object| is_allowed(operator.schema, position, object);
         let fixed = operator.arguments.iter().enumerate().all(|(position, argument)| match argument {
             Argument::Object(object) => allowed(position, *object),
             Argument::Slot(_) => true,
         });
-        fixed.then(|| shared.operator(task, operator, &allowed)).flatten()
-    });
-    let operators = operators.collect();
+        if fixed {
+            operators.extend(shared.operator(task, operator, &allowed));
+        }
+    }
     // Everything but the operators is the same.
-    Task {
+    Ok(Task {
         operators,
         object_names: task.object_names.clone(),
         schema_names: task.schema_names.clone(),
         variables: task.variables.clone(),
+        exclusive: task.exclusive.clone(),
         axioms: task.axioms.clone(),
         slots: task.slots.clone(),
         number_names: task.number_names.clone(),
@@ -55,7 +64,7 @@ pub(super) fn restrict(task: &Task, is_allowed: &dyn Fn(u32, usize, ObjectId) ->
         others: task.others.clone(),
         unreachable: task.unreachable.clone(),
         ..*task
-    }
+    })
 }
 
 impl Shared {
@@ -119,7 +128,7 @@ impl Shared {
 /// What is left of an operator's slots.
 fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> bool) -> Left {
     let arguments = |slot: usize| {
-        let own = move |argument: &Argument| *argument == Argument::Slot(slot as u16);
+        let own = move |argument: &Argument| *argument == Argument::Slot(dense(slot));
         operator.arguments.iter().enumerate().filter(move |(_, argument)| own(argument)).map(|(at, _)| at)
     };
     let kept: Kept = operator
@@ -127,11 +136,11 @@ fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> b
         .iter()
         .enumerate()
         .map(|(position, slot)| {
-            let fits = |index: &u16| {
+            let fits = |index: &u32| {
                 let design = task.slots[slot.slot.index()].designs[slot.designs[*index as usize] as usize];
                 arguments(position).all(|argument| allowed(argument, design))
             };
-            (0..slot.designs.len() as u16).filter(fits).collect()
+            (0..dense(slot.designs.len())).filter(fits).collect()
         })
         .collect();
     let uses = operator.slots.iter().zip(kept.iter()).map(|(slot, kept)| SlotUse {
@@ -157,8 +166,8 @@ fn rows(table: &Table<Int>, kept: &Kept, sizes: &[usize]) -> Arc<[Int]> {
 
 /// The combinations of a rule that are still possible.
 fn exclusions(rule: &Forbidden, kept: &Kept) -> Forbidden {
-    let moved = |(slot, index): (&u16, &u16)| {
-        kept[*slot as usize].iter().position(|known| known == index).map(|position| position as u16)
+    let moved = |(slot, index): (&u32, &u32)| {
+        kept[*slot as usize].iter().position(|known| known == index).map(|position| dense(position))
     };
     let combination = |bad: &SlotSet| rule.slots.iter().zip(bad).map(moved).collect::<Option<SlotSet>>();
     Forbidden {

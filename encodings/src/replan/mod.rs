@@ -28,7 +28,7 @@ use num_rational::BigRational;
 use crate::bounds::Bounds;
 use crate::ground::{Config, Generality, ground_for};
 use crate::lifted::ObjectId;
-use crate::limits::Limits;
+use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
 use crate::pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
 use crate::pddl::types::TypeHierarchy;
@@ -161,7 +161,12 @@ impl Replanner {
         let Some(situation) = base.layout.situation(&base.task, query.problem) else {
             return Replanned::Misfit;
         };
-        let set = self.set(&situation.available, query.limits);
+        let Ok(set) = self.set(&situation.available, query.limits) else {
+            let Ok(task) = base.masked(&situation.available, &Limits::none()) else {
+                return Replanned::Unknown;
+            };
+            return solve::keep_old(&base, &task, &situation, query);
+        };
         solve::solve(&base, &set, &situation, query, STATE_LIMIT)
     }
 
@@ -186,7 +191,7 @@ impl Replanner {
             };
             let available: Vec<Vec<ObjectId>> = (0..all.len()).map(open).collect();
             let situation = Situation { available, ..situation.clone() };
-            let set = base.restrict(&situation.available, query.limits);
+            let set = base.restrict(&situation.available, query.limits).ok()?;
             match solve::solve(&base, &set, &situation, query, BLOCKING_STATES) {
                 Replanned::Optimal { .. } => Some(true),
                 Replanned::Unsolvable => Some(false),
@@ -209,34 +214,36 @@ impl Replanner {
         Some(names)
     }
 
-    /// What is known of a set of available designs, or is found out now.
-    fn set(&mut self, available: &[Vec<ObjectId>], limits: &Limits) -> Arc<Set> {
+    /// What is known of a set of available designs, or is found out now. What was cut short by a limit is not kept.
+    fn set(&mut self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Arc<Set>, Interrupted> {
         let found = match self.sets.iter().position(|(known, _)| known == available) {
             Some(position) => self.sets.remove(position).1,
-            None => Arc::new(self.base.restrict(available, limits)),
+            None => Arc::new(self.base.restrict(available, limits)?),
         };
         if self.sets.len() >= SETS {
             self.sets.remove(0);
         }
-        // What was cut short by a limit is not good for the next time.
-        if !limits.reached() {
-            self.sets.push((available.to_vec(), found.clone()));
-        }
-        found
+        self.sets.push((available.to_vec(), found.clone()));
+        Ok(found)
     }
 }
 
 impl Base {
-    fn restrict(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Set {
+    /// The task with what is available.
+    fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {
         let is_allowed = |schema: u32, position: usize, object: ObjectId| {
             let mut needed = self.requirements[schema as usize].iter().filter(|(own, _)| *own == position);
             needed.all(|(_, predicate)| available[*predicate].binary_search(&object).is_ok())
         };
-        let task = mask::restrict(&self.task, &is_allowed);
-        let bounds = Bounds::new(&task, limits);
-        let prepared = Prepared::new(&task);
-        let ties = ties::Prepared::new(&task, &bounds);
-        Set { task, bounds, prepared, ties }
+        mask::restrict(&self.task, &is_allowed, limits)
+    }
+
+    fn restrict(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Set, Interrupted> {
+        let task = self.masked(available, limits)?;
+        let bounds = Bounds::new(&task, limits)?;
+        let prepared = Prepared::new(&task, limits)?;
+        let ties = ties::Prepared::new(&task, &bounds, limits)?;
+        Ok(Set { task, bounds, prepared, ties })
     }
 
     /// For each predicate the objects that some operator needs to be available, sorted.

@@ -8,7 +8,7 @@ use num_rational::BigRational;
 use rustc_hash::FxHashSet;
 
 use crate::lifted::ObjectId;
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::plan::{GroundPlan, GroundStep, decode, replay_from, resolve};
 use crate::replan::layout::Situation;
 use crate::replan::{Base, Query, Replanned, Set};
@@ -47,8 +47,9 @@ pub(super) fn solve(
     open.sort_by(|left, right| left.0.cmp(&right.0).then_with(|| left.1.arguments.cmp(&right.1.arguments)));
     let old: Vec<Option<GroundStep>> =
         query.old.iter().copied().flatten().map(|step| find(&set.task, step)).collect();
-    let incumbent =
-        |start: &Start| Some(Candidate::new(set, start, old_plan(set, &start.state, query, &old)?));
+    let incumbent = |start: &Start| {
+        Some(Candidate::new(&set.task, start, old_plan(&set.task, &start.state, query, &old)?))
+    };
     let incumbents: Vec<Option<Candidate>> = open.iter().map(|(_, start)| incumbent(start)).collect();
     let known = incumbents.iter().flatten().min_by(|left, right| left.value.cmp(&right.value)).cloned();
     let mut best: Option<(BigRational, usize)> = None;
@@ -64,11 +65,11 @@ pub(super) fn solve(
             Found::Optimal(plan) => plan,
             Found::None => continue,
             Found::Unknown(plan) if query.limits.reached() => {
-                let cut_short = plan.map(|plan| Candidate::new(set, &start, plan));
-                let ended = winners.into_iter().map(|(start, plan)| Candidate::new(set, &start, plan));
+                let cut_short = plan.map(|plan| Candidate::new(&set.task, &start, plan));
+                let ended = winners.into_iter().map(|(start, plan)| Candidate::new(&set.task, &start, plan));
                 let all = known.into_iter().chain(cut_short).chain(ended);
                 let least = all.min_by(|left, right| left.value.cmp(&right.value));
-                return least.map_or(Replanned::Unknown, |least| least.feasible(set));
+                return least.map_or(Replanned::Unknown, |least| least.feasible(&set.task));
             }
             Found::Unknown(_) => return Replanned::Unknown,
         };
@@ -90,11 +91,23 @@ pub(super) fn solve(
     Replanned::Optimal { first, steps: decode(&set.task, &plan).steps, metric }
 }
 
+/// The old plan, where it still is one: all that can be said without time to search.
+pub(super) fn keep_old(base: &Base, task: &Task, situation: &Situation, query: &Query<'_>) -> Replanned {
+    let Some(starts) = starts(base, situation, query) else { return Replanned::Misfit };
+    let old: Vec<Option<GroundStep>> =
+        query.old.iter().copied().flatten().map(|step| find(task, step)).collect();
+    let known = starts.iter().filter_map(|start| {
+        old_plan(task, &start.state, query, &old).map(|plan| Candidate::new(task, start, plan))
+    });
+    let least = known.min_by(|left, right| left.value.cmp(&right.value));
+    least.map_or(Replanned::Unknown, |least| least.feasible(task))
+}
+
 /// The old plan, if it is one from a state on.
-fn old_plan(set: &Set, state: &State, query: &Query<'_>, old: &[Option<GroundStep>]) -> Option<GroundPlan> {
+fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundStep>]) -> Option<GroundPlan> {
     query.old?;
     let steps: Vec<GroundStep> = old.iter().cloned().collect::<Option<_>>()?;
-    let cost = replay_from(&set.task, state, &steps)?.1;
+    let cost = replay_from(task, state, &steps)?.1;
     Some(GroundPlan { steps, cost })
 }
 
@@ -108,14 +121,14 @@ struct Candidate {
 }
 
 impl Candidate {
-    fn new(set: &Set, start: &Start, plan: GroundPlan) -> Self {
-        let cost = BigRational::new(plan.cost.into(), set.task.objective.scale.into());
+    fn new(task: &Task, start: &Start, plan: GroundPlan) -> Self {
+        let cost = BigRational::new(plan.cost.into(), task.objective.scale.into());
         Self { first: start.first, value: (&start.own + cost, plan.steps.len()), plan }
     }
 
-    fn feasible(self, set: &Set) -> Replanned {
-        let metric = if set.task.objective.maximize { -self.value.0 } else { self.value.0 };
-        Replanned::Feasible { first: self.first, steps: decode(&set.task, &self.plan).steps, metric }
+    fn feasible(self, task: &Task) -> Replanned {
+        let metric = if task.objective.maximize { -self.value.0 } else { self.value.0 };
+        Replanned::Feasible { first: self.first, steps: decode(task, &self.plan).steps, metric }
     }
 }
 
@@ -191,7 +204,7 @@ fn find(task: &Task, (action, arguments): &(String, Vec<String>)) -> Option<Grou
         let fits = operator.arguments.iter().zip(arguments).all(|(argument, name)| match argument {
             crate::task::Argument::Object(object) => same(*object, name),
             crate::task::Argument::Slot(slot) => {
-                let size = operator.slots[*slot as usize].designs.len() as u16;
+                let size = dense(operator.slots[*slot as usize].designs.len());
                 let design = (0..size).find(|design| {
                     choice[*slot as usize] = *design;
                     same(resolve(task, operator, &choice, *argument), name)

@@ -39,6 +39,11 @@ impl Lit {
         self.0 >> 1
     }
 
+    /// A number for the literal, counted from 0.
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+
     pub(crate) fn is_positive(self) -> bool {
         self.0 & 1 == 0
     }

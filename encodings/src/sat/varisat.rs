@@ -17,6 +17,7 @@ use std::rc::Rc;
 use varisat::ExtendFormula as _;
 
 use crate::limits::Limits;
+use crate::number::dense;
 use crate::sat::{Answer, Lit, Solver};
 
 /// A Varisat solver.
@@ -71,7 +72,7 @@ impl Varisat {
                 self.core.clear();
                 let failed = self.solver.failed_core().unwrap_or_default().iter();
                 self.core
-                    .extend(failed.map(|literal| Lit::new(literal.index() as u32, literal.is_positive())));
+                    .extend(failed.map(|literal| Lit::new(dense(literal.index()), literal.is_positive())));
                 self.failed |= !self.core.is_empty();
                 Answer::Unsatisfiable
             }

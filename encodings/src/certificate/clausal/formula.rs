@@ -308,7 +308,7 @@ impl Timeline {
     }
 
     /// A design by its position among those that suit a slot of an operator.
-    pub(super) fn design(&self, uses: &[(u32, Vec<u16>)], slot: u16, design: u16) -> Var {
+    pub(super) fn design(&self, uses: &[(u32, Vec<u32>)], slot: u32, design: u32) -> Var {
         let (slot, suited) = &uses[slot as usize];
         self.chosen[*slot as usize][suited[design as usize] as usize]
     }

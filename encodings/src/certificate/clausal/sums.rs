@@ -152,7 +152,7 @@ fn compare(formula: &mut Formula, condition: &[Var], number: &Bits, factor: Int,
 }
 
 /// What an operator fills, the slots that a table is over, and the table.
-type Kind<'k> = (u32, &'k [u16], u32);
+type Kind<'k> = (u32, &'k [u32], u32);
 
 struct Adder<'a> {
     model: &'a Model,
@@ -284,7 +284,7 @@ impl Adder<'_> {
                 let mut condition = vec![-chosen];
                 for slot in slots.iter().rev() {
                     let size = uses[*slot as usize].1.len();
-                    condition.push(-self.timeline.design(uses, *slot, (rest % size) as u16));
+                    condition.push(-self.timeline.design(uses, *slot, (rest % size) as u32));
                     rest /= size;
                 }
                 for (position, own) in added.iter().enumerate() {

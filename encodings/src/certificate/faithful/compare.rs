@@ -181,7 +181,7 @@ impl<'c> Comparison<'c> {
         &self,
         meaning: &Meaning,
         condition: &Condition,
-        (choice, sizes): (&[u16], &[usize]),
+        (choice, sizes): (&[u32], &[usize]),
     ) -> std::result::Result<(), String> {
         let known = Known::new(self, meaning);
         if let Some(fact) = condition.facts.iter().find(|fact| !known.fact(**fact)) {
@@ -302,7 +302,7 @@ impl<'c> Comparison<'c> {
     }
 
     /// Operators with a choice of designs that have these arguments.
-    fn candidates(&self, action: &Action, arguments: &[u32]) -> Vec<(&'c Operator, Vec<u16>)> {
+    fn candidates(&self, action: &Action, arguments: &[u32]) -> Vec<(&'c Operator, Vec<u32>)> {
         let name = action.identifier.name.as_str().to_ascii_lowercase();
         let object = |object: &u32| self.objects.get(&self.world.name(*object).to_ascii_lowercase()).copied();
         let objects: Option<Vec<u32>> = arguments.iter().map(object).collect();
@@ -319,23 +319,23 @@ impl<'c> Comparison<'c> {
     }
 
     /// The choice of designs that gives an operator its arguments, if it admits that.
-    fn choice(&self, operator: &Operator, objects: &[u32]) -> Option<Vec<u16>> {
+    fn choice(&self, operator: &Operator, objects: &[u32]) -> Option<Vec<u32>> {
         let uses = &self.model.uses[operator.uses as usize];
-        let mut choice: Vec<Option<u16>> = vec![None; uses.len()];
+        let mut choice: Vec<Option<u32>> = vec![None; uses.len()];
         for (argument, object) in operator.arguments.iter().zip(objects) {
             let Argument::Slot(place) = argument else { continue };
-            let (slot, designs) = uses.get(usize::from(*place))?;
+            let (slot, designs) = uses.get(*place as usize)?;
             let all = &self.model.slots[*slot as usize];
-            let position = designs.iter().position(|design| all[usize::from(*design)] == *object)? as u16;
-            let own = &mut choice[usize::from(*place)];
+            let position = designs.iter().position(|design| all[*design as usize] == *object)? as u32;
+            let own = &mut choice[*place as usize];
             if own.is_some_and(|other| other != position) {
                 return None;
             }
             *own = Some(position);
         }
-        let choice: Vec<u16> = choice.into_iter().collect::<Option<_>>()?;
+        let choice: Vec<u32> = choice.into_iter().collect::<Option<_>>()?;
         let excluded = self.model.exclusions[operator.exclusions as usize].iter().any(|exclusion| {
-            let chosen: Vec<u16> = exclusion.slots.iter().map(|slot| choice[usize::from(*slot)]).collect();
+            let chosen: Vec<u32> = exclusion.slots.iter().map(|slot| choice[*slot as usize]).collect();
             exclusion.combinations.contains(&chosen)
         });
         (!excluded).then_some(choice)
@@ -344,7 +344,7 @@ impl<'c> Comparison<'c> {
     fn simulates(
         &self,
         operator: &Operator,
-        choice: &[u16],
+        choice: &[u32],
         meaning: &Meaning,
         cost: &BigRational,
     ) -> std::result::Result<(), String> {
