@@ -171,7 +171,7 @@ fn check(name: &str, seed: u64, unit: Option<Q>, tally: &mut Tally) {
         mode: mode.clone(),
         random: fastrand::Rng::with_seed(seed),
         times,
-        left: setting("ORACLE_PLANS", 100) as usize,
+        left: setting("ORACLE_PLANS", 300) as usize,
         disagreements: Vec::new(),
         best: None,
         valid: 0,

@@ -3,42 +3,40 @@
 //! Times of events are sums of durations, and times a little before and after those, so that events fall on the borders of actions. Undefined
 //! values occur where the definition is clear only: in comparisons that stand in a conjunction, and in operands.
 
-use super::happening::World;
 use super::model::{
     Action, Atom, Axiom, Body, Comparison, Condition, Effect, Expression, Fluent, Measure, Operation, Part,
     Q, Task, Term, q,
 };
-use super::sequence::Search;
 
 /// Functions: a number that actions change, one that nobody changes, one that may have no value, and costs.
-const LEVEL: usize = 0;
-const LENGTH: usize = 1;
-const MAYBE: usize = 2;
-const COST: usize = 3;
+pub(super) const LEVEL: usize = 0;
+pub(super) const LENGTH: usize = 1;
+pub(super) const MAYBE: usize = 2;
+pub(super) const COST: usize = 3;
 
 /// What a task is like.
 #[derive(Debug, Clone, Copy)]
-struct Flavour {
+pub(super) struct Flavour {
     /// For plans that overlap: every duration and time of an event is a multiple of this.
-    unit: Option<Q>,
-    durative: u8,
-    conditional: u8,
-    numeric: u8,
-    events: u8,
-    negative: u8,
+    pub(super) unit: Option<Q>,
+    pub(super) durative: u8,
+    pub(super) conditional: u8,
+    pub(super) numeric: u8,
+    pub(super) events: u8,
+    pub(super) negative: u8,
 }
 
 pub struct Maker {
-    pub random: fastrand::Rng,
-    flavour: Flavour,
-    task: Task,
+    pub(super) random: fastrand::Rng,
+    pub(super) flavour: Flavour,
+    pub(super) task: Task,
 }
 
-fn constant(value: Q) -> Expression {
+pub(super) fn constant(value: Q) -> Expression {
     Expression::Number(value)
 }
 
-fn none() -> Condition {
+pub(super) fn none() -> Condition {
     Condition::All(Vec::new())
 }
 
@@ -70,14 +68,16 @@ impl Maker {
         };
         let mut maker = Self { random, flavour, task };
         maker.fill();
+        maker.random = fastrand::Rng::with_seed(!seed);
+        maker.durations_in_effects();
         maker.task
     }
 
-    fn chance(&mut self, percent: u8) -> bool {
+    pub(super) fn chance(&mut self, percent: u8) -> bool {
         self.random.u8(..100) < percent
     }
 
-    fn pick<T: Clone>(&mut self, choices: &[T]) -> T {
+    pub(super) fn pick<T: Clone>(&mut self, choices: &[T]) -> T {
         choices[self.random.usize(..choices.len())].clone()
     }
 
@@ -129,7 +129,7 @@ impl Maker {
         self.task.axioms.push(Axiom { predicate: self.task.predicates.len() - 1, condition });
     }
 
-    fn is_derived(&self, predicate: usize) -> bool {
+    pub(super) fn is_derived(&self, predicate: usize) -> bool {
         self.task.axioms.iter().any(|axiom| axiom.predicate == predicate)
     }
 
@@ -156,7 +156,7 @@ impl Maker {
         Fluent { function, terms }
     }
 
-    fn comparison(&mut self, left: usize, variables: usize) -> Condition {
+    pub(super) fn comparison(&mut self, left: usize, variables: usize) -> Condition {
         let left = Expression::Fluent(self.fluent(left, variables));
         let left = match self.random.u8(..6) {
             0 => Expression::Sum(Box::new(left), Box::new(constant(q(1)))),
@@ -179,7 +179,7 @@ impl Maker {
     }
 
     /// A condition, with further ones inside as deep as said. The types of the variables.
-    fn condition(&mut self, variables: &[usize], depth: usize) -> Condition {
+    pub(super) fn condition(&mut self, variables: &[usize], depth: usize) -> Condition {
         let count = variables.len();
         let choice = self.random.u8(..100);
         let more = |maker: &mut Self| Box::new(maker.condition(variables, depth - 1));
@@ -202,7 +202,7 @@ impl Maker {
         }
     }
 
-    fn conjunction(&mut self, variables: &[usize], counts: &[usize]) -> Condition {
+    pub(super) fn conjunction(&mut self, variables: &[usize], counts: &[usize]) -> Condition {
         let mut parts: Vec<_> = (0..self.pick(counts)).map(|_| self.condition(variables, 1)).collect();
         if self.chance(self.flavour.numeric / 12) {
             parts.push(self.comparison(MAYBE, variables.len()));
@@ -212,7 +212,11 @@ impl Maker {
 
     fn operand(&mut self, variables: usize, cost: bool) -> Expression {
         match self.random.u8(..10) {
-            0 | 1 => Expression::Fluent(self.fluent(LENGTH, variables)),
+            0 => Expression::Fluent(self.fluent(LENGTH, variables)),
+            1 => {
+                let length = Expression::Fluent(self.fluent(LENGTH, variables));
+                Expression::Quotient(Box::new(length), Box::new(constant(q(2))))
+            }
             2 if !cost => Expression::Fluent(self.fluent(LEVEL, 0)),
             3 if !cost && self.random.bool() => Expression::Fluent(self.fluent(MAYBE, 0)),
             _ if cost => {
@@ -319,196 +323,27 @@ impl Maker {
         Action { name: format!("a{number}"), parameters, body }
     }
 
-    fn ground_atoms(&self) -> Vec<Atom> {
-        let objects = self.task.objects.len();
-        let mut atoms = Vec::new();
-        for predicate in (0..self.task.predicates.len()).filter(|at| !self.is_derived(*at)) {
-            let arity = self.task.predicates[predicate].1 as u32;
-            for number in 0..objects.pow(arity) {
-                let digit = |at: u32| Term::Object(number / objects.pow(arity - 1 - at) % objects);
-                atoms.push(Atom { predicate, terms: (0..arity).map(digit).collect() });
-            }
-        }
-        atoms
-    }
-
-    fn initial(&mut self) {
-        let atoms = self.ground_atoms();
-        self.task.atoms = atoms.into_iter().filter(|_| self.chance(35)).collect();
-        let level = Fluent { function: LEVEL, terms: Vec::new() };
-        self.task.values.push((level, q(self.random.i64(0..4))));
-        for object in 0..self.task.objects.len() {
-            let fluent = Fluent { function: LENGTH, terms: vec![Term::Object(object)] };
-            let value = match self.flavour.unit {
-                Some(unit) => unit * q(self.random.i64(0..4)),
-                None => self.pick(&[q(0), q(1), q(2), q(3), Q::new(1, 2), q(10)]),
-            };
-            self.task.values.push((fluent, value));
-        }
-        if self.chance(60) {
-            let maybe = Fluent { function: MAYBE, terms: Vec::new() };
-            self.task.values.push((maybe, q(self.random.i64(0..3))));
-        }
-        self.task.values.push((Fluent { function: COST, terms: Vec::new() }, q(0)));
-    }
-
-    /// The durations of the actions' instances.
-    fn durations(&self) -> Vec<Q> {
-        let world = World::new(self.task.clone());
-        let duration = |(action, objects): &(usize, Vec<usize>)| match &self.task.actions[*action].body {
-            Body::Durative { duration, .. } => world.value(duration, &world.initial, objects).ok(),
-            Body::Instantaneous(_) => None,
-        };
-        let mut durations: Vec<Q> =
-            world.instances.iter().filter_map(duration).filter(|d| *d > q(0)).collect();
-        durations.sort_unstable();
-        durations.dedup();
-        durations
-    }
-
-    fn events(&mut self) {
-        if !self.chance(self.flavour.events) {
-            return;
-        }
-        let durations = self.durations();
-        if durations.is_empty() && self.chance(60) {
-            return;
-        }
-        let atoms = self.ground_atoms();
-        for _ in 0..self.random.usize(1..5) {
-            let mut time = q(0);
-            for _ in 0..self.random.usize(..3) {
-                time += if durations.is_empty() {
-                    self.flavour.unit.unwrap_or(q(1))
-                } else {
-                    self.pick(&durations)
-                };
-            }
-            time += match self.flavour.unit {
-                Some(unit) => unit * q(self.pick(&[0, 0, 1, 1, 2, -1])),
-                None => self.pick(&[
-                    q(0),
-                    q(0),
-                    q(0),
-                    q(1),
-                    Q::new(1, 2),
-                    Q::new(-1, 2),
-                    Q::new(1, 1000),
-                    Q::new(-1, 1000),
-                ]),
-            };
-            if time < q(0) || self.task.events.iter().any(|(other, _)| *other == time) {
+    /// Effects that depend on the duration.
+    fn durations_in_effects(&mut self) {
+        for at in 0..self.task.actions.len() {
+            let mut action = self.task.actions[at].clone();
+            let Body::Durative { duration, start, end, .. } = &mut action.body else { continue };
+            let changes = matches!(duration, Expression::Fluent(Fluent { function: LEVEL, .. }));
+            if changes || !self.chance(self.flavour.numeric / 4) {
                 continue;
             }
-            let mut literals: Vec<(bool, Atom)> = Vec::new();
-            for _ in 0..self.pick(&[1, 1, 2]) {
-                let atom = self.pick(&atoms);
-                if literals.iter().all(|(_, other)| *other != atom) {
-                    literals.push((self.random.bool(), atom));
-                }
+            let mut operand = Expression::Duration(Box::new(duration.clone()));
+            if self.random.bool() {
+                operand = Expression::Product(Box::new(constant(Q::new(1, 2))), Box::new(operand));
             }
-            self.task.events.push((time, literals));
-        }
-        self.task.events.sort_by_key(|(time, _)| *time);
-    }
-
-    /// Mostly what holds in a state that can be reached.
-    fn goal(&mut self) {
-        if self.chance(20) {
-            self.task.goal = self.conjunction(&[], &[1, 1, 2]);
-            return;
-        }
-        let world = World::new(self.task.clone());
-        let search = Search::new(&world, 40);
-        let (state, ..) = search.nodes[self.random.usize(search.nodes.len() / 2..search.nodes.len())].clone();
-        let initial = search.nodes[0].0.atoms;
-        let mut literals: Vec<(bool, Atom)> = Vec::new();
-        let atoms = self.ground_atoms();
-        for atom in &atoms {
-            let bit = 1 << world.atom(atom, &[]);
-            let percent = if (state.atoms ^ initial) & bit == 0 { 5 } else { 60 };
-            if self.chance(percent) {
-                literals.push((state.atoms & bit != 0, atom.clone()));
+            let function = self.pick(&[LEVEL, COST]);
+            let effect = Effect::Change(Operation::Increase, Fluent { function, terms: Vec::new() }, operand);
+            if self.random.bool() {
+                start.effects.push(effect)
+            } else {
+                end.effects.push(effect)
             }
+            self.task.actions[at] = action;
         }
-        let literal = |(positive, atom): (bool, Atom)| {
-            let atom = Condition::Atom(atom);
-            if positive { atom } else { Condition::Not(Box::new(atom)) }
-        };
-        let mut parts: Vec<_> = literals.into_iter().map(literal).collect();
-        if self.chance(self.flavour.numeric / 3) {
-            parts.push(self.comparison(LEVEL, 0));
-        }
-        if parts.is_empty() || self.chance(10) {
-            parts.push(self.condition(&[], 1));
-        }
-        self.task.goal = Condition::All(parts);
-    }
-
-    /// An action that reaches the literals of the goal and can always be executed, at a price.
-    fn dear(&mut self) {
-        let Condition::All(parts) = &self.task.goal else { return };
-        let literal = |part: &Condition| match part {
-            Condition::Atom(atom) => Some(Effect::Add(atom.clone())),
-            Condition::Not(part) => match &**part {
-                Condition::Atom(atom) => Some(Effect::Delete(atom.clone())),
-                _ => None,
-            },
-            _ => None,
-        };
-        let set = |effect: &Effect| match effect {
-            Effect::Add(atom) | Effect::Delete(atom) => !self.is_derived(atom.predicate),
-            _ => false,
-        };
-        let mut effects: Vec<_> = parts.iter().filter_map(literal).filter(set).collect();
-        if !self.chance(30) {
-            return;
-        }
-        let body = if self.flavour.durative > 0 {
-            let empty = Part { condition: none(), effects: Vec::new() };
-            let duration = constant(self.flavour.unit.unwrap_or(q(10)) * q(10));
-            Body::Durative {
-                duration,
-                start: empty,
-                over_all: none(),
-                end: Part { condition: none(), effects },
-            }
-        } else {
-            let cost = Fluent { function: COST, terms: Vec::new() };
-            effects.push(Effect::Change(Operation::Increase, cost, constant(q(50))));
-            Body::Instantaneous(Part { condition: none(), effects })
-        };
-        self.task.actions.push(Action { name: "dear".into(), parameters: Vec::new(), body });
-    }
-
-    /// Without a metric only where it is clear whether plans are measured by their time.
-    fn measure(&mut self) {
-        let is_durative = |action: &&Action| matches!(action.body, Body::Durative { .. });
-        let durative = self.task.actions.iter().filter(is_durative).count();
-        let dear = self
-            .task
-            .actions
-            .last()
-            .filter(|action| action.name == "dear")
-            .is_some_and(|action| is_durative(&action));
-        if self.chance(30) {
-            if self.flavour.unit.is_some() || dear {
-                self.task.measure = Measure::Time;
-                return;
-            }
-            if durative == 0 {
-                return;
-            }
-        }
-        let functions = vec![(q(1), COST)];
-        let weights = [q(1), q(2), Q::new(1, 2), q(100)];
-        let (time, functions) = match self.random.u8(..10) {
-            0..4 if durative > 0 => (q(1), Vec::new()),
-            4..6 if durative > 0 => (self.pick(&weights), functions),
-            6 if self.flavour.unit.is_none() => (q(0), vec![(self.pick(&weights), COST), (q(1), LEVEL)]),
-            _ => (q(0), vec![(self.pick(&weights), COST)]),
-        };
-        let maximize = self.flavour.unit.is_none() && self.chance(8);
-        self.task.measure = Measure::Metric { maximize, time, functions };
     }
 }

@@ -1,12 +1,14 @@
 //! Generator A: everything temporal and logical, one after another and overlapping.
 
 pub mod best;
+mod evaluate;
 pub mod execute;
 mod graph;
 pub mod happening;
 mod make;
 pub mod model;
 pub mod overlap;
+mod problem;
 mod reduce;
 mod sequence;
 mod shrink;

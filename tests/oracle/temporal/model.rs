@@ -55,7 +55,8 @@ pub enum Expression {
     Number(Q),
     Fluent(Fluent),
     Sum(Box<Expression>, Box<Expression>),
-    Difference(Box<Expression>, Box<Expression>),
+    /// `?duration` of the action, which takes this long.
+    Duration(Box<Expression>),
     Product(Box<Expression>, Box<Expression>),
     Quotient(Box<Expression>, Box<Expression>),
 }
@@ -186,7 +187,7 @@ impl Task {
             Expression::Number(value) => number(*value),
             Expression::Fluent(fluent) => self.fluent(fluent),
             Expression::Sum(left, right) => pair("+", left, right),
-            Expression::Difference(left, right) => pair("-", left, right),
+            Expression::Duration(_) => "?duration".to_owned(),
             Expression::Product(left, right) => pair("*", left, right),
             Expression::Quotient(left, right) => pair("/", left, right),
         }

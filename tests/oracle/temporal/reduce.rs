@@ -29,10 +29,9 @@ pub struct Reduction {
 
 fn expression_functions(expression: &Expression, found: &mut Vec<usize>) {
     match expression {
-        Expression::Number(_) => {}
+        Expression::Number(_) | Expression::Duration(_) => {}
         Expression::Fluent(fluent) => found.push(fluent.function),
         Expression::Sum(left, right)
-        | Expression::Difference(left, right)
         | Expression::Product(left, right)
         | Expression::Quotient(left, right) => {
             expression_functions(left, found);
