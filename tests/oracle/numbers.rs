@@ -152,6 +152,7 @@ fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
     let case = puzzle.case(seed.is_multiple_of(2));
     judge(&case, tally);
     let mut rng = Rng::with_seed(seed ^ 0x5eed);
+    variants::check_validator(&puzzle, &case, &mut rng, tally);
     if seed % 4 == 1 {
         variants::check_variants(&puzzle, &case, &mut rng, tally);
     }

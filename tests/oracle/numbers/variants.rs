@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use encodings::{Backend, Config, Limits, Semantics, Solution, Status, Strategy, Unbounded};
 use fastrand::Rng;
 
-use crate::judge::{Case, Tally, rational, read, steps_of};
+use crate::judge::{Case, Mode, Tally, plan_lines, project_verdict, rational, read, steps_of};
 
 use super::Puzzle;
 use super::draw::one;
@@ -191,4 +191,42 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
         }
     }
     tally.planning += started.elapsed();
+}
+
+/// The validator has to agree with the oracle on random plans, most of them invalid.
+pub fn check_validator(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut Tally) {
+    let Ok((mission, problem)) = read(&case.domain, &case.problem) else { return };
+    let known = match &puzzle.explored.known {
+        Known::Best((_, plan)) | Known::NoBest((_, plan)) | Known::Open(Some((_, plan))) => plan.clone(),
+        Known::NoPlan | Known::Open(None) => Vec::new(),
+    };
+    let instances = puzzle.ground.instances.len();
+    for _ in 0..4 {
+        let mut plan = known.clone();
+        plan.truncate(6);
+        for _ in 0..rng.usize(1..4) {
+            let position = rng.usize(0..=plan.len());
+            match rng.u32(0..3) {
+                0 if position < plan.len() => {
+                    plan.remove(position);
+                }
+                1 if position + 1 < plan.len() => plan.swap(position, position + 1),
+                _ if instances > 0 => plan.insert(position, rng.usize(0..instances)),
+                _ => {}
+            }
+        }
+        let steps = puzzle.steps(&plan);
+        let verdict = project_verdict(&mission, &problem, &steps, &Mode::Sequential);
+        let own = (case.execute)(&steps);
+        tally.count(if own.is_ok() { "random plan: valid" } else { "random plan: invalid" });
+        let measured = puzzle.task.metric.is_some();
+        if own.is_ok() != verdict.valid
+            || own.is_ok() && measured && own.as_ref().ok() != verdict.metric.as_ref()
+        {
+            let said = verdict.violation.map_or_else(String::new, |violation| violation.message.clone());
+            let reason =
+                format!("{own:?}, but {} {said} {:?}\n{}", verdict.valid, verdict.metric, plan_lines(&steps));
+            tally.fail(case, "the validator judges a plan otherwise", &reason);
+        }
+    }
 }
