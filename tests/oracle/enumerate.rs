@@ -215,10 +215,10 @@ fn enumerate(name: &str, default: u64, unit: impl Fn(u64) -> Option<Q>) {
 
 #[test]
 fn plans_one_after_another() {
-    enumerate("enumerated", 500, |_| None);
+    enumerate("enumerated", 200, |_| None);
 }
 
 #[test]
 fn plans_that_overlap() {
-    enumerate("enumerated-overlap", 500, |seed| Some(concurrent_unit(seed)));
+    enumerate("enumerated-overlap", 200, |seed| Some(concurrent_unit(seed)));
 }

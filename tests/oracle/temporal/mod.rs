@@ -112,7 +112,7 @@ fn actions_one_after_another() {
 
 #[test]
 fn overlapping_actions() {
-    run(1000, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
+    run(500, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
 }
 
 /// The kinds of failures of a task.
