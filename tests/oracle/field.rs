@@ -1,0 +1,356 @@
+//! What users found: tasks on which the planner was wrong once, each with what is true of it, in every mode.
+//!
+//! The small ones are written out, others lie in `field/`. The verdicts are from the definition; where it differs from what was
+//! reported, a comment says why.
+
+use std::time::Duration;
+
+use encodings::{Config, Limits, Status};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+
+use crate::judge::{Case, Mode, Step, Tally, Truth, judge, read};
+
+/// An exact decimal.
+fn exact(text: &str) -> BigRational {
+    let (whole, rest) = text.split_once('.').unwrap_or((text, ""));
+    let digits: BigInt = format!("{whole}{rest}").parse().expect("a number");
+    BigRational::new(digits, BigInt::from(10).pow(rest.len() as u32))
+}
+
+/// Steps from `start: (action arguments) [duration]`, separated by commas.
+fn steps(text: &str) -> Vec<Step> {
+    let step = |text: &str| {
+        let (start, rest) = text.split_once(": (").expect("a start");
+        let (call, duration) = rest.split_once(") [").expect("a duration");
+        let mut call = call.split(' ').map(str::to_owned);
+        Step {
+            start: exact(start.trim()),
+            action: call.next().expect("an action"),
+            arguments: call.collect(),
+            duration: exact(duration.trim_end_matches(']')),
+        }
+    };
+    text.split(", ").filter(|text| !text.is_empty()).map(step).collect()
+}
+
+/// The best value, and a plan that has it.
+fn best(value: &str, plan: &str) -> Truth {
+    Truth::Best(exact(value), steps(plan))
+}
+
+fn sequential() -> Mode {
+    Mode::Sequential
+}
+
+fn overlapping() -> Mode {
+    Mode::Concurrent(exact("0.001"))
+}
+
+fn check(name: &str, (domain, problem): (&str, &str), cases: Vec<(Mode, Truth)>) {
+    let mut tally = Tally::default();
+    for (mode, truth) in cases {
+        let value = match &truth {
+            Truth::Best(value, _) | Truth::NoBest(value, _) => Ok(value.clone()),
+            _ => Err("there is no plan".to_owned()),
+        };
+        let certify = mode == Mode::Sequential;
+        let case = Case {
+            name: name.to_owned(),
+            domain: domain.to_owned(),
+            problem: problem.to_owned(),
+            mode,
+            maximize: problem.contains("maximize"),
+            truth,
+            execute: Box::new(move |_| value.clone()),
+            certify,
+            limit: Duration::from_secs(20),
+        };
+        judge(&case, &mut tally);
+    }
+    tally.finish();
+}
+
+const CONFLICT: &str = "(:durative-action a :parameters () :duration (= ?duration 2) :condition (and)
+  :effect (and (at start (q)) (at start (p)) (at start (increase (f) 5)) (when (at start (p)) (at start (assign (f) 0)))))";
+
+fn conflict(dear: &str) -> String {
+    format!(
+        "(define (domain d) (:requirements :adl :fluents :durative-actions) (:predicates (p) (q)) (:functions (f)) {CONFLICT} {dear})"
+    )
+}
+
+/// Effects at the start that contradict each other only if a condition holds.
+#[test]
+fn b1_conditional_start_conflict() {
+    let problem = "(define (problem p) (:domain d) (:init (= (f) 2)) (:goal (q)))";
+    let dear = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (q)))";
+    for dear in ["", dear] {
+        let truth = best("2", "0: (a) [2]");
+        check("b1", (&conflict(dear), problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
+    }
+}
+
+/// As before, for every pair of effects that contradict each other.
+#[test]
+fn b1_all_pairs() {
+    let effects =
+        ["(increase (f) 5)", "(decrease (f) 1)", "(scale-up (f) 2)", "(assign (f) 0)", "(assign (f) 1)"];
+    for first in effects {
+        for second in effects {
+            for time in ["start", "end"] {
+                let domain = format!(
+                    "(define (domain d) (:requirements :adl :fluents :durative-actions) (:predicates (p) (q)) (:functions (f))
+                     (:durative-action a :parameters () :duration (= ?duration 2) :condition (and)
+                      :effect (and (at end (q)) (at {time} {first}) (when (at {time} (p)) (at {time} {second}))))
+                     (:action other :parameters () :precondition (q) :effect (p)))"
+                );
+                let problem = "(define (problem p) (:domain d) (:init (= (f) 2)) (:goal (q)))";
+                check("b1-pair", (&domain, problem), vec![(sequential(), best("2", "0: (a) [2]"))]);
+            }
+        }
+    }
+}
+
+/// An operand without a value in an effect whose condition does not hold.
+#[test]
+fn b1_undefined_operand() {
+    let domain = "(define (domain d) (:requirements :adl :fluents :durative-actions)
+     (:predicates (p) (q) (r)) (:functions (f) (s) (total-cost))
+     (:durative-action a :parameters () :duration (= ?duration 1) :condition (and (at start (r)) (at end (r)))
+      :effect (and (at end (q)) (when (at start (p)) (at start (increase (f) (s))))))
+     (:action dear :parameters () :precondition (and) :effect (and (p) (not (r)) (increase (total-cost) 0))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (f) 2) (r)) (:goal (q)))";
+    check("b1-undefined", (domain, problem), vec![(sequential(), best("1", "0: (a) [1]"))]);
+}
+
+const BETWEEN: &str = "(:durative-action a :parameters () :duration (= ?duration 10)
+  :condition (and (at start (p)) (at end (q))) :effect (at end (g)))";
+
+/// The start lies between events. Overlapping, the end reads what the event at 12 adds, so it lies at least the separation later.
+#[test]
+fn b2_wait_between_events() {
+    let dear = "(:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (g)))";
+    for dear in ["", dear] {
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions :timed-initial-literals) (:predicates (p) (q) (g)) {BETWEEN} {dear})"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (p) (at 5 (not (p))) (at 12 (q))) (:goal (g)))";
+        let cases = vec![
+            (sequential(), best("10", "3: (a) [10]")),
+            (overlapping(), best("12.001", "2.001: (a) [10]")),
+        ];
+        check("b2", (&domain, problem), cases);
+    }
+}
+
+/// A metric without a best value, and an event to wait for: no horizon was asked for.
+#[test]
+fn b3_no_horizon() {
+    let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals :fluents)
+     (:predicates (p) (g)) (:functions (total-cost))
+     (:action a :parameters () :precondition (p) :effect (and (g) (increase (total-cost) 1))))";
+    for (event, plan) in [("(at 5 (p))", "6: (a) [0]"), ("(p)", "0: (a) [0]")] {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init {event} (= (total-cost) 0)) (:goal (g)) (:metric maximize (total-cost)))"
+        );
+        check("b3", (domain, &problem), vec![(sequential(), Truth::NoBest(exact("1"), steps(plan)))]);
+    }
+}
+
+/// A condition over all ends before the end.
+#[test]
+fn b4_event_at_the_end() {
+    let dear = "(:durative-action dear :parameters () :duration (= ?duration 50) :condition (and) :effect (at end (g)))";
+    for dear in ["", dear] {
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions :timed-initial-literals) (:predicates (p) (g))
+             (:durative-action a :parameters () :duration (= ?duration 2) :condition (over all (p)) :effect (at end (g))) {dear})"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (p) (at 2 (not (p)))) (:goal (g)))";
+        let truth = best("2", "0: (a) [2]");
+        check("b4", (&domain, problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
+    }
+}
+
+/// Start and end of an action of duration 0 are one happening, and interfere here.
+#[test]
+fn duration_zero_that_interferes() {
+    let domain = "(define (domain d) (:requirements :adl :fluents :durative-actions) (:predicates (p) (g)) (:functions (total-cost))
+     (:durative-action a :parameters () :duration (= ?duration 0) :condition (over all (p))
+      :effect (and (at start (p)) (at end (not (p))) (at end (g))))
+     (:action dear :parameters () :precondition (and) :effect (and (g) (increase (total-cost) 50))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0)) (:goal (g)) (:metric minimize (total-cost)))";
+    let truth = best("50", "0: (dear) [0]");
+    check("e4", (domain, problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
+}
+
+/// An event at the end of an action whose end does not care.
+#[test]
+fn conc_14() {
+    let domain = "(define (domain c) (:requirements :durative-actions :fluents :negative-preconditions :timed-initial-literals)
+     (:predicates (p0) (p1) (p2))
+     (:durative-action a0 :parameters () :duration (= ?duration 5)
+      :condition (and (at end (not (p2))) (at start (p1))) :effect (and (at end (not (p0))) (at end (p1))))
+     (:durative-action a1 :parameters () :duration (= ?duration 2)
+      :condition (and (over all (p2))) :effect (and (at start (p0)) (at start (not (p2)))))
+     (:durative-action a2 :parameters () :duration (= ?duration 1) :condition (and (over all (p1)) (at start (not (p2))))
+      :effect (and (at end (p0)) (at end (not (p2))) (at start (p2)))))";
+    let problem = "(define (problem p) (:domain c) (:init (p1) (at 6 (not (p1))) (at 1 (not (p1)))) (:goal (and (p0))))";
+    let truth = best("1", "0: (a2) [1]");
+    check("conc-14", (domain, problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
+}
+
+/// Reported with 1, but an end at 1 adds what the event at 1 deletes, and so they interfere. From 3 on (p2) holds, so the start, which
+/// reads it, is at 3.001; one after another, at any time after 3.
+#[test]
+fn conc_30012() {
+    let domain = "(define (domain c) (:requirements :durative-actions :fluents :negative-preconditions :timed-initial-literals)
+     (:predicates (p0) (p1) (p2) (p3))
+     (:durative-action a0 :parameters () :duration (= ?duration 3)
+      :condition (and (over all (p0)) (at start (p2)) (over all (p3))) :effect (and (at end (p1))))
+     (:durative-action a1 :parameters () :duration (= ?duration 1) :condition (and (over all (p2)) (at start (p2)))
+      :effect (and (at start (p2)) (at end (p3)) (at end (p2)))))";
+    let problem = "(define (problem p) (:domain c) (:init (p1) (p2) (at 3 (p2)) (at 1 (not (p2)))) (:goal (and (p1) (p3))))";
+    let cases =
+        vec![(sequential(), best("1", "4: (a1) [1]")), (overlapping(), best("4.001", "3.001: (a1) [1]"))];
+    check("conc-30012", (domain, problem), cases);
+}
+
+macro_rules! random {
+    ($test:ident, $name:literal, $value:literal, $plan:literal) => {
+        #[test]
+        fn $test() {
+            let domain = include_str!(concat!("field/", $name, "-domain.pddl"));
+            let problem = include_str!(concat!("field/", $name, "-problem.pddl"));
+            check($name, (domain, problem), vec![(sequential(), best($value, $plan))]);
+        }
+    };
+}
+
+random!(dur_1065, "dur-1065", "0", "0: (a0 tb_0) [2]");
+random!(
+    dur_40254,
+    "dur-40254",
+    "800.000002",
+    "0: (mv l0 l2) [2], 2: (mv l2 l3) [2], 4: (a3 tb_0 tb_0) [2], 6: (a3 tb_0 tb_1) [2]"
+);
+random!(til_20019, "til-20019", "107", "0.001: (a0) [0.5], 0.502: (a0) [0.5]");
+random!(til_20146, "til-20146", "4", "0: (a1 l0) [2], 2.001: (a1 l0) [2]");
+random!(til_40171, "til-40171", "0.5", "1.6: (a1 tb_1) [1.5]");
+
+fn one_action(functions: &str, condition: &str, values: &str) -> (String, String) {
+    let domain = format!(
+        "(define (domain d) (:requirements :fluents) (:predicates (done)) (:functions {functions})
+         (:action go :parameters () :precondition {condition} :effect (done)))"
+    );
+    (domain, format!("(define (problem p) (:domain d) (:init {values}) (:goal (done)))"))
+}
+
+/// Products of decimals with many digits.
+#[test]
+fn n1_products() {
+    let cases = [
+        ("(>= (* (big) (big)) 1)", "(= (big) 18446744073709551616)"),
+        (
+            "(>= (* (a) (b) (c)) 0.5)",
+            "(= (a) 0.9389223822355513) (= (b) 0.9762061333860831) (= (c) 0.9856748130961577)",
+        ),
+        (
+            "(>= (* (a) (b) (c)) 0.5)",
+            "(= (a) 0.98147466740908) (= (b) 0.9333705472472253) (= (c) 0.9836707393119472)",
+        ),
+    ];
+    for (condition, values) in cases {
+        let (domain, problem) = one_action("(big) (a) (b) (c)", condition, values);
+        let cases = vec![(sequential(), best("1", "0: (go) [0]")), (overlapping(), best("0", "0: (go) [0]"))];
+        check("n1", (&domain, &problem), cases);
+    }
+}
+
+/// A cheap action behind such a product, and a dear one.
+#[test]
+fn n1_cheap_and_dear() {
+    let domain = "(define (domain d) (:requirements :fluents) (:predicates (done)) (:functions (total-cost) (a) (b) (c))
+     (:action risky :parameters () :precondition (>= (* (a) (b) (c)) 0.0001) :effect (and (done) (increase (total-cost) 1)))
+     (:action safe :parameters () :effect (and (done) (increase (total-cost) 100))))";
+    for values in [
+        "(= (a) 0.6307070394199809) (= (b) 0.2200377354949996) (= (c) 0.6706353937051572)",
+        "(= (a) 0.6338035485622269) (= (b) 0.2174744612379466) (= (c) 0.9250096893649316)",
+    ] {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init (= (total-cost) 0) {values}) (:goal (done)) (:metric minimize (total-cost)))"
+        );
+        let truth = best("1", "0: (risky) [0]");
+        check("n1-dear", (domain, &problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
+    }
+}
+
+/// A cost of 2^128 beside one of 1.
+#[test]
+fn n1_large_cost() {
+    let domain =
+        "(define (domain d) (:requirements :fluents) (:predicates (done)) (:functions (total-cost) (big))
+     (:action dear :parameters () :effect (and (done) (increase (total-cost) (* (big) (big)))))
+     (:action cheap :parameters () :effect (and (done) (increase (total-cost) 1))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0) (= (big) 18446744073709551616)) (:goal (done))
+     (:metric minimize (total-cost)))";
+    check("n1-cost", (domain, problem), vec![(sequential(), best("1", "0: (cheap) [0]"))]);
+}
+
+/// Large coefficients.
+#[test]
+fn n2_coefficients() {
+    let domain = "(define (domain d) (:requirements :fluents) (:predicates (done) (ready)) (:functions (x) (y) (z))
+     (:action bump :parameters () :precondition (not (ready))
+      :effect (and (ready) (increase (x) 1) (increase (y) 1) (increase (z) 1)))
+     (:action finish :parameters ()
+      :precondition (and (ready) (>= (+ (* 1000000000000000000 (x)) (* 1000000000000000000 (y))) (* 1000000000000000000 (z))))
+      :effect (done)))";
+    let problem = "(define (problem p) (:domain d) (:init (= (x) 10) (= (y) 10) (= (z) 15)) (:goal (done)))";
+    let cases = vec![
+        (sequential(), best("2", "0: (bump) [0], 0: (finish) [0]")),
+        (overlapping(), best("0.001", "0: (bump) [0], 0.001: (finish) [0]")),
+    ];
+    check("n2", (domain, problem), cases);
+}
+
+/// Seventy doublings.
+#[test]
+fn n3_doublings() {
+    let predicates: String = (0..71).map(|at| format!(" (c{at})")).collect();
+    let action = |at: usize| {
+        format!(
+            "(:action s{at} :parameters () :precondition (c{at}) :effect (and (not (c{at})) (c{}) (increase (x) (x))))\n",
+            at + 1
+        )
+    };
+    let actions: String = (0..70).map(action).collect();
+    let domain = format!(
+        "(define (domain d) (:requirements :fluents) (:predicates{predicates}) (:functions (x)) {actions})"
+    );
+    let problem = "(define (problem p) (:domain d) (:init (c0) (= (x) 1)) (:goal (and (c70) (>= (x) 1))))";
+    let plan: Vec<_> = (0..70).map(|at| format!("0: (s{at}) [0]")).collect();
+    check("n3", (&domain, problem), vec![(sequential(), best("70", &plan.join(", ")))]);
+    let (mission, problem) = read(&domain, problem).expect("it is read");
+    let limits = Limits::none().with_time(Duration::from_secs(20));
+    if let Ok(task) = mission.ground(&problem, &[], &limits) {
+        let config = Config { horizon: Some(75), limits, ..Config::default() };
+        let solution = encodings::optimize(&task, &config, &mut |_| {});
+        assert!(!matches!(solution.status, Status::UnsolvableWithinHorizon | Status::Unsolvable));
+    }
+}
+
+/// A measure beyond 64 bits.
+#[test]
+fn n5_large_measure() {
+    let domain = "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (done)) (:functions (cost))
+     (:durative-action dear :parameters () :duration (= ?duration 60000000000) :condition ()
+      :effect (and (at end (done)) (at end (increase (cost) 5))))
+     (:durative-action cheap :parameters () :duration (= ?duration 50000000000) :condition ()
+      :effect (and (at end (done)) (at end (increase (cost) 7)))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (cost) 0)) (:goal (done))
+     (:metric minimize (+ (* 1000000000 (total-time)) (cost))))";
+    let truth = best("50000000000000000007", "0: (cheap) [50000000000]");
+    check("n5", (domain, problem), vec![(sequential(), truth.clone()), (overlapping(), truth)]);
+}

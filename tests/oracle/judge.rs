@@ -1,0 +1,482 @@
+//! Asks the planner about a task whose truth is known, and says where the two differ.
+//!
+//! The planner is called as the program calls it: read, ground, optimize, validate, certify, verify.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use encodings::pddl::Source;
+use encodings::pddl::ast::{Name, Problem};
+use encodings::validate::{Options, PlanStep, PlanText, Verdict, validate};
+use encodings::{Config, Exact, Limits, Plan, Solution, Status, Task, Unbounded};
+use metaplan::certificate::{self, Contents};
+use metaplan::measure::measure;
+use metaplan::message::Message;
+use metaplan::mission::{Bindings, Mission};
+use num_rational::BigRational;
+use num_traits::Zero as _;
+
+/// One action of a plan, with its exact times.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    pub action: String,
+    pub arguments: Vec<String>,
+    pub start: BigRational,
+    /// 0 for an instantaneous action.
+    pub duration: BigRational,
+}
+
+/// What is true of a task.
+#[derive(Debug, Clone)]
+pub enum Truth {
+    /// The best value of the metric, and a plan that has it.
+    Best(BigRational, Vec<Step>),
+    /// There is no plan.
+    NoPlan,
+    /// There are plans, but none that is best. A plan and its value.
+    NoBest(BigRational, Vec<Step>),
+    /// The oracle gave up; with the best plan that it found, if any.
+    Open(Option<(BigRational, Vec<Step>)>),
+}
+
+/// Whether actions overlap.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Mode {
+    /// One after another.
+    Sequential,
+    /// They overlap; what interferes is at least so far apart.
+    Concurrent(BigRational),
+}
+
+/// Executes a plan by the definition: its value, or why it is none.
+pub type Executor = Box<dyn Fn(&[Step]) -> Result<BigRational, String>>;
+
+/// A task and what is true of it.
+pub struct Case {
+    /// Generator and seed, also the name of the directory where a failure is saved.
+    pub name: String,
+    pub domain: String,
+    pub problem: String,
+    pub mode: Mode,
+    /// Whether the larger value is the better.
+    pub maximize: bool,
+    pub truth: Truth,
+    pub execute: Executor,
+    /// Whether a claim is certified, and the certificate verified. In sequential mode only.
+    pub certify: bool,
+    /// How long the planner may take.
+    pub limit: Duration,
+}
+
+/// Something that cannot be: the planner, the certificate, the validator and the oracle do not agree.
+#[derive(Debug)]
+pub struct Failure {
+    /// In a few words, for counting.
+    pub kind: &'static str,
+    pub text: String,
+}
+
+/// What came of many tasks.
+#[derive(Debug, Default)]
+pub struct Tally {
+    pub tasks: usize,
+    pub counts: BTreeMap<String, usize>,
+    pub failures: Vec<Failure>,
+    /// Time in the planner, and in certificates.
+    pub planning: Duration,
+    pub certificates: Duration,
+}
+
+/// What the planner says.
+#[derive(Debug)]
+enum Answer {
+    Refused(String),
+    Solved(Box<Solved>),
+}
+
+#[derive(Debug)]
+struct Solved {
+    solution: Solution,
+    /// Where there is no metric: whether plans are measured by their time.
+    timed: bool,
+    /// The task, where a certificate can be written.
+    task: Option<Task>,
+}
+
+/// An exact number of the planner.
+pub fn rational(exact: Exact) -> BigRational {
+    BigRational::new(exact.numerator.into(), exact.denominator.into())
+}
+
+/// A decimal for a plan, exact where there is one, otherwise with nine digits.
+pub fn decimal(number: &BigRational) -> String {
+    let mut scale = num_bigint::BigInt::from(1);
+    for digits in 0..40_usize {
+        let scaled = number * &scale;
+        if scaled.is_integer() {
+            let text = format!("{:0>width$}", scaled.to_integer().to_string(), width = digits + 1);
+            let (whole, rest) = text.split_at(text.len() - digits);
+            return if rest.is_empty() { whole.to_owned() } else { format!("{whole}.{rest}") };
+        }
+        scale *= 10;
+    }
+    let billion = BigRational::from_integer(1_000_000_000.into());
+    decimal(&((number * &billion).round() / billion))
+}
+
+/// A plan as lines `start: (action arguments) [duration]`.
+pub fn plan_lines(steps: &[Step]) -> String {
+    steps.iter().fold(String::new(), |mut text, step| {
+        let call = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
+        let _ = writeln!(text, "{}: ({call}) [{}]", decimal(&step.start), decimal(&step.duration));
+        text
+    })
+}
+
+/// The planner's plan in the oracle's terms.
+pub fn steps_of(plan: &Plan) -> Vec<Step> {
+    plan.steps
+        .iter()
+        .map(|step| Step {
+            action: step.action.clone(),
+            arguments: step.arguments.clone(),
+            start: rational(step.start),
+            duration: rational(step.duration),
+        })
+        .collect()
+}
+
+/// A plan as the validator takes it.
+pub fn plan_text(steps: &[Step]) -> PlanText {
+    let step = |step: &Step| PlanStep {
+        action: Name::new(&step.action),
+        arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
+        start: Some(step.start.clone()),
+        duration: (!step.duration.is_zero()).then(|| step.duration.clone()),
+        line: 0,
+    };
+    PlanText { steps: steps.iter().map(step).collect() }
+}
+
+/// How the validator reads a plan of a mode. One after another it takes no rounding: the times are exact.
+pub fn options(mode: &Mode) -> Options {
+    match mode {
+        Mode::Sequential => Options { concurrent: false, tolerance: BigRational::zero() },
+        Mode::Concurrent(separation) => Options { concurrent: true, tolerance: separation.clone() },
+    }
+}
+
+/// What the project's validator says about a plan.
+pub fn project_verdict(mission: &Mission, problem: &Problem, steps: &[Step], mode: &Mode) -> Verdict {
+    validate(mission.domain(), problem, &plan_text(steps), &options(mode))
+}
+
+/// Domain and problem as the program reads them.
+pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Vec<Message>> {
+    let source = |name: &str, text: &str| Ok(Source::new(name, text.to_owned()));
+    let (domain, problem) = (source("domain.pddl", domain), source("problem.pddl", problem));
+    let mission = Mission::new("", None, Bindings::default(), domain, problem)?;
+    let (problem, _warnings) = mission.filled()?;
+    Ok((mission, problem))
+}
+
+fn plan(mission: &Mission, problem: &Problem, mode: &Mode, limits: &Limits) -> Answer {
+    let refused = |messages: Vec<Message>| {
+        let mut codes: Vec<_> = messages.iter().map(|message| message.code.clone()).collect();
+        codes.dedup();
+        Answer::Refused(codes.join("+"))
+    };
+    match mode {
+        Mode::Sequential => match mission.ground(problem, &[], limits) {
+            Err(messages) => refused(messages),
+            Ok(task) => {
+                let config = Config { limits: limits.clone(), ..Config::default() };
+                let point = encodings::lexicographic(&task, &config, &mut |_| {});
+                let timed = task.is_timed();
+                Answer::Solved(Box::new(Solved { solution: point.solution, timed, task: Some(task) }))
+            }
+        },
+        Mode::Concurrent(separation) => match mission.ground_concurrent(problem, &[], separation, limits) {
+            Err(messages) => refused(messages),
+            Ok(task) => {
+                let solution = encodings::optimize_concurrent(&task, limits, &mut |_| {});
+                Answer::Solved(Box::new(Solved { solution, timed: true, task: None }))
+            }
+        },
+    }
+}
+
+impl Tally {
+    /// Counts something.
+    pub fn count(&mut self, what: impl Into<String>) {
+        *self.counts.entry(what.into()).or_default() += 1;
+    }
+
+    /// Notes a failure, and saves its files where `ORACLE_SAVE` says.
+    pub fn fail(&mut self, case: &Case, kind: &'static str, reason: &str) {
+        let Case { name, domain, problem, mode, truth, .. } = case;
+        let mode = match mode {
+            Mode::Sequential => "one after another".to_owned(),
+            Mode::Concurrent(separation) => format!("concurrent, separation {separation}"),
+        };
+        let truth = match truth {
+            Truth::Best(cost, plan) => format!("best {cost} by\n{}", plan_lines(plan)),
+            Truth::NoPlan => "no plan\n".to_owned(),
+            Truth::NoBest(cost, plan) => format!("no best value; {cost} by\n{}", plan_lines(plan)),
+            Truth::Open(Some((cost, plan))) => format!("at least as good as {cost} by\n{}", plan_lines(plan)),
+            Truth::Open(None) => "not known\n".to_owned(),
+        };
+        let text = format!("{name}: {kind}: {reason}\n{mode}; by the oracle: {truth}{domain}\n{problem}\n");
+        if let Some(directory) = std::env::var_os("ORACLE_SAVE") {
+            let directory = PathBuf::from(directory).join(name);
+            std::fs::create_dir_all(&directory).expect("a directory");
+            for (file, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {
+                std::fs::write(directory.join(file), text).expect("a file");
+            }
+            let failures = directory.join("failures.txt");
+            let before = std::fs::read_to_string(&failures).unwrap_or_default();
+            std::fs::write(failures, before + &text).expect("a file");
+        }
+        self.count(format!("FAILURE {kind}"));
+        self.failures.push(Failure { kind, text });
+    }
+
+    /// The counts, one a line, and the times.
+    pub fn summary(&self) -> String {
+        let mut text = format!("{} tasks\n", self.tasks);
+        for (what, count) in &self.counts {
+            let _ = writeln!(text, "{count:>8}  {what}");
+        }
+        let each = |time: Duration| time.as_secs_f64() * 1e3 / self.tasks.max(1) as f64;
+        let (planning, certificates) = (each(self.planning), each(self.certificates));
+        let _ =
+            writeln!(text, "a task: {planning:.2} ms in the planner, {certificates:.2} ms in certificates");
+        text
+    }
+
+    /// Ends a test: prints the summary, and panics with the first failures if there are any.
+    #[allow(clippy::print_stdout)]
+    pub fn finish(&self) {
+        println!("{}", self.summary());
+        let texts: Vec<_> = self.failures.iter().take(5).map(|failure| failure.text.as_str()).collect();
+        assert!(texts.is_empty(), "{}\n{}", texts.join("\n"), self.summary());
+    }
+}
+
+/// Which value is better: less than 0 if the first is.
+fn compare(maximize: bool, left: &BigRational, right: &BigRational) -> std::cmp::Ordering {
+    if maximize { right.cmp(left) } else { left.cmp(right) }
+}
+
+/// Asks the planner about a task, and counts and notes what comes of it.
+pub fn judge(case: &Case, tally: &mut Tally) {
+    tally.tasks += 1;
+    tally.count(match &case.truth {
+        Truth::Best(..) => "oracle: best",
+        Truth::NoPlan => "oracle: no plan",
+        Truth::NoBest(..) => "oracle: no best value",
+        Truth::Open(_) => "oracle: open",
+    });
+    if let Truth::Best(cost, plan) | Truth::NoBest(cost, plan) | Truth::Open(Some((cost, plan))) = &case.truth
+    {
+        match (case.execute)(plan) {
+            Ok(value) if value == *cost => {}
+            other => tally.fail(case, "the oracle refutes itself", &format!("{other:?}")),
+        }
+    }
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| judge_caught(case, tally))) {
+        let reason = panic.downcast_ref::<String>().map(String::as_str);
+        let reason = reason.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("?").to_owned();
+        tally.fail(case, "panic", &reason);
+    }
+}
+
+fn judge_caught(case: &Case, tally: &mut Tally) {
+    let (mission, problem) = match read(&case.domain, &case.problem) {
+        Ok(read) => read,
+        Err(messages) => {
+            let texts: Vec<_> = messages.iter().map(|message| message.message.clone()).collect();
+            return tally.fail(case, "not read", &texts.join("; "));
+        }
+    };
+    check_witness(case, &mission, &problem, tally);
+    let started = Instant::now();
+    let limits = Limits::none().with_time(case.limit);
+    let answer = plan(&mission, &problem, &case.mode, &limits);
+    tally.planning += started.elapsed();
+    match answer {
+        Answer::Refused(codes) => {
+            // A limit while grounding is no refusal.
+            tally.count(if limits.reached() {
+                "limit while grounding".into()
+            } else {
+                format!("refused {codes}")
+            });
+        }
+        Answer::Solved(solved) => {
+            check_claim(case, &solved, tally);
+            if let Some(plan) = &solved.solution.plan {
+                check_plan(case, (&mission, &problem), plan, solved.timed, tally);
+            }
+            if let (true, Some(task)) = (case.certify, &solved.task) {
+                let started = Instant::now();
+                check_certificate(case, (&mission, &problem), task, &solved.solution, tally);
+                tally.certificates += started.elapsed();
+            }
+        }
+    }
+}
+
+/// The validator has to accept the oracle's plan.
+fn check_witness(case: &Case, mission: &Mission, problem: &Problem, tally: &mut Tally) {
+    let (Truth::Best(cost, plan) | Truth::NoBest(cost, plan) | Truth::Open(Some((cost, plan)))) = &case.truth
+    else {
+        return;
+    };
+    let verdict = project_verdict(mission, problem, plan, &case.mode);
+    if let Some(violation) = &verdict.violation {
+        tally.fail(case, "the validator refuses the oracle's plan", &violation.message);
+    } else if problem.metric.is_some() && verdict.metric.as_ref() != Some(cost) {
+        tally.fail(
+            case,
+            "the validator measures the oracle's plan otherwise",
+            &format!("{:?}", verdict.metric),
+        );
+    }
+}
+
+/// Compares the planner's claim with the truth.
+fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
+    let solution = &solved.solution;
+    let cost = solution.plan.as_ref().map(|plan| rational(plan.cost));
+    tally.count(match (solution.status, solution.unbounded) {
+        (Status::Feasible, Some(Unbounded::Proved)) => "planner: no best value, proved",
+        (Status::Feasible, Some(Unbounded::Suspected)) => "planner: no best value, suspected",
+        (Status::Optimal, _) => "planner: optimal",
+        (Status::Feasible, None) => "planner: feasible",
+        (Status::Unsolvable, _) => "planner: no plan",
+        (Status::UnsolvableWithinHorizon, _) => "planner: no plan within the horizon",
+        (Status::Unknown, _) => "planner: nothing known",
+    });
+    let claim = format!("the planner says {:?}, {:?}, cost {cost:?}", solution.status, solution.proof);
+    let kind = match (solution.status, &case.truth) {
+        (Status::UnsolvableWithinHorizon, _) => Some("a horizon that was not asked for"),
+        (Status::Unsolvable, Truth::Best(..) | Truth::NoBest(..) | Truth::Open(Some(_))) => {
+            Some("false: no plan")
+        }
+        (Status::Optimal | Status::Feasible, Truth::NoPlan) => Some("a plan where there is none"),
+        (Status::Optimal, Truth::NoBest(..)) => Some("false: optimal, no best value"),
+        (Status::Optimal, Truth::Best(best, _)) if cost.as_ref() != Some(best) => Some("false: optimal"),
+        (Status::Optimal, Truth::Open(Some((found, _))))
+            if cost.as_ref().is_none_or(|cost| compare(case.maximize, found, cost).is_lt()) =>
+        {
+            Some("false: optimal")
+        }
+        (Status::Feasible, Truth::Best(best, _)) if solution.unbounded == Some(Unbounded::Proved) => {
+            let _ = best;
+            Some("false: no best value")
+        }
+        _ => None,
+    };
+    if let Some(kind) = kind {
+        tally.fail(case, kind, &claim);
+    }
+    let (Truth::Best(found, _) | Truth::Open(Some((found, _))) | Truth::NoBest(found, _)) = &case.truth
+    else {
+        return;
+    };
+    if let Some(bound) = solution.lower_bound.map(rational) {
+        if kind.is_none() && compare(case.maximize, found, &bound).is_lt() {
+            tally.fail(case, "false: bound", &format!("{claim}, bound {bound}"));
+        }
+    }
+}
+
+/// Every plan that is shown has to be valid, and to cost what is claimed.
+fn check_plan(
+    case: &Case,
+    (mission, problem): (&Mission, &Problem),
+    plan: &Plan,
+    timed: bool,
+    tally: &mut Tally,
+) {
+    let steps = steps_of(plan);
+    let cost = rational(plan.cost);
+    let show = || format!("cost {cost} claimed for\n{}", plan_lines(&steps));
+    match (case.execute)(&steps) {
+        Ok(value) if value == cost => {}
+        Ok(value) => tally.fail(case, "a plan costs otherwise", &format!("{value}; {}", show())),
+        Err(reason) => tally.fail(case, "an invalid plan", &format!("{reason}; {}", show())),
+    }
+    let verdict = project_verdict(mission, problem, &steps, &case.mode);
+    let value = measure(problem, &verdict, steps.len(), timed);
+    if let Some(violation) = &verdict.violation {
+        tally.fail(
+            case,
+            "the validator refuses the planner's plan",
+            &format!("{}; {}", violation.message, show()),
+        );
+    } else if value.as_ref() != Some(&cost) {
+        tally.fail(case, "the validator measures otherwise", &format!("{value:?}; {}", show()));
+    }
+}
+
+/// What is claimed is certified, and the certificate has to be verified if the claim is true, and only then.
+fn check_certificate(
+    case: &Case,
+    (mission, problem): (&Mission, &Problem),
+    task: &Task,
+    solution: &Solution,
+    tally: &mut Tally,
+) {
+    if !matches!(solution.status, Status::Optimal | Status::Unsolvable) {
+        return;
+    }
+    let parent = tempfile::tempdir().expect("a temporary directory");
+    let directory = parent.path().join("certificate");
+    let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_lines(&steps_of(plan)));
+    let contents = Contents { mission, problem, task, solution, plan: &plan };
+    let limits = || Limits::none().with_time(case.limit);
+    if let Err(message) = certificate::write(&directory, &contents, &limits()) {
+        return tally.count(format!("no certificate: {}", message.code));
+    }
+    let report = certificate::verify(&directory, &limits);
+    let refuted = match (&case.truth, &solution.plan) {
+        (Truth::Best(best, _), Some(plan)) => rational(plan.cost) != *best,
+        (Truth::Open(Some((found, _))), Some(plan)) => {
+            compare(case.maximize, found, &rational(plan.cost)).is_lt()
+        }
+        (Truth::NoPlan, None) | (Truth::Open(None), _) => false,
+        (Truth::NoPlan, Some(_)) | (Truth::NoBest(..), _) | (Truth::Best(..) | Truth::Open(_), None) => true,
+    };
+    let wrong = report.parts.iter().find_map(|part| Some((part.part, part.result.as_ref().err()?)));
+    match (wrong, refuted) {
+        (None, true) => tally.fail(case, "A FALSE CLAIM IS VERIFIED", &format!("{:?}", report.claim)),
+        (None, false) => tally.count("certificate: verified"),
+        (Some((part, reason)), true) => {
+            tally.count(format!("certificate of a false claim fails: {part}: {reason:.40}"))
+        }
+        (Some(("limits", _)), false) => tally.count("certificate: limit"),
+        (Some((part, reason)), false) => {
+            tally.fail(case, "a true claim is not verified", &format!("{part}: {reason}"));
+        }
+    }
+}
+
+/// A number from the environment.
+pub fn setting(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+}
+
+/// Judges as many tasks of a generator as the environment says (`default` if it does not), each from its seed.
+pub fn run(default: u64, cases: impl Fn(u64) -> Vec<Case>) -> Tally {
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
+    let mut tally = Tally::default();
+    for seed in from..from + tasks {
+        cases(seed).iter().for_each(|case| judge(case, &mut tally));
+    }
+    tally
+}

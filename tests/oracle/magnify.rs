@@ -1,0 +1,273 @@
+//! Generated missions with all their numbers replaced by decimals of 16 significant digits: how much longer is planning, certifying
+//! and verifying?
+//!
+//! Missions come from `../shared/tools/gen_ratpa.py` (needs python3). Distances are multiplied by square roots, everything else by
+//! decimals, so that nothing is used more than before and the battery holds a little more: a mission that could be carried out
+//! still can be. Numbers that are compared with each other move apart, so that the same designs may be used.
+//!
+//! The factors of a domain (weights of the metric) stay whole where times are measured: products of three numbers of 16 digits
+//! exceed what the planner takes. How many missions it takes with all numbers replaced is printed, too.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Significant digits.
+const DIGITS: usize = 16;
+/// How many missions.
+const MISSIONS: usize = 50;
+/// How much longer decimals may take, in the geometric mean.
+const MOST: f64 = 3.0;
+/// Shown as a status where a plan is proved and no certificate is written.
+const NO_CERTIFICATE: i32 = 120;
+/// Measurements below are noise of starting a program, in seconds.
+const LEAST: f64 = 0.002;
+
+/// A number between 0 and 1 that depends on a name only (FNV).
+fn fraction(name: &str) -> f64 {
+    let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    ((hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// A decimal with 16 significant digits.
+fn written(value: f64) -> String {
+    let before = (value.log10().floor() as i64 + 1).max(0) as usize;
+    format!("{value:.digits$}", digits = DIGITS - before.min(DIGITS))
+}
+
+/// What a number of a function becomes.
+fn magnified(function: &str, arguments: &[&str], value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // A way is as long in both directions.
+    let mut sorted = arguments.to_vec();
+    if function == "dist" {
+        sorted.sort_unstable();
+    }
+    let part = fraction(&format!("{function} {}", sorted.join(" ")));
+    written(match function {
+        "dist" => value * (1.0 - part / 20.0).sqrt(),
+        // The same value, or recharging would not fill the battery.
+        "battery" | "capacity" => value + fraction("battery") / 4.0,
+        "visibility" => value * (1.0 + part / 50.0),
+        _ => value * (1.0 - part / 50.0),
+    })
+}
+
+/// The problem with other initial values.
+fn problem(text: &str) -> String {
+    let mut parts = text.split("(= (");
+    let mut magnified_text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (call, rest) = part.split_once(") ").expect("a value follows a function");
+        let (number, rest) = rest.split_once(')').expect("a value ends");
+        let mut names = call.split(' ');
+        let function = names.next().expect("a function");
+        let value = magnified(function, &names.collect::<Vec<_>>(), number.parse().expect("a number"));
+        let _ = write!(magnified_text, "(= ({call}) {value}){rest}");
+    }
+    magnified_text
+}
+
+/// The domain with another value that the battery is charged to, and, if asked for, with other factors.
+fn domain(text: &str, factors: bool) -> String {
+    let mut words = Vec::new();
+    for (position, word) in text.split(' ').enumerate() {
+        let digits = word.trim_end_matches([')', '\n']);
+        let rest = &word[digits.len()..];
+        match digits.parse::<f64>() {
+            Ok(value) if factors || words.last().is_some_and(|word| word == "(battery)") => {
+                let charged = words.last().is_some_and(|word| word == "(battery)");
+                let function = if charged { "battery".to_owned() } else { format!("factor {position}") };
+                words.push(magnified(&function, &[], value) + rest);
+            }
+            _ => words.push(word.to_owned()),
+        }
+    }
+    words.join(" ")
+}
+
+/// What a program came to: its exit status and its processor time.
+struct Run {
+    status: i32,
+    time: f64,
+}
+
+/// Runs the program, three times where it is quick, and takes the median.
+fn run(arguments: &[&str], once: bool) -> Run {
+    let script = "import resource as r, subprocess as s, sys\n\
+        def once():\n \
+        u = lambda: sum(r.getrusage(r.RUSAGE_CHILDREN)[:2])\n \
+        t = u()\n \
+        c = s.run(sys.argv[2:], stdout=s.DEVNULL, stderr=s.DEVNULL).returncode\n \
+        return u() - t, c\n\
+        runs = [once()]\n\
+        if runs[0][0] < 1 and sys.argv[1] == 'thrice': runs += [once(), once()]\n\
+        print(*sorted(runs)[len(runs) // 2])";
+    let mut python = Command::new("python3");
+    let times = if once { "once" } else { "thrice" };
+    python.args(["-c", script, times, env!("CARGO_BIN_EXE_metaplan")]).args(arguments);
+    let output = python.output().expect("python3 runs");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let (time, status) = text.trim().split_once(' ').unwrap_or_else(|| panic!("{output:?}"));
+    Run { status: status.parse().expect("a status"), time: time.parse().expect("a time") }
+}
+
+/// The command that plans a mission.
+fn plan_arguments(directory: &Path, name: &str) -> [String; 6] {
+    let file = |part: &str| directory.join(format!("{name}.{part}.pddl")).display().to_string();
+    let [plan, quiet, limit, seconds] = ["plan", "--quiet", "--time-limit", "60"].map(str::to_owned);
+    [plan, quiet, limit, seconds, file("domain"), file("problem")]
+}
+
+/// Planning, certifying, verifying.
+fn all_runs(directory: &Path, name: &str) -> [Run; 3] {
+    let certificate = directory.join(format!("{name}.certificate")).display().to_string();
+    let arguments = plan_arguments(directory, name);
+    let plan = arguments.each_ref().map(String::as_str);
+    let planned = run(&plan, false);
+    let mut certified = run(&[&plan[..], &["--certificate", &certificate]].concat(), true);
+    if certified.status == 0 && !Path::new(&certificate).exists() {
+        certified.status = NO_CERTIFICATE;
+    }
+    let verified = run(&["verify", &certificate], false);
+    [planned, certified, verified]
+}
+
+/// Family, places or pipelines, designs, functions, goals, seed.
+fn sizes() -> Vec<[usize; 6]> {
+    let mut sizes = Vec::new();
+    for seed in 1..=4 {
+        for (places, designs, functions, goals) in [
+            (10, 6, 1, 1),
+            (10, 3, 2, 2),
+            (20, 6, 1, 2),
+            (20, 12, 2, 1),
+            (30, 6, 3, 1),
+            (50, 6, 1, 1),
+            (50, 12, 1, 2),
+            (80, 6, 2, 1),
+        ] {
+            sizes.push([0, places, designs, functions, goals, seed]);
+        }
+        for (pipelines, designs, functions) in [(1, 6, 2), (2, 6, 1), (3, 6, 2), (3, 3, 1)] {
+            sizes.push([1, pipelines, designs, functions, 1, seed]);
+        }
+    }
+    sizes.push([0, 100, 6, 2, 1, 1]);
+    sizes.push([0, 200, 6, 1, 1, 1]);
+    sizes.truncate(MISSIONS);
+    sizes
+}
+
+/// Lets the tool write a mission, and writes it once more with decimals.
+fn generate(tool: &Path, directory: &Path, size: &[usize; 6], encoding: &str) -> Option<String> {
+    let [family, n, m, k, goals, seed] = size;
+    let family = ["ugv", "uuv"][*family];
+    let name = format!("{family}-n{n}-m{m}-k{k}-g{goals}-s{seed}");
+    let mut python = Command::new("python3");
+    python
+        .arg(tool)
+        .args(["--family", family, "--enc", encoding, "--name", &name])
+        .arg("--out")
+        .arg(directory);
+    for (option, value) in [("--n", n), ("--m", m), ("--k", k), ("--goals", goals), ("--seed", seed)] {
+        python.arg(option).arg(value.to_string());
+    }
+    let output = python.output().ok()?;
+    assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+    let name = format!("{name}.{encoding}");
+    let read = |part: &str| {
+        std::fs::read_to_string(directory.join(format!("{name}.{part}.pddl")))
+            .expect("the tool has written it")
+    };
+    for (kind, factors) in [("decimals", false), ("all", true)] {
+        let texts = [("domain", domain(&read("domain"), factors)), ("problem", problem(&read("problem")))];
+        for (part, text) in texts {
+            std::fs::write(directory.join(format!("{name}.{kind}.{part}.pddl")), text).expect("a file");
+        }
+    }
+    Some(name)
+}
+
+fn geometric_mean(ratios: &[f64]) -> f64 {
+    (ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len().max(1) as f64).exp()
+}
+
+#[test]
+#[allow(clippy::print_stdout)]
+#[ignore = "plans, certifies and verifies 100 missions: minutes, and only a release build says something"]
+fn decimals_beside_integers() {
+    let tool = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/tools/gen_ratpa.py");
+    if !tool.exists() || Command::new("python3").arg("--version").output().is_err() {
+        println!("skipped: needs python3 and {}", tool.display());
+        return;
+    }
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let mut all_numbers = [0, 0];
+    let (mut ratios, mut wrong) = ([Vec::new(), Vec::new(), Vec::new()], Vec::new());
+    println!(
+        "mission | planning: integers, decimals | certifying | verifying | ratios; processor time in seconds"
+    );
+    for (position, size) in sizes().iter().enumerate() {
+        let encoding = ["n", "f"][position % 2];
+        let Some(name) = generate(&tool, directory.path(), size, encoding) else { continue };
+        let whole = all_runs(directory.path(), &name);
+        let digits = all_runs(directory.path(), &format!("{name}.decimals"));
+        let mut line = name.clone();
+        for (part, (whole, digits)) in whole.iter().zip(&digits).enumerate() {
+            let ratio = digits.time.max(LEAST) / whole.time.max(LEAST);
+            let _ = write!(line, " | {:.3} {:.3} {ratio:.2}", whole.time, digits.time);
+            // A refusal takes no time.
+            if (whole.status, digits.status) == (0, 0) {
+                ratios[part].push(ratio);
+            } else {
+                let _ = write!(line, " (status {} {})", whole.status, digits.status);
+            }
+        }
+        println!("{line}");
+        let planned = run(
+            &plan_arguments(directory.path(), &format!("{name}.all")).each_ref().map(String::as_str),
+            true,
+        );
+        all_numbers[usize::from(planned.status == 0)] += 1;
+        let failed = |runs: &[Run; 3]| runs.iter().any(|run| run.status != 0);
+        if failed(&digits) {
+            wrong.push(format!("{line}{}", if failed(&whole) { ", with integers, too" } else { "" }));
+        }
+    }
+    let means: Vec<f64> = ratios.iter().map(|ratios| geometric_mean(ratios)).collect();
+    println!(
+        "geometric means of decimals over integers: planning {:.2} ({} missions), certifying {:.2} ({}), verifying {:.2} ({})",
+        means[0],
+        ratios[0].len(),
+        means[1],
+        ratios[1].len(),
+        means[2],
+        ratios[2].len()
+    );
+    println!("with factors of 16 digits, too: {} planned, {} not", all_numbers[1], all_numbers[0]);
+    println!("not planned, certified and verified with decimals: {}\n{}", wrong.len(), wrong.join("\n"));
+    assert!(
+        means.iter().all(|mean| *mean <= MOST),
+        "decimals take more than {MOST} times as long: {means:?}"
+    );
+    assert!(wrong.iter().all(|line| line.ends_with("too")), "missions that only decimals make fail");
+}
+
+#[test]
+fn numbers_are_magnified_in_place() {
+    let text =
+        "(:init (= (dist w1 w2) 3) (= (dist w2 w1) 3)\n (charger w1) (= (total-cost) 0) (= (battery) 60))";
+    let new = problem(text);
+    let values: Vec<&str> =
+        new.split("(= (dist w").skip(1).filter_map(|part| part.split([' ', ')']).nth(3)).collect();
+    assert!(new.contains("(charger w1) (= (total-cost) 0)"), "{new}");
+    assert!(values.len() == 2 && values[0] == values[1] && values[0].len() == DIGITS + 1, "{values:?} {new}");
+    assert!(domain("(assign (battery) 60) (* 2 (x))\n)", false).contains("(assign (battery) 60."));
+    assert_eq!(written(0.5), "0.5000000000000000");
+    assert_eq!(written(60.25), "60.25000000000000");
+}

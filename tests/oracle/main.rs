@@ -1,0 +1,14 @@
+//! The planner, its certificates and its validator against oracles by another hand.
+//!
+//! A generator makes a tiny task from a seed and computes by brute force what is true of it; [`judge`] asks the planner and compares.
+//! The oracles are written from the definition of a plan (PDDL 2.1, PDDL 2.2) and share nothing with the planner, not even the reader:
+//! a generator's task is a structure of its own, which is printed as PDDL.
+//!
+//! `ORACLE_FROM` is the first seed, `ORACLE_TASKS` how many follow, `ORACLE_SAVE` a directory for the files of what fails.
+
+mod enumerate;
+mod field;
+mod judge;
+mod magnify;
+mod numbers;
+mod temporal;

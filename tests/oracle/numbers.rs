@@ -1,0 +1,210 @@
+//! Generator B: numbers, function designs, optimisation.
+//!
+//! Missions with designs and tasks of arithmetic are made from seeds, with numbers that are hard to compute with and thresholds
+//! that are hit exactly or missed by a hair; explicit search in rational numbers says what is true of them.
+
+mod arithmetic;
+mod deeds;
+mod draw;
+mod explore;
+mod fronts;
+mod ground;
+mod missions;
+mod model;
+mod print;
+mod shrink;
+mod special;
+mod step;
+mod truth;
+mod tune;
+mod variants;
+
+use std::rc::Rc;
+use std::time::Duration;
+
+use fastrand::Rng;
+
+use crate::judge::{Case, Executor, Mode, Step, Tally, Truth, judge, setting};
+
+use explore::{Budget, Measures};
+use ground::Ground;
+use model::{Expr, Number, Task};
+use truth::{Explored, Known};
+
+/// How much the oracle does for a task.
+const BUDGET: Budget = Budget { states: 300, attempts: 25_000 };
+
+/// A task, and what is known of it.
+struct Puzzle {
+    name: String,
+    task: Task,
+    ground: Rc<Ground>,
+    explored: Explored,
+}
+
+impl Puzzle {
+    fn new(name: String, task: Task, objectives: &[Expr]) -> Option<Self> {
+        Self::within(name, task, objectives, BUDGET)
+    }
+
+    fn within(name: String, task: Task, objectives: &[Expr], budget: Budget) -> Option<Self> {
+        let ground = Rc::new(ground::ground(&task, objectives, budget.attempts)?);
+        let maximize = task.metric.as_ref().is_some_and(|(maximize, _)| *maximize);
+        let explored = truth::truth(&ground, maximize, budget)?;
+        Some(Self { name, task, ground, explored })
+    }
+
+    fn maximize(&self) -> bool {
+        self.task.metric.as_ref().is_some_and(|(maximize, _)| *maximize)
+    }
+
+    /// The plan in the terms of the judge, one action after another.
+    fn steps(&self, plan: &[usize]) -> Vec<Step> {
+        let mut clock = model::whole(0);
+        let step = |position: &usize| {
+            let instance = &self.ground.instances[*position];
+            let name = |object: &usize| self.task.objects[*object].0.clone();
+            let start = clock.clone();
+            clock += &instance.duration;
+            Step {
+                action: self.task.actions[instance.action].name.clone(),
+                arguments: instance.arguments.iter().map(name).collect(),
+                start,
+                duration: instance.duration.clone(),
+            }
+        };
+        plan.iter().map(step).collect()
+    }
+
+    fn case(&self, certify: bool) -> Case {
+        let (domain, problem) = print::print(&self.task);
+        let found = |found: &(Number, Vec<usize>)| (found.0.clone(), self.steps(&found.1));
+        let truth = match &self.explored.known {
+            Known::Best(best) => {
+                let (cost, plan) = found(best);
+                Truth::Best(cost, plan)
+            }
+            Known::NoPlan => Truth::NoPlan,
+            Known::NoBest(best) => {
+                let (cost, plan) = found(best);
+                Truth::NoBest(cost, plan)
+            }
+            Known::Open(best) => Truth::Open(best.as_ref().map(found)),
+        };
+        Case {
+            name: self.name.clone(),
+            domain,
+            problem,
+            mode: Mode::Sequential,
+            maximize: self.maximize(),
+            truth,
+            execute: executor(Rc::clone(&self.ground)),
+            certify,
+            limit: Duration::from_millis(500),
+        }
+    }
+}
+
+/// Executes a plan, one action after another, and says what it costs.
+fn executor(ground: Rc<Ground>) -> Executor {
+    Box::new(move |steps: &[Step]| {
+        let measures = Measures::new(&ground);
+        let mut state = measures.initial();
+        let mut clock = model::whole(0);
+        for step in steps {
+            let position = ground.by_name.get(&(step.action.clone(), step.arguments.clone()));
+            let instance = &ground.instances[*position.ok_or(format!("no action {step:?}"))?];
+            if step.duration != instance.duration {
+                return Err(format!("{step:?} takes {}", instance.duration));
+            }
+            if step.start < clock {
+                return Err(format!("{step:?} overlaps"));
+            }
+            clock = &step.start + &step.duration;
+            state = step::execute(instance, &state).ok_or(format!("{step:?} cannot be executed"))?;
+        }
+        if !step::all_hold(&ground.goal, &state) {
+            return Err("the goal does not hold".to_owned());
+        }
+        let steps = i64::try_from(steps.len()).expect("a short plan");
+        measures.of(&state, steps).map(|mut values| values.swap_remove(0)).ok_or("no value".to_owned())
+    })
+}
+
+/// The task of a seed.
+fn task(seed: u64) -> Task {
+    let mut rng = Rng::with_seed(seed);
+    // Close seeds give close sequences at first.
+    (0..8).for_each(|_| {
+        rng.u64(..);
+    });
+    if rng.u32(0..5) < 3 { missions::mission(&mut rng) } else { arithmetic::arithmetic(&mut rng) }
+}
+
+/// Judges a task: always as the program plans it, every second time with a certificate, and on a share in other ways.
+fn judge_seed(seed: u64, tally: &mut Tally) {
+    judge_task(seed, &task(seed), tally);
+}
+
+fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
+    let of = |objectives: &[Expr]| Puzzle::new(format!("numbers-{seed}"), task.clone(), objectives);
+    let Some(puzzle) = of(&[]) else { return tally.count("oracle: too large") };
+    let case = puzzle.case(seed.is_multiple_of(2));
+    judge(&case, tally);
+    let mut rng = Rng::with_seed(seed ^ 0x5eed);
+    variants::check_validator(&puzzle, &case, &mut rng, tally);
+    if seed % 4 == 1 {
+        variants::check_variants(&puzzle, &case, &mut rng, tally);
+    }
+    if seed % 4 == 3 {
+        let objectives = variants::objectives(&puzzle, &mut rng);
+        if let Some(puzzle) = of(&objectives) {
+            variants::check_objectives(&puzzle, &objectives, &case, tally);
+        }
+    }
+}
+
+#[test]
+fn random_tasks_with_numbers() {
+    // Without optimisation a task takes five times as long.
+    let most = if cfg!(debug_assertions) { 400 } else { 2000 };
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", most));
+    let mut tally = Tally::default();
+    (from..from + tasks).for_each(|seed| judge_seed(seed, &mut tally));
+    tally.finish();
+}
+
+#[test]
+#[ignore = "writes the tasks of `ORACLE_FROM` and what follows to `ORACLE_SAVE`"]
+fn show() {
+    let directory = std::path::PathBuf::from(std::env::var_os("ORACLE_SAVE").expect("ORACLE_SAVE is set"));
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 1));
+    for seed in from..from + tasks {
+        let (domain, problem) = print::print(&task(seed));
+        let directory = directory.join(format!("numbers-{seed}"));
+        std::fs::create_dir_all(&directory).expect("a directory");
+        std::fs::write(directory.join("domain.pddl"), domain).expect("a file");
+        std::fs::write(directory.join("problem.pddl"), problem).expect("a file");
+    }
+}
+
+#[test]
+#[ignore = "makes the tasks of `ORACLE_FROM` and what follows smaller, where they fail, and prints them"]
+#[allow(clippy::print_stdout)]
+fn smaller() {
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 1));
+    for seed in from..from + tasks {
+        let kinds = |task: &Task| {
+            let mut tally = Tally::default();
+            judge_task(seed, task, &mut tally);
+            tally.failures.iter().map(|failure| failure.kind).collect::<Vec<_>>()
+        };
+        for kind in kinds(&task(seed)) {
+            let small = shrink::shrink(task(seed), &|task| kinds(task).contains(&kind));
+            let mut tally = Tally::default();
+            judge_task(seed, &small, &mut tally);
+            let texts = tally.failures.iter().filter(|failure| failure.kind == kind);
+            texts.for_each(|failure| println!("{}", failure.text));
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What of a state matters: numbers that nothing reads and that only increase become costs of actions.
+
+use super::happening::{Obstacle, State, World, fit};
+use super::model::{Body, Condition, Effect, Expression, Measure, Operation, Q, q};
+
+/// What becomes of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    Kept,
+    /// Only its weight in the metric counts.
+    Cost(Q),
+    /// Nobody reads it; only whether it has a value counts.
+    Unread,
+}
+
+/// How the states of a task are reduced, and what the rest costs.
+#[derive(Debug)]
+pub struct Reduction {
+    roles: Vec<Role>,
+    /// The weight of time; 1 for each action if plans are measured by their steps.
+    pub time: Q,
+    pub step: Q,
+    /// Weights of what is part of the state, by number.
+    remaining: Vec<(Q, usize)>,
+    pub maximize: bool,
+    /// What the metric has before the plan.
+    offset: Q,
+}
+
+fn expression_functions(expression: &Expression, found: &mut Vec<usize>) {
+    match expression {
+        Expression::Number(_) | Expression::Duration(_) => {}
+        Expression::Fluent(fluent) => found.push(fluent.function),
+        Expression::Sum(left, right)
+        | Expression::Product(left, right)
+        | Expression::Quotient(left, right) => {
+            expression_functions(left, found);
+            expression_functions(right, found);
+        }
+    }
+}
+
+fn condition_functions(condition: &Condition, found: &mut Vec<usize>) {
+    match condition {
+        Condition::Atom(_) | Condition::Same(..) => {}
+        Condition::Compare(_, left, right) => {
+            expression_functions(left, found);
+            expression_functions(right, found);
+        }
+        Condition::Not(part) | Condition::Forall(_, part) | Condition::Exists(_, part) => {
+            condition_functions(part, found);
+        }
+        Condition::All(parts) | Condition::Any(parts) => {
+            parts.iter().for_each(|part| condition_functions(part, found));
+        }
+        Condition::Imply(left, right) => {
+            condition_functions(left, found);
+            condition_functions(right, found);
+        }
+    }
+}
+
+/// What effects read, and what they do otherwise than increasing and decreasing.
+fn effect_functions(effects: &[Effect], read: &mut Vec<usize>, other: &mut Vec<usize>) {
+    for effect in effects {
+        match effect {
+            Effect::Add(_) | Effect::Delete(_) => {}
+            Effect::Change(operation, fluent, expression) => {
+                expression_functions(expression, read);
+                if !matches!(operation, Operation::Increase | Operation::Decrease) {
+                    other.push(fluent.function);
+                }
+            }
+            Effect::When(condition, parts) => {
+                condition_functions(condition, read);
+                effect_functions(parts, read, other);
+            }
+            Effect::Forall(_, parts) => effect_functions(parts, read, other),
+        }
+    }
+}
+
+impl Reduction {
+    pub fn new(world: &World) -> Self {
+        let task = &world.task;
+        let (mut read, mut other) = (Vec::new(), Vec::new());
+        condition_functions(&task.goal, &mut read);
+        task.axioms.iter().for_each(|axiom| condition_functions(&axiom.condition, &mut read));
+        for action in &task.actions {
+            let parts = match &action.body {
+                Body::Instantaneous(part) => vec![part],
+                Body::Durative { duration, start, over_all, end } => {
+                    expression_functions(duration, &mut read);
+                    condition_functions(over_all, &mut read);
+                    vec![start, end]
+                }
+            };
+            for part in parts {
+                condition_functions(&part.condition, &mut read);
+                effect_functions(&part.effects, &mut read, &mut other);
+            }
+        }
+        let (mut time, mut step, mut maximize, mut weights) = (q(0), q(0), false, Vec::new());
+        match &task.measure {
+            Measure::Steps => step = q(1),
+            Measure::Time => time = q(1),
+            Measure::Metric { maximize: larger, time: weight, functions } => {
+                (time, maximize, weights) = (*weight, *larger, functions.clone());
+            }
+        }
+        let mut roles = vec![Role::Kept; world.initial.values.len()];
+        let (mut remaining, mut offset) = (Vec::new(), q(0));
+        for function in (0..task.functions.len()).filter(|function| !read.contains(function)) {
+            let first = world.value_of(function);
+            let count = task.objects.len().pow(task.functions[function].1 as u32);
+            let weight: Vec<Q> =
+                weights.iter().filter(|(_, at)| *at == function).map(|(weight, _)| *weight).collect();
+            let role = match &weight[..] {
+                [] => Role::Unread,
+                _ if other.contains(&function) => Role::Kept,
+                weights => Role::Cost(weights.iter().sum()),
+            };
+            (first..first + count).for_each(|at| roles[at] = role);
+        }
+        for (weight, function) in weights {
+            let at = world.value_of(function);
+            if roles[at] == Role::Kept {
+                remaining.push((weight, at));
+            } else {
+                offset += weight * world.initial.values[at].expect("what is measured has a value");
+            }
+        }
+        Self { roles, time, step, remaining, maximize, offset }
+    }
+
+    /// The state without what does not matter, and what this has cost.
+    pub fn reduce(&self, mut state: State) -> Result<(State, Q), Obstacle> {
+        let mut cost = q(0);
+        for (value, role) in state.values.iter_mut().zip(&self.roles) {
+            match (role, &value) {
+                (Role::Cost(weight), Some(value)) => cost = fit(cost + weight * value)?,
+                (Role::Unread, Some(_)) => {}
+                _ => continue,
+            }
+            *value = Some(q(0));
+        }
+        Ok((state, cost))
+    }
+
+    /// Whether a number is part of the state.
+    pub fn keeps(&self, at: usize) -> bool {
+        self.roles[at] == Role::Kept
+    }
+
+    /// What the metric has besides the costs of actions.
+    pub fn rest(&self, state: &State) -> Result<Q, Obstacle> {
+        let mut sum = self.offset;
+        for (weight, at) in &self.remaining {
+            let value = state.values[*at].ok_or(Obstacle::Blocked("the metric is undefined"))?;
+            sum = fit(sum + weight * value)?;
+        }
+        Ok(sum)
+    }
+}
