@@ -107,8 +107,8 @@ struct Solved {
 }
 
 /// An exact number of the planner.
-pub fn rational(exact: Exact) -> BigRational {
-    BigRational::new(exact.numerator.into(), exact.denominator.into())
+pub fn rational(exact: &Exact) -> BigRational {
+    exact.to_rational()
 }
 
 /// A decimal for a plan, exact where there is one, otherwise with nine digits.
@@ -143,8 +143,8 @@ pub fn steps_of(plan: &Plan) -> Vec<Step> {
         .map(|step| Step {
             action: step.action.clone(),
             arguments: step.arguments.clone(),
-            start: rational(step.start),
-            duration: rational(step.duration),
+            start: rational(&step.start),
+            duration: rational(&step.duration),
         })
         .collect()
 }
@@ -191,6 +191,17 @@ fn plan(mission: &Mission, problem: &Problem, mode: &Mode, limits: &Limits) -> A
     };
     match mode {
         Mode::Sequential => match mission.ground(problem, &[], limits) {
+            // As the program does where numbers are too large for integers.
+            Err(messages) if messages.iter().all(|message| message.code == "E304") => {
+                match mission.ground_exact(problem, &[], limits) {
+                    Err(messages) => refused(messages),
+                    Ok(task) => {
+                        let config = Config { limits: limits.clone(), ..Config::default() };
+                        let solution = encodings::optimize_exact(&task, &config);
+                        Answer::Solved(Box::new(Solved { solution, timed: task.is_timed(), task: None }))
+                    }
+                }
+            }
             Err(messages) => refused(messages),
             Ok(task) => {
                 let config = Config { limits: limits.clone(), ..Config::default() };
@@ -351,7 +362,7 @@ fn check_witness(case: &Case, mission: &Mission, problem: &Problem, tally: &mut 
 /// Compares the planner's claim with the truth.
 fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     let solution = &solved.solution;
-    let cost = solution.plan.as_ref().map(|plan| rational(plan.cost));
+    let cost = solution.plan.as_ref().map(|plan| rational(&plan.cost));
     tally.count(match (solution.status, solution.unbounded) {
         (Status::Feasible, Some(Unbounded::Proved)) => "planner: no best value, proved",
         (Status::Feasible, Some(Unbounded::Suspected)) => "planner: no best value, suspected",
@@ -388,7 +399,7 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     else {
         return;
     };
-    if let Some(bound) = solution.lower_bound.map(rational) {
+    if let Some(bound) = solution.lower_bound.as_ref().map(rational) {
         if kind.is_none() && compare(case.maximize, found, &bound).is_lt() {
             tally.fail(case, "false: bound", &format!("{claim}, bound {bound}"));
         }
@@ -404,7 +415,7 @@ fn check_plan(
     tally: &mut Tally,
 ) {
     let steps = steps_of(plan);
-    let cost = rational(plan.cost);
+    let cost = rational(&plan.cost);
     let show = || format!("cost {cost} claimed for\n{}", plan_lines(&steps));
     match (case.execute)(&steps) {
         Ok(value) if value == cost => {}
@@ -443,11 +454,11 @@ fn check_certificate(
     if let Err(message) = certificate::write(&directory, &contents, &limits()) {
         return tally.count(format!("no certificate: {}", message.code));
     }
-    let report = certificate::verify(&directory, &limits);
+    let report = certificate::verify(&directory, &limits());
     let refuted = match (&case.truth, &solution.plan) {
-        (Truth::Best(best, _), Some(plan)) => rational(plan.cost) != *best,
+        (Truth::Best(best, _), Some(plan)) => rational(&plan.cost) != *best,
         (Truth::Open(Some((found, _))), Some(plan)) => {
-            compare(case.maximize, found, &rational(plan.cost)).is_lt()
+            compare(case.maximize, found, &rational(&plan.cost)).is_lt()
         }
         (Truth::NoPlan, None) | (Truth::Open(None), _) => false,
         (Truth::NoPlan, Some(_)) | (Truth::NoBest(..), _) | (Truth::Best(..) | Truth::Open(_), None) => true,

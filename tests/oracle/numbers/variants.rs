@@ -56,7 +56,7 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
 fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, said: &str, tally: &mut Tally) {
     let mut cost = None;
     if let Some(plan) = &solution.plan {
-        let claimed = rational(plan.cost);
+        let claimed = rational(&plan.cost);
         if plan.steps.iter().any(|step| !step.configuration.is_empty()) {
             tally.count("variant: a plan with designs in slots");
         }
@@ -116,7 +116,7 @@ fn check_horizon(
     }
     let best = within(space, puzzle.maximize(), horizon);
     let reached = config.limits.reached();
-    if best.is_some_and(|(best, _)| space.complete && !reached && rational(plan.cost) != best) {
+    if best.is_some_and(|(best, _)| space.complete && !reached && rational(&plan.cost) != best) {
         tally.count("NOTE: not the best plan within the horizon");
     }
 }
@@ -162,7 +162,7 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
     let started = Instant::now();
     if let Ok(task) = mission.ground(&problem, &metrics, &Limits::none()) {
         let point = encodings::lexicographic(&task, &config(), &mut |_| {});
-        let values: Vec<Number> = point.values.into_iter().map(rational).collect();
+        let values: Vec<Number> = point.values.iter().map(rational).collect();
         tally.count(format!("list: {:?}", point.solution.status));
         let wrong = match point.solution.status {
             Status::Optimal => all.first() != Some(&values),
@@ -178,7 +178,7 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
         tally.count(format!("front: {:?}", found.status));
         let points = found.points.into_iter();
         let mut points: Vec<Vec<Number>> =
-            points.map(|point| point.values.into_iter().map(rational).collect()).collect();
+            points.map(|point| point.values.iter().map(rational).collect()).collect();
         points.retain(|point| !point.is_empty());
         points.sort();
         let wrong = match found.status {
