@@ -152,7 +152,7 @@ fn cost(model: &Model, metric: &BigRational) -> Result<i128, Fault> {
     let scaled = metric * BigRational::from_integer(model.objective.scale.into());
     let scaled = if model.objective.maximize { -scaled } else { scaled };
     let cost = if scaled.is_integer() { scaled.to_integer().to_i128() } else { None };
-    let cost = cost.and_then(|cost| cost.checked_sub(model.objective.offset.into()));
+    let cost = cost.and_then(|cost| cost.checked_sub(model.objective.offset));
     // A claim is as large as other costs, so that sums with it are integers.
     let cost = cost.filter(|cost| shape::is_small(*cost));
     cost.ok_or_else(|| Fault::Cost(metric.to_string()))
@@ -184,7 +184,7 @@ impl Checker<'_> {
         let index = Index::new(self.model);
         for (label, position) in argument.labels.iter().zip(0..) {
             let state = self.model.state(&label.0, &label.1);
-            let paid = i128::from(label.2);
+            let paid = label.2;
             if self.model.holds(&self.model.goal, &state, &[], &[])
                 && self.cost.is_none_or(|cost| paid < cost)
             {
@@ -229,8 +229,8 @@ impl Checker<'_> {
         }
         let known = self.labels.get(&state.values[..self.model.basic]);
         known.into_iter().flatten().any(|(numbers, cost)| {
-            let mut pairs = numbers.iter().map(|number| i128::from(*number)).zip(&state.numbers);
-            i128::from(*cost) <= paid
+            let mut pairs = numbers.iter().copied().zip(&state.numbers);
+            (*cost) <= paid
                 && if self.monotone { pairs.all(|(a, b)| a >= *b) } else { pairs.all(|(a, b)| a == *b) }
         })
     }

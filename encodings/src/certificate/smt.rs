@@ -150,7 +150,7 @@ impl Writer<'_> {
     fn cut_off(&self, potential: &Potential) -> String {
         self.entries(&potential.pattern, &potential.values, |value| match (value, self.cost) {
             (None, _) => Some("true".to_owned()),
-            (Some(more), Some(cost)) => Some(format!("(>= paid {})", number(cost - i128::from(more)))),
+            (Some(more), Some(cost)) => Some(format!("(>= paid {})", number(cost - more))),
             (Some(_), None) => None,
         })
     }

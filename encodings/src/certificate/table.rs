@@ -50,7 +50,7 @@ impl<'t> Table<'t> {
     }
 
     pub(super) fn at_row(&self, row: usize) -> Option<i128> {
-        self.values[row].map(i128::from)
+        self.values[row]
     }
 
     /// Every combination that agrees with some facts.
@@ -110,7 +110,7 @@ impl<'t> Table<'t> {
         for (operator, position) in model.operators.iter().zip(0..) {
             if !self.touches(operator) {
                 // It leads from each combination to itself; any finite value stands for all.
-                let finite = self.values.iter().flatten().max().map(|most| i128::from(*most));
+                let finite = self.values.iter().flatten().max().copied();
                 if finite.is_some() && !check(operator, finite, finite) {
                     return Err(format!("operator {position}, which changes nothing that the table knows"));
                 }
@@ -193,5 +193,5 @@ pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Resul
 /// The value that a number must have for a comparison to hold, if it is about that number alone.
 fn lower_end(linear: &Linear, number: u32) -> Option<i128> {
     let Quantity { constant, tables } = &linear.quantity;
-    (linear.factors == [(number, 1)] && tables.is_empty()).then(|| -i128::from(*constant))
+    (linear.factors == [(number, 1)] && tables.is_empty()).then(|| -(*constant))
 }

@@ -336,8 +336,8 @@ fn hostile_numbers_prove_nothing() {
         let claim = example.optimum.map(fraction);
         let dearer = claim.clone().map(|cost| cost + fraction("1"));
         let documents = [&certificate.task, &certificate.argument];
-        for place in 0..2 {
-            let document: Value = serde_json::from_str(documents[place]).expect("JSON");
+        for (place, document) in documents.into_iter().enumerate() {
+            let document: Value = serde_json::from_str(document).expect("JSON");
             let mut all = Vec::new();
             changes(&document, "", &mut all);
             let mut paths: Vec<String> = all

@@ -189,6 +189,9 @@ impl Task<'_> {
                 let mut news = false;
                 for rule in list(&layer["rules"]) {
                     let head = rule.get(0)?;
+                    if number(head.get(1)?)? != 0 {
+                        return None;
+                    }
                     if !Self::fact(head, &state)? && self.holds(rule.get(1)?, &state, &BTreeMap::new())? {
                         *state.0.get_mut(index(head.get(0)?)?)? = number(head.get(1)?)?;
                         news = true;

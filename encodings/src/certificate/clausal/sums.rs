@@ -44,7 +44,7 @@ fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
 
 /// How many bits a number needs for so many steps, and to be compared.
 fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, String> {
-    let initial = i128::from(model.numbers[number as usize]);
+    let initial = model.numbers[number as usize];
     let (mut least, mut most) = (initial, initial);
     let (mut falls, mut rises) = (0, 0);
     for operator in &model.operators {
@@ -93,7 +93,7 @@ impl Sums {
         let mut numbers = Vec::new();
         for (number, initial) in (0..).zip(&model.numbers) {
             let width = number_width(model, number, steps)?;
-            numbers.push(formula.constant((*initial).into(), width));
+            numbers.push(formula.constant(*initial, width));
         }
         Ok(Self { spent, limit, numbers })
     }
@@ -147,7 +147,7 @@ impl Sums {
 
 /// Where a condition holds, a multiple of a number plus a constant is at least 0.
 fn compare(formula: &mut Formula, condition: &[Var], number: &Bits, factor: Int, constant: Int) {
-    let (factor, constant) = (i128::from(factor), i128::from(constant));
+    let (factor, constant) = (factor, constant);
     match factor {
         0 if constant >= 0 => {}
         0 => formula.clause(&condition.iter().map(|literal| -literal).collect::<Vec<_>>()),
@@ -225,7 +225,7 @@ impl Adder<'_> {
     /// A number plus what each operator adds to it.
     fn sum(&mut self, formula: &mut Formula, base: &Bits, parts: &[Option<&Quantity>], name: &str) -> Bits {
         let step = self.step;
-        let constants = parts.iter().map(|part| part.map_or(0, |quantity| i128::from(quantity.constant)));
+        let constants = parts.iter().map(|part| part.map_or(0, |quantity| quantity.constant));
         let mut kinds: BTreeMap<i128, Vec<Var>> = BTreeMap::new();
         for (own, constant) in self.timeline.operators.iter().zip(constants) {
             kinds.entry(constant).or_default().push(*own);
@@ -293,7 +293,7 @@ impl Adder<'_> {
                     rest /= size;
                 }
                 for (position, own) in added.iter().enumerate() {
-                    let literal = if bit((*value).into(), position) { *own } else { -own };
+                    let literal = if bit(*value, position) { *own } else { -own };
                     formula.clause(&[&condition[..], &[literal]].concat());
                 }
             }

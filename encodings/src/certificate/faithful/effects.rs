@@ -61,7 +61,7 @@ fn numbers(task: &Translation<'_>, case: &Case, made: Option<Made<'_>>) -> Resul
 /// What becomes of one variable.
 struct Variable<'v> {
     task: &'v Translation<'v>,
-    variable: u32,
+    own: u32,
     case: &'v Case,
     /// What the end of the case does to its atoms.
     effects: Vec<&'v (Formula, Key, bool)>,
@@ -93,7 +93,7 @@ impl<'v> Variable<'v> {
             .filter_map(|effect| Some((task.literals(&effect.condition, true), own(&effect.effects)?)))
             .collect();
         let certain = operator.and_then(|operator| own(&operator.effects));
-        Self { task, variable, case, effects, certain, conditional }
+        Self { task, own: variable, case, effects, certain, conditional }
     }
 
     /// Whether both make the same of it wherever this is known.
@@ -140,7 +140,7 @@ impl<'v> Variable<'v> {
         }
         self.task
             .names
-            .atoms(self.variable)
+            .atoms(self.own)
             .find(|(_, key)| self.may_hold(known, key))
             .map_or(Outcome::Other, |(_, key)| Outcome::Open(Formula::Atom(key.clone(), true)))
     }
@@ -152,9 +152,9 @@ impl<'v> Variable<'v> {
     /// The value before, if it is known.
     fn current(&self, known: &Known) -> Value {
         let structure = &self.task.names.structure;
-        let mut atoms = self.task.names.atoms(self.variable).filter(|(_, key)| self.may_hold(known, key));
+        let mut atoms = self.task.names.atoms(self.own).filter(|(_, key)| self.may_hold(known, key));
         match atoms.next() {
-            None => Some(self.task.model.variables[self.variable as usize].len() as u32 - 1),
+            None => Some(self.task.model.variables[self.own as usize].len() as u32 - 1),
             Some((value, key)) if known.atom(structure, key) == Some(true) => Some(value),
             // Where one is known to hold, the others are known not to.
             Some(_) => None,
@@ -173,9 +173,9 @@ impl<'v> Variable<'v> {
                 None => self.case.truths.get(key).copied(),
             }
         };
-        let none = self.task.model.variables[self.variable as usize].len() as u32 - 1;
+        let none = self.task.model.variables[self.own as usize].len() as u32 - 1;
         let (mut added, mut remaining, mut deleted) = (Vec::new(), Vec::new(), None);
-        for (value, key) in self.task.names.atoms(self.variable) {
+        for (value, key) in self.task.names.atoms(self.own) {
             match after(key) {
                 Some(true) => added.push(value),
                 Some(false) if self.may_hold(known, key) => deleted = Some(key),

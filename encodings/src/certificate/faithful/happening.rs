@@ -21,10 +21,14 @@ impl<'r> Reads<'r> {
     fn new(condition: &'r Formula, moment: &'r Moment) -> Self {
         let mut reads = Self::default();
         reads.formula(condition);
-        moment.atoms.iter().for_each(|(guard, ..)| reads.formula(guard));
+        for (guard, ..) in &moment.atoms {
+            reads.formula(guard);
+        }
         for (guard, _, _, value) in &moment.numbers {
             reads.formula(guard);
-            value.iter().for_each(|value| reads.linear(value));
+            if let Some(value) = value {
+                reads.linear(value);
+            }
         }
         reads
     }

@@ -130,8 +130,8 @@ impl Invariant {
     }
 
     /// That an expression is at least 0, or more than 0 if strict; decided where intervals decide it.
-    pub(super) fn compare(&self, linear: Linear, strict: bool) -> Formula {
-        let linear = self.settled(&linear);
+    pub(super) fn compare(&self, linear: &Linear, strict: bool) -> Formula {
+        let linear = self.settled(linear);
         let range = linear.range(|key| self.numbers.get(key));
         let fails = |number: &BigRational| number.is_negative() || strict && number.is_zero();
         if range.high.as_ref().is_some_and(fails) {

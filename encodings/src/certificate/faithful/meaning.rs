@@ -32,6 +32,9 @@ pub(super) struct Case {
     pub(super) duration: Option<BigRational>,
 }
 
+/// What fluents become.
+type Changes = BTreeMap<Key, Linear>;
+
 /// Effects that take place at once, each under a condition.
 #[derive(Default)]
 pub(super) struct Moment {
@@ -129,7 +132,7 @@ impl<'r> Durative<'r> {
             let guards = guards.chain(start.numbers.iter().map(|(guard, ..)| guard));
             for known in known.split(structure, guards)? {
                 let truths = start.truths(structure, &known);
-                for (known, changes) in start.numbers(structure, known, &Applied::default())? {
+                for (known, changes) in start.numbers(structure, &known, &Applied::default())? {
                     reader.applied = Applied { truths: truths.clone(), changes };
                     let later =
                         self.condition(&mut reader, &[ConditionTime::OverAll, ConditionTime::AtEnd])?;
@@ -222,7 +225,7 @@ impl Moment {
     ) -> Result<Vec<Case>, Cause> {
         let mut all = Vec::new();
         for known in known.split(structure, self.numbers.iter().map(|(guard, ..)| guard))? {
-            for (known, own) in self.numbers(structure, known, applied)? {
+            for (known, own) in self.numbers(structure, &known, applied)? {
                 let mut changes = applied.changes.clone();
                 changes.extend(own);
                 let (truths, effects) = (applied.truths.clone(), self.atoms.clone());
@@ -237,9 +240,9 @@ impl Moment {
     fn numbers(
         &self,
         structure: &Structure,
-        known: Known,
+        known: &Known,
         applied: &Applied,
-    ) -> Result<Vec<(Known, BTreeMap<Key, Linear>)>, Cause> {
+    ) -> Result<Vec<(Known, Changes)>, Cause> {
         let mut by_fluent: BTreeMap<&Key, Vec<(Assignment, &Linear)>> = BTreeMap::new();
         for (guard, kind, key, value) in &self.numbers {
             if known.decide(structure, guard) == Some(true) {

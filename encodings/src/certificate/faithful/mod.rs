@@ -39,7 +39,7 @@ use crate::certificate::model::Model;
 use crate::certificate::shape;
 use crate::certificate::write::TASK_FORMAT;
 use crate::limits::Limits;
-use crate::pddl::ast::{Action, ActionBody, Condition, ConditionTime, Domain, Effect, Problem};
+use crate::pddl::ast::{Action, ActionBody, ConditionTime, Domain, Effect, Problem};
 use axioms::Axioms;
 use compare::Comparison;
 use invariant::{Invariant, Widening};
@@ -240,12 +240,9 @@ fn requires(world: &World<'_>, action: &Action, arguments: &[u32]) -> std::resul
     match &action.body {
         ActionBody::Instantaneous { precondition, .. } => instances::conjuncts(precondition, &mut atoms),
         ActionBody::Durative { conditions, .. } => {
-            let start: Vec<&Condition> = conditions
-                .iter()
-                .filter(|(time, _)| *time == ConditionTime::AtStart)
-                .map(|(_, condition)| condition)
-                .collect();
-            start.into_iter().for_each(|condition| instances::conjuncts(condition, &mut atoms));
+            for (_, condition) in conditions.iter().filter(|(time, _)| *time == ConditionTime::AtStart) {
+                instances::conjuncts(condition, &mut atoms);
+            }
         }
     }
     let names = action.parameters.iter().map(|parameter| &parameter.identifier.name);

@@ -243,7 +243,7 @@ impl<'r> Reader<'r> {
             return Ok(None);
         };
         let difference = left.minus(&right);
-        let at_least = |linear: Linear, strict: bool| self.invariant.compare(linear, strict);
+        let at_least = |linear: Linear, strict: bool| self.invariant.compare(&linear, strict);
         Ok(Some(match operator {
             Comparison::GreaterOrEqual => at_least(difference, false),
             Comparison::Greater => at_least(difference, true),

@@ -236,7 +236,7 @@ impl<'t> Translation<'t> {
         let clauses = condition.clauses.iter().map(|clause| self.literals(clause, false));
         let comparisons = condition.comparisons.iter().map(|linear| {
             let linear = self.linear(linear, choice, sizes);
-            self.invariant.compare(linear, false)
+            self.invariant.compare(&linear, false)
         });
         Formula::junction(facts.chain(clauses).chain(comparisons), true)
     }
