@@ -322,7 +322,10 @@ fn numbers_of_any_size_are_planned_with() {
       (:goal (p)) (:metric minimize (total-cost)))";
     let outcome = plan(domain, problem, &["-v"]);
     check(&outcome, 0, &["planned by search alone", "2^118", "`dear`"]);
-    assert!(outcome.stdout.contains("cost 340282366920938463463374607431768211456.2: optimal"), "{outcome:?}");
+    assert!(
+        outcome.stdout.contains("cost 340282366920938463463374607431768211456.2: optimal"),
+        "{outcome:?}"
+    );
     // What rests on formulas is refused or warned of.
     let directory = tempfile::tempdir().expect("a directory");
     let certificate = directory.path().join("certificate").display().to_string();
