@@ -98,9 +98,8 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
 /// The best plan with at most `horizon` steps, where no plan at all costs less than `lower`.
 fn within(task: &Task<Rational>, horizon: usize, lower: &Rational, limits: &Limits) -> Solution {
     let (status, plan, proof) = match explore(&task.with_horizon(horizon), limits) {
-        Explored::Optimal(plan) => (Status::Feasible, Some(plan), None),
+        Explored::Optimal(plan) | Explored::Unknown(Some(plan), _) => (Status::Feasible, Some(plan), None),
         Explored::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof),
-        Explored::Unknown(Some(plan), _) => (Status::Feasible, Some(plan), None),
         Explored::Unknown(None, _) => (Status::Unknown, None, None),
     };
     let solution = answer(task, status, plan.as_ref(), proof);

@@ -313,6 +313,27 @@ fn a_bounded_reading_stands_in_for_a_metric_without_a_best_value() {
 }
 
 #[test]
+fn numbers_of_any_size_are_planned_with() {
+    let domain = "(define (domain d) (:requirements :fluents) (:predicates (p)) (:functions (total-cost) (big) (level))
+      (:action dear :parameters () :precondition (<= (level) 1)
+        :effect (and (p) (increase (total-cost) (* (big) (big)))))
+      (:action halve :parameters () :precondition () :effect (and (scale-up (level) 0.5) (increase (total-cost) 0.1))))";
+    let problem = "(define (problem x) (:domain d) (:init (= (total-cost) 0) (= (big) 18446744073709551616) (= (level) 3))
+      (:goal (p)) (:metric minimize (total-cost)))";
+    let outcome = plan(domain, problem, &["-v"]);
+    check(&outcome, 0, &["planned by search alone", "2^118", "`dear`"]);
+    assert!(
+        outcome.stdout.contains("cost 340282366920938463463374607431768211456.2: optimal"),
+        "{outcome:?}"
+    );
+    // What rests on formulas is refused or warned of.
+    let directory = tempfile::tempdir().expect("a directory");
+    let certificate = directory.path().join("certificate").display().to_string();
+    check(&plan(domain, problem, &["--certificate", &certificate]), 0, &["M120", "2^118"]);
+    check(&plan(domain, problem, &["--alternatives", "3"]), 3, &["E304"]);
+}
+
+#[test]
 fn every_solver_proves_the_same() {
     let cheapest = metaplan(&["plan", "missions/ugv.toml"]);
     for solver in encodings::Backend::BUILT_IN {

@@ -58,7 +58,9 @@ pub(crate) fn finish<N: TaskNumber>(
         let name = schema_name(lifted, &ground);
         let kinds = (&mut numbers, &mut costs[..], &mut durations);
         let finished = operator(ground, &atoms, &mut slots, kinds).map_err(|error| error.within(&name))?;
-        finished.into_iter().for_each(|operator| operators.insert(operator));
+        if let Some(operator) = finished {
+            operators.insert(operator);
+        }
     }
     let goal = match &task.goal {
         Some(goal) => condition(goal, &atoms, &mut numbers)?,
