@@ -15,7 +15,7 @@ use crate::bounds::Bounds;
 use crate::error::Error;
 use crate::ground::{Config as GroundConfig, Generality, ground_for};
 use crate::limits::{Interrupted, Limits};
-use crate::number::{Int, Rational};
+use crate::number::{Int, Rational, dense};
 use crate::optimize::Config;
 use crate::pddl::ast::{Domain, Problem};
 use crate::plan::{GroundPlan, decode, metric};
@@ -199,7 +199,7 @@ impl Task<Rational> {
     /// The same task for plans with at most so many steps: each uses up one of a number of them. As in formulas, waits are steps.
     fn with_horizon(&self, horizon: usize) -> Self {
         let mut task = self.clone();
-        let left = NumericId(task.initial.numbers.len() as u32);
+        let left = NumericId(dense(task.initial.numbers.len()));
         task.number_names.push("steps left".to_owned());
         task.initial.numbers.push(Rational::from_big(BigRational::from_integer(horizon.into())));
         let mut after = Linear::variable(left);

@@ -31,7 +31,7 @@ pub struct Exact(Rational);
 
 impl Exact {
     /// A number of a ground task that is so many times what the files write.
-    pub(crate) fn scaled<N: TaskNumber>(value: N, scale: Int) -> Self {
+    pub(crate) fn scaled<N: TaskNumber>(value: &N, scale: Int) -> Self {
         Self(value.to_rational() / Rational::from_integer(scale))
     }
 
@@ -143,9 +143,9 @@ impl Step {
             arguments: arguments(task, operator, choice),
             configuration: configuration(task, operator, choice),
             reconfigured: Vec::new(),
-            start: Exact::scaled(start, task.time_scale),
-            duration: Exact::scaled(duration, task.time_scale),
-            cost: Exact::scaled(cost, task.objective.scale),
+            start: Exact::scaled(&start, task.time_scale),
+            duration: Exact::scaled(&duration, task.time_scale),
+            cost: Exact::scaled(&cost, task.objective.scale),
         }
     }
 
@@ -172,7 +172,7 @@ pub(crate) fn metric<N: TaskNumber>(task: &Task<N>, cost: N) -> Exact {
 impl<N: TaskNumber> Objective<N> {
     /// The metric as the file writes it for a sum of operator costs.
     pub(crate) fn metric(&self, cost: N) -> Exact {
-        Exact::scaled(self.signed(cost + self.offset.clone()), self.scale)
+        Exact::scaled(&self.signed(cost + self.offset.clone()), self.scale)
     }
 
     /// A cost as the file counts it.

@@ -20,7 +20,7 @@ impl Model {
     pub(super) fn state(&self, basic: &[u32], numbers: &[Int]) -> State {
         let mut values = basic.to_vec();
         values.resize(self.variables.len(), 0);
-        let mut state = State { values, numbers: numbers.iter().map(|number| i128::from(*number)).collect() };
+        let mut state = State { values, numbers: numbers.to_vec() };
         self.derive(&mut state);
         state
     }
@@ -76,13 +76,13 @@ impl Model {
 
     /// The value of a quantity for a combination of designs.
     pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> i128 {
-        let mut sum = i128::from(quantity.constant);
+        let mut sum = quantity.constant;
         for (slots, table) in &quantity.tables {
             let mut row = 0;
             for slot in slots {
                 row = row * sizes[*slot as usize] + choice[*slot as usize] as usize;
             }
-            sum += i128::from(self.tables[*table as usize][row]);
+            sum += self.tables[*table as usize][row];
         }
         sum
     }
@@ -90,20 +90,20 @@ impl Model {
     /// A lower bound on a quantity for all combinations of designs.
     pub(super) fn least(&self, quantity: &Quantity) -> i128 {
         let least = |table: &u32| self.tables[*table as usize].iter().min().copied().unwrap_or(0);
-        let tables = quantity.tables.iter().map(|(_, table)| i128::from(least(table)));
-        i128::from(quantity.constant) + tables.sum::<i128>()
+        let tables = quantity.tables.iter().map(|(_, table)| least(table));
+        quantity.constant + tables.sum::<i128>()
     }
 
     /// An upper bound, as `least` is a lower one.
     pub(super) fn most(&self, quantity: &Quantity) -> i128 {
         let most = |table: &u32| self.tables[*table as usize].iter().max().copied().unwrap_or(0);
-        let tables = quantity.tables.iter().map(|(_, table)| i128::from(most(table)));
-        i128::from(quantity.constant) + tables.sum::<i128>()
+        let tables = quantity.tables.iter().map(|(_, table)| most(table));
+        quantity.constant + tables.sum::<i128>()
     }
 
     pub(super) fn linear(&self, linear: &Linear, state: &State, choice: &[u32], sizes: &[usize]) -> i128 {
         let numbers = linear.factors.iter();
-        let numbers = numbers.map(|(number, factor)| state.numbers[*number as usize] * i128::from(*factor));
+        let numbers = numbers.map(|(number, factor)| state.numbers[*number as usize] * *factor);
         self.quantity(&linear.quantity, choice, sizes) + numbers.sum::<i128>()
     }
 

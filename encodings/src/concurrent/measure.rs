@@ -45,7 +45,7 @@ impl Measure {
     /// The metric of the file.
     pub(super) fn metric(&self, total: Int) -> Exact {
         let sign = if self.maximize { -1 } else { 1 };
-        Exact::scaled(sign * (total + self.offset), self.scale)
+        Exact::scaled(&(sign * (total + self.offset)), self.scale)
     }
 }
 
