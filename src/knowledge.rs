@@ -200,31 +200,37 @@ impl Knowledge {
     }
 
     /// What is questionable about the documents.
+    #[must_use]
     pub fn warnings(&self) -> &[Message] {
         &self.warnings
     }
 
     /// What it was read from.
+    #[must_use]
     pub fn sources(&self) -> &Sources {
         &self.sources
     }
 
     /// How many rules there are: those of each document, and those of rule files; axioms do not count.
+    #[must_use]
     pub fn rule_count(&self) -> usize {
         self.rule_count
     }
 
     /// The typed view on what holds now.
+    #[must_use]
     pub fn view(&self) -> View<'_> {
         self.runtime.view()
     }
 
     /// The engine, to ask for facts and derivations.
+    #[must_use]
     pub fn engine(&self) -> &Engine {
         self.runtime.engine()
     }
 
     /// What the robot reports, as updates of the engine.
+    #[must_use]
     pub fn runtime(&self) -> &Runtime {
         &self.runtime
     }
@@ -344,6 +350,7 @@ impl Knowledge {
     }
 
     /// What is stated now and was not when the documents were read, and what is stated no more; sorted.
+    #[must_use]
     pub fn statements(&self) -> Statements {
         let stated = |runtime: &Runtime| -> BTreeSet<Statement> {
             let engine = runtime.engine();
@@ -374,12 +381,14 @@ impl Knowledge {
     }
 
     /// How many names and values have been interned since the documents were read.
+    #[must_use]
     pub fn growth(&self) -> usize {
         let count = |runtime: &Runtime| runtime.engine().symbols().len();
         count(&self.runtime).saturating_sub(count(&self.origin))
     }
 
     /// Whether some attribute type has this local name or IRI.
+    #[must_use]
     pub fn has_attribute(&self, name: &str) -> bool {
         self.view().attribute_types().iter().any(|attribute| attribute.name == name || attribute.iri == name)
     }
@@ -404,11 +413,13 @@ impl Knowledge {
     }
 
     /// What follows and is not stated, in the order of its N-Triples.
+    #[must_use]
     pub fn inferred(&self) -> Vec<Fact> {
         self.engine().facts().filter(|fact| !self.engine().is_asserted(fact)).collect()
     }
 
     /// All contradictions; empty if the knowledge is consistent.
+    #[must_use]
     pub fn contradictions(&self) -> Vec<Contradiction> {
         let symbols = self.engine().symbols();
         let violations = self.engine().violations().into_iter();

@@ -116,11 +116,13 @@ impl Manifest {
     }
 
     /// The manifest's own name.
+    #[must_use]
     pub fn file(&self) -> &str {
         &self.file
     }
 
     /// The knowledge base's files.
+    #[must_use]
     pub fn sources(&self) -> Sources {
         let knowledge = &self.knowledge;
         let all = |paths: &[PathBuf]| paths.iter().map(|path| self.path(path)).collect();
@@ -140,11 +142,13 @@ impl Manifest {
     }
 
     /// The domain file.
+    #[must_use]
     pub fn domain(&self) -> PathBuf {
         self.path(&self.planning.domain)
     }
 
     /// The problem file.
+    #[must_use]
     pub fn problem(&self) -> PathBuf {
         self.path(&self.planning.problem)
     }

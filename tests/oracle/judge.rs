@@ -399,10 +399,11 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     else {
         return;
     };
-    if let Some(bound) = solution.lower_bound.as_ref().map(rational) {
-        if kind.is_none() && compare(case.maximize, found, &bound).is_lt() {
-            tally.fail(case, "false: bound", &format!("{claim}, bound {bound}"));
-        }
+    if let Some(bound) = solution.lower_bound.as_ref().map(rational)
+        && kind.is_none()
+        && compare(case.maximize, found, &bound).is_lt()
+    {
+        tally.fail(case, "false: bound", &format!("{claim}, bound {bound}"));
     }
 }
 
@@ -468,7 +469,7 @@ fn check_certificate(
         (None, true) => tally.fail(case, "A FALSE CLAIM IS VERIFIED", &format!("{:?}", report.claim)),
         (None, false) => tally.count("certificate: verified"),
         (Some((part, reason)), true) => {
-            tally.count(format!("certificate of a false claim fails: {part}: {reason:.40}"))
+            tally.count(format!("certificate of a false claim fails: {part}: {reason:.40}"));
         }
         (Some(("limits", _)), false) => tally.count("certificate: limit"),
         (Some((part, reason)), false) => {

@@ -41,7 +41,7 @@ fn certified(example: &Example) -> (Certificate, String) {
         .unwrap_or_else(|errors| panic!("{}: {errors:?}", example.name));
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     let cost = solution.plan.as_ref().map(|plan| &plan.cost);
-    let cost = cost.map(|cost| cost.to_rational());
+    let cost = cost.map(metaplan_encodings::Exact::to_rational);
     assert_eq!(cost, example.optimum.map(fraction), "{}", example.name);
     let certificate = certify(&task, &solution, &Limits::none())
         .unwrap_or_else(|| panic!("{}: no certificate", example.name));

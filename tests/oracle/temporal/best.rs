@@ -31,6 +31,7 @@ pub type Schedule = Vec<(usize, Q, Q)>;
 
 /// What is true, given the best way in a graph of all plans but the empty one, whose value is given if it is a plan. `open` if
 /// the graph has not all plans.
+#[allow(clippy::type_complexity)]
 pub fn judged(
     world: &World,
     optimum: Optimum,

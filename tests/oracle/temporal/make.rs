@@ -339,9 +339,9 @@ impl Maker {
             let function = self.pick(&[LEVEL, COST]);
             let effect = Effect::Change(Operation::Increase, Fluent { function, terms: Vec::new() }, operand);
             if self.random.bool() {
-                start.effects.push(effect)
+                start.effects.push(effect);
             } else {
-                end.effects.push(effect)
+                end.effects.push(effect);
             }
             self.task.actions[at] = action;
         }

@@ -46,6 +46,7 @@ fn known(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
     steps.iter().map(step).collect()
 }
 
+#[allow(clippy::needless_pass_by_value)]
 fn obstacle(obstacle: Obstacle) -> String {
     match obstacle {
         Obstacle::Blocked(reason) => reason.to_owned(),

@@ -326,7 +326,7 @@ impl Task {
                 .collect::<String>()
         };
         let _ = write!(text, ")\n (:predicates{})\n", declared(&self.predicates));
-        let _ = write!(text, " (:functions{})\n", declared(&self.functions));
+        let _ = writeln!(text, " (:functions{})", declared(&self.functions));
         for axiom in &self.axioms {
             let (name, arity) = &self.predicates[axiom.predicate];
             let arguments: String = (0..*arity).map(|at| format!(" ?v{at} - object")).collect();

@@ -201,7 +201,7 @@ impl Search<'_> {
             at.ended = true;
             match self.world.happening(instance, End::Finish, &state) {
                 Ok(end) if at.happenings.iter().all(|other| !other.interferes(&end)) => {
-                    at.happenings.push(end)
+                    at.happenings.push(end);
                 }
                 Err(Obstacle::TooLarge) => return self.open = true,
                 _ => return,
