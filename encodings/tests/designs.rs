@@ -23,6 +23,7 @@ fn answer(solution: &Solution) -> Option<(String, Vec<String>)> {
     Some((plan.cost.to_string(), plan.steps.iter().map(step).collect()))
 }
 
+#[allow(clippy::unnecessary_wraps)]
 fn found(cost: &str, steps: &[&str]) -> Option<(String, Vec<String>)> {
     Some((cost.to_owned(), steps.iter().map(|step| (*step).to_owned()).collect()))
 }

@@ -1,6 +1,8 @@
 //! Tasks whose numbers no scale makes integers: random ones against all sequences of actions, executed in big rationals by the
 //! definition of their effects, and cases of known cost. The validator executes every plan.
 
+#![allow(clippy::format_collect, clippy::print_stderr)]
+
 mod random;
 
 use std::collections::HashMap;

@@ -1,4 +1,6 @@
 //! The live planner against planning anew: the same plan, for random changes of state and availability.
+
+#![allow(clippy::format_collect)]
 #![expect(clippy::print_stdout, reason = "times are what one of these tests is for")]
 
 #[expect(dead_code, reason = "the oracle is for other tests")]
