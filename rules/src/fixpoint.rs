@@ -277,8 +277,12 @@ impl Round<'_> {
                 }
                 block
             }
-            Step::Compare { left, right, equal } => {
-                retain(block, width, |bound| (resolve(*left, bound) == resolve(*right, bound)) == *equal)
+            Step::Compare { left, right, equal: true } => {
+                retain(block, width, |bound| resolve(*left, bound) == resolve(*right, bound))
+            }
+            Step::Compare { left, right, equal: false } => {
+                let symbols = self.symbols.borrow();
+                retain(block, width, |bound| symbols.differ(resolve(*left, bound), resolve(*right, bound)))
             }
         })
     }
