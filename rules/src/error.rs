@@ -143,8 +143,14 @@ pub enum Error {
     BudgetExhausted {
         /// The rule that was being evaluated.
         rule: RuleIdentity,
-        /// In partial matches.
+        /// In steps.
         budget: u64,
+    },
+    /// The evaluation was interrupted; the engine is as it was before the update.
+    #[error("R304 interrupted, last in rule {rule}")]
+    Interrupted {
+        /// The rule that was being evaluated.
+        rule: RuleIdentity,
     },
     /// A fact or rule with a symbol that the engine's interner never gave out.
     #[error("R302 symbol number {index} is not in the engine's symbols")]

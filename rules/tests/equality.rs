@@ -4,7 +4,7 @@ mod text;
 
 use std::collections::BTreeSet;
 
-use metaplan_rules::{Delta, Engine, Symbols, owl_rl, parse_rules};
+use metaplan_rules::{Delta, Engine, Limits, Symbols, owl_rl, parse_rules};
 use text::{fact, facts, prefixes, show_violation};
 
 fn engine(rules: &str, stated: &str) -> Engine {
@@ -116,7 +116,9 @@ fn an_update_that_is_stopped_leaves_everything_as_it_was() {
     let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
     let stated = facts(&mut symbols, "sameAs(a, b), p(a), p(c)");
     let program = owl_rl::with_equality(&program, &mut symbols);
-    let mut engine = Engine::with_step_budget(symbols, program, stated, 1000).expect("nothing to count");
+    let mut engine =
+        Engine::with_limits(symbols, program, stated, Limits { steps: 1000, ..Limits::default() })
+            .expect("nothing to count");
     let before = engine.facts().collect::<Vec<_>>();
     let (insert, delete) = (vec![fact(&mut engine, "go(c)")], vec![fact(&mut engine, "sameAs(a, b)")]);
     engine.apply(Delta { insert, delete }).expect_err("it never ends");

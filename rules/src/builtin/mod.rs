@@ -272,7 +272,7 @@ impl BuiltIn {
             Self::DataRange => matches!(right, Literal::Uri(datatype) if left.is_in(datatype)),
             Self::OutsideDataRange => {
                 matches!(right, Literal::Uri(datatype) if left.membership(datatype) == Some(false))
-            },
+            }
             Self::Equal => order() == Some(Ordering::Equal),
             // SWRL defines it as the negation of `equal`; what has no value satisfies neither.
             Self::NotEqual => {

@@ -97,7 +97,7 @@ impl Equality {
     /// Pairs with a literal that is not the other side.
     pub fn clashes(&self, engine: &Engine) -> Vec<Fact> {
         let rows = engine.matching_rows(self.same, &[None, None]);
-        let clashes = rows.filter(|row| row[0] != row[1]);
+        let clashes = rows.filter(|row| engine.symbols.differ(row[0], row[1]));
         clashes.map(|row| Fact::new(self.same, row.iter().copied())).collect()
     }
 }

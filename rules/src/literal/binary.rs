@@ -58,7 +58,9 @@ pub(super) fn base64(bytes: &[u8]) -> String {
 pub(super) fn recurring(text: &str, local: &str) -> Option<Literal> {
     let (body, zone) = super::temporal::split_zone(text)?;
     let number = |part: &str, range: std::ops::RangeInclusive<u32>| {
-        part.len() == 2 && part.bytes().all(|b| b.is_ascii_digit()) && part.parse().is_ok_and(|n| range.contains(&n))
+        part.len() == 2
+            && part.bytes().all(|b| b.is_ascii_digit())
+            && part.parse().is_ok_and(|n| range.contains(&n))
     };
     let year = |part: &str| {
         let digits = part.strip_prefix('-').unwrap_or(part);

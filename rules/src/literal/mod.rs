@@ -155,10 +155,9 @@ impl Literal {
     /// The canonical lexical form.
     pub fn lexical(&self) -> String {
         match self {
-            Self::String(text)
-            | Self::Uri(text)
-            | Self::Language { text, .. }
-            | Self::Recurring(text, _) => text.to_string(),
+            Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
+                text.to_string()
+            }
             Self::Hexadecimal(bytes) => binary::hexadecimal(bytes),
             Self::Base64(bytes) => binary::base64(bytes),
             Self::Boolean(value) => value.to_string(),
