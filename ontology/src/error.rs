@@ -84,6 +84,16 @@ pub enum Error {
         /// Why not.
         reason: String,
     },
+    /// O112: expressions within expressions, more than the reader takes.
+    #[error("{}: error[O112]: expressions are nested more than {deepest} deep", place(file, position.as_ref()))]
+    TooDeep {
+        /// The document.
+        file: String,
+        /// Where, if the syntax shows it.
+        position: Option<Position>,
+        /// How deep they may be.
+        deepest: usize,
+    },
     /// O106: a name that the knowledge base does not have.
     #[error("error[O106]: the knowledge base has no {kind} `{name}`; it has {}", listed(known))]
     Unknown {
@@ -143,6 +153,7 @@ impl Error {
             Self::Exists { .. } => "O108",
             Self::Engine(_) => "O109",
             Self::NotANumber { .. } => "O110",
+            Self::TooDeep { .. } => "O112",
             Self::Unwritable { .. } => "O111",
         }
     }
@@ -151,7 +162,7 @@ impl Error {
     pub fn position(&self) -> Option<&Position> {
         match self {
             Self::Malformed { position, .. } => Some(position),
-            Self::UnresolvedImport { position, .. } => position.as_ref(),
+            Self::UnresolvedImport { position, .. } | Self::TooDeep { position, .. } => position.as_ref(),
             _ => None,
         }
     }

@@ -12,7 +12,7 @@ pub const DEFAULT_STEP_BUDGET: u64 = 10_000_000_000;
 
 /// The steps that a value costs which a recursive rule computes and nothing has named before: nothing but the budget ends
 /// a rule that counts, and its rounds are dear.
-const VALUE_STEPS: u64 = 10_000;
+const VALUE_STEPS: u64 = 25_000;
 
 /// The caller is asked after so many rows at most.
 const ROWS_BETWEEN_QUESTIONS: u64 = 1 << 14;
@@ -21,7 +21,7 @@ const ROWS_BETWEEN_QUESTIONS: u64 = 1 << 14;
 #[derive(Clone, Debug)]
 pub struct Limits {
     /// How many steps one update may take. A step extends one partial match of a rule's body; a value that a recursive rule
-    /// computes for the first time costs 10,000.
+    /// computes for the first time costs 25,000.
     pub steps: u64,
     /// Asked every few thousand rows, which is some microseconds to a millisecond apart.
     pub interrupt: Option<Interrupt>,

@@ -19,7 +19,7 @@ use crate::names::Names;
 use crate::normalize::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
 use crate::owl::{
     ANONYMOUS, AnnotatedAxiom, Annotation, AnnotationValue, Argument, Atom, Axiom, Bound, Characteristic,
-    ClassExpression, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Rule,
+    ClassExpression, DataRange, EntityKind, INVERSE, Iri, Literal, ObjectPropertyExpression, Rule,
 };
 use crate::read::Parts;
 use crate::vocab::{rdfs, swrla};
@@ -51,6 +51,7 @@ pub(crate) fn build(
     for annotated in ontology {
         builder.component(annotated.component, annotated.ann);
     }
+    let unread = builder.leftovers(&rest);
     let Builder { mut parts, mut rules, .. } = builder;
     rules.sort_by_key(|(index, _)| *index);
     parts.rules =
@@ -61,7 +62,7 @@ pub(crate) fn build(
     parts.axioms.dedup();
     parts.annotations.sort();
     parts.annotations.dedup();
-    parts.warnings.extend(leftovers(&rest));
+    parts.warnings.extend(unread);
     Ok(parts)
 }
 
@@ -240,6 +241,13 @@ impl Builder {
     }
 
     fn object(&mut self, property: &ho::ObjectPropertyExpression<RcStr>) -> ObjectPropertyExpression {
+        let name = match property {
+            ho::ObjectPropertyExpression::ObjectProperty(iri)
+            | ho::ObjectPropertyExpression::InverseObjectProperty(iri) => iri,
+        };
+        if let Some(inverse) = name.strip_prefix(INVERSE) {
+            return ObjectPropertyExpression::Inverse(self.iri(inverse));
+        }
         match property {
             ho::ObjectPropertyExpression::ObjectProperty(iri) => {
                 ObjectPropertyExpression::Property(self.iri(iri))
@@ -397,6 +405,25 @@ impl Builder {
         })
     }
 
+    /// One warning for each thing that horned-owl could not place.
+    fn leftovers(&mut self, rest: &IncompleteParse<RcStr>) -> Vec<Warning> {
+        let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
+            format!("{} {} {}", term(subject), term(predicate), term(object))
+        };
+        let simple = rest.simple.iter().map(|found| triple(found.triple()));
+        let nodes = rest.bnode.iter().flat_map(|found| found.vec_triple().iter().map(triple));
+        let lists = rest.bnode_seq.iter().map(|items| {
+            let items: Vec<_> = items.iter().map(term).collect();
+            format!("the list ({})", items.join(" "))
+        });
+        let classes =
+            rest.class_expression.iter().map(|class| format!("the class expression {}", self.class(class)));
+        let annotations = rest.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
+        let statements = simple.chain(nodes).chain(lists).chain(classes).chain(annotations);
+        let reason = || "part of no axiom or rule".to_owned();
+        statements.map(|statement| Warning::Unread { statement, reason: reason() }).collect()
+    }
+
     fn key(&mut self, key: &ho::HasKey<RcStr>) -> Axiom {
         let (mut objects, mut data) = (Vec::new(), Vec::new());
         for property in &key.vpe {
@@ -415,6 +442,7 @@ impl Builder {
 fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
     Some(match component {
         Component::DeclareClass(d) => (EntityKind::Class, &*d.0),
+        Component::DeclareObjectProperty(d) if d.0.starts_with(INVERSE) => return None,
         Component::DeclareObjectProperty(d) => (EntityKind::ObjectProperty, &*d.0),
         Component::DeclareDataProperty(d) => (EntityKind::DataProperty, &*d.0),
         Component::DeclareAnnotationProperty(d) if !d.0.starts_with(ORIGIN) => {
@@ -424,24 +452,6 @@ fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
         Component::DeclareNamedIndividual(d) => (EntityKind::NamedIndividual, &*d.0),
         _ => return None,
     })
-}
-
-/// One warning for each thing that horned-owl could not place.
-fn leftovers(rest: &IncompleteParse<RcStr>) -> Vec<Warning> {
-    let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
-        format!("{} {} {}", term(subject), term(predicate), term(object))
-    };
-    let simple = rest.simple.iter().map(|found| triple(found.triple()));
-    let nodes = rest.bnode.iter().flat_map(|found| found.vec_triple().iter().map(triple));
-    let lists = rest.bnode_seq.iter().map(|items| {
-        let items: Vec<_> = items.iter().map(term).collect();
-        format!("the list ({})", items.join(" "))
-    });
-    let classes = rest.class_expression.iter().map(|class| format!("the class expression {class:?}"));
-    let annotations = rest.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
-    let statements = simple.chain(nodes).chain(lists).chain(classes).chain(annotations);
-    let reason = || "part of no axiom or rule".to_owned();
-    statements.map(|statement| Warning::Unread { statement, reason: reason() }).collect()
 }
 
 fn term(term: &Term<RcStr>) -> String {

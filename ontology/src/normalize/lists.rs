@@ -1,17 +1,42 @@
 //! Axioms that lie in lists: `AllDisjointClasses` and `AllDisjointProperties` into pairs, a list that several axioms
 //! share into one copy each, property chains that are not lists taken away.
 
-use oxrdf::{NamedOrBlankNode, Term};
+use oxrdf::{NamedNode, NamedOrBlankNode, Term};
 
 use crate::error::Warning;
 use crate::graph::{Graph, subject_of};
+use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression};
 use crate::vocab::{owl, rdf};
 
-pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
+/// Returns the axioms that need no reader.
+pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<AnnotatedAxiom> {
+    let disjoint = disjoint_classes(graph);
     pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);
     pairs(graph, owl::ALL_DISJOINT_PROPERTIES, owl::PROPERTY_DISJOINT_WITH, warnings);
     check_chains(graph, warnings);
     unshare(graph);
+    disjoint
+}
+
+/// So many classes are still made disjoint by pairs.
+const PAIRS: usize = 16;
+
+/// Takes the disjointness of many named classes, for which pairs would be too many.
+fn disjoint_classes(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
+    let mut axioms = Vec::new();
+    for (_, node) in graph.instances(owl::ALL_DISJOINT_CLASSES) {
+        let Ok(list) = graph.object(&node, owl::MEMBERS).and_then(|head| graph.list(head)) else { continue };
+        let class = |item: &Term| Some(ClassExpression::Class(crate::read::iri_of(item)?.into()));
+        let classes: Option<Vec<_>> = list.items.iter().map(class).collect();
+        let Some(classes) = classes.filter(|classes| classes.len() > PAIRS) else { continue };
+        for item in list.items.iter().filter_map(subject_of) {
+            graph.state(&item, rdf::TYPE, NamedNode::new_unchecked(owl::CLASS));
+        }
+        axioms.push(AnnotatedAxiom { axiom: Axiom::DisjointClasses(classes), annotations: Vec::new() });
+        let own = graph.of(&node).map(|(index, _)| index).chain(list.spine.iter().copied()).collect();
+        take(graph, own);
+    }
+    axioms
 }
 
 /// Replaces each `class` axiom by `predicate` between all pairs of its members.

@@ -92,7 +92,8 @@ fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec
     let (documents, mut warnings) = closure(roots, options, &mut texts)?;
     let sources: Vec<Source> = documents.iter().map(source).collect();
     let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
-    let Normal { ntriples, plain, names, rules, warnings: more } = normalize::normalize(documents);
+    let Normal { ntriples, plain, names, rules, warnings: more } =
+        normalize::normalize(documents).map_err(|error| vec![error])?;
     warnings.extend(more);
     let parts = horned::build(&ntriples, &about, &rules, plain, names)
         .map_err(|reason| vec![Error::NotAnOntology { reason }])?;
