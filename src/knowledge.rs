@@ -8,7 +8,7 @@ use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::{self, Status};
 use ontology::{Equality, Ontology, ReadOptions};
-use rules::{Delta, Engine, Fact, Literal, Prefixes, Program, Symbols, Value};
+use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Symbols, Value};
 use serde::{Deserialize, Serialize};
 
 use crate::message::Message;
@@ -27,6 +27,8 @@ pub struct Sources {
     pub rules: Vec<String>,
     /// Where imports are looked for.
     pub options: ReadOptions,
+    /// How far conclusions are drawn, at once and after each update.
+    pub limits: Limits,
 }
 
 /// Knowledge about a robot: what is stated, and what follows.
@@ -134,13 +136,11 @@ impl Stated {
                 return Err(errors);
             }
         };
-        let lowered = ontology::lower_with(&ontology, equality, &mut symbols);
+        let rule_count = ontology.rules.len() + own.len();
+        let lowered = ontology::lower_together(&ontology, own, equality, &mut symbols);
         let warnings =
             ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
-        let rule_count = ontology.rules.len() + own.len();
-        let mut program = lowered.program;
-        program.rules.extend(own);
-        Ok(Self { symbols, program, facts: lowered.facts, ontology, rule_count, warnings })
+        Ok(Self { symbols, program: lowered.program, facts: lowered.facts, ontology, rule_count, warnings })
     }
 
     /// Changes what is stated.
@@ -177,7 +177,7 @@ impl Knowledge {
     pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
         let Stated { symbols, program, facts, ontology, rule_count, mut warnings } =
             Stated::read(sources, equality)?;
-        let engine = Engine::new(symbols, program, facts)
+        let engine = Engine::with_limits(symbols, program, facts, sources.limits.clone())
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let mistakes = ontology::tomasys::check(&ontology, &engine);
         warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
@@ -423,9 +423,21 @@ impl Knowledge {
                     }
                     other => format!("{other:?}"),
                 },
-                facts: violation.supports.iter().map(|fact| fact.display(symbols).to_string()).collect(),
+                facts: violation.supports.iter().map(|fact| shown(fact, symbols)).collect(),
             })
             .collect()
+    }
+}
+
+/// A fact as text; that an individual is a member of a group is in words.
+fn shown(fact: &Fact, symbols: &Symbols) -> String {
+    let name = symbols.value(fact.predicate).as_name().unwrap_or_default();
+    match fact.arguments[..] {
+        [member, number] if name.starts_with(ontology::INTERNAL) => {
+            let number = symbols.value(number).as_literal().map(Literal::lexical).unwrap_or_default();
+            format!("{} is member {number} of those that exclude each other", symbols.value(member))
+        }
+        _ => fact.display(symbols).to_string(),
     }
 }
 

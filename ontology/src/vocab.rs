@@ -46,6 +46,7 @@ vocabulary! {
         TOP_OBJECT_PROPERTY = "topObjectProperty", TOP_DATA_PROPERTY = "topDataProperty",
         BOTTOM_OBJECT_PROPERTY = "bottomObjectProperty", BOTTOM_DATA_PROPERTY = "bottomDataProperty",
         SAME_AS = "sameAs", DIFFERENT_FROM = "differentFrom", MEMBERS = "members",
+        DISTINCT_MEMBERS = "distinctMembers",
         ALL_DISJOINT_CLASSES = "AllDisjointClasses", ALL_DISJOINT_PROPERTIES = "AllDisjointProperties",
         DISJOINT_WITH = "disjointWith", PROPERTY_DISJOINT_WITH = "propertyDisjointWith",
         EQUIVALENT_CLASS = "equivalentClass", EQUIVALENT_PROPERTY = "equivalentProperty",

@@ -164,6 +164,9 @@ struct Imports {
     /// A directory to look for imports in, with those below it (repeatable).
     #[arg(long, value_name = "DIR", value_parser = existing_directory)]
     directory: Vec<PathBuf>,
+    /// Goes on with a warning where an import is found nowhere.
+    #[arg(long)]
+    ignore_missing_imports: bool,
 }
 
 impl Imports {
@@ -171,6 +174,7 @@ impl Imports {
         ReadOptions {
             catalogs: self.catalog.clone(),
             directories: self.directory.clone(),
+            allow_missing_imports: self.ignore_missing_imports,
             ..ReadOptions::default()
         }
     }
@@ -194,8 +198,9 @@ impl Situation {
             [manifest] => {
                 let imports = &self.imports;
                 let none = self.knowledge.is_empty() && self.rules.is_empty();
-                if !(none && imports.catalog.is_empty() && imports.directory.is_empty()) {
-                    let text = "`--kb`, `--rules`, `--catalog` and `--directory` go with DOMAIN and PROBLEM; \
+                let here = imports.catalog.is_empty() && imports.directory.is_empty();
+                if !(none && here && !imports.ignore_missing_imports) {
+                    let text = "`--kb`, `--rules` and where imports lie go with DOMAIN and PROBLEM; \
                                 a mission's manifest names its own";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
@@ -232,6 +237,7 @@ impl Situation {
                         documents: self.knowledge.clone(),
                         rules,
                         options: self.imports.options(),
+                        ..Sources::default()
                     })
                 });
                 Mission::new("", knowledge, Bindings::default(), source(domain), source(problem))?

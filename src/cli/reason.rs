@@ -7,7 +7,7 @@ use clap::Args;
 use metaplan::knowledge::{Contradiction, Knowledge, Sources};
 use metaplan::message::Message;
 use ontology::Equality;
-use rules::{Delta, Value};
+use rules::{DEFAULT_STEP_BUDGET, Delta, Limits, Value};
 use serde_json::json;
 
 use crate::cli::{Common, Exit, Failure, Format, Imports, output, setting};
@@ -38,6 +38,9 @@ pub struct Arguments {
     /// Two names never stand for one individual, as in databases and in PDDL; in OWL they may.
     #[arg(long)]
     unique_names: bool,
+    /// How many steps conclusions may take; a rule that never ends is named when they are used up.
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_STEP_BUDGET)]
+    step_limit: u64,
 }
 
 /// Runs the command.
@@ -79,7 +82,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 fn read(arguments: &Arguments) -> Result<Knowledge, Failure> {
     let equality = if arguments.unique_names { Equality::UniqueNames } else { Equality::Owl };
     let (documents, rules) = (arguments.documents.clone(), arguments.rules.clone());
-    let sources = Sources { documents, rules, options: arguments.imports.options() };
+    let limits = Limits { steps: arguments.step_limit, ..Limits::default() };
+    let sources = Sources { documents, rules, options: arguments.imports.options(), limits };
     Ok(Knowledge::read_as(&sources, equality)?)
 }
 

@@ -5,9 +5,8 @@
 
 mod transcribe;
 
-pub(crate) use transcribe::{owl_xml, transcribe};
+pub(crate) use transcribe::{Fault, owl_xml, transcribe};
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use horned_owl::io::ParserConfiguration;
@@ -24,9 +23,31 @@ use crate::owl::{
 use crate::read::Parts;
 use crate::vocab::{rdfs, swrla};
 
+/// The stack on which horned-owl runs, in bytes of address space: it recurses into lists and expressions.
+const STACK: usize = 1 << 29;
+
+/// Runs a reader or writer where long lists do not overflow the stack.
+fn with_stack<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T, String> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);
+        let thread = thread.map_err(|error| format!("there is no room for the OWL reader: {error}"))?;
+        thread.join().map_err(|_| "the OWL reader failed on it".to_owned())
+    })
+}
+
 /// Reads a normalised N-Triples document about the ontology `about`, and adds what it says to `plain`, whose IRIs are
 /// `names`; `origins` says where each rule comes from.
 pub(crate) fn build(
+    ntriples: &[u8],
+    about: &str,
+    origins: &[Origin],
+    plain: Parts,
+    names: Names,
+) -> Result<Parts, String> {
+    with_stack(|| build_here(ntriples, about, origins, plain, names))?
+}
+
+fn build_here(
     ntriples: &[u8],
     about: &str,
     origins: &[Origin],
@@ -44,9 +65,7 @@ pub(crate) fn build(
             )?;
         parser.parse()
     };
-    let (ontology, rest) = catch_unwind(AssertUnwindSafe(reading))
-        .map_err(|_| "the OWL reader failed on it".to_owned())?
-        .map_err(|error| error.to_string())?;
+    let (ontology, rest) = reading().map_err(|error| plain_text(&error.to_string()))?;
     let mut builder = Builder { ontology: about.into(), names, parts: plain, rules: Vec::new() };
     for annotated in ontology {
         builder.component(annotated.component, annotated.ann);
@@ -452,6 +471,15 @@ fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
         Component::DeclareNamedIndividual(d) => (EntityKind::NamedIndividual, &*d.0),
         _ => return None,
     })
+}
+
+/// A message of horned-owl, in which debug forms show IRIs, with the IRIs alone.
+fn plain_text(message: &str) -> String {
+    let Some((what, rest)) = message.split_once(": ").filter(|(_, rest)| rest.contains('"')) else {
+        return message.to_owned();
+    };
+    let names: Vec<_> = rest.split('"').skip(1).step_by(2).map(|name| format!("<{name}>")).collect();
+    format!("{what}: {}", names.join(" "))
 }
 
 fn term(term: &Term<RcStr>) -> String {

@@ -8,7 +8,7 @@ use crate::graph::{Graph, subject_of};
 use crate::vocab::{owl, rdf};
 
 /// Deeper expressions are refused. Real ones are nested less than 20 deep.
-pub(crate) const DEEPEST: usize = 256;
+pub(crate) const DEEPEST: usize = 128;
 
 const NESTS: [&str; 10] = [
     owl::SOME_VALUES_FROM,
@@ -57,10 +57,40 @@ fn depth(graph: &Graph, root: NamedOrBlankNode, depths: &mut FxHashMap<NamedOrBl
             };
             let depth = parts().map(part).max().unwrap_or(0);
             depths.insert(node, depth);
-        } else if depths.insert(node.clone(), 0).is_none() {
+        } else if !depths.contains_key(&node) {
+            depths.insert(node.clone(), 0);
             open.push((node.clone(), true));
             open.extend(parts().map(|(_, part)| (part, false)));
         }
     }
     depths.get(&root).copied().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use oxrdf::{BlankNode, NamedNode, Triple};
+
+    fn nested(depth: usize, outermost_first: bool) -> Graph {
+        let mut levels: Vec<usize> = (0..depth).collect();
+        if !outermost_first {
+            levels.reverse();
+        }
+        let (mut graph, node) =
+            (Graph::default(), |level: usize| BlankNode::new_unchecked(format!("b{level}")));
+        for level in levels {
+            let predicate = NamedNode::new_unchecked(owl::COMPLEMENT_OF);
+            graph.add(Triple::new(node(level), predicate, node(level + 1)));
+        }
+        graph
+    }
+
+    #[test]
+    fn depth_is_counted_in_any_order() {
+        for order in [true, false] {
+            assert_eq!(too_deep(&nested(DEEPEST, order)), None);
+            assert!(too_deep(&nested(DEEPEST + 1, order)).is_some());
+            assert!(too_deep(&nested(20_000, order)).is_some());
+        }
+    }
 }

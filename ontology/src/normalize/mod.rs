@@ -22,6 +22,7 @@ mod lists;
 mod plain;
 mod swrl;
 
+pub(crate) use depth::DEEPEST;
 pub(crate) use swrl::{INDIVIDUAL, ORIGIN, TRUE, VARIABLE};
 
 use crate::error::{Error, Warning};
@@ -84,7 +85,7 @@ pub(crate) fn normalize(documents: Vec<Document>) -> Result<Normal, Error> {
     let ((mut graph, parts), mut warnings) = (merge(documents), Vec::new());
     if let Some(index) = depth::too_deep(&graph) {
         let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);
-        return Err(Error::TooDeep { file: files[part].clone(), position: None, deepest: depth::DEEPEST });
+        return Err(Error::TooDeep { file: files[part].clone(), position: None, deepest: DEEPEST });
     }
     let rules = swrl::rewrite(&mut graph, &parts, &mut warnings);
     forms::rewrite(&mut graph);
