@@ -21,6 +21,7 @@ mod ntriples;
 mod read;
 mod write;
 
+pub mod entail;
 pub mod kb;
 pub mod runtime;
 pub mod tomasys;

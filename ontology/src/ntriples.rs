@@ -1,6 +1,5 @@
 //! Facts as an N-Triples document: sorted, each once, one triple a line.
 
-use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use rules::{Fact, Symbol, Symbols, Value};
@@ -14,7 +13,9 @@ use crate::vocab::{owl, rdf};
 /// Left out are facts that no triple can state (other arities), the relations that [`crate::lower`] invents, and that
 /// an individual is one (an `owl:Thing`), or the same as itself. Anonymous individuals become blank nodes again.
 pub fn ntriples<'a>(symbols: &Symbols, facts: impl IntoIterator<Item = &'a Fact>) -> String {
-    let lines: BTreeSet<String> = facts.into_iter().filter_map(|fact| triple(symbols, fact)).collect();
+    let mut lines: Vec<String> = facts.into_iter().filter_map(|fact| triple(symbols, fact)).collect();
+    lines.sort_unstable();
+    lines.dedup();
     lines.into_iter().fold(String::new(), |mut text, line| {
         // Writing to a string does not fail.
         let _ = writeln!(text, "{line}");

@@ -95,7 +95,7 @@ const FILES: [(&str, Verdict); 62] = [
 ];
 
 /// These two come with the verdicts above, and what stops readers and reasoners.
-const MORE: [(&str, Verdict); 21] = [
+const MORE: [(&str, Verdict); 16] = [
     ("userdt-functional.ttl", Nothing),
     ("zeros.ttl", Inconsistent),
     ("hostile/01-lol.owl", Refused(&["01-lol.owl:1:", "O102", "entit"])),
@@ -108,15 +108,17 @@ const MORE: [(&str, Verdict); 21] = [
     ("hostile/26-empty.owl", Refused(&["26-empty.owl:1:1", "O113", "empty"])),
     ("hostile/28-ws.ttl", Refused(&["28-ws.ttl:1:1", "O113", "empty"])),
     ("hostile/36-product.ttl", Nothing),
-    ("hostile/37-alldiff.ttl", Nothing),
-    ("hostile/38-disjoint.ttl", Nothing),
-    ("hostile/40-trans.ttl", Follows(&["i0 p i400"])),
-    ("hostile/41-maxcard.ttl", Follows(&["i0 sameAs i1", "i7 sameAs i1000"])),
-    ("hostile/42-swrl-runaway.ttl", Endless),
+    ("hostile/37-alldiff.ttl", Inconsistent),
+    ("hostile/38-disjoint.ttl", Inconsistent),
     ("hostile/43-badprefix.ofn", Refused(&["43-badprefix.ofn:2:", "O102", "`foo:`"])),
     ("hostile/47-regex.ttl", Nothing),
-    ("hostile/12-cyc1.ttl", Nothing),
-    ("hostile/12-cyc2.ttl", Nothing),
+];
+
+/// What is much work in any case.
+const MUCH: [(&str, Verdict); 3] = [
+    ("hostile/40-trans.ttl", Follows(&["i0 p i1500", "i1 p i3"])),
+    ("hostile/41-maxcard.ttl", Follows(&["i0 sameAs i1", "i7 sameAs i1000"])),
+    ("hostile/42-swrl-runaway.ttl", Endless),
 ];
 
 /// Rules that go with a file, by its name.
@@ -208,18 +210,15 @@ fn every_file_has_its_verdict() {
         return;
     }
     for (file, verdict) in FILES.iter().chain(&MORE) {
-        println!("{file}");
-        if !matches!(verdict, Endless) {
-            check(file, verdict);
-        }
+        check(file, verdict);
     }
 }
 
 #[test]
 #[cfg_attr(debug_assertions, ignore = "takes a minute without optimisation")]
-fn a_rule_that_never_ends_is_named() {
+fn what_is_much_work_ends() {
     if is_there() {
-        check("hostile/42-swrl-runaway.ttl", &Endless);
+        MUCH.iter().for_each(|(file, verdict)| check(file, verdict));
     }
 }
 
@@ -236,7 +235,7 @@ fn every_file_is_in_the_table() {
             if name.ends_with(".swrl") || name == "hostile" {
                 continue;
             }
-            assert!(FILES.iter().chain(&MORE).any(|(file, _)| *file == name), "{name}");
+            assert!(FILES.iter().chain(&MORE).chain(&MUCH).any(|(file, _)| *file == name), "{name}");
         }
     }
 }
