@@ -2,12 +2,13 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::{self, Status};
-use ontology::{Equality, Ontology, ReadOptions};
+use ontology::{EntityKind, Equality, Iri, Ontology, ReadOptions};
 use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Symbols, Value};
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +16,9 @@ use crate::message::Message;
 
 /// The name under which the shipped co-adaptation rules are asked for.
 pub const COADAPTATION: &str = "coadaptation";
+/// From so many names of one individual on, not all of their pairs are listed.
+const MANY_NAMES: usize = 32;
+
 /// The name under which the shipped rules of the TOMASys metamodel are asked for.
 pub const TOMASYS: &str = "tomasys";
 
@@ -40,6 +44,7 @@ pub struct Knowledge {
     rule_count: usize,
     warnings: Vec<Message>,
     sources: Sources,
+    entities: Arc<[(EntityKind, Iri)]>,
 }
 
 /// A stated fact, with names and values in place of symbols.
@@ -182,8 +187,8 @@ impl Knowledge {
         let mistakes = ontology::tomasys::check(&ontology, &engine);
         warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
         let runtime = Runtime::new(engine, Mode::Retract);
-        let sources = sources.clone();
-        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources })
+        let (sources, entities) = (sources.clone(), ontology.entities.into());
+        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources, entities })
     }
 
     /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
@@ -195,13 +200,18 @@ impl Knowledge {
         let engine = Engine::new(symbols, program, facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let runtime = Runtime::new(engine, Mode::Retract);
-        let sources = Sources::default();
-        Ok(Self { origin: runtime.clone(), runtime, rule_count: 0, warnings: Vec::new(), sources })
+        let (sources, entities) = (Sources::default(), Arc::default());
+        Ok(Self { origin: runtime.clone(), runtime, rule_count: 0, warnings: Vec::new(), sources, entities })
     }
 
     /// What is questionable about the documents.
     pub fn warnings(&self) -> &[Message] {
         &self.warnings
+    }
+
+    /// The classes, properties and individuals that the documents name.
+    pub fn entities(&self) -> &[(EntityKind, Iri)] {
+        &self.entities
     }
 
     /// What it was read from.
@@ -403,9 +413,10 @@ impl Knowledge {
         Ok(ontology::lower(&ontology, self.runtime.engine_mut().symbols_mut()).facts)
     }
 
-    /// What follows and is not stated, in the order of its N-Triples.
+    /// What follows and is not stated, in the order of its N-Triples. That names stand for one individual is said of an
+    /// individual of more than 32 names by the pairs with its first name.
     pub fn inferred(&self) -> Vec<Fact> {
-        self.engine().facts().filter(|fact| !self.engine().is_asserted(fact)).collect()
+        self.engine().facts_in_brief(MANY_NAMES).filter(|fact| !self.engine().is_asserted(fact)).collect()
     }
 
     /// All contradictions; empty if the knowledge is consistent.

@@ -226,8 +226,14 @@ impl Engine {
 
     /// Everything that holds, in the order of symbols.
     pub fn facts(&self) -> impl Iterator<Item = Fact> {
+        self.facts_in_brief(usize::MAX)
+    }
+
+    /// As [`Engine::facts`]; but that names stand for one individual is said of an individual of more than `most` names only
+    /// by the pairs with its first name, from which the others follow.
+    pub fn facts_in_brief(&self, most: usize) -> impl Iterator<Item = Fact> {
         let mut facts: Vec<Fact> = match &self.equality {
-            Some(equality) => equality.facts(self),
+            Some(equality) => equality.facts(self, most),
             None => self.rows_with(0).collect(),
         };
         facts.sort_unstable();

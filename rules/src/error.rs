@@ -56,6 +56,20 @@ pub enum Error {
         /// As written.
         name: String,
     },
+    /// A built-in of a library that the engine does not have.
+    #[error(
+        "{file}:{line}:{column}: R104 built-in <{name}> belongs to a library that the engine does not have"
+    )]
+    ForeignBuiltIn {
+        /// The source as named by the caller.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// In characters, counted from 1.
+        column: u32,
+        /// Its IRI.
+        name: String,
+    },
     /// An atom that SWRL does not have, in text that is to be SWRL.
     #[error("{file}:{line}:{column}: R105 {what} is not SWRL")]
     NotSwrl {

@@ -17,6 +17,7 @@ mod plan_json;
 mod plan_text;
 mod plan_verdict;
 mod reason;
+mod reason_ask;
 mod run;
 mod simulate;
 mod validate;

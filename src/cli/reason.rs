@@ -10,6 +10,7 @@ use ontology::Equality;
 use rules::{DEFAULT_STEP_BUDGET, Delta, Limits, Value};
 use serde_json::json;
 
+use crate::cli::reason_ask::Questions;
 use crate::cli::{Common, Exit, Failure, Format, Imports, output, setting};
 
 /// Arguments of `reason`.
@@ -41,6 +42,8 @@ pub struct Arguments {
     /// How many steps conclusions may take; a rule that never ends is named when they are used up.
     #[arg(long, value_name = "N", default_value_t = DEFAULT_STEP_BUDGET)]
     step_limit: u64,
+    #[command(flatten)]
+    questions: Questions,
 }
 
 /// Runs the command.
@@ -60,6 +63,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     for (attribute, value) in &arguments.set {
         knowledge.measure(attribute, value).map_err(Failure::usage)?;
+    }
+    if let Some(exit) = arguments.questions.answer(&mut knowledge, &arguments.imports, common)? {
+        return Ok(exit);
     }
     let contradictions = knowledge.contradictions();
     match common.format {

@@ -136,6 +136,7 @@ impl Manifest {
                 directories: all(&knowledge.directories),
                 ..ReadOptions::default()
             },
+            ..Sources::default()
         }
     }
 

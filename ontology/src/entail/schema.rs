@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rules::{Delta, Engine, Error, Fact, Symbol};
 
 use super::{Prover, contradiction, edge, member, value};
-use crate::owl::{EntityKind, Iri, ObjectPropertyExpression, Ontology};
+use crate::owl::{EntityKind, Iri, ObjectPropertyExpression};
 use crate::vocab::owl;
 
 /// A class or property and what is above it.
@@ -21,7 +21,7 @@ pub struct SchemaEntity {
     pub empty: Option<String>,
 }
 
-/// The classes, object properties and data properties of an ontology, sorted.
+/// The classes, object properties and data properties among some entities, in their order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Schema {
     /// Classes.
@@ -37,17 +37,22 @@ pub struct Schema {
 ///
 /// # Errors
 /// A rule does not come to an end.
-pub fn schema(engine: &Engine, ontology: &Ontology) -> Result<Schema, Error> {
+pub fn schema(engine: &Engine, named: &[(EntityKind, Iri)]) -> Result<Schema, Error> {
     let mut work = Prover::new(engine)?.base;
     Ok(Schema {
-        classes: entities(&mut work, ontology, EntityKind::Class)?,
-        object_properties: entities(&mut work, ontology, EntityKind::ObjectProperty)?,
-        data_properties: entities(&mut work, ontology, EntityKind::DataProperty)?,
+        classes: entities(&mut work, named, EntityKind::Class)?,
+        object_properties: entities(&mut work, named, EntityKind::ObjectProperty)?,
+        data_properties: entities(&mut work, named, EntityKind::DataProperty)?,
     })
 }
 
-fn entities(work: &mut Engine, ontology: &Ontology, kind: EntityKind) -> Result<Vec<SchemaEntity>, Error> {
-    let names: Vec<&Iri> = ontology.entities(kind).filter(|iri| !iri.starts_with(owl::NS)).collect();
+fn entities(
+    work: &mut Engine,
+    named: &[(EntityKind, Iri)],
+    kind: EntityKind,
+) -> Result<Vec<SchemaEntity>, Error> {
+    let named = named.iter().filter(|(other, iri)| *other == kind && !iri.starts_with(owl::NS));
+    let names: Vec<&Iri> = named.map(|(_, iri)| iri).collect();
     let symbols = names.iter().map(|iri| work.symbols_mut().name(iri)).collect::<BTreeSet<Symbol>>();
     let consistent = contradiction(work).is_none();
     let (mut found, mut above) = (Vec::new(), BTreeMap::new());

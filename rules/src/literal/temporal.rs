@@ -103,21 +103,6 @@ impl Moment {
         add_seconds(&self.seconds, self.zone.unwrap_or(0))
     }
 
-    /// Year, month and day, then hour, minute and second, each where its kind has it, and the time zone as text (empty if
-    /// there is none).
-    pub(crate) fn parts(&self) -> (Option<[i64; 3]>, Option<(i64, i64, Decimal)>, String) {
-        let local = self.local();
-        let (day, _) = split_day(&local);
-        let (year, month, date) = civil_from_days(day);
-        let within = add_seconds(&local, -day * DAY);
-        let (unscaled, scale) = within.parts();
-        let whole = i64::try_from(unscaled / super::ten_to(scale)).unwrap_or(0);
-        let second = add_seconds(&within, -(whole / 60) * 60);
-        let calendar = (self.kind != MomentKind::Time).then_some([year, month, date]);
-        let clock = (self.kind != MomentKind::Date).then_some((whole / 3600, whole / 60 % 60, second));
-        (calendar, clock, self.zone.map(zone_text).unwrap_or_default())
-    }
-
     /// The seconds from another moment of the same kind to this one; `None` where only one has a time zone.
     pub(crate) fn since(&self, other: &Self) -> Option<Duration> {
         let comparable = self.kind == other.kind && self.zone.is_some() == other.zone.is_some();
