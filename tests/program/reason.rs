@@ -133,11 +133,7 @@ fn questions_are_answered() {
         ],
     );
     check(&ask(&["--why", ":tom a :Stone"], ""), 1, &["does not hold"]);
-    check(
-        &ask(&["--why-not", "tom a Stone"], ""),
-        0,
-        &["does not hold", "by rule SubClassOf(<http://x#StoneCat>"],
-    );
+    check(&ask(&["--why-not", "tom a Stone"], ""), 0, &["does not hold", "(SubClassOf(<http://x#StoneCat>"]);
     check(&ask(&["--why", "tim a Cat"], ""), 2, &["nothing is called `tim`"]);
     check(&ask(&["--why", "tom Cat"], ""), 2, &["SUBJECT a CLASS"]);
     for arguments in [&["--schema"][..], &["--why", "tom a Pet"], &["--entails", "zoo.ttl"]] {

@@ -122,8 +122,14 @@ impl Lowering<'_, '_> {
 
     fn axiom(&mut self, axiom: &Axiom) -> Outside {
         match axiom {
-            Axiom::SubClassOf(sub, sup) => self.sub_class(sub, sup),
-            Axiom::EquivalentClasses(classes) => self.equivalent_classes(classes),
+            Axiom::SubClassOf(sub, sup) => {
+                self.sub_class(sub, sup);
+                Ok(())
+            }
+            Axiom::EquivalentClasses(classes) => {
+                self.equivalent_classes(classes);
+                Ok(())
+            }
             Axiom::DisjointClasses(classes) => {
                 self.disjoint_classes(classes, &axiom.to_string());
                 Ok(())
@@ -154,7 +160,8 @@ impl Lowering<'_, '_> {
                 Ok(())
             }
             Axiom::ObjectPropertyCharacteristic(characteristic, property) => {
-                self.characteristic(*characteristic, property)
+                self.characteristic(*characteristic, property);
+                Ok(())
             }
             Axiom::NegativeObjectPropertyAssertion(property, from, to) => {
                 let (from, to) = (self.context.constant(from), self.context.constant(to));
@@ -204,7 +211,7 @@ impl Lowering<'_, '_> {
         Ok(())
     }
 
-    fn sub_class(&mut self, sub: &ClassExpression, sup: &ClassExpression) -> Outside {
+    fn sub_class(&mut self, sub: &ClassExpression, sup: &ClassExpression) {
         let mut variables = Variables::default();
         let x = variables.fresh("x");
         let bodies = class::condition(self.context, sub, x, &mut variables);
@@ -219,14 +226,13 @@ impl Lowering<'_, '_> {
                 self.rule(body, head.clone(), &variables);
             }
         }
-        Ok(())
     }
 
     /// A circle of subclass axioms; the directions that have a rule form are kept.
-    fn equivalent_classes(&mut self, classes: &[ClassExpression]) -> Outside {
-        let next = classes.iter().cycle().skip(1);
-        let results: Vec<_> = classes.iter().zip(next).map(|(sub, sup)| self.sub_class(sub, sup)).collect();
-        results.into_iter().collect()
+    fn equivalent_classes(&mut self, classes: &[ClassExpression]) {
+        for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
+            self.sub_class(sub, sup);
+        }
     }
 
     fn disjoint_classes(&mut self, classes: &[ClassExpression], axiom: &str) {
@@ -262,8 +268,7 @@ impl Lowering<'_, '_> {
         let one = |iri: &Iri| Property::Property(iri.clone());
         if any(self.context, EntityKind::Class) {
             let classes: Vec<_> = entities.iter().cloned().map(ClassExpression::Class).collect();
-            // Between names, both directions have a rule form.
-            let _ = self.equivalent_classes(&classes);
+            self.equivalent_classes(&classes);
         }
         if any(self.context, EntityKind::ObjectProperty) || any(self.context, EntityKind::DataProperty) {
             self.equivalent_properties(&entities.iter().map(one).collect::<Vec<_>>());
@@ -274,7 +279,7 @@ impl Lowering<'_, '_> {
         let text = Axiom::DisjointUnion(class.clone(), parts.to_vec()).to_string();
         let class = ClassExpression::Class(class.clone());
         for part in parts {
-            self.sub_class(part, &class)?;
+            self.sub_class(part, &class);
         }
         self.disjoint_classes(parts, &text);
         Err("that the parts cover the class")
@@ -366,7 +371,7 @@ impl Lowering<'_, '_> {
         Ok(())
     }
 
-    fn characteristic(&mut self, characteristic: Characteristic, property: &Property) -> Outside {
+    fn characteristic(&mut self, characteristic: Characteristic, property: &Property) {
         let mut v = Variables::default();
         let (x, y) = (v.fresh("x"), v.fresh("y"));
         let mut edge = |first, second| self.context.property(property, first, second);
@@ -376,7 +381,7 @@ impl Lowering<'_, '_> {
                 let functional = characteristic == Characteristic::Functional;
                 let pair = if functional { [edge(x, y), edge(x, z)] } else { [edge(y, x), edge(z, x)] };
                 self.context.merge(&self.identity, [y, z], pair.to_vec(), &v);
-                return Ok(());
+                return;
             }
             Characteristic::Irreflexive => (vec![edge(x, x)], Vec::new()),
             Characteristic::Symmetric => (vec![edge(x, y)], vec![edge(y, x)]),
@@ -391,6 +396,5 @@ impl Lowering<'_, '_> {
             }
         };
         self.rule(body, head, &v);
-        Ok(())
     }
 }

@@ -123,7 +123,7 @@ fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, varia
     for atom in &rule.body {
         let argument = match atom {
             Atom::Class(ClassExpression::Class(iri), argument) if &**iri == owl::THING => argument,
-            Atom::SameIndividual(first, second) if matches!(second, Argument::Variable(_)) => first,
+            Atom::SameIndividual(first, Argument::Variable(_)) => first,
             _ => continue,
         };
         if let (Argument::Variable(_), x) = (argument, term(context, argument, variables))

@@ -31,7 +31,7 @@ pub(crate) fn too_deep(graph: &Graph) -> Option<usize> {
         if !NESTS[..8].contains(&triple.predicate.as_str()) {
             continue;
         }
-        if depth(graph, root, &mut depths) >= DEEPEST {
+        if depth(graph, &root, &mut depths) >= DEEPEST {
             return Some(index);
         }
     }
@@ -43,7 +43,7 @@ fn nested(object: &Term) -> Option<NamedOrBlankNode> {
 }
 
 /// The depth of the expression at a node; lists add nothing. A circle counts once round.
-fn depth(graph: &Graph, root: NamedOrBlankNode, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> usize {
+fn depth(graph: &Graph, root: &NamedOrBlankNode, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> usize {
     let mut open = vec![(root.clone(), false)];
     while let Some((node, is_done)) = open.pop() {
         let parts = || {
@@ -63,7 +63,7 @@ fn depth(graph: &Graph, root: NamedOrBlankNode, depths: &mut FxHashMap<NamedOrBl
             open.extend(parts().map(|(_, part)| (part, false)));
         }
     }
-    depths.get(&root).copied().unwrap_or(0)
+    depths.get(root).copied().unwrap_or(0)
 }
 
 #[cfg(test)]

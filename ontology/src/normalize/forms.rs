@@ -152,7 +152,7 @@ fn types(graph: &mut Graph) {
             .of(&node)
             .filter(|(_, triple)| {
                 let is = |class: &&str| is_type(triple, class);
-                expressions.iter().any(|class| is(class)) && !is(&wanted)
+                expressions.iter().any(&is) && !is(&wanted)
             })
             .map(|(index, _)| index)
             .collect();

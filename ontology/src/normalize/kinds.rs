@@ -126,9 +126,8 @@ impl Kinds<'_> {
 }
 
 fn kind_of(used: Use) -> (&'static str, &'static str) {
-    if used.data || (used.literal && !used.object && !used.entity) {
-        (owl::DATATYPE_PROPERTY, "a data property")
-    } else if used.restricted && used.literal && !used.object && !used.individual {
+    let values_only = used.literal && !used.object;
+    if used.data || values_only && (!used.entity || used.restricted && !used.individual) {
         (owl::DATATYPE_PROPERTY, "a data property")
     } else if used.object || used.restricted || (used.individual && !used.entity) {
         (owl::OBJECT_PROPERTY, "an object property")

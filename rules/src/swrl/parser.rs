@@ -10,7 +10,7 @@ use crate::literal::{Literal, XSD, is_datatype};
 use crate::rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
 
-/// Where the built-ins of SWRLTab and SQWRL live.
+/// Where the built-ins of `SWRLTab` and SQWRL live.
 const LIBRARIES: [&str; 2] =
     ["http://swrl.stanford.edu/ontologies/built-ins/", "http://sqwrl.stanford.edu/ontologies/built-ins/"];
 
