@@ -2,19 +2,23 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::{self, Status};
-use ontology::{Equality, Ontology, ReadOptions};
-use rules::{Delta, Engine, Fact, Literal, Prefixes, Program, Symbols, Value};
+use ontology::{EntityKind, Equality, Iri, Ontology, ReadOptions};
+use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Symbols, Value};
 use serde::{Deserialize, Serialize};
 
 use crate::message::Message;
 
 /// The name under which the shipped co-adaptation rules are asked for.
 pub const COADAPTATION: &str = "coadaptation";
+/// From so many names of one individual on, not all of their pairs are listed.
+const MANY_NAMES: usize = 32;
+
 /// The name under which the shipped rules of the TOMASys metamodel are asked for.
 pub const TOMASYS: &str = "tomasys";
 
@@ -27,6 +31,8 @@ pub struct Sources {
     pub rules: Vec<String>,
     /// Where imports are looked for.
     pub options: ReadOptions,
+    /// How far conclusions are drawn, at once and after each update.
+    pub limits: Limits,
 }
 
 /// Knowledge about a robot: what is stated, and what follows.
@@ -38,6 +44,7 @@ pub struct Knowledge {
     rule_count: usize,
     warnings: Vec<Message>,
     sources: Sources,
+    entities: Arc<[(EntityKind, Iri)]>,
 }
 
 /// A stated fact, with names and values in place of symbols.
@@ -134,13 +141,11 @@ impl Stated {
                 return Err(errors);
             }
         };
-        let lowered = ontology::lower_with(&ontology, equality, &mut symbols);
+        let rule_count = ontology.rules.len() + own.len();
+        let lowered = ontology::lower_together(&ontology, own, equality, &mut symbols);
         let warnings =
             ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
-        let rule_count = ontology.rules.len() + own.len();
-        let mut program = lowered.program;
-        program.rules.extend(own);
-        Ok(Self { symbols, program, facts: lowered.facts, ontology, rule_count, warnings })
+        Ok(Self { symbols, program: lowered.program, facts: lowered.facts, ontology, rule_count, warnings })
     }
 
     /// Changes what is stated.
@@ -177,13 +182,13 @@ impl Knowledge {
     pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
         let Stated { symbols, program, facts, ontology, rule_count, mut warnings } =
             Stated::read(sources, equality)?;
-        let engine = Engine::new(symbols, program, facts)
+        let engine = Engine::with_limits(symbols, program, facts, sources.limits.clone())
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let mistakes = ontology::tomasys::check(&ontology, &engine);
         warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
         let runtime = Runtime::new(engine, Mode::Retract);
-        let sources = sources.clone();
-        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources })
+        let (sources, entities) = (sources.clone(), ontology.entities.into());
+        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources, entities })
     }
 
     /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
@@ -195,42 +200,41 @@ impl Knowledge {
         let engine = Engine::new(symbols, program, facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let runtime = Runtime::new(engine, Mode::Retract);
-        let sources = Sources::default();
-        Ok(Self { origin: runtime.clone(), runtime, rule_count: 0, warnings: Vec::new(), sources })
+        let (sources, entities) = (Sources::default(), Arc::default());
+        Ok(Self { origin: runtime.clone(), runtime, rule_count: 0, warnings: Vec::new(), sources, entities })
     }
 
     /// What is questionable about the documents.
-    #[must_use]
     pub fn warnings(&self) -> &[Message] {
         &self.warnings
     }
 
+    /// The classes, properties and individuals that the documents name.
+    pub fn entities(&self) -> &[(EntityKind, Iri)] {
+        &self.entities
+    }
+
     /// What it was read from.
-    #[must_use]
     pub fn sources(&self) -> &Sources {
         &self.sources
     }
 
     /// How many rules there are: those of each document, and those of rule files; axioms do not count.
-    #[must_use]
     pub fn rule_count(&self) -> usize {
         self.rule_count
     }
 
     /// The typed view on what holds now.
-    #[must_use]
     pub fn view(&self) -> View<'_> {
         self.runtime.view()
     }
 
     /// The engine, to ask for facts and derivations.
-    #[must_use]
     pub fn engine(&self) -> &Engine {
         self.runtime.engine()
     }
 
     /// What the robot reports, as updates of the engine.
-    #[must_use]
     pub fn runtime(&self) -> &Runtime {
         &self.runtime
     }
@@ -350,7 +354,6 @@ impl Knowledge {
     }
 
     /// What is stated now and was not when the documents were read, and what is stated no more; sorted.
-    #[must_use]
     pub fn statements(&self) -> Statements {
         let stated = |runtime: &Runtime| -> BTreeSet<Statement> {
             let engine = runtime.engine();
@@ -381,14 +384,12 @@ impl Knowledge {
     }
 
     /// How many names and values have been interned since the documents were read.
-    #[must_use]
     pub fn growth(&self) -> usize {
         let count = |runtime: &Runtime| runtime.engine().symbols().len();
         count(&self.runtime).saturating_sub(count(&self.origin))
     }
 
     /// Whether some attribute type has this local name or IRI.
-    #[must_use]
     pub fn has_attribute(&self, name: &str) -> bool {
         self.view().attribute_types().iter().any(|attribute| attribute.name == name || attribute.iri == name)
     }
@@ -412,14 +413,13 @@ impl Knowledge {
         Ok(ontology::lower(&ontology, self.runtime.engine_mut().symbols_mut()).facts)
     }
 
-    /// What follows and is not stated, in the order of its N-Triples.
-    #[must_use]
+    /// What follows and is not stated, in the order of its N-Triples. That names stand for one individual is said of an
+    /// individual of more than 32 names by the pairs with its first name.
     pub fn inferred(&self) -> Vec<Fact> {
-        self.engine().facts().filter(|fact| !self.engine().is_asserted(fact)).collect()
+        self.engine().facts_in_brief(MANY_NAMES).filter(|fact| !self.engine().is_asserted(fact)).collect()
     }
 
     /// All contradictions; empty if the knowledge is consistent.
-    #[must_use]
     pub fn contradictions(&self) -> Vec<Contradiction> {
         let symbols = self.engine().symbols();
         let violations = self.engine().violations().into_iter();
@@ -434,9 +434,21 @@ impl Knowledge {
                     }
                     other => format!("{other:?}"),
                 },
-                facts: violation.supports.iter().map(|fact| fact.display(symbols).to_string()).collect(),
+                facts: violation.supports.iter().map(|fact| shown(fact, symbols)).collect(),
             })
             .collect()
+    }
+}
+
+/// A fact as text; that an individual is a member of a group is in words.
+fn shown(fact: &Fact, symbols: &Symbols) -> String {
+    let name = symbols.value(fact.predicate).as_name().unwrap_or_default();
+    match fact.arguments[..] {
+        [member, number] if name.starts_with(ontology::INTERNAL) => {
+            let number = symbols.value(number).as_literal().map(Literal::lexical).unwrap_or_default();
+            format!("{} is member {number} of those that exclude each other", symbols.value(member))
+        }
+        _ => fact.display(symbols).to_string(),
     }
 }
 

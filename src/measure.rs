@@ -6,7 +6,6 @@ use num_rational::BigRational;
 
 /// The value of a valid plan of so many steps (waits are none). Without a metric it is the time where the task is
 /// `timed` ([`encodings::Task::is_timed`]), and the number of steps otherwise. None if the metric has no value after the plan.
-#[must_use]
 pub fn measure(problem: &Problem, verdict: &Verdict, steps: usize, timed: bool) -> Option<BigRational> {
     match (&problem.metric, &verdict.metric) {
         (_, Some(metric)) => Some(metric.clone()),

@@ -92,7 +92,6 @@ impl Message {
     }
 
     /// Messages of the PDDL front end, with the source lines that they are about.
-    #[must_use]
     pub fn from_pddl(diagnostics: &[Diagnostic], sources: &[&Source]) -> Vec<Self> {
         let details = |diagnostic: &Diagnostic| Details {
             severity: if diagnostic.severity == Severity::Error { "error" } else { "warning" },
@@ -108,7 +107,6 @@ impl Message {
     }
 
     /// Errors of grounding and encoding.
-    #[must_use]
     pub fn from_encodings(errors: &[encodings::Error], domain: &Source, problem: &Source) -> Vec<Self> {
         let message = |error: &encodings::Error| match error.place() {
             Some(place) => {
@@ -123,7 +121,6 @@ impl Message {
     }
 
     /// An error of reading a knowledge base.
-    #[must_use]
     pub fn from_ontology(error: &ontology::Error) -> Self {
         if let ontology::Error::Engine(error) = error {
             return Self::from_rules(error);
@@ -132,13 +129,11 @@ impl Message {
     }
 
     /// A warning of reading or lowering a knowledge base.
-    #[must_use]
     pub fn from_ontology_warning(warning: &ontology::Warning) -> Self {
         Self::from_text("warning", warning.code(), &warning.to_string())
     }
 
     /// An error in rules.
-    #[must_use]
     pub fn from_rules(error: &rules::Error) -> Self {
         let text = error.to_string();
         let is_code = |word: &&str| word.len() == 4 && word.starts_with('R');
@@ -164,13 +159,11 @@ impl Message {
     }
 
     /// Whether it is an error.
-    #[must_use]
     pub fn is_error(&self) -> bool {
         self.severity == "error"
     }
 
     /// As a terminal shows it, with a line break at its end.
-    #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }

@@ -57,10 +57,19 @@ pub enum Error {
         /// What the parser says.
         message: String,
     },
+    /// O113: the document is in no syntax that is read.
+    #[error("{position}: error[O113]: this is {what}")]
+    OtherSyntax {
+        /// Its start.
+        position: Position,
+        /// What it looks like, and what would be right.
+        what: &'static str,
+    },
     /// O103: an import is found nowhere.
     #[error(
-        "{}: error[O103]: cannot find the import <{import}>; name a directory that contains it, \
-         or a catalog with <uri name=\"{import}\" uri=\"FILE\"/>", place(file, position.as_ref())
+        "{}: error[O103]: cannot find the import <{import}>; name a directory that contains it \
+         (--directory), or a catalog with <uri name=\"{import}\" uri=\"FILE\"/> (--catalog), or go on without it \
+         (--ignore-missing-imports)", place(file, position.as_ref())
     )]
     UnresolvedImport {
         /// The document that imports.
@@ -79,10 +88,24 @@ pub enum Error {
         reason: String,
     },
     /// O105: the merged documents do not form an OWL ontology.
-    #[error("error[O105]: the documents do not form an OWL ontology: {reason}")]
+    #[error("{}: error[O105]: the documents do not form an OWL ontology: {reason}", place(file, position.as_ref()))]
     NotAnOntology {
+        /// The first document.
+        file: String,
+        /// Where a document names what is wrong.
+        position: Option<Position>,
         /// Why not.
         reason: String,
+    },
+    /// O112: expressions within expressions, more than the reader takes.
+    #[error("{}: error[O112]: expressions are nested more than {deepest} deep", place(file, position.as_ref()))]
+    TooDeep {
+        /// The document.
+        file: String,
+        /// Where, if the syntax shows it.
+        position: Option<Position>,
+        /// How deep they may be.
+        deepest: usize,
     },
     /// O106: a name that the knowledge base does not have.
     #[error("error[O106]: the knowledge base has no {kind} `{name}`; it has {}", listed(known))]
@@ -135,6 +158,7 @@ impl Error {
         match self {
             Self::Unreadable { .. } => "O101",
             Self::Malformed { .. } => "O102",
+            Self::OtherSyntax { .. } => "O113",
             Self::UnresolvedImport { .. } => "O103",
             Self::Catalog { .. } => "O104",
             Self::NotAnOntology { .. } => "O105",
@@ -143,6 +167,7 @@ impl Error {
             Self::Exists { .. } => "O108",
             Self::Engine(_) => "O109",
             Self::NotANumber { .. } => "O110",
+            Self::TooDeep { .. } => "O112",
             Self::Unwritable { .. } => "O111",
         }
     }
@@ -150,8 +175,10 @@ impl Error {
     /// The place in a document, where the error has one.
     pub fn position(&self) -> Option<&Position> {
         match self {
-            Self::Malformed { position, .. } => Some(position),
-            Self::UnresolvedImport { position, .. } => position.as_ref(),
+            Self::Malformed { position, .. } | Self::OtherSyntax { position, .. } => Some(position),
+            Self::UnresolvedImport { position, .. }
+            | Self::TooDeep { position, .. }
+            | Self::NotAnOntology { position, .. } => position.as_ref(),
             _ => None,
         }
     }

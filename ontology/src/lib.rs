@@ -21,12 +21,13 @@ mod ntriples;
 mod read;
 mod write;
 
+pub mod entail;
 pub mod kb;
 pub mod runtime;
 pub mod tomasys;
 
 pub use error::{Error, Position, Warning};
-pub use lower::{AXIOM_SOURCE, Equality, INTERNAL, Lowered, lower, lower_with};
+pub use lower::{AXIOM_SOURCE, Equality, INTERNAL, Lowered, lower, lower_together, lower_with};
 pub use ntriples::ntriples;
 pub use owl::*;
 pub use read::{ReadOptions, Syntax, read_files, read_text};

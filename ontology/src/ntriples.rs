@@ -1,6 +1,5 @@
 //! Facts as an N-Triples document: sorted, each once, one triple a line.
 
-use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use rules::{Fact, Symbol, Symbols, Value};
@@ -12,9 +11,11 @@ use crate::vocab::{owl, rdf};
 /// Writes facts about individuals: a fact with one argument as `rdf:type`, one with two as a property.
 ///
 /// Left out are facts that no triple can state (other arities), the relations that [`crate::lower`] invents, and that
-/// an individual is the same as itself. Anonymous individuals become blank nodes again.
+/// an individual is one (an `owl:Thing`), or the same as itself. Anonymous individuals become blank nodes again.
 pub fn ntriples<'a>(symbols: &Symbols, facts: impl IntoIterator<Item = &'a Fact>) -> String {
-    let lines: BTreeSet<String> = facts.into_iter().filter_map(|fact| triple(symbols, fact)).collect();
+    let mut lines: Vec<String> = facts.into_iter().filter_map(|fact| triple(symbols, fact)).collect();
+    lines.sort_unstable();
+    lines.dedup();
     lines.into_iter().fold(String::new(), |mut text, line| {
         // Writing to a string does not fail.
         let _ = writeln!(text, "{line}");
@@ -25,6 +26,7 @@ pub fn ntriples<'a>(symbols: &Symbols, facts: impl IntoIterator<Item = &'a Fact>
 fn triple(symbols: &Symbols, fact: &Fact) -> Option<String> {
     let predicate = symbols.value(fact.predicate).as_name().filter(|name| !name.starts_with(INTERNAL))?;
     match fact.arguments[..] {
+        [_] if predicate == owl::THING => None,
         [subject] => Some(format!("{} <{}> <{predicate}> .", node(symbols, subject)?, rdf::TYPE)),
         [subject, object] if subject == object && predicate == owl::SAME_AS => None,
         [subject, object] => {

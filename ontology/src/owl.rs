@@ -19,6 +19,9 @@ pub type Iri = Arc<str>;
 /// What the IRIs of anonymous individuals start with.
 pub const ANONYMOUS: &str = "urn:metaplan:anonymous:";
 
+/// What the name of a property starts with that stands for the inverse of another one, on the way through horned-owl.
+pub(crate) const INVERSE: &str = "urn:metaplan:inverse:";
+
 /// A literal as written; [`rules::Literal`] gives it a value.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Literal {

@@ -44,7 +44,9 @@ vocabulary! {
         ANNOTATION_PROPERTY = "AnnotationProperty", NAMED_INDIVIDUAL = "NamedIndividual",
         FUNCTIONAL_PROPERTY = "FunctionalProperty",
         TOP_OBJECT_PROPERTY = "topObjectProperty", TOP_DATA_PROPERTY = "topDataProperty",
+        BOTTOM_OBJECT_PROPERTY = "bottomObjectProperty", BOTTOM_DATA_PROPERTY = "bottomDataProperty",
         SAME_AS = "sameAs", DIFFERENT_FROM = "differentFrom", MEMBERS = "members",
+        DISTINCT_MEMBERS = "distinctMembers",
         ALL_DISJOINT_CLASSES = "AllDisjointClasses", ALL_DISJOINT_PROPERTIES = "AllDisjointProperties",
         DISJOINT_WITH = "disjointWith", PROPERTY_DISJOINT_WITH = "propertyDisjointWith",
         EQUIVALENT_CLASS = "equivalentClass", EQUIVALENT_PROPERTY = "equivalentProperty",
@@ -52,6 +54,14 @@ vocabulary! {
         HAS_VALUE = "hasValue", ONE_OF = "oneOf", AXIOM = "Axiom", ANNOTATION = "Annotation",
         ANNOTATED_SOURCE = "annotatedSource",
         REAL = "real", RATIONAL = "rational",
+        INTERSECTION_OF = "intersectionOf", UNION_OF = "unionOf", COMPLEMENT_OF = "complementOf",
+        DATATYPE_COMPLEMENT_OF = "datatypeComplementOf", ON_DATATYPE = "onDatatype", DATA_RANGE = "DataRange",
+        ON_PROPERTIES = "onProperties", SOME_VALUES_FROM = "someValuesFrom", ALL_VALUES_FROM = "allValuesFrom",
+        HAS_SELF = "hasSelf", CARDINALITY = "cardinality", MIN_CARDINALITY = "minCardinality",
+        MAX_CARDINALITY = "maxCardinality", QUALIFIED_CARDINALITY = "qualifiedCardinality",
+        MIN_QUALIFIED_CARDINALITY = "minQualifiedCardinality",
+        MAX_QUALIFIED_CARDINALITY = "maxQualifiedCardinality", ON_CLASS = "onClass", ON_DATA_RANGE = "onDataRange",
+        ALL_DIFFERENT = "AllDifferent", NEGATIVE_PROPERTY_ASSERTION = "NegativePropertyAssertion",
     }
 }
 

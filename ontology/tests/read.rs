@@ -352,7 +352,10 @@ fn imports_are_found_on_this_machine() {
             let errors = result.expect_err("unresolved");
             let [error @ Error::UnresolvedImport { import, .. }] = &errors[..] else { panic!("{errors:?}") };
             assert_eq!(import, url);
-            assert!(error.to_string().contains("name a directory that contains it, or a catalog"), "{error}");
+            assert!(
+                error.to_string().contains("name a directory that contains it (--directory), or a catalog"),
+                "{error}"
+            );
         }
     }
 }

@@ -15,15 +15,13 @@ use smallvec::SmallVec;
 use crate::equality::Equality;
 use crate::error::Error;
 use crate::fact::{Arguments, Fact};
+use crate::limits::Limits;
 use crate::maintain::{Maintenance, state_change};
 use crate::network::{Network, SAME_AS, compile};
 use crate::record::Records;
 use crate::rule::{Program, Rule};
 use crate::store::{Store, columns, state};
 use crate::symbol::{Symbol, Symbols};
-
-/// How many partial matches one update may extend, unless the caller says otherwise.
-pub const DEFAULT_STEP_BUDGET: u64 = 10_000_000_000;
 
 /// Joins are planned anew when the facts have grown by this factor ...
 const REPLAN_FACTOR: usize = 4;
@@ -50,7 +48,7 @@ pub struct Engine {
     pub(crate) network: Arc<Network>,
     pub(crate) store: Store,
     pub(crate) records: Records,
-    pub(crate) budget: u64,
+    pub(crate) limits: Limits,
     /// Rules that are switched off.
     pub(crate) disabled: Vec<Rule>,
     /// Where `owl:sameAs` is equality, the names of each individual; the store then knows one of each.
@@ -67,18 +65,18 @@ impl Engine {
         program: Program,
         facts: impl IntoIterator<Item = Fact>,
     ) -> Result<Self, Vec<Error>> {
-        Self::with_step_budget(symbols, program, facts, DEFAULT_STEP_BUDGET)
+        Self::with_limits(symbols, program, facts, Limits::default())
     }
 
-    /// As [`Engine::new`], where this derivation and each later update may extend so many partial matches.
+    /// As [`Engine::new`], within limits for this derivation and each later update.
     ///
     /// # Errors
-    /// As [`Engine::new`].
-    pub fn with_step_budget(
+    /// As [`Engine::new`]; or R304 where the evaluation was interrupted.
+    pub fn with_limits(
         symbols: Symbols,
         program: Program,
         facts: impl IntoIterator<Item = Fact>,
-        budget: u64,
+        limits: Limits,
     ) -> Result<Self, Vec<Error>> {
         let facts: Vec<Fact> = facts.into_iter().collect();
         if let Some(error) = facts.iter().find_map(|fact| check_fact(fact, &symbols).err()) {
@@ -90,7 +88,7 @@ impl Engine {
         let equality = same.map(|same| Arc::new(Equality::new(same, &program)));
         let (network, store, records) = (Arc::default(), Store::default(), Records::default());
         let mut engine =
-            Self { symbols, program, network, store, records, budget, disabled: Vec::new(), equality };
+            Self { symbols, program, network, store, records, limits, disabled: Vec::new(), equality };
         engine.build(facts)?;
         Ok(engine)
     }
@@ -114,28 +112,46 @@ impl Engine {
         self.settle().map_err(|error| vec![error])
     }
 
+    /// Sets the limits of later updates. Where there is an interrupt, an update keeps what was there before until it ends, which
+    /// costs a copy of each relation that changes.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits;
+    }
+
     /// Changes which facts are stated and returns the net change of all facts that hold, stated or derived, sorted.
     ///
     /// Facts that are already stated, and deletions of facts that are not, change nothing.
     ///
     /// # Errors
-    /// R301 where the step budget is used up, R302 and R303; the engine is then as it was before.
+    /// R301 where the step budget is used up, R304 where the evaluation was interrupted, R302 and R303; the engine is then
+    /// as it was before.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
         for fact in delta.insert.iter().chain(&delta.delete) {
             check_fact(fact, &self.symbols)?;
         }
-        if let Some(equality) = self.equality.take() {
-            return self.apply_equally(equality, &delta);
-        }
+        // To derive everything anew would take longer than whoever interrupts wants to wait.
+        let before = self.limits.interrupt.is_some().then(|| self.clone());
+        let result = match self.equality.take() {
+            Some(equality) => self.apply_equally(equality, &delta),
+            None => self.apply_plainly(delta),
+        };
+        result.map_err(|(error, undo)| {
+            match before {
+                Some(before) => *self = before,
+                None => self.restore(&undo),
+            }
+            error
+        })
+    }
+
+    /// On an error also what takes the change back.
+    fn apply_plainly(&mut self, delta: Delta) -> Result<Delta, (Error, Delta)> {
         self.replan();
         let stated = state_change(self, delta);
         let mut maintenance = Maintenance::new(self);
         match maintenance.update(&stated) {
             Ok(()) => Ok(maintenance.finish()),
-            Err(error) => {
-                self.restore(&stated.undo());
-                Err(error)
-            }
+            Err(error) => Err((error, stated.undo())),
         }
     }
 
@@ -160,7 +176,8 @@ impl Engine {
         let (stated, gone) = (self.stated(), FxHashSet::from_iter(&undo.delete));
         let kept = stated.into_iter().filter(|fact| !gone.contains(fact));
         let facts: Vec<Fact> = kept.chain(undo.insert.iter().cloned()).collect();
-        let budget = std::mem::replace(&mut self.budget, u64::MAX);
+        let without = Limits { steps: u64::MAX, interrupt: None };
+        let limits = std::mem::replace(&mut self.limits, without);
         if let Some(equality) = &mut self.equality {
             *equality = Arc::new(equality.emptied(&self.program));
             self.store = Store::default();
@@ -174,7 +191,7 @@ impl Engine {
             self.store.state(facts);
             let _ = Maintenance::new(self).derive_all();
         }
-        self.budget = budget;
+        self.limits = limits;
     }
 
     /// Everything that is stated.
@@ -209,8 +226,14 @@ impl Engine {
 
     /// Everything that holds, in the order of symbols.
     pub fn facts(&self) -> impl Iterator<Item = Fact> {
+        self.facts_in_brief(usize::MAX)
+    }
+
+    /// As [`Engine::facts`]; but that names stand for one individual is said of an individual of more than `most` names only
+    /// by the pairs with its first name, from which the others follow.
+    pub fn facts_in_brief(&self, most: usize) -> impl Iterator<Item = Fact> {
         let mut facts: Vec<Fact> = match &self.equality {
-            Some(equality) => equality.facts(self),
+            Some(equality) => equality.facts(self, most),
             None => self.rows_with(0).collect(),
         };
         facts.sort_unstable();

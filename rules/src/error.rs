@@ -56,6 +56,20 @@ pub enum Error {
         /// As written.
         name: String,
     },
+    /// A built-in of a library that the engine does not have.
+    #[error(
+        "{file}:{line}:{column}: R104 built-in <{name}> belongs to a library that the engine does not have"
+    )]
+    ForeignBuiltIn {
+        /// The source as named by the caller.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// In characters, counted from 1.
+        column: u32,
+        /// Its IRI.
+        name: String,
+    },
     /// An atom that SWRL does not have, in text that is to be SWRL.
     #[error("{file}:{line}:{column}: R105 {what} is not SWRL")]
     NotSwrl {
@@ -143,8 +157,14 @@ pub enum Error {
     BudgetExhausted {
         /// The rule that was being evaluated.
         rule: RuleIdentity,
-        /// In partial matches.
+        /// In steps.
         budget: u64,
+    },
+    /// The evaluation was interrupted; the engine is as it was before the update.
+    #[error("R304 interrupted, last in rule {rule}")]
+    Interrupted {
+        /// The rule that was being evaluated.
+        rule: RuleIdentity,
     },
     /// A fact or rule with a symbol that the engine's interner never gave out.
     #[error("R302 symbol number {index} is not in the engine's symbols")]

@@ -7,7 +7,7 @@
 //!
 //! A block is handed over, not shared: it is consumed by the one rule that extends it.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::hash::{BuildHasherDefault, Hash, Hasher};
 use std::sync::Arc;
 
@@ -15,6 +15,7 @@ use rustc_hash::FxHasher;
 
 use crate::aggregate::Function;
 use crate::fact::Arguments;
+use crate::limits::Budget;
 use crate::literal::Literal;
 use crate::plan::{HIDDEN, Pattern, Plan, Source, Step};
 use crate::store::{Relation, RelationId, Row, Store, state};
@@ -66,13 +67,6 @@ pub(crate) struct Round<'a> {
     pub blocks: RefCell<Vec<Vec<Symbol>>>,
     /// What was put off to bound memory, to be evaluated by later runs.
     pub deferred: RefCell<Vec<Seed>>,
-}
-
-/// Steps left, and the rule that used up the last.
-#[derive(Clone, Default, Debug)]
-pub(crate) struct Budget {
-    pub left: Cell<u64>,
-    pub exhausted_by: Cell<Option<u32>>,
 }
 
 /// A block in [`Round::blocks`].
@@ -196,16 +190,6 @@ impl Round<'_> {
         self.widths[plan.rule as usize]
     }
 
-    /// Takes steps from the budget; `false` once it is used up.
-    fn spend(&self, steps: u64, rule: u32) -> bool {
-        let left = self.budget.left.get();
-        if left < steps {
-            self.budget.exhausted_by.set(Some(rule));
-        }
-        self.budget.left.set(left.saturating_sub(steps));
-        left >= steps
-    }
-
     fn seed(&self, seed: &Seed) -> Option<BlockId> {
         let plan = &self.plans[seed.plan as usize];
         let empty = vec![Symbol(0); self.width(plan)];
@@ -216,6 +200,9 @@ impl Round<'_> {
                 let relation = self.store.get(*relation);
                 let mut block = Vec::with_capacity(self.width(plan) * (to - from) as usize);
                 for &row in &self.rows[*from as usize..*to as usize] {
+                    if plan.seed_is_link && relation.record(row).rule == plan.rule {
+                        continue;
+                    }
                     extend_match(&mut block, &empty, relation.row(row), &plan.seed);
                 }
                 self.put(block)
@@ -229,13 +216,13 @@ impl Round<'_> {
         let step = plan.steps.get(number as usize)?;
         let block = self.take(block);
         let width = self.width(plan);
-        if !self.spend((block.len() / width) as u64, plan.rule) {
+        if !self.budget.spend((block.len() / width) as u64, plan.rule) {
             return None;
         }
         self.put(match step {
-            Step::Join { relation, skip, index, key, pattern } => {
-                let lookup =
-                    Lookup { relation: self.store.get(*relation), skip: *skip, index: *index, key, pattern };
+            Step::Join { relation, skip, index, key, pattern, is_link } => {
+                let (relation, index) = (self.store.get(*relation), *index);
+                let lookup = Lookup { relation, skip: *skip, index, key, pattern, is_link: *is_link };
                 let (longer, done) = self.join(&lookup, &block, width, plan.rule);
                 if done < block.len() {
                     let start = Start::Matches { step: number, bindings: block[done..].to_vec() };
@@ -243,11 +230,12 @@ impl Round<'_> {
                 }
                 longer
             }
-            Step::Contains { relation, skip, key } => {
+            Step::Contains { relation, skip, key, is_link } => {
                 let (relation, skip) = (self.store.get(*relation), self.visibility(*skip));
-                retain(block, width, |bound| {
-                    find(relation, key, bound).is_some_and(|r| relation.state(r) & skip == 0)
-                })
+                let fits = |row: Row| {
+                    relation.state(row) & skip == 0 && !(*is_link && relation.record(row).rule == plan.rule)
+                };
+                retain(block, width, |bound| find(relation, key, bound).is_some_and(fits))
             }
             Step::Absent { .. } if self.retracting => block,
             Step::Absent { relation, key } => {
@@ -262,7 +250,7 @@ impl Round<'_> {
                 })
             }
             Step::Compute { built_in, result, arguments } => {
-                self.compute(block, width, *result, |symbols, bound| {
+                self.compute(block, width, (*result, plan.rule), |symbols, bound| {
                     built_in.compute(&literals(symbols, arguments, bound)?)
                 })
             }
@@ -277,8 +265,12 @@ impl Round<'_> {
                 }
                 block
             }
-            Step::Compare { left, right, equal } => {
-                retain(block, width, |bound| (resolve(*left, bound) == resolve(*right, bound)) == *equal)
+            Step::Compare { left, right, equal: true } => {
+                retain(block, width, |bound| resolve(*left, bound) == resolve(*right, bound))
+            }
+            Step::Compare { left, right, equal: false } => {
+                let symbols = self.symbols.borrow();
+                retain(block, width, |bound| symbols.differ(resolve(*left, bound), resolve(*right, bound)))
             }
         })
     }
@@ -298,8 +290,10 @@ impl Round<'_> {
                 return (longer, position * width);
             }
             let before = longer.len();
+            let mut looked_at = 0;
             let mut visit = |row: Row| {
-                if relation.state(row) & skip == 0 {
+                looked_at += 1;
+                if relation.state(row) & skip == 0 && !(lookup.is_link && relation.record(row).rule == rule) {
                     extend_match(&mut longer, bound, relation.row(row), lookup.pattern);
                 }
             };
@@ -311,7 +305,8 @@ impl Round<'_> {
             } else {
                 (0..relation.bound()).for_each(&mut visit);
             }
-            if !self.spend(((longer.len() - before) / width) as u64, rule) {
+            let steps = ((longer.len() - before) / width) as u64;
+            if !self.budget.spend(steps, rule) || !self.budget.visit(looked_at, rule) {
                 return (Vec::new(), block.len());
             }
         }
@@ -364,14 +359,18 @@ impl Round<'_> {
         &self,
         mut block: Vec<Symbol>,
         width: usize,
-        result: u16,
+        (result, rule): (u16, u32),
         function: impl Fn(&Symbols, &[Symbol]) -> Option<Literal>,
     ) -> Vec<Symbol> {
         let mut symbols = self.symbols.borrow_mut();
         let mut kept = 0;
         for start in (0..block.len()).step_by(width) {
             let Some(value) = function(&symbols, &block[start..start + width]) else { continue };
+            let known = symbols.len();
             block[start + usize::from(result)] = intern(&mut symbols, value);
+            if symbols.len() > known && !self.budget.spend_on_value(rule) {
+                return Vec::new();
+            }
             block.copy_within(start..start + width, kept);
             kept += width;
         }
@@ -399,6 +398,8 @@ struct Lookup<'a> {
     index: Option<usize>,
     key: &'a [Source],
     pattern: &'a Pattern,
+    /// See [`crate::plan::Lowered::is_closure`].
+    is_link: bool,
 }
 
 /// Appends a partial match, extended by a row, where the row fits.

@@ -58,7 +58,8 @@ impl<'a> Lowering<'a> {
             heads.push(Template { relation, arguments: columns(&bound) });
             self.constraints.push((relation, position));
         }
-        self.lowered.push(Lowered { rule: position, width, heads, body });
+        let is_closure = Lowered::closes(&heads, &body);
+        self.lowered.push(Lowered { rule: position, width, heads, body, is_closure });
     }
 
     fn anonymous(&mut self, arity: usize) -> RelationId {
@@ -115,7 +116,7 @@ impl<'a> Lowering<'a> {
         conditions.extend(scope.context.iter().filter_map(|&at| outside[at].clone()));
         let heads = vec![Template { relation: matches, arguments: columns(&variables) }];
         let width = rule.variable_count().max(1);
-        self.lowered.push(Lowered { rule: position, width, heads, body: conditions });
+        self.lowered.push(Lowered { rule: position, width, heads, body: conditions, is_closure: false });
         let value = match aggregate.value() {
             Some(Term::Variable(Variable(number))) => {
                 Source::Variable(variables.iter().position(|&v| v == number)? as u16)

@@ -3,7 +3,7 @@
 //! In each stratum: 1. over-delete the rows whose recorded derivation lost an atom; 2. rederive what has another
 //! derivation from what is left; 3. insert semi-naively what follows from new and revived rows.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
@@ -12,11 +12,13 @@ use smallvec::SmallVec;
 use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::{Arguments, Fact};
-use crate::fixpoint::{Budget, Matches, PlanId, Round, Seed, Start, resolve, run};
+use crate::fixpoint::{Matches, PlanId, Round, Seed, Start, resolve, run};
+use crate::forest::Forest;
+use crate::limits::Budget;
 use crate::network::{Network, Stratum};
 use crate::plan::HIDDEN;
 use crate::store::{Record, RelationId, Row, state};
-use crate::symbol::Symbol;
+use crate::symbol::{Symbol, Symbols};
 
 /// Rows that start one run of the crepe program; bounds the memory of partial matches.
 const CHUNK: usize = 2048;
@@ -87,6 +89,8 @@ pub(crate) struct Maintenance<'a> {
     pending: Rows,
     /// Strata that a change reached.
     touched: Vec<bool>,
+    /// Names that were concluded to be one in this update: of a class, only as many pairs are kept as connect it.
+    joined: Forest,
     budget: Budget,
 }
 
@@ -94,8 +98,9 @@ impl<'a> Maintenance<'a> {
     pub fn new(engine: &'a mut Engine) -> Self {
         let network = Arc::clone(&engine.network);
         let touched = vec![false; network.strata.len()];
-        let budget = Budget { left: Cell::new(engine.budget), exhausted_by: Cell::new(None) };
-        Self { engine, network, added: Vec::new(), doomed: Vec::new(), pending: Vec::new(), touched, budget }
+        let budget = Budget::new(&engine.limits);
+        let (added, doomed, pending) = (Vec::new(), Vec::new(), Vec::new());
+        Self { engine, network, added, doomed, pending, touched, joined: Forest::default(), budget }
     }
 
     /// Derives everything from the stated facts of an engine that has derived nothing yet.
@@ -268,6 +273,7 @@ impl<'a> Maintenance<'a> {
 
     /// Semi-naive rounds until nothing new follows.
     fn saturate(&mut self, stratum: &Stratum) -> Result<(), Error> {
+        self.budget.recursive.set(true);
         while !self.pending.is_empty() {
             let front = std::mem::take(&mut self.pending);
             self.promote(&front);
@@ -275,6 +281,7 @@ impl<'a> Maintenance<'a> {
             self.run(&front, |relation| stratum.positive.get(&relation).map(Vec::as_slice), false)?;
             self.mark(&front, false);
         }
+        self.budget.recursive.set(false);
         Ok(())
     }
 
@@ -348,9 +355,10 @@ impl<'a> Maintenance<'a> {
         };
         let matches = run(&round, seeds);
         let deferred = round.deferred.into_inner();
-        if let Some(rule) = self.budget.exhausted_by.get() {
-            let rule = &self.engine.program.rules[self.network.rules[rule as usize].rule];
-            return Err(Error::BudgetExhausted { rule: rule.identity.clone(), budget: self.engine.budget });
+        let identity =
+            |rule: u32| self.engine.program.rules[self.network.rules[rule as usize].rule].identity.clone();
+        if let Some(error) = self.budget.error(identity) {
+            return Err(error);
         }
         for matches in matches {
             if retracting { self.retract(&matches) } else { self.conclude(&matches) }
@@ -363,13 +371,15 @@ impl<'a> Maintenance<'a> {
         let network = Arc::clone(&self.network);
         let number = network.plans[matches.plan as usize].rule;
         let rule = &network.rules[number as usize];
-        let Engine { store, records, .. } = &mut *self.engine;
+        let Engine { store, records, symbols, .. } = &mut *self.engine;
         let mut arguments: SmallVec<[Symbol; 16]> = SmallVec::new();
         for bound in matches.bindings.chunks_exact(rule.width) {
             for head in &rule.heads {
                 arguments.clear();
                 arguments.extend(head.arguments.iter().map(|&source| resolve(source, bound)));
-                if Some(head.relation) == network.same && arguments[0] == arguments[1] {
+                if Some(head.relation) == network.same
+                    && (arguments[0] == arguments[1] || !joins(&mut self.joined, symbols, &arguments))
+                {
                     continue;
                 }
                 let relation = store.get_mut(head.relation);
@@ -427,4 +437,10 @@ impl<'a> Maintenance<'a> {
             self.touch(head.relation);
         }
     }
+}
+
+/// Whether a pair of equal names connects what was not connected before in this update; a pair with a literal always does,
+/// because it is a contradiction.
+fn joins(joined: &mut Forest, symbols: &Symbols, pair: &[Symbol]) -> bool {
+    pair.iter().any(|&symbol| symbols.as_literal(symbol).is_some()) || joined.connect(pair[0], pair[1])
 }

@@ -124,7 +124,8 @@ pub(crate) fn revise(
             rule.rule = position;
             compiled.insert(position);
         } else {
-            *rule = Lowered { rule: 0, width: rule.width, heads: Vec::new(), body: Vec::new() };
+            let (heads, body) = (Vec::new(), Vec::new());
+            *rule = Lowered { rule: 0, width: rule.width, heads, body, is_closure: false };
             removed.insert(number as u32);
         }
     }

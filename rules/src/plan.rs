@@ -34,9 +34,16 @@ pub(crate) struct Pattern {
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     /// Rows of a relation; `index` is on the columns of `key`, in ascending order.
-    Join { relation: RelationId, skip: u8, index: Option<usize>, key: Vec<Source>, pattern: Pattern },
+    Join {
+        relation: RelationId,
+        skip: u8,
+        index: Option<usize>,
+        key: Vec<Source>,
+        pattern: Pattern,
+        is_link: bool,
+    },
     /// A row with all columns known.
-    Contains { relation: RelationId, skip: u8, key: Vec<Source> },
+    Contains { relation: RelationId, skip: u8, key: Vec<Source>, is_link: bool },
     /// No row with these columns.
     Absent { relation: RelationId, key: Vec<Source> },
     /// A built-in with all arguments known.
@@ -64,6 +71,8 @@ pub(crate) struct Plan {
     /// Which compiled rule.
     pub rule: u32,
     pub seed: Pattern,
+    /// Whether seeds are links, see [`Lowered::is_closure`].
+    pub seed_is_link: bool,
     pub steps: Vec<Step>,
 }
 
@@ -83,6 +92,29 @@ pub(crate) struct Lowered {
     pub width: usize,
     pub heads: Vec<Template>,
     pub body: Vec<Condition>,
+    /// Whether it says no more than that a relation is transitive. What it concludes are then chains of *links*, rows that
+    /// were not concluded by it, so that its second condition needs links only: each conclusion is found once for each
+    /// last link of a chain, and not once for each row in the middle.
+    pub is_closure: bool,
+}
+
+impl Lowered {
+    /// Whether heads and body are those of a transitive relation: `p(x, y), p(y, z) -> p(x, z)`.
+    pub fn closes(heads: &[Template], body: &[Condition]) -> bool {
+        let ([head], [Condition::Relation(first, left), Condition::Relation(second, right)]) = (heads, body)
+        else {
+            return false;
+        };
+        match (left[..].as_ref(), right[..].as_ref(), head.arguments[..].as_ref()) {
+            ([Source::Variable(x), Source::Variable(y)], [middle, last], [from, to]) => {
+                let (x, y) = (Source::Variable(*x), Source::Variable(*y));
+                let distinct = x != y && x != *last && y != *last && matches!(last, Source::Variable(_));
+                let chained = *middle == y && *from == x && to == last;
+                distinct && chained && first == second && *first == head.relation
+            }
+            _ => false,
+        }
+    }
 }
 
 /// A body atom whose predicate is a relation.
@@ -207,6 +239,7 @@ impl Planner<'_> {
     fn plan(&mut self, seed: Vec<Source>, skip: Option<usize>, fresh_from: usize) -> Option<Plan> {
         let mut bound = Bound(vec![false; self.lowered.width]);
         let seed = bound.pattern(seed.into_iter().enumerate());
+        let seed_is_link = self.is_link(skip);
         let mut rest: Vec<usize> = (0..self.lowered.body.len()).filter(|&p| Some(p) != skip).collect();
         let mut steps = Vec::new();
         while !rest.is_empty() {
@@ -219,7 +252,11 @@ impl Planner<'_> {
             let hidden = if position < fresh_from { HIDDEN | state::FRESH } else { HIDDEN };
             steps.push(self.step(position, hidden, &mut bound));
         }
-        Some(Plan { rule: self.number, seed, steps })
+        Some(Plan { rule: self.number, seed, seed_is_link, steps })
+    }
+
+    fn is_link(&self, position: Option<usize>) -> bool {
+        self.lowered.is_closure && position == Some(1)
     }
 
     /// The position within `rest` of the relation with the fewest expected matches.
@@ -241,9 +278,10 @@ impl Planner<'_> {
     }
 
     fn step(&mut self, position: usize, skip: u8, bound: &mut Bound) -> Step {
+        let is_link = self.is_link(Some(position));
         match &self.lowered.body[position] {
             Condition::Relation(relation, sources) if bound.knows_all(sources) => {
-                Step::Contains { relation: *relation, skip, key: sources.clone() }
+                Step::Contains { relation: *relation, skip, key: sources.clone(), is_link }
             }
             Condition::Relation(relation, sources) => {
                 let known = |column: &usize| bound.knows(sources[*column]);
@@ -253,7 +291,7 @@ impl Planner<'_> {
                 let key = columns.iter().map(|&column| sources[column]).collect();
                 let others =
                     sources.iter().copied().enumerate().filter(|(column, _)| mask & (1 << column) == 0);
-                Step::Join { relation: *relation, skip, index, key, pattern: bound.pattern(others) }
+                Step::Join { relation: *relation, skip, index, key, pattern: bound.pattern(others), is_link }
             }
             Condition::Not(relation, sources) => Step::Absent { relation: *relation, key: sources.clone() },
             Condition::BuiltIn(built_in, sources) => match sources[0] {

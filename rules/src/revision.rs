@@ -127,7 +127,7 @@ impl Engine {
 
     fn rebuild(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
         let stated = self.stated();
-        let mut engine = Self::with_step_budget(self.symbols().clone(), program, stated, self.budget)?;
+        let mut engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
         engine.disabled.clone_from(&self.disabled);
         let insert = engine.facts().filter(|fact| !self.holds(fact)).collect();
         let delete = self.facts().filter(|fact| !engine.holds(fact)).collect();

@@ -137,6 +137,16 @@ impl Symbols {
         self.values.is_empty()
     }
 
+    /// Whether two symbols certainly stand for two things, where names stand for individuals of their own: not of two
+    /// literals of which that is undecided.
+    pub(crate) fn differ(&self, left: Symbol, right: Symbol) -> bool {
+        left != right
+            && match (self.as_literal(left), self.as_literal(right)) {
+                (Some(left), Some(right)) => left.differs(right),
+                _ => true,
+            }
+    }
+
     /// Whether any literal was interned whose lexical form its datatype forbids.
     pub(crate) fn any_ill_typed(&self) -> bool {
         self.ill_typed > 0

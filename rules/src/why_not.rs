@@ -292,7 +292,7 @@ impl Search<'_> {
             },
             Condition::Different(left, right) => {
                 if let (Some(left), Some(right)) = (value(*left, &state.bound), value(*right, &state.bound))
-                    && left == right
+                    && !self.engine.symbols.differ(left, right)
                 {
                     state.obstacles.push(Obstacle::Equality { left, right, wanted: false });
                 }

@@ -2,7 +2,9 @@
 
 mod text;
 
-use metaplan_rules::{COADAPTATION_RULES, Delta, Engine, Prefixes, Symbols, TOMASYS_RULES, parse_rules};
+use metaplan_rules::{
+    COADAPTATION_RULES, Delta, Engine, Interrupt, Limits, Prefixes, Symbols, TOMASYS_RULES, parse_rules,
+};
 use text::{engine, fact, facts, show_violation};
 
 /// Each script line is `+fact`, `-fact`, `?fact` (must hold) or `!fact` (must not).
@@ -150,14 +152,114 @@ fn runaway_rules_end_in_an_error_that_names_them() {
     let mut symbols = Symbols::new();
     let program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
     let mut engine =
-        Engine::with_step_budget(symbols, program.clone(), [], 10_000).expect("nothing to count");
+        Engine::with_limits(symbols, program.clone(), [], Limits { steps: 10_000, ..Limits::default() })
+            .expect("nothing to count");
     let start = facts(engine.symbols_mut(), "go(1), calm(1)");
     engine.apply(Delta { insert: vec![start[1].clone()], delete: vec![] }).expect("nothing to count");
     let change = Delta { insert: vec![start[0].clone()], delete: vec![start[1].clone()] };
     let error = engine.apply(change).expect_err("it never ends");
     assert_eq!(error.to_string(), "R301 step budget of 10000 used up, last in rule test#0 (count)");
     assert_eq!(engine.facts().collect::<Vec<_>>(), [start[1].clone()]);
-    assert!(Engine::with_step_budget(engine.symbols().clone(), program, [start[0].clone()], 10_000).is_err());
+    assert!(
+        Engine::with_limits(
+            engine.symbols().clone(),
+            program,
+            [start[0].clone()],
+            Limits { steps: 10_000, ..Limits::default() }
+        )
+        .is_err()
+    );
+}
+
+#[test]
+fn values_of_recursive_rules_are_dear_and_of_others_are_not() {
+    let counted = |rules: &str, steps: u64| {
+        let mut symbols = Symbols::new();
+        let program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
+        let stated: Vec<_> = (0..50).flat_map(|n| facts(&mut symbols, &format!("v({n})"))).collect();
+        Engine::with_limits(symbols, program, stated, Limits { steps, ..Limits::default() }).is_ok()
+    };
+    assert!(counted("v(?x) ^ swrlb:multiply(?y, ?x, 1000) -> w(?y)", 1_000));
+    let recursive = "v(?x) ^ swrlb:lessThan(?x, 100) ^ swrlb:add(?y, ?x, 1) -> v(?y)";
+    assert!(!counted(recursive, 1_000_000) && counted(recursive, 2_000_000));
+}
+
+/// Interrupted at any question, the engine is as it was before, and does the same when it is asked again.
+#[test]
+fn evaluation_can_be_interrupted() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    let rules =
+        "e(?x, ?y) -> p(?x, ?y) . p(?x, ?y) ^ e(?y, ?z) -> p(?x, ?z) . same(?x, ?y) -> sameAs(?x, ?y)";
+    let stated: String = (0..300).map(|n| format!("e(n{n}, n{}), ", n + 1)).collect();
+    for equality in [false, true] {
+        let mut symbols = Symbols::new();
+        let mut program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
+        program.equality = equality;
+        let facts = facts(&mut symbols, stated.trim_end_matches(", "));
+        let questions = Arc::new(AtomicUsize::new(usize::MAX));
+        let counter = Arc::clone(&questions);
+        let limits = Limits {
+            interrupt: Some(Interrupt::new(move || counter.fetch_sub(1, Ordering::Relaxed) == 0)),
+            ..Limits::default()
+        };
+        questions.store(2, Ordering::Relaxed);
+        let stopped = Engine::with_limits(symbols.clone(), program.clone(), facts.clone(), limits.clone());
+        let error = stopped.expect_err("interrupted").remove(0).to_string();
+        assert_eq!(error, "R304 interrupted, last in rule test#1");
+        questions.store(usize::MAX, Ordering::Relaxed);
+        let mut engine = Engine::with_limits(symbols, program, [], limits).expect("nothing to do");
+        let delta = Delta { insert: facts, delete: Vec::new() };
+        for question in 0.. {
+            questions.store(question, Ordering::Relaxed);
+            match engine.apply(delta.clone()) {
+                Ok(change) => {
+                    assert_eq!(change.insert.len(), 300 + 300 * 301 / 2);
+                    assert!(question > 2, "never asked");
+                    break;
+                }
+                Err(error) => assert!(error.to_string().starts_with("R304"), "{error}"),
+            }
+            assert_eq!(engine.facts().count(), 0);
+        }
+    }
+}
+
+/// A closure over links gives what the rule says, whatever comes and goes: a chain with a detour, and an alias.
+#[test]
+fn a_transitive_relation_is_its_closure_after_every_change() {
+    let rules = "[closure] p(?x, ?y) ^ p(?y, ?z) -> p(?x, ?z) . [alias] q(?x, ?y) -> p(?x, ?y) . \
+                 [back] p(?x, ?y) ^ both(?x) -> p(?y, ?x)";
+    let mut engine = engine(rules, "").expect("rules");
+    let steps = [
+        "+p(a, b)", "+p(b, c)", "+q(c, d)", "+q(a, c)", "+p(a, d)", "-p(b, c)", "+q(b, c)", "-q(c, d)",
+        "+p(d, a)", "+q(c, d)", "-p(a, b)", "+both(c)", "-q(a, c)", "-p(a, d)", "-both(c)", "+p(c, c)",
+        "-q(b, c)", "-p(c, c)",
+    ];
+    let mut stated = std::collections::BTreeSet::new();
+    for step in steps {
+        let (sign, text) = step.split_at(1);
+        let delta = facts(engine.symbols_mut(), text);
+        let change = if sign == "+" {
+            stated.insert(text);
+            Delta { insert: delta, delete: Vec::new() }
+        } else {
+            stated.remove(text);
+            Delta { insert: Vec::new(), delete: delta }
+        };
+        engine.apply(change).expect("no budget needed");
+        let shown = |engine: &Engine| -> Vec<String> {
+            engine.facts().map(|fact| fact.display(engine.symbols()).to_string()).collect()
+        };
+        // By a rule that is not seen to be a closure, because a third atom comes with it.
+        let plain = rules.replace("-> p(?x, ?z)", "^ swrlb:equal(1, 1) -> p(?x, ?z)");
+        let all: Vec<&str> = stated.iter().copied().collect();
+        let fresh = text::engine(&plain, &all.join(", ")).expect("rules");
+        let (mut found, mut expected) = (shown(&engine), shown(&fresh));
+        found.sort();
+        expected.sort();
+        assert_eq!(found, expected, "{step}");
+    }
 }
 
 #[test]

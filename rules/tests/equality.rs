@@ -4,7 +4,7 @@ mod text;
 
 use std::collections::BTreeSet;
 
-use metaplan_rules::{Delta, Engine, Symbols, owl_rl, parse_rules};
+use metaplan_rules::{Delta, Engine, Fact, Limits, Symbols, owl_rl, parse_rules};
 use text::{fact, facts, prefixes, show_violation};
 
 fn engine(rules: &str, stated: &str) -> Engine {
@@ -116,7 +116,9 @@ fn an_update_that_is_stopped_leaves_everything_as_it_was() {
     let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
     let stated = facts(&mut symbols, "sameAs(a, b), p(a), p(c)");
     let program = owl_rl::with_equality(&program, &mut symbols);
-    let mut engine = Engine::with_step_budget(symbols, program, stated, 1000).expect("nothing to count");
+    let mut engine =
+        Engine::with_limits(symbols, program, stated, Limits { steps: 1000, ..Limits::default() })
+            .expect("nothing to count");
     let before = engine.facts().collect::<Vec<_>>();
     let (insert, delete) = (vec![fact(&mut engine, "go(c)")], vec![fact(&mut engine, "sameAs(a, b)")]);
     engine.apply(Delta { insert, delete }).expect_err("it never ends");
@@ -136,4 +138,16 @@ fn a_clone_goes_its_own_way() {
     assert_eq!(original.facts().count(), 2);
     let insert = vec![fact(&mut original, "q(a)")];
     assert_eq!(original.apply(Delta { insert, delete: vec![] }).expect("no budget needed").insert.len(), 2);
+}
+
+/// The pairs of a class grow with its square, and are not listed where nobody wants them.
+#[test]
+fn large_classes_are_listed_in_brief() {
+    let stated: Vec<String> = (1..40).map(|n| format!("sameAs(n0, n{n})")).collect();
+    let engine = engine("", &stated.join(", "));
+    assert_eq!(engine.facts().count(), 40 * 39);
+    assert_eq!(engine.facts_in_brief(40).count(), 40 * 39);
+    let brief: Vec<Fact> = engine.facts_in_brief(39).collect();
+    assert_eq!(brief.len(), 39);
+    assert!(brief.iter().all(|fact| engine.holds(fact) && fact.arguments[0] == brief[0].arguments[0]));
 }

@@ -1,6 +1,6 @@
 //! No input makes the readers panic, and what they read prints and reads back as the same value.
 
-use metaplan_rules::{Engine, Literal, Prefixes, Symbols, parse_rules, print_rules};
+use metaplan_rules::{Engine, Limits, Literal, Prefixes, Symbols, parse_rules, print_rules};
 use proptest::prelude::*;
 
 const DATATYPES: [&str; 16] = [
@@ -33,7 +33,7 @@ proptest! {
                 program.rules.iter().map(|rule| (rule.head.clone(), rule.body.clone())).collect()
             };
             prop_assert_eq!(bare(&program), bare(&again), "{}", printed);
-            let _ = Engine::with_step_budget(symbols, program, [], 1000);
+            let _ = Engine::with_limits(symbols, program, [], Limits { steps: 1000, ..Limits::default() });
         }
     }
 

@@ -95,6 +95,13 @@ fn errors_have_codes_and_positions() {
         &["test:1:9: R104 built-in `listConcat` works on lists or URIs, which the engine has no values for"],
     );
     check(
+        "@prefix t: <http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#> .\nt:add(?x, ?y, 1, \"Days\") -> q(?x)",
+        &[
+            "test:2:1: R104 built-in <http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#add> belongs to a \
+           library that the engine does not have",
+        ],
+    );
+    check(
         "p(?x) -> q(\"open",
         &[
             "test:1:12: R101 the closing `\"` of a string is missing",

@@ -102,7 +102,7 @@ fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     let rules = rules.collect::<Result<Vec<_>, String>>()?;
     // What the document imports would lie outside of the certificate.
     let options = ReadOptions { closed: true, ..ReadOptions::default() };
-    let sources = Sources { documents, rules, options };
+    let sources = Sources { documents, rules, options, ..Sources::default() };
     let mut stated = Stated::read(&sources, Equality::Owl).map_err(|messages| said_first(&messages))?;
     for rule in &mut stated.program.rules {
         let file = sources.rules.iter().position(|file| **file == *rule.identity.source);

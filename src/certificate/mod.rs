@@ -120,7 +120,6 @@ pub struct Report {
 
 impl Report {
     /// Whether the claim is proved.
-    #[must_use]
     pub fn verified(&self) -> bool {
         self.claim.is_some() && self.parts.iter().all(|part| part.result.is_ok())
     }

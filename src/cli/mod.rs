@@ -18,6 +18,7 @@ mod plan_json;
 mod plan_text;
 mod plan_verdict;
 mod reason;
+mod reason_ask;
 mod run;
 mod simulate;
 mod validate;
@@ -165,6 +166,9 @@ struct Imports {
     /// A directory to look for imports in, with those below it (repeatable).
     #[arg(long, value_name = "DIR", value_parser = existing_directory)]
     directory: Vec<PathBuf>,
+    /// Goes on with a warning where an import is found nowhere.
+    #[arg(long)]
+    ignore_missing_imports: bool,
 }
 
 impl Imports {
@@ -172,6 +176,7 @@ impl Imports {
         ReadOptions {
             catalogs: self.catalog.clone(),
             directories: self.directory.clone(),
+            allow_missing_imports: self.ignore_missing_imports,
             ..ReadOptions::default()
         }
     }
@@ -195,8 +200,9 @@ impl Situation {
             [manifest] => {
                 let imports = &self.imports;
                 let none = self.knowledge.is_empty() && self.rules.is_empty();
-                if !(none && imports.catalog.is_empty() && imports.directory.is_empty()) {
-                    let text = "`--kb`, `--rules`, `--catalog` and `--directory` go with DOMAIN and PROBLEM; \
+                let here = imports.catalog.is_empty() && imports.directory.is_empty();
+                if !(none && here && !imports.ignore_missing_imports) {
+                    let text = "`--kb`, `--rules` and where imports lie go with DOMAIN and PROBLEM; \
                                 a mission's manifest names its own";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
@@ -233,6 +239,7 @@ impl Situation {
                         documents: self.knowledge.clone(),
                         rules,
                         options: self.imports.options(),
+                        ..Sources::default()
                     })
                 });
                 Mission::new("", knowledge, Bindings::default(), source(domain), source(problem))?

@@ -1,5 +1,6 @@
 //! Writing: answers, messages, tables, files that are either whole or not there.
 
+use std::collections::BTreeMap;
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,6 +17,9 @@ static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 
 /// How many messages are shown before the rest is only counted.
 const MESSAGE_LIMIT: usize = 20;
+
+/// How many warnings of one code are shown before the rest is only counted.
+const KIND_LIMIT: usize = 10;
 
 /// Writes to standard output; a reader that has gone away is no fault, a full disk is.
 pub fn answer(text: &str) {
@@ -53,8 +57,16 @@ pub fn note(text: &str) {
 pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Message>) {
     if !common.quiet {
         let mut stderr = std::io::stderr().lock();
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for message in messages {
-            let _ = stderr.write_all(message.text().as_bytes());
+            let count = counts.entry(&message.code).or_default();
+            *count += 1;
+            if *count <= KIND_LIMIT {
+                let _ = stderr.write_all(message.text().as_bytes());
+            }
+        }
+        for (code, count) in counts.into_iter().filter(|(_, count)| *count > KIND_LIMIT) {
+            let _ = writeln!(stderr, "… and {} more {code}; `--format json` lists all", count - KIND_LIMIT);
         }
     }
 }

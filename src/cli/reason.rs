@@ -7,9 +7,10 @@ use clap::Args;
 use metaplan::knowledge::{Contradiction, Knowledge, Sources};
 use metaplan::message::Message;
 use ontology::Equality;
-use rules::{Delta, Value};
+use rules::{DEFAULT_STEP_BUDGET, Delta, Limits, Value};
 use serde_json::json;
 
+use crate::cli::reason_ask::Questions;
 use crate::cli::{Common, Exit, Failure, Format, Imports, output, setting};
 
 /// Arguments of `reason`.
@@ -38,6 +39,11 @@ pub struct Arguments {
     /// Two names never stand for one individual, as in databases and in PDDL; in OWL they may.
     #[arg(long)]
     unique_names: bool,
+    /// How many steps conclusions may take; a rule that never ends is named when they are used up.
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_STEP_BUDGET)]
+    step_limit: u64,
+    #[command(flatten)]
+    questions: Questions,
 }
 
 /// Runs the command.
@@ -57,6 +63,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     for (attribute, value) in &arguments.set {
         knowledge.measure(attribute, value).map_err(Failure::usage)?;
+    }
+    if let Some(exit) = arguments.questions.answer(&mut knowledge, &arguments.imports, common)? {
+        return Ok(exit);
     }
     let contradictions = knowledge.contradictions();
     match common.format {
@@ -79,7 +88,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 fn read(arguments: &Arguments) -> Result<Knowledge, Failure> {
     let equality = if arguments.unique_names { Equality::UniqueNames } else { Equality::Owl };
     let (documents, rules) = (arguments.documents.clone(), arguments.rules.clone());
-    let sources = Sources { documents, rules, options: arguments.imports.options() };
+    let limits = Limits { steps: arguments.step_limit, ..Limits::default() };
+    let sources = Sources { documents, rules, options: arguments.imports.options(), limits };
     Ok(Knowledge::read_as(&sources, equality)?)
 }
 

@@ -133,7 +133,6 @@ impl Loop {
     }
 
     /// Why the plan, with what is left of the action under way, does not fit the situation as it is believed.
-    #[must_use]
     pub fn violation(&self) -> Option<String> {
         self.verdict().violation.map(|violation| sentence(&violation))
     }

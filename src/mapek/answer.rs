@@ -167,7 +167,6 @@ impl Answer {
     }
 
     /// The effect, if it is one.
-    #[must_use]
     pub fn effect(&self) -> Option<&Effect> {
         match self {
             Self::Effect(effect) => Some(effect),

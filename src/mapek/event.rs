@@ -118,7 +118,6 @@ impl From<Event> for Observation {
 
 impl Observation {
     /// Reads a line.
-    #[must_use]
     pub fn parse(text: &str) -> Self {
         let mut observation = Self { sequence: None, time: None, events: Vec::new() };
         match observation.read(text) {
@@ -315,7 +314,6 @@ fn component(component: &str, value: &str) -> Result<Event, Fault> {
 
 impl Event {
     /// The event as an object of the format.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         match self {
             Self::Measured { attribute, value } => {
@@ -352,7 +350,6 @@ impl Event {
 
 impl Observation {
     /// The observation as an object of the format, if it is one event; an empty object otherwise.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let [Ok(event)] = self.events.as_slice() else { return json!({}) };
         let mut object = event.to_json();

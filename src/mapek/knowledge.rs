@@ -93,37 +93,31 @@ impl Knowledge {
     }
 
     /// The mission as it is believed to be.
-    #[must_use]
     pub fn mission(&self) -> &Mission {
         &self.mission
     }
 
     /// The designs that are available, by local name.
-    #[must_use]
     pub fn available(&self) -> &BTreeSet<String> {
         &self.available
     }
 
     /// Function to the design that it has.
-    #[must_use]
     pub fn configuration(&self) -> &BTreeMap<String, String> {
         &self.configuration
     }
 
     /// The number of the action that is under way, and the action as it runs now.
-    #[must_use]
     pub fn running(&self) -> Option<(u64, &PlannedStep)> {
         self.running.as_ref().map(|running| (running.action, &running.step))
     }
 
     /// Whether the action that is under way was asked to end.
-    #[must_use]
     pub fn cancelling(&self) -> bool {
         self.running.as_ref().is_some_and(|running| running.cancelling)
     }
 
     /// Whether the action that is under way was asked to stand still.
-    #[must_use]
     pub fn suspended(&self) -> bool {
         self.running.as_ref().is_some_and(|running| running.suspended)
     }
@@ -139,25 +133,21 @@ impl Knowledge {
     }
 
     /// How many lines were handled.
-    #[must_use]
     pub fn lines(&self) -> u64 {
         self.lines
     }
 
     /// The greatest number of a line that had one.
-    #[must_use]
     pub fn sequence(&self) -> Option<u64> {
         self.sequence
     }
 
     /// The time of the last line, since the start of the mission.
-    #[must_use]
     pub fn now(&self) -> Duration {
         self.now
     }
 
     /// Whether the goal was seen to hold and nothing has changed since.
-    #[must_use]
     pub fn reached(&self) -> bool {
         self.reached
     }

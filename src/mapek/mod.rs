@@ -123,7 +123,6 @@ impl Loop {
     }
 
     /// What the loop knows.
-    #[must_use]
     pub fn knowledge(&self) -> &Knowledge {
         &self.knowledge
     }
@@ -166,7 +165,6 @@ impl Loop {
     }
 
     /// Effects that were asked for and not acknowledged, to be asked for again after a restart.
-    #[must_use]
     pub fn repeat(&self) -> Vec<Answer> {
         let again = |effect: &Effect| Answer::Effect(Effect { repeated: true, ..effect.clone() });
         self.knowledge.outstanding().map(again).collect()

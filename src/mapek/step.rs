@@ -39,7 +39,6 @@ impl PlannedStep {
     }
 
     /// `move wp1 wp2 (f_localization = fd_amcl_kinect)`: without functions and designs among the arguments.
-    #[must_use]
     pub fn summary(&self) -> String {
         let configured = |word: &str| self.configuration.iter().any(|(f, d)| f == word || d == word);
         let mut text = self.action.clone();
@@ -52,14 +51,12 @@ impl PlannedStep {
     }
 
     /// The arguments without those that say which design fills which function.
-    #[must_use]
     pub fn context(&self) -> Vec<Option<&str>> {
         let is_design = |word: &str| self.configuration.iter().any(|(_, design)| design == word);
         self.arguments.iter().map(|word| (!is_design(word)).then_some(word.as_str())).collect()
     }
 
     /// The design of a function.
-    #[must_use]
     pub fn design(&self, function: &str) -> Option<&str> {
         self.configuration.iter().find(|(known, _)| known == function).map(|(_, design)| design.as_str())
     }
@@ -91,7 +88,6 @@ impl PlannedStep {
     }
 
     /// The step as an object of the format.
-    #[must_use]
     pub fn to_json(&self) -> Value {
         let configuration: Map<String, Value> =
             self.configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect();

@@ -64,7 +64,6 @@ impl Bindings {
     }
 
     /// The predicates that say which design solves which function.
-    #[must_use]
     pub fn solves(&self) -> Vec<Name> {
         let own = self.own.iter().filter(|(_, query)| **query == Query::Solves).map(|(name, _)| name.clone());
         own.chain(GroundConfig::default().solves).collect()

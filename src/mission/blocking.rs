@@ -26,7 +26,6 @@ pub enum Blocking {
 impl Mission {
     /// Why there is no plan for a problem that [`Mission::filled`] has made and that is proved to have none. None if the mission has
     /// no knowledge base, or if a limit was reached before the reason was known.
-    #[must_use]
     pub fn blocking(&self, problem: &Problem, config: &Config) -> Option<Blocking> {
         let config = &Config { horizon: None, ..config.clone() };
         let designs = self.knowledge.as_ref()?.view().function_designs();

@@ -27,7 +27,6 @@ impl Mission {
     }
 
     /// The problem as it is believed now, without what the knowledge base contributes.
-    #[must_use]
     pub fn problem(&self) -> &Problem {
         &self.problem
     }

@@ -116,13 +116,11 @@ impl Manifest {
     }
 
     /// The manifest's own name.
-    #[must_use]
     pub fn file(&self) -> &str {
         &self.file
     }
 
     /// The knowledge base's files.
-    #[must_use]
     pub fn sources(&self) -> Sources {
         let knowledge = &self.knowledge;
         let all = |paths: &[PathBuf]| paths.iter().map(|path| self.path(path)).collect();
@@ -138,17 +136,16 @@ impl Manifest {
                 directories: all(&knowledge.directories),
                 ..ReadOptions::default()
             },
+            ..Sources::default()
         }
     }
 
     /// The domain file.
-    #[must_use]
     pub fn domain(&self) -> PathBuf {
         self.path(&self.planning.domain)
     }
 
     /// The problem file.
-    #[must_use]
     pub fn problem(&self) -> PathBuf {
         self.path(&self.planning.problem)
     }

@@ -129,13 +129,11 @@ impl Mission {
     }
 
     /// How eager the adaptation loop is.
-    #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
     /// The knowledge base, if the mission has one.
-    #[must_use]
     pub fn knowledge(&self) -> Option<&Knowledge> {
         self.knowledge.as_ref()
     }
@@ -212,7 +210,6 @@ impl Mission {
     }
 
     /// What the knowledge base adds to the actions of a plain domain; none if the domain is explicit.
-    #[must_use]
     pub fn adaptation(&self) -> Option<&CoAdaptation> {
         self.adaptation.as_ref()
     }
@@ -238,19 +235,16 @@ impl Mission {
     }
 
     /// The predicates that say which design solves which function.
-    #[must_use]
     pub fn solves(&self) -> Vec<Name> {
         self.bindings.solves()
     }
 
     /// The symbols of the co-adaptation process.
-    #[must_use]
     pub fn roles(&self) -> &Roles {
         &self.roles
     }
 
     /// The domain, in explicit form if its file is plain.
-    #[must_use]
     pub fn domain(&self) -> &Domain {
         &self.domain
     }

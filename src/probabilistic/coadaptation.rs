@@ -251,14 +251,12 @@ impl Coadaptation {
 
     /// Whether a problem spells out places and configurations, as [`Coadaptation::new`] reads them; otherwise the states
     /// of the task serve ([`Tasked`](crate::probabilistic::Tasked)).
-    #[must_use]
     pub fn is_spelt_out(problem: &Problem, roles: &Roles) -> bool {
         let facts = Facts::new(problem);
         [&roles.configured, &roles.suits].iter().any(|role| !facts.of(role).is_empty())
     }
 
     /// The configurations that the loss of the component takes away.
-    #[must_use]
     pub fn lost(&self, configuration: usize) -> bool {
         self.loss
             .as_ref()

@@ -44,7 +44,6 @@ pub struct Stages {
 
 impl Stages {
     /// All of it.
-    #[must_use]
     pub fn total(&self) -> Duration {
         self.build + self.solve + self.extract
     }
@@ -132,19 +131,16 @@ impl Comparison {
     }
 
     /// The penalised time that the plan with re-planning takes above the best policy: the price of determinism.
-    #[must_use]
     pub fn price_of_determinism(&self) -> Option<f64> {
         Some(self.penalised('c')? - self.penalised('a')?)
     }
 
     /// The penalised time that the plan without re-planning takes above the best policy: the price of the open loop.
-    #[must_use]
     pub fn price_of_open_loop(&self) -> Option<f64> {
         Some(self.penalised('b')? - self.penalised('a')?)
     }
 
     /// The penalised time that re-planning saves.
-    #[must_use]
     pub fn value_of_replanning(&self) -> Option<f64> {
         Some(self.penalised('b')? - self.penalised('c')?)
     }

@@ -30,7 +30,6 @@ pub struct Risk {
 
 impl Risk {
     /// Everything that the mission has.
-    #[must_use]
     pub fn all(mission: &Coadaptation) -> Self {
         Self {
             collisions: true,
@@ -73,7 +72,6 @@ impl Situation {
 
 impl State {
     /// What it says.
-    #[must_use]
     pub fn situation(self) -> Situation {
         Situation {
             place: (self.0 & 0xFFFF) as usize,
@@ -135,7 +133,6 @@ pub struct Process<N> {
 
 impl<N: Number> Process<N> {
     /// The process with some risks, and with some of the [`REWARDS`].
-    #[must_use]
     pub fn new(mission: &Coadaptation, risk: Risk, rewards: &[&str]) -> Self {
         let number = |value: &BigRational| N::from_rational(value);
         let wanted: Vec<usize> =
@@ -216,7 +213,6 @@ impl<N: Number> Process<N> {
     }
 
     /// The states at the goal, by number.
-    #[must_use]
     pub fn goals(&self, states: &States<State>) -> FixedBitSet {
         let mut goals = FixedBitSet::with_capacity(states.len());
         for (number, state) in states.iter().enumerate() {
@@ -226,7 +222,6 @@ impl<N: Number> Process<N> {
     }
 
     /// Whether a state is at the goal.
-    #[must_use]
     pub fn is_goal(&self, state: State) -> bool {
         let situation = state.situation();
         situation.place == self.goal && !situation.failed
@@ -251,13 +246,11 @@ pub enum Action {
 
 impl Action {
     /// From the number that a process has for it.
-    #[must_use]
     pub fn from_number(number: u32) -> Self {
         if number & 1 == 0 { Self::Move(number as usize >> 1) } else { Self::Change(number as usize >> 1) }
     }
 
     /// The number that a process has for it.
-    #[must_use]
     pub fn number(self) -> u32 {
         match self {
             Self::Move(arc) => (arc as u32) << 1,

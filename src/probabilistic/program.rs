@@ -15,7 +15,6 @@ use crate::probabilistic::coadaptation::{Coadaptation, Traversal};
 use crate::probabilistic::process::Risk;
 
 /// The mission as a model: `l` is the place, `c` the configuration, `b` the battery; `hit`, `failed` and `lost` are flags.
-#[must_use]
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
     let writer = Writer { mission, risk };
     model(

@@ -39,7 +39,6 @@ pub struct Published {
 
 impl Published {
     /// What the robot then does: one reconfiguration if it is needed, and the route.
-    #[must_use]
     pub fn actions(&self, mission: &Coadaptation) -> Vec<Action> {
         let change = (self.configuration != mission.initial).then_some(Action::Change(self.configuration));
         change.into_iter().chain(self.route.iter().map(|arc| Action::Move(*arc))).collect()
@@ -48,7 +47,6 @@ impl Published {
 
 /// The shortest simple routes in order of their length, which for each arc is the least time that any configuration
 /// takes, at most so many.
-#[must_use]
 pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>> {
     let length = |arc: usize| {
         let by = mission.arcs[arc].by.iter().flatten().map(|traversal| traversal.time.to_f64());
@@ -131,7 +129,6 @@ fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Op
 }
 
 /// Runs the procedure with the priority on time (0), energy (1) or safety (2); none if no route can be driven.
-#[must_use]
 pub fn published(mission: &Coadaptation, priority: usize) -> Option<Published> {
     let available = |configuration: &usize| mission.configurations[*configuration].available;
     let mut candidates = Vec::new();

@@ -21,7 +21,6 @@ use crate::probabilistic::published::{ROUTES, shortest_routes};
 
 /// The mission as a model of the published setting: `r` is the route (0 before it is chosen), `p` how many of its arcs are
 /// behind the robot, `c` the configuration, `b` the battery; `rd` says that a reconfiguration was made.
-#[must_use]
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
     let writer = Writer { mission, routes };

@@ -112,7 +112,6 @@ impl Tasked {
     }
 
     /// What the steps of a plan do from a situation.
-    #[must_use]
     pub fn actions(&self, situation: &Situation, steps: &[Step]) -> Option<Vec<Action>> {
         let (mut place, mut configuration) = (situation.place, situation.configuration);
         let mut actions = Vec::new();

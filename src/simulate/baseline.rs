@@ -41,7 +41,6 @@ impl Strategy {
     pub const ALL: [Self; 5] = [Self::Joint, Self::Failure, Self::Greedy, Self::Random, Self::None];
 
     /// Its name.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Joint => "joint",

@@ -66,7 +66,6 @@ impl Default for Run {
 impl Run {
     /// The mean time from a disturbance to what was done about it; none where there was no such event, which is not the
     /// same as a reaction at once.
-    #[must_use]
     pub fn mean_reaction(&self) -> Option<f64> {
         let count = self.reactions.len();
         (count > 0).then(|| self.reactions.iter().sum::<f64>() / count as f64)
@@ -74,7 +73,6 @@ impl Run {
 
     /// The values of [`SUAVE_COLUMNS`]; empty where the mission has none, and `no event` where there was nothing to react
     /// to. The search time of a pipeline that was not found is the mission's, as SUAVE has it.
-    #[must_use]
     pub fn suave(&self) -> [String; 4] {
         let Some(distance) = self.distance else {
             return [String::new(), String::new(), String::new(), self.reaction()];
@@ -92,7 +90,6 @@ impl Run {
     }
 
     /// Whether this is the better outcome: a mission that is accomplished before one that is not, then the lower cost.
-    #[must_use]
     pub fn is_better_than(&self, other: &Self) -> bool {
         match (self.accomplished, other.accomplished) {
             (true, true) => self.cost < other.cost - 1e-6,

@@ -102,7 +102,6 @@ pub struct Suave {
 
 impl Simulation {
     /// What is wrong with the numbers, if something is.
-    #[must_use]
     pub fn mistake(&self) -> Option<String> {
         let positive = [("step", self.step), ("time_budget", self.time_budget), ("patience", self.patience)];
         let wrong = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0));

@@ -25,7 +25,6 @@ const QUANTILES: [f64; 30] = [
 
 impl Sample {
     /// The sample of some values; none without any.
-    #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
         if count == 0 {

@@ -78,16 +78,96 @@ fn standard_input_stands_for_any_document() {
 #[test]
 fn the_profile_is_summed_up() {
     let model = format!(
-        "{HEAD}@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . :p a owl:ObjectProperty , owl:ReflexiveProperty .
+        "{HEAD}@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . :p a owl:ObjectProperty .
+         :B a owl:Class ; rdfs:subClassOf [ a owl:Class ; owl:unionOf ( :A :B ) ] .
          :A a owl:Class ; rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :A ] ."
     );
     let outcome = run(&["reason", "-"], &model);
-    check(&outcome, 0, &["warning[O301]: ReflexiveObjectProperty", "warning[O304]: 2 of "]);
+    check(&outcome, 0, &["warning[O301]: SubClassOf(<http://x#B>", "warning[O304]: 2 of "]);
     assert_eq!(outcome.stderr.matches("O301").count(), 2, "{outcome:#?}");
     let outcome = run(&["reason", "-", "--format", "json", "-q"], &model);
     let answer: serde_json::Value = serde_json::from_str(&outcome.stdout).expect("JSON");
     let codes: Vec<_> = answer["warnings"].as_array().expect("an array").iter().map(|w| &w["code"]).collect();
     assert_eq!(codes, ["O301", "O301", "O304"], "{answer:#}");
+}
+
+const ZOO: &str =
+    "@prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix : <http://x#> .
+:Cat a owl:Class ; rdfs:subClassOf :Pet . :Pet a owl:Class ; rdfs:subClassOf :Animal . :Animal a owl:Class .
+:Stone a owl:Class ; owl:disjointWith :Animal . :StoneCat a owl:Class ; rdfs:subClassOf :Stone , :Cat .
+:tom a :Cat .
+";
+
+/// What follows is asked for, with derivations.
+#[test]
+fn questions_are_answered() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let ask = |arguments: &[&str], input: &str| {
+        let all = [&["reason", "zoo.ttl"], arguments].concat();
+        metaplan_in(directory.path(), &all, input)
+    };
+    let prefixes = ZOO.lines().take(2).collect::<Vec<_>>().join(" ");
+    std::fs::write(directory.path().join("zoo.ttl"), ZOO).expect("a file");
+    let entailed = format!(
+        "{prefixes} :Cat a owl:Class ; rdfs:subClassOf :Animal . :Animal a owl:Class . :tom a :Pet ."
+    );
+    let open = format!("{entailed} :tom a :Stone . :Stone a owl:Class .");
+    let answer = ask(&["--entails", "-"], &entailed);
+    check(&answer, 0, &["follows: SubClassOf(<http://x#Cat> <http://x#Animal>)", "2 of 2 statements follow"]);
+    check(
+        &ask(&["--entails", "-"], &open),
+        1,
+        &["not shown: ClassAssertion(<http://x#Stone> <http://x#tom>)"],
+    );
+    let schema = ask(&["--schema"], "");
+    check(&schema, 0, &["<http://x#Cat> below <http://x#Pet>\n", "<http://x#StoneCat> is always empty"]);
+    let why = ask(&["--why", "tom a Animal"], "");
+    check(
+        &why,
+        0,
+        &[
+            "<http://x#Animal>(<http://x#tom>) by rule",
+            "SubClassOf(<http://x#Pet> <http://x#Animal>)",
+            "is stated",
+        ],
+    );
+    check(&ask(&["--why", ":tom a :Stone"], ""), 1, &["does not hold"]);
+    check(&ask(&["--why-not", "tom a Stone"], ""), 0, &["does not hold", "(SubClassOf(<http://x#StoneCat>"]);
+    check(&ask(&["--why", "tim a Cat"], ""), 2, &["nothing is called `tim`"]);
+    check(&ask(&["--why", "tom Cat"], ""), 2, &["SUBJECT a CLASS"]);
+    for arguments in [&["--schema"][..], &["--why", "tom a Pet"], &["--entails", "zoo.ttl"]] {
+        let json = ask(&[arguments, &["--format", "json"]].concat(), "").json();
+        assert!(json["format"].as_str().is_some_and(|format| format.ends_with("/1")), "{json:#}");
+    }
+}
+
+/// A rule that counts ends with an error that names it; a missing import need not stop anything.
+#[test]
+fn limits_and_missing_imports_are_options() {
+    let count = "<http://x#n>(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> <http://x#n>(?x, ?m) .\n";
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    std::fs::write(directory.path().join("count.swrl"), count).expect("a file");
+    std::fs::write(directory.path().join("model.ttl"), "<http://x#i> <http://x#n> 1 .").expect("a file");
+    let arguments = ["reason", "model.ttl", "--rules", "count.swrl", "-q", "--step-limit", "1000000"];
+    check(
+        &metaplan_in(directory.path(), &arguments, ""),
+        3,
+        &["R301 step budget of 1000000", "count.swrl#0"],
+    );
+    let imports = "<http://x> a <http://www.w3.org/2002/07/owl#Ontology> ;
+        <http://www.w3.org/2002/07/owl#imports> <http://nowhere.example/y> .";
+    check(&run(&["reason", "-"], imports), 3, &["O103", "--ignore-missing-imports"]);
+    check(&run(&["reason", "-", "--ignore-missing-imports"], imports), 0, &["warning[O206]"]);
+}
+
+/// Of many warnings of one kind, ten are shown.
+#[test]
+fn warnings_are_summed_up() {
+    let model: String = (0..15).map(|n| format!("<http://x#i{n}> a <http://x#C{n}> .\n")).collect();
+    let outcome = run(&["reason", "-"], &model);
+    check(&outcome, 0, &["and 5 more O201"]);
+    assert_eq!(outcome.stderr.matches("warning[O201]").count(), 10, "{outcome:#?}");
 }
 
 #[test]

@@ -5,9 +5,8 @@
 
 mod transcribe;
 
-pub(crate) use transcribe::{owl_xml, transcribe};
+pub(crate) use transcribe::{Fault, owl_xml, transcribe};
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use horned_owl::io::ParserConfiguration;
@@ -19,14 +18,36 @@ use crate::names::Names;
 use crate::normalize::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
 use crate::owl::{
     ANONYMOUS, AnnotatedAxiom, Annotation, AnnotationValue, Argument, Atom, Axiom, Bound, Characteristic,
-    ClassExpression, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Rule,
+    ClassExpression, DataRange, EntityKind, INVERSE, Iri, Literal, ObjectPropertyExpression, Rule,
 };
 use crate::read::Parts;
 use crate::vocab::{rdfs, swrla};
 
+/// The stack on which horned-owl runs, in bytes of address space: it recurses into lists and expressions.
+const STACK: usize = 1 << 29;
+
+/// Runs a reader or writer where long lists do not overflow the stack.
+fn with_stack<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T, String> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);
+        let thread = thread.map_err(|error| format!("there is no room for the OWL reader: {error}"))?;
+        thread.join().map_err(|_| "the OWL reader failed on it".to_owned())
+    })
+}
+
 /// Reads a normalised N-Triples document about the ontology `about`, and adds what it says to `plain`, whose IRIs are
 /// `names`; `origins` says where each rule comes from.
 pub(crate) fn build(
+    ntriples: &[u8],
+    about: &str,
+    origins: &[Origin],
+    plain: Parts,
+    names: Names,
+) -> Result<Parts, String> {
+    with_stack(|| build_here(ntriples, about, origins, plain, names))?
+}
+
+fn build_here(
     ntriples: &[u8],
     about: &str,
     origins: &[Origin],
@@ -44,13 +65,12 @@ pub(crate) fn build(
             )?;
         parser.parse()
     };
-    let (ontology, rest) = catch_unwind(AssertUnwindSafe(reading))
-        .map_err(|_| "the OWL reader failed on it".to_owned())?
-        .map_err(|error| error.to_string())?;
+    let (ontology, rest) = reading().map_err(|error| plain_text(&error.to_string()))?;
     let mut builder = Builder { ontology: about.into(), names, parts: plain, rules: Vec::new() };
     for annotated in ontology {
         builder.component(annotated.component, annotated.ann);
     }
+    let unread = builder.leftovers(&rest);
     let Builder { mut parts, mut rules, .. } = builder;
     rules.sort_by_key(|(index, _)| *index);
     parts.rules =
@@ -61,7 +81,7 @@ pub(crate) fn build(
     parts.axioms.dedup();
     parts.annotations.sort();
     parts.annotations.dedup();
-    parts.warnings.extend(leftovers(&rest));
+    parts.warnings.extend(unread);
     Ok(parts)
 }
 
@@ -240,6 +260,13 @@ impl Builder {
     }
 
     fn object(&mut self, property: &ho::ObjectPropertyExpression<RcStr>) -> ObjectPropertyExpression {
+        let name = match property {
+            ho::ObjectPropertyExpression::ObjectProperty(iri)
+            | ho::ObjectPropertyExpression::InverseObjectProperty(iri) => iri,
+        };
+        if let Some(inverse) = name.strip_prefix(INVERSE) {
+            return ObjectPropertyExpression::Inverse(self.iri(inverse));
+        }
         match property {
             ho::ObjectPropertyExpression::ObjectProperty(iri) => {
                 ObjectPropertyExpression::Property(self.iri(iri))
@@ -397,6 +424,25 @@ impl Builder {
         })
     }
 
+    /// One warning for each thing that horned-owl could not place.
+    fn leftovers(&mut self, rest: &IncompleteParse<RcStr>) -> Vec<Warning> {
+        let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
+            format!("{} {} {}", term(subject), term(predicate), term(object))
+        };
+        let simple = rest.simple.iter().map(|found| triple(found.triple()));
+        let nodes = rest.bnode.iter().flat_map(|found| found.vec_triple().iter().map(triple));
+        let lists = rest.bnode_seq.iter().map(|items| {
+            let items: Vec<_> = items.iter().map(term).collect();
+            format!("the list ({})", items.join(" "))
+        });
+        let classes =
+            rest.class_expression.iter().map(|class| format!("the class expression {}", self.class(class)));
+        let annotations = rest.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
+        let statements = simple.chain(nodes).chain(lists).chain(classes).chain(annotations);
+        let reason = || "part of no axiom or rule".to_owned();
+        statements.map(|statement| Warning::Unread { statement, reason: reason() }).collect()
+    }
+
     fn key(&mut self, key: &ho::HasKey<RcStr>) -> Axiom {
         let (mut objects, mut data) = (Vec::new(), Vec::new());
         for property in &key.vpe {
@@ -415,6 +461,7 @@ impl Builder {
 fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
     Some(match component {
         Component::DeclareClass(d) => (EntityKind::Class, &*d.0),
+        Component::DeclareObjectProperty(d) if d.0.starts_with(INVERSE) => return None,
         Component::DeclareObjectProperty(d) => (EntityKind::ObjectProperty, &*d.0),
         Component::DeclareDataProperty(d) => (EntityKind::DataProperty, &*d.0),
         Component::DeclareAnnotationProperty(d) if !d.0.starts_with(ORIGIN) => {
@@ -426,22 +473,13 @@ fn entity(component: &Component<RcStr>) -> Option<(EntityKind, &str)> {
     })
 }
 
-/// One warning for each thing that horned-owl could not place.
-fn leftovers(rest: &IncompleteParse<RcStr>) -> Vec<Warning> {
-    let triple = |[subject, predicate, object]: &[Term<RcStr>; 3]| {
-        format!("{} {} {}", term(subject), term(predicate), term(object))
+/// A message of horned-owl, in which debug forms show IRIs, with the IRIs alone.
+fn plain_text(message: &str) -> String {
+    let Some((what, rest)) = message.split_once(": ").filter(|(_, rest)| rest.contains('"')) else {
+        return message.to_owned();
     };
-    let simple = rest.simple.iter().map(|found| triple(found.triple()));
-    let nodes = rest.bnode.iter().flat_map(|found| found.vec_triple().iter().map(triple));
-    let lists = rest.bnode_seq.iter().map(|items| {
-        let items: Vec<_> = items.iter().map(term).collect();
-        format!("the list ({})", items.join(" "))
-    });
-    let classes = rest.class_expression.iter().map(|class| format!("the class expression {class:?}"));
-    let annotations = rest.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
-    let statements = simple.chain(nodes).chain(lists).chain(classes).chain(annotations);
-    let reason = || "part of no axiom or rule".to_owned();
-    statements.map(|statement| Warning::Unread { statement, reason: reason() }).collect()
+    let names: Vec<_> = rest.split('"').skip(1).step_by(2).map(|name| format!("<{name}>")).collect();
+    format!("{what}: {}", names.join(" "))
 }
 
 fn term(term: &Term<RcStr>) -> String {

@@ -1,13 +1,12 @@
 //! OWL/XML and functional-style documents as N-Triples, and N-Triples as OWL/XML, by the readers and writers of horned-owl.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
 use horned_owl::error::{HornedError, Location};
 use horned_owl::io::{ParserConfiguration, ofn, owx, rdf};
 use horned_owl::model::{self as ho, RcAnnotatedComponent, RcStr};
 use horned_owl::ontology::component_mapped::ComponentMappedOntology;
 use horned_owl::ontology::set::SetOntology;
 
+use super::with_stack;
 use crate::read::Syntax;
 
 /// Why a document cannot be transcribed.
@@ -32,7 +31,7 @@ pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> 
         };
         Fault { offset: usize::try_from(offset).unwrap_or(0), message: error.to_string() }
     };
-    let transcription = || {
+    let transcription = || -> Result<Vec<u8>, HornedError> {
         let (mut text, build) = (text, ho::Build::new_rc());
         let configuration = ParserConfiguration::new(&build);
         let ontology: SetOntology<RcStr> = match syntax {
@@ -43,19 +42,18 @@ pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> 
         rdf::writer::write_to_rdf_format(Vec::new(), &ontology, "nt")
     };
     let panicked = |_| Fault { offset: 0, message: format!("the {syntax} reader failed on this document") };
-    catch_unwind(AssertUnwindSafe(transcription)).map_err(panicked)?.map_err(fault)
+    with_stack(|| transcription().map_err(fault)).map_err(panicked)?
 }
 
 /// A functional-style document as an OWL/XML document.
 pub(crate) fn owl_xml(text: &[u8]) -> Result<String, String> {
-    let transcription = || {
+    let transcription = || -> Result<Vec<u8>, HornedError> {
         let (mut text, build) = (text, ho::Build::new_rc());
         let ontology: SetOntology<RcStr> = ofn::reader::read(&mut text, ParserConfiguration::new(&build))?.0;
         let ontology = ComponentMappedOntology::<RcStr, RcAnnotatedComponent>::from(ontology);
         owx::writer::write(Vec::new(), &ontology, None)
     };
-    let bytes: Vec<u8> = catch_unwind(AssertUnwindSafe(transcription))
-        .map_err(|_| "the OWL/XML writer failed on it".to_owned())?
-        .map_err(|error: HornedError| error.to_string())?;
+    let bytes = with_stack(|| transcription().map_err(|error| error.to_string()))
+        .map_err(|_| "the OWL/XML writer failed on it".to_owned())??;
     String::from_utf8(bytes).map_err(|error| error.to_string())
 }

@@ -4,10 +4,11 @@ use rules::{Atom, RuleIdentity, Term};
 
 use super::class;
 use super::context::{Conjunction, Context, Variables, identity};
+use super::groups;
 use super::range;
 use crate::error::Warning;
 use crate::owl::{
-    AnnotatedAxiom, Axiom, Characteristic, ClassExpression, DataRange, Iri,
+    AnnotatedAxiom, Axiom, Characteristic, ClassExpression, DataRange, EntityKind, Iri,
     ObjectPropertyExpression as Property,
 };
 use crate::vocab::owl;
@@ -24,7 +25,8 @@ pub(crate) fn lower_rules(axioms: &[AnnotatedAxiom], context: &mut Context) {
             continue;
         }
         let before = context.rules.len();
-        let mut lowering = Lowering { identity: identity(axiom, position), context };
+        context.identity = identity(axiom, position);
+        let mut lowering = Lowering { identity: context.identity.clone(), context };
         let result = lowering.axiom(axiom);
         if let Err(reason) = context.take_gaps().and(result) {
             let partly = context.rules.len() > before;
@@ -51,8 +53,6 @@ fn is_assertion(axiom: &Axiom) -> bool {
         Axiom::ClassAssertion(ClassExpression::Class(_), _)
             | Axiom::ObjectPropertyAssertion(..)
             | Axiom::DataPropertyAssertion(..)
-            | Axiom::SameIndividual(_)
-            | Axiom::DifferentIndividuals(_)
             | Axiom::DatatypeDefinition(..)
     )
 }
@@ -60,6 +60,7 @@ fn is_assertion(axiom: &Axiom) -> bool {
 /// Adds the facts of an assertion about named classes and properties; nothing for any other axiom.
 fn assertion(context: &mut Context, axiom: &Axiom) {
     match axiom {
+        // That an individual is one need not be said, unless something asks.
         Axiom::ClassAssertion(ClassExpression::Class(class), individual) if &**class != owl::THING => {
             let (class, individual) = (context.name(class), context.name(individual));
             context.state(class, [individual]);
@@ -88,6 +89,13 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
                 context.state(same, [first, second]);
             }
         }
+        Axiom::DifferentIndividuals(individuals) if individuals.len() > groups::PAIRS => {
+            let member = groups::relation(context, &axiom.to_string());
+            for (place, individual) in individuals.iter().enumerate() {
+                let (individual, number) = (context.name(individual), groups::number(context, place));
+                context.state(member, [individual, number]);
+            }
+        }
         Axiom::DifferentIndividuals(individuals) => {
             let different = context.name(owl::DIFFERENT_FROM);
             for (place, first) in individuals.iter().enumerate() {
@@ -114,10 +122,27 @@ impl Lowering<'_, '_> {
 
     fn axiom(&mut self, axiom: &Axiom) -> Outside {
         match axiom {
-            Axiom::SubClassOf(sub, sup) => self.sub_class(sub, sup),
-            Axiom::EquivalentClasses(classes) => self.equivalent_classes(classes),
+            Axiom::SubClassOf(sub, sup) => {
+                self.sub_class(sub, sup);
+                Ok(())
+            }
+            Axiom::EquivalentClasses(classes) => {
+                self.equivalent_classes(classes);
+                Ok(())
+            }
             Axiom::DisjointClasses(classes) => {
-                self.disjoint_classes(classes);
+                self.disjoint_classes(classes, &axiom.to_string());
+                Ok(())
+            }
+            Axiom::SameIndividual(entities) => {
+                self.same_entities(entities);
+                Ok(())
+            }
+            Axiom::DifferentIndividuals(individuals) => {
+                if individuals.len() > groups::PAIRS {
+                    let member = groups::relation(self.context, &axiom.to_string());
+                    groups::forbid(self.context, &self.identity, member);
+                }
                 Ok(())
             }
             Axiom::DisjointUnion(class, parts) => self.disjoint_union(class, parts),
@@ -135,7 +160,8 @@ impl Lowering<'_, '_> {
                 Ok(())
             }
             Axiom::ObjectPropertyCharacteristic(characteristic, property) => {
-                self.characteristic(*characteristic, property)
+                self.characteristic(*characteristic, property);
+                Ok(())
             }
             Axiom::NegativeObjectPropertyAssertion(property, from, to) => {
                 let (from, to) = (self.context.constant(from), self.context.constant(to));
@@ -185,31 +211,44 @@ impl Lowering<'_, '_> {
         Ok(())
     }
 
-    fn sub_class(&mut self, sub: &ClassExpression, sup: &ClassExpression) -> Outside {
+    fn sub_class(&mut self, sub: &ClassExpression, sup: &ClassExpression) {
         let mut variables = Variables::default();
         let x = variables.fresh("x");
         let bodies = class::condition(self.context, sub, x, &mut variables);
         let conclusions = class::conclusions(self.context, sup, x, &mut variables);
         for body in &bodies {
             for (more, head) in &conclusions {
-                let body: Conjunction = body.iter().chain(more).cloned().collect();
-                if body.is_empty() {
-                    return Err("a statement about all individuals");
+                let mut body: Conjunction = body.iter().chain(more).cloned().collect();
+                // Where nothing may be, nothing has to be named for a contradiction.
+                if body.is_empty() && !head.is_empty() {
+                    body.push(self.context.thing(x));
                 }
                 self.rule(body, head.clone(), &variables);
             }
         }
-        Ok(())
     }
 
     /// A circle of subclass axioms; the directions that have a rule form are kept.
-    fn equivalent_classes(&mut self, classes: &[ClassExpression]) -> Outside {
-        let next = classes.iter().cycle().skip(1);
-        let results: Vec<_> = classes.iter().zip(next).map(|(sub, sup)| self.sub_class(sub, sup)).collect();
-        results.into_iter().collect()
+    fn equivalent_classes(&mut self, classes: &[ClassExpression]) {
+        for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
+            self.sub_class(sub, sup);
+        }
     }
 
-    fn disjoint_classes(&mut self, classes: &[ClassExpression]) {
+    fn disjoint_classes(&mut self, classes: &[ClassExpression], axiom: &str) {
+        if classes.len() > groups::PAIRS {
+            let member = groups::relation(self.context, axiom);
+            for (place, class) in classes.iter().enumerate() {
+                let mut variables = Variables::default();
+                let x = variables.fresh("x");
+                let number = Term::Constant(groups::number(self.context, place));
+                for body in class::condition(self.context, class, x, &mut variables) {
+                    self.rule(body, vec![Atom::relation(member, [x, number])], &variables);
+                }
+            }
+            groups::forbid(self.context, &self.identity, member);
+            return;
+        }
         for (place, first) in classes.iter().enumerate() {
             for second in &classes[place + 1..] {
                 let mut variables = Variables::default();
@@ -223,12 +262,26 @@ impl Lowering<'_, '_> {
         }
     }
 
+    /// Names of classes and properties that stand for one entity stand for one class or property (eq-rep).
+    fn same_entities(&mut self, entities: &[Iri]) {
+        let any = |context: &Context, kind| entities.iter().any(|iri| context.is(kind, iri));
+        let one = |iri: &Iri| Property::Property(iri.clone());
+        if any(self.context, EntityKind::Class) {
+            let classes: Vec<_> = entities.iter().cloned().map(ClassExpression::Class).collect();
+            self.equivalent_classes(&classes);
+        }
+        if any(self.context, EntityKind::ObjectProperty) || any(self.context, EntityKind::DataProperty) {
+            self.equivalent_properties(&entities.iter().map(one).collect::<Vec<_>>());
+        }
+    }
+
     fn disjoint_union(&mut self, class: &Iri, parts: &[ClassExpression]) -> Outside {
+        let text = Axiom::DisjointUnion(class.clone(), parts.to_vec()).to_string();
         let class = ClassExpression::Class(class.clone());
         for part in parts {
-            self.sub_class(part, &class)?;
+            self.sub_class(part, &class);
         }
-        self.disjoint_classes(parts);
+        self.disjoint_classes(parts, &text);
         Err("that the parts cover the class")
     }
 
@@ -297,8 +350,11 @@ impl Lowering<'_, '_> {
     fn end(&mut self, property: &Property, class: &ClassExpression, subject: bool) {
         let mut variables = Variables::default();
         let (x, y) = (variables.fresh("x"), variables.fresh("y"));
-        let edge = self.context.property(property, x, y);
+        // The top properties relate every individual to every other, and to every value.
+        let (Property::Property(name) | Property::Inverse(name)) = property;
+        let is_top = [owl::TOP_OBJECT_PROPERTY, owl::TOP_DATA_PROPERTY].contains(&&**name);
         let end = if subject { x } else { y };
+        let edge = if is_top { self.context.thing(end) } else { self.context.property(property, x, y) };
         for (more, head) in class::conclusions(self.context, class, end, &mut variables) {
             let body = std::iter::once(edge.clone()).chain(more).collect();
             self.rule(body, head, &variables);
@@ -315,7 +371,7 @@ impl Lowering<'_, '_> {
         Ok(())
     }
 
-    fn characteristic(&mut self, characteristic: Characteristic, property: &Property) -> Outside {
+    fn characteristic(&mut self, characteristic: Characteristic, property: &Property) {
         let mut v = Variables::default();
         let (x, y) = (v.fresh("x"), v.fresh("y"));
         let mut edge = |first, second| self.context.property(property, first, second);
@@ -325,7 +381,7 @@ impl Lowering<'_, '_> {
                 let functional = characteristic == Characteristic::Functional;
                 let pair = if functional { [edge(x, y), edge(x, z)] } else { [edge(y, x), edge(z, x)] };
                 self.context.merge(&self.identity, [y, z], pair.to_vec(), &v);
-                return Ok(());
+                return;
             }
             Characteristic::Irreflexive => (vec![edge(x, x)], Vec::new()),
             Characteristic::Symmetric => (vec![edge(x, y)], vec![edge(y, x)]),
@@ -334,9 +390,11 @@ impl Lowering<'_, '_> {
                 let z = v.fresh("z");
                 (vec![edge(x, y), edge(y, z)], vec![edge(x, z)])
             }
-            Characteristic::Reflexive => return Err("a statement about all individuals"),
+            Characteristic::Reflexive => {
+                let head = edge(x, x);
+                (vec![self.context.thing(x)], vec![head])
+            }
         };
         self.rule(body, head, &v);
-        Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 use rules::{Atom, Term};
 
+use super::INTERNAL;
 use super::context::{Conjunction, Context, Variables};
 use super::range;
 use crate::owl::{Bound, ClassExpression, DataRange};
@@ -23,9 +24,15 @@ pub(crate) fn condition(
         C::Class(iri) if &**iri == owl::NOTHING => Vec::new(),
         C::Class(iri) => vec![vec![context.relation(iri, [x])]],
         C::IntersectionOf(classes) => {
+            let parts = classes.iter().map(|class| (class, condition(context, class, x, variables)));
+            let parts: Vec<_> = parts.collect();
+            let size = parts.iter().fold(1, |size: usize, (_, part)| size.saturating_mul(part.len()));
             let mut product = vec![Vec::new()];
-            for class in classes {
-                product = cross(&product, &condition(context, class, x, variables));
+            for (class, mut part) in parts {
+                if size > ALTERNATIVES {
+                    part = abbreviated(context, class, part, x);
+                }
+                product = cross(&product, &part);
             }
             product
         }
@@ -64,6 +71,36 @@ pub(crate) fn condition(
         }
         C::Cardinality(..) | C::DataCardinality(..) => context.gap("a cardinality as a condition"),
     }
+}
+
+/// A conjunction of unions is multiplied out up to so many alternatives.
+pub(crate) const ALTERNATIVES: usize = 16;
+
+/// The alternatives of being in a class as one, by an auxiliary relation that each of them concludes.
+pub(crate) fn abbreviated(
+    context: &mut Context,
+    class: &ClassExpression,
+    alternatives: Vec<Conjunction>,
+    x: Term,
+) -> Vec<Conjunction> {
+    if alternatives.len() < 2 {
+        return alternatives;
+    }
+    // One is everything.
+    if alternatives.iter().any(Vec::is_empty) {
+        return vec![Vec::new()];
+    }
+    let name = format!("{INTERNAL}class:{class}");
+    if context.abbreviated.insert(name.clone()) {
+        let mut variables = Variables::default();
+        let own = variables.fresh("x");
+        let identity = context.identity.clone();
+        for body in condition(context, class, own, &mut variables) {
+            let head = vec![context.relation(&name, [own])];
+            context.rule(&identity, head, body, &variables);
+        }
+    }
+    vec![vec![context.relation(&name, [x])]]
 }
 
 /// As [`condition`], for a data range.

@@ -1,12 +1,12 @@
 //! What lowering collects, and the small vocabulary in which the other files of this folder write rules.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term, Variable};
 
 use super::{AXIOM_SOURCE, Equality, INTERNAL};
 use crate::error::Warning;
-use crate::owl::{AnnotatedAxiom, Axiom, DataRange, Iri, Literal, ObjectPropertyExpression};
+use crate::owl::{Axiom, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Ontology};
 use crate::vocab::{local_name, owl};
 
 /// Atoms that must all hold.
@@ -21,8 +21,14 @@ pub(crate) struct Context<'a> {
     pub equality: Equality,
     /// Named data ranges.
     pub definitions: HashMap<Iri, DataRange>,
-    /// Why parts of what is lowered now have no rule form.
+    /// The IRIs of classes and of properties.
+    entities: HashSet<(EntityKind, Iri)>,
+    /// What is lowered now.
+    pub identity: RuleIdentity,
+    /// Why parts of it have no rule form.
     gaps: Vec<&'static str>,
+    /// Classes that have an auxiliary relation.
+    pub abbreviated: HashSet<String>,
 }
 
 /// The variables of one rule.
@@ -53,18 +59,22 @@ impl Variables {
     }
 }
 
+/// The labels of rules are cut after so many characters: an axiom can have thousands of members.
+const LONGEST_LABEL: usize = 2_000;
+
 /// The identity of the rules of an axiom.
 pub(crate) fn identity(axiom: &Axiom, position: usize) -> RuleIdentity {
-    RuleIdentity {
-        source: AXIOM_SOURCE.into(),
-        label: Some(axiom.to_string().into()),
-        position: position as u32,
+    let mut label = axiom.to_string();
+    if let Some((end, _)) = label.char_indices().nth(LONGEST_LABEL) {
+        label.truncate(end);
+        label.push('…');
     }
+    RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: position as u32 }
 }
 
 impl<'a> Context<'a> {
-    pub(crate) fn new(symbols: &'a mut Symbols, equality: Equality, axioms: &[AnnotatedAxiom]) -> Self {
-        let definitions = axioms.iter().filter_map(|annotated| match &annotated.axiom {
+    pub(crate) fn new(symbols: &'a mut Symbols, equality: Equality, ontology: &Ontology) -> Self {
+        let definitions = ontology.axioms.iter().filter_map(|annotated| match &annotated.axiom {
             Axiom::DatatypeDefinition(name, range) => Some((name.clone(), range.clone())),
             _ => None,
         });
@@ -75,8 +85,21 @@ impl<'a> Context<'a> {
             warnings: Vec::new(),
             equality,
             definitions: definitions.collect(),
+            entities: ontology.entities.iter().cloned().collect(),
+            identity: RuleIdentity::new(AXIOM_SOURCE, 0),
             gaps: Vec::new(),
+            abbreviated: HashSet::new(),
         }
+    }
+
+    /// Whether an IRI names an entity of a kind.
+    pub(crate) fn is(&self, kind: EntityKind, iri: &Iri) -> bool {
+        self.entities.contains(&(kind, iri.clone()))
+    }
+
+    /// That a term is an individual.
+    pub(crate) fn thing(&mut self, term: Term) -> Atom {
+        self.relation(owl::THING, [term])
     }
 
     /// Notes that a part of what is lowered now has no rule form; what is returned for it concludes nothing.

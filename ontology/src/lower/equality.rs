@@ -12,6 +12,7 @@ use rules::{Atom, Rule, RuleIdentity, Term};
 
 use super::AXIOM_SOURCE;
 use super::context::{Context, Variables};
+use super::groups;
 use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression};
 use crate::vocab::owl;
 
@@ -25,24 +26,19 @@ pub enum Equality {
     UniqueNames,
 }
 
-/// Whether anything concludes or states that two names are one; adds the rules for difference, if anything asks.
+/// Whether anything concludes or states that two names are one; adds the rules for difference, if anything but the
+/// constraint that forbids to differ from oneself asks.
 pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     let (same, different) = (context.name(owl::SAME_AS), context.name(owl::DIFFERENT_FROM));
     let heads = |rule: &Rule| rule.head.iter().any(|atom| matches!(atom, Atom::Same(..)));
     let asks = |rule: &Rule| {
-        rule.body
-            .iter()
-            .any(|atom| matches!(atom, Atom::Relation { predicate, .. } if *predicate == different))
+        let is_difference =
+            |atom: &Atom| matches!(atom, Atom::Relation { predicate, .. } if *predicate == different);
+        !(rule.head.is_empty() && rule.body.len() == 1) && rule.body.iter().any(is_difference)
     };
     let merges = context.rules.iter().any(heads) || context.facts.iter().any(|fact| fact.predicate == same);
     if context.rules.iter().any(asks) {
         difference(axioms, context);
-    }
-    if merges {
-        let mut variables = Variables::default();
-        let x = variables.fresh("x");
-        let clash = Atom::relation(different, [x, x]);
-        context.rule(&identity("eq-diff1", 0), Vec::new(), vec![clash], &variables);
     }
     merges
 }
@@ -69,6 +65,14 @@ fn difference(axioms: &[AnnotatedAxiom], context: &mut Context) {
     for (position, annotated) in axioms.iter().enumerate() {
         let identity = super::context::identity(&annotated.axiom, position);
         match &annotated.axiom {
+            Axiom::DisjointClasses(classes) if classes.len() > groups::PAIRS => {
+                let member = groups::relation(context, &annotated.axiom.to_string());
+                groups::differ(context, &identity, member);
+            }
+            Axiom::DifferentIndividuals(individuals) if individuals.len() > groups::PAIRS => {
+                let member = groups::relation(context, &annotated.axiom.to_string());
+                groups::differ(context, &identity, member);
+            }
             Axiom::DisjointClasses(classes) => {
                 for (place, first) in classes.iter().enumerate() {
                     for second in &classes[place + 1..] {

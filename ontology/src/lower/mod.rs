@@ -16,8 +16,10 @@ mod axiom;
 mod class;
 mod context;
 mod equality;
+mod groups;
 mod range;
 mod swrl;
+mod vocabulary;
 
 use rules::{Atom, Error, Fact, Program, Rule, RuleIdentity, Symbols};
 
@@ -52,12 +54,29 @@ pub fn lower(ontology: &Ontology, symbols: &mut Symbols) -> Lowered {
 
 /// As [`lower()`], under the given semantics of names.
 pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols) -> Lowered {
-    let mut context = Context::new(symbols, equality, &ontology.axioms);
+    lower_together(ontology, Vec::new(), equality, symbols)
+}
+
+/// As [`lower_with`], together with rules that somebody else has made, whose names are among the symbols: they mean by
+/// `owl:Thing`, `owl:Nothing`, `sameAs` and `differentFrom` what the ontology means. They come last.
+pub fn lower_together(
+    ontology: &Ontology,
+    own: Vec<Rule>,
+    equality: Equality,
+    symbols: &mut Symbols,
+) -> Lowered {
+    let mut context = Context::new(symbols, equality, ontology);
     let duplicates = swrl::lower(&ontology.rules, &mut context);
     axiom::lower_rules(&ontology.axioms, &mut context);
     context.drop_unusable();
     axiom::lower_assertions(&ontology.axioms, &mut context);
+    let stated = context.rules.len();
+    context.take_in(own);
+    let taken = context.rules.len();
+    vocabulary::lower(ontology, &mut context);
     let equality = equality == Equality::Owl && equality::lower(&ontology.axioms, &mut context);
+    // Rules of others stay last.
+    context.rules[stated..].rotate_left(taken - stated);
     let Context { rules, facts, mut warnings, .. } = context;
     warnings.sort();
     warnings.dedup();
@@ -65,6 +84,20 @@ pub fn lower_with(ontology: &Ontology, equality: Equality, symbols: &mut Symbols
 }
 
 impl Context<'_> {
+    /// Takes in rules of others. Two names that differ may stand for one individual, so that their `differentFrom` asks for
+    /// what is entailed.
+    fn take_in(&mut self, own: Vec<Rule>) {
+        let owl = self.equality == Equality::Owl;
+        for mut rule in own {
+            for atom in &mut rule.body {
+                if let (true, Atom::Different(left, right)) = (owl, &*atom) {
+                    *atom = self.different(*left, *right);
+                }
+            }
+            self.rules.push(rule);
+        }
+    }
+
     /// Takes out the rules that the engine rejects (unsafe variables, for one): it would reject the whole program. A
     /// rule for an axiom binds its variables by the relations of its body.
     fn drop_unusable(&mut self) {

@@ -12,12 +12,15 @@ use crate::vocab::{owl, rdf, rdfs, xsd};
 /// Datatypes may be defined by each other so deep; deeper, or in a circle, they are not tested.
 const DEPTH: usize = 16;
 
+/// An intersection of unions of data ranges is multiplied out up to so many alternatives.
+const MOST_ALTERNATIVES: usize = 1_024;
+
 /// The datatypes whose value spaces the engine knows, by local name in the XML Schema namespace. Of others nothing is
 /// known but that they have values.
 const DATATYPES: &str = " string normalizedString token language Name NCName NMTOKEN boolean decimal integer \
     nonNegativeInteger positiveInteger nonPositiveInteger negativeInteger long int short byte unsignedLong unsignedInt \
     unsignedShort unsignedByte float double dateTime dateTimeStamp date time duration dayTimeDuration \
-    yearMonthDuration anyURI ";
+    yearMonthDuration anyURI hexBinary base64Binary gYear gYearMonth gMonth gMonthDay gDay ";
 
 type Tests = Result<Vec<Conjunction>, &'static str>;
 
@@ -48,19 +51,19 @@ impl Lowering<'_, '_> {
                 Some(definition) => self.tests(&definition, inside, depth - 1),
                 None => self.datatype(iri, inside),
             },
+            // A value is outside where it certainly is none of the members.
+            DataRange::OneOf(literals) if !inside => {
+                let differs = |member| Atom::Different(self.value, Term::Constant(member));
+                let members: Vec<_> = literals.iter().map(|literal| self.context.literal(literal)).collect();
+                Ok(vec![members.into_iter().map(differs).collect()])
+            }
             DataRange::OneOf(literals) => {
                 let predicate = self.context.members_of(range);
                 for literal in literals {
                     let member = self.context.literal(literal);
                     self.context.state(predicate, [member]);
                 }
-                let arguments = vec![self.value];
-                let member = if inside {
-                    Atom::Relation { predicate, arguments }
-                } else {
-                    Atom::Not { predicate, arguments }
-                };
-                Ok(vec![vec![member]])
+                Ok(vec![vec![Atom::relation(predicate, [self.value])]])
             }
             DataRange::IntersectionOf(ranges) if inside => self.all(ranges, inside, depth),
             DataRange::IntersectionOf(ranges) => self.any(ranges, inside, depth),
@@ -84,6 +87,9 @@ impl Lowering<'_, '_> {
         let mut product = vec![Vec::new()];
         for range in ranges {
             product = super::class::cross(&product, &self.tests(range, inside, depth - 1)?);
+            if product.len() > MOST_ALTERNATIVES {
+                return Err("a data range of too many alternatives");
+            }
         }
         Ok(product)
     }

@@ -22,6 +22,7 @@ pub(crate) fn lower(rules: &[Rule], context: &mut Context) -> usize {
             position: rule.position,
         };
         let position = context.rules.len();
+        context.identity = identity.clone();
         let (ontology, label) = (rule.ontology.to_string(), rule.label.as_ref().map(ToString::to_string));
         let result = lower_rule(rule, &identity, context);
         if let Err(reason) = context.take_gaps().map_err(str::to_owned).and(result) {
@@ -82,7 +83,17 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
     let mut variables = Variables::default();
     let mut bodies: Vec<Conjunction> = vec![Vec::new()];
     for atom in &rule.body {
-        bodies = class::cross(&bodies, &condition(context, atom, &mut variables)?);
+        let mut ways = condition(context, atom, &mut variables)?;
+        if let Atom::Class(class, argument) = atom
+            && bodies.len() * ways.len() > class::ALTERNATIVES
+        {
+            let x = term(context, argument, &mut variables);
+            ways = class::abbreviated(context, class, ways, x);
+        }
+        bodies = class::cross(&bodies, &ways);
+    }
+    for body in &mut bodies {
+        individuals(context, rule, body, &mut variables);
     }
     let (mut heads, mut further) = (Vec::new(), Vec::new());
     for atom in &rule.head {
@@ -104,6 +115,37 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
         }
     }
     Ok(())
+}
+
+/// Lets variables range over all individuals that a body asks to be in `owl:Thing`, or to be the same, and says nothing else
+/// about.
+fn individuals(context: &mut Context, rule: &Rule, body: &mut Conjunction, variables: &mut Variables) {
+    for atom in &rule.body {
+        let argument = match atom {
+            Atom::Class(ClassExpression::Class(iri), argument) if &**iri == owl::THING => argument,
+            Atom::SameIndividual(first, Argument::Variable(_)) => first,
+            _ => continue,
+        };
+        if let (Argument::Variable(_), x) = (argument, term(context, argument, variables))
+            && !is_bound(body, x)
+        {
+            body.push(context.thing(x));
+        }
+    }
+}
+
+/// Whether a relation, or equality with what one binds, gives a variable its values.
+fn is_bound(body: &Conjunction, x: Term) -> bool {
+    let binds = |atom: &rules::Atom| matches!(atom, rules::Atom::Relation { arguments, .. } if arguments.contains(&x));
+    body.iter().any(|atom| match atom {
+        rules::Atom::Same(left, right) if *left == x || *right == x => {
+            let other = if *left == x { *right } else { *left };
+            other != x && (matches!(other, Term::Constant(_)) || body.iter().any(|atom| {
+                matches!(atom, rules::Atom::Relation { arguments, .. } if arguments.contains(&other))
+            }))
+        }
+        atom => binds(atom),
+    })
 }
 
 fn term(context: &mut Context, argument: &Argument, variables: &mut Variables) -> Term {

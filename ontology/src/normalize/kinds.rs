@@ -27,6 +27,8 @@ struct Use {
     /// By an axiom or rule that says which.
     data: bool,
     object: bool,
+    /// By a restriction that does not say which.
+    restricted: bool,
     /// On something that is not an individual.
     entity: bool,
 }
@@ -124,9 +126,10 @@ impl Kinds<'_> {
 }
 
 fn kind_of(used: Use) -> (&'static str, &'static str) {
-    if used.data || (used.literal && !used.object && !used.entity) {
+    let values_only = used.literal && !used.object;
+    if used.data || values_only && (!used.entity || used.restricted && !used.individual) {
         (owl::DATATYPE_PROPERTY, "a data property")
-    } else if used.object || (used.individual && !used.entity) {
+    } else if used.object || used.restricted || (used.individual && !used.entity) {
         (owl::OBJECT_PROPERTY, "an object property")
     } else {
         (owl::ANNOTATION_PROPERTY, "an annotation property")
@@ -175,6 +178,10 @@ impl Declared {
 
     /// Whether the node is something else than an individual.
     fn is_entity(&self, graph: &Graph, node: &NamedOrBlankNode) -> bool {
+        // Most of what headers say are annotations.
+        if graph.of(node).any(|(_, triple)| is_type(triple, owl::ONTOLOGY)) {
+            return true;
+        }
         named(node).is_none_or(|iri| {
             let individual = iri.starts_with(ANONYMOUS)
                 || graph.objects(node, rdf::TYPE).any(|class| match class {
@@ -183,10 +190,7 @@ impl Declared {
                     }
                     _ => true,
                 });
-            !individual
-                && (self.classes.contains(iri)
-                    || self.properties.contains(iri)
-                    || graph.of(node).any(|(_, triple)| is_type(triple, owl::ONTOLOGY)))
+            !individual && (self.classes.contains(iri) || self.properties.contains(iri))
         })
     }
 }
@@ -196,6 +200,23 @@ fn named(node: &NamedOrBlankNode) -> Option<&str> {
         NamedOrBlankNode::NamedNode(node) => Some(node.as_str()),
         NamedOrBlankNode::BlankNode(_) => None,
     }
+}
+
+/// Whether a restriction is one on values.
+fn restricts_data(graph: &Graph, restriction: &NamedOrBlankNode, declared: &Declared) -> bool {
+    graph.of(restriction).any(|(_, triple)| match triple.predicate.as_str() {
+        owl::ON_DATA_RANGE => true,
+        owl::HAS_VALUE => matches!(triple.object, Term::Literal(_)),
+        owl::SOME_VALUES_FROM | owl::ALL_VALUES_FROM => match &triple.object {
+            Term::NamedNode(filler) => declared.is_datatype(filler.as_str()),
+            Term::BlankNode(node) => {
+                let node = NamedOrBlankNode::from(node.clone());
+                graph.of(&node).any(|(_, said)| is_type(said, rdfs::DATATYPE))
+            }
+            Term::Literal(_) => false,
+        },
+        _ => false,
+    })
 }
 
 /// Notes the undeclared classes that a triple names.
@@ -244,10 +265,15 @@ fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &m
                 note(property, &|used| if data { used.data = true } else { used.object = true });
             }
         }
-        rdfs::DOMAIN | owl::ON_PROPERTY => {
-            let property = if predicate == rdfs::DOMAIN { named(&triple.subject) } else { object };
-            if let Some(property) = property {
+        rdfs::DOMAIN => {
+            if let Some(property) = named(&triple.subject) {
                 note(property, &|_| ());
+            }
+        }
+        owl::ON_PROPERTY => {
+            let data = restricts_data(graph, &triple.subject, declared);
+            if let Some(property) = object {
+                note(property, &|used| if data { used.data = true } else { used.restricted = true });
             }
         }
         owl::INVERSE_OF => {

@@ -1,17 +1,57 @@
 //! Axioms that lie in lists: `AllDisjointClasses` and `AllDisjointProperties` into pairs, a list that several axioms
 //! share into one copy each, property chains that are not lists taken away.
 
-use oxrdf::{NamedOrBlankNode, Term};
+use oxrdf::{NamedNode, NamedOrBlankNode, Term};
 
 use crate::error::Warning;
 use crate::graph::{Graph, subject_of};
+use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression, Iri};
 use crate::vocab::{owl, rdf};
 
-pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
+/// Returns the axioms that need no reader.
+pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) -> Vec<AnnotatedAxiom> {
+    let groups = groups(graph);
     pairs(graph, owl::ALL_DISJOINT_CLASSES, owl::DISJOINT_WITH, warnings);
     pairs(graph, owl::ALL_DISJOINT_PROPERTIES, owl::PROPERTY_DISJOINT_WITH, warnings);
     check_chains(graph, warnings);
     unshare(graph);
+    groups
+}
+
+/// So many members of a group are still read by others, or paired.
+const PAIRS: usize = 16;
+
+/// Takes the axioms that many named classes are disjoint, or many named individuals different: pairs would be too many, and
+/// horned-owl takes time that grows with the square of a list.
+fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
+    let mut axioms = Vec::new();
+    for (kind, class) in
+        [(owl::ALL_DISJOINT_CLASSES, owl::CLASS), (owl::ALL_DIFFERENT, owl::NAMED_INDIVIDUAL)]
+    {
+        for (_, node) in graph.instances(kind) {
+            let members = [owl::MEMBERS, owl::DISTINCT_MEMBERS];
+            let Some(list) = members
+                .iter()
+                .find_map(|members| graph.object(&node, members).and_then(|head| graph.list(head)).ok())
+            else {
+                continue;
+            };
+            let named: Option<Vec<Iri>> =
+                list.items.iter().map(|item| crate::read::iri_of(item).map(Iri::from)).collect();
+            let Some(named) = named.filter(|named| named.len() > PAIRS) else { continue };
+            for item in list.items.iter().filter_map(subject_of) {
+                graph.state(&item, rdf::TYPE, NamedNode::new_unchecked(class));
+            }
+            let axiom = match class {
+                owl::CLASS => Axiom::DisjointClasses(named.into_iter().map(ClassExpression::Class).collect()),
+                _ => Axiom::DifferentIndividuals(named),
+            };
+            axioms.push(AnnotatedAxiom { axiom, annotations: Vec::new() });
+            let own = graph.of(&node).map(|(index, _)| index).chain(list.spine.iter().copied()).collect();
+            take(graph, own);
+        }
+    }
+    axioms
 }
 
 /// Replaces each `class` axiom by `predicate` between all pairs of its members.

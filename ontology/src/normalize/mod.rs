@@ -8,20 +8,24 @@
 //! |---|---|
 //! | here | headers of imported ontologies (taken away) |
 //! | `swrl` | every rule into one canonical shape |
+//! | `forms` | definitions as OWL 1 writes them, expressions without types, axioms with IRIs |
 //! | `lists` | disjointness of many into pairs, shared lists into copies, property chains checked |
 //! | `anonymous` | blank-node individuals into IRIs |
 //! | `kinds` | undeclared entities into declared ones |
 //! | `plain` | statements that need no reader into our own structures |
 
 mod anonymous;
+mod depth;
+mod forms;
 mod kinds;
 mod lists;
 mod plain;
 mod swrl;
 
+pub(crate) use depth::DEEPEST;
 pub(crate) use swrl::{INDIVIDUAL, ORIGIN, TRUE, VARIABLE};
 
-use crate::error::Warning;
+use crate::error::{Error, Warning};
 use crate::graph::{Graph, is_type};
 use crate::names::Names;
 use crate::owl::Iri;
@@ -73,15 +77,25 @@ pub(crate) fn merge(documents: Vec<Document>) -> (Graph, Vec<(usize, Iri)>) {
 }
 
 /// Merges and rewrites; see the module documentation.
-pub(crate) fn normalize(documents: Vec<Document>) -> Normal {
+///
+/// # Errors
+/// Class expressions are nested too deep.
+pub(crate) fn normalize(documents: Vec<Document>) -> Result<Normal, Error> {
+    let files: Vec<String> = documents.iter().map(|document| document.name.clone()).collect();
     let ((mut graph, parts), mut warnings) = (merge(documents), Vec::new());
+    if let Some(index) = depth::too_deep(&graph) {
+        let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);
+        return Err(Error::TooDeep { file: files[part].clone(), position: None, deepest: DEEPEST });
+    }
     let rules = swrl::rewrite(&mut graph, &parts, &mut warnings);
-    lists::rewrite(&mut graph, &mut warnings);
+    forms::rewrite(&mut graph);
+    let disjoint = lists::rewrite(&mut graph, &mut warnings);
     anonymous::rewrite(&mut graph, &mut warnings);
     kinds::declare(&mut graph, &mut warnings);
     let mut names = Names::default();
-    let plain = plain::take(&mut graph, &mut names);
-    Normal { ntriples: graph.to_ntriples(), plain, names, rules, warnings }
+    let mut plain = plain::take(&mut graph, &mut names);
+    plain.axioms.extend(disjoint);
+    Ok(Normal { ntriples: graph.to_ntriples(), plain, names, rules, warnings })
 }
 
 /// Whether an IRI belongs to the vocabularies of RDF, RDFS, OWL, SWRL or XML Schema itself.

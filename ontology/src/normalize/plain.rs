@@ -52,9 +52,10 @@ pub(crate) fn take(graph: &mut Graph, names: &mut Names) -> Parts {
 
 /// The plain statements with the indices of their triples, in order.
 fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
-    let (kinds, patterns) = (kinds(graph), patterns(graph));
+    let (kinds, patterns, headers) = (kinds(graph), patterns(graph), headers(graph));
     let of = |triple: &Triple| {
         let subject = named(triple).filter(|subject| !is_reserved(subject) && !patterns.contains(subject))?;
+        let is_header = headers.contains(subject);
         let kind = |iri: &str| kinds.get(iri).copied().unwrap_or_default();
         match (triple.predicate.as_str(), &triple.object) {
             (_, Term::BlankNode(_)) => None,
@@ -64,10 +65,17 @@ fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
             (rdf::TYPE, Term::NamedNode(class)) if !is_reserved(class.as_str()) => {
                 kind(class.as_str()).class.then_some(Statement::Class)
             }
-            (predicate, _) if DESCRIPTIONS.contains(&predicate) => Some(Statement::Annotation),
+            (predicate, _) if DESCRIPTIONS.contains(&predicate) => {
+                (!is_header).then_some(Statement::Annotation)
+            }
+            (owl::TOP_OBJECT_PROPERTY | owl::BOTTOM_OBJECT_PROPERTY, Term::NamedNode(_)) => {
+                Some(Statement::Object)
+            }
+            (owl::TOP_DATA_PROPERTY | owl::BOTTOM_DATA_PROPERTY, Term::Literal(_)) => Some(Statement::Data),
             (predicate, _) if is_reserved(predicate) || subject == predicate => None,
             (predicate, value) => match (kind(predicate).property?.ok()?, value) {
                 (Statement::Object, Term::Literal(_)) | (Statement::Data, Term::NamedNode(_)) => None,
+                (Statement::Annotation, _) if is_header => None,
                 (statement, _) => Some(statement),
             },
         }
@@ -110,15 +118,14 @@ fn kinds(graph: &Graph) -> FxHashMap<&str, Kinds> {
 
 /// Subjects of which a triple may be part of more than one statement.
 fn patterns(graph: &Graph) -> FxHashSet<&str> {
-    graph.iter().filter_map(|(_, triple)| pattern(triple)).collect()
+    let annotated = graph.iter().filter(|(_, triple)| triple.predicate.as_str() == owl::ANNOTATED_SOURCE);
+    annotated.filter_map(|(_, triple)| iri_of(&triple.object)).collect()
 }
 
-fn pattern(triple: &Triple) -> Option<&str> {
-    match (triple.predicate.as_str(), iri_of(&triple.object)?) {
-        (owl::ANNOTATED_SOURCE, source) => Some(source),
-        (rdf::TYPE, owl::ONTOLOGY) => named(triple),
-        _ => None,
-    }
+/// Ontologies, whose annotations are read by others. What else is said of one it is said of as an individual.
+fn headers(graph: &Graph) -> FxHashSet<&str> {
+    let typed = graph.iter().filter(|(_, triple)| crate::graph::is_type(triple, owl::ONTOLOGY));
+    typed.filter_map(|(_, triple)| named(triple)).collect()
 }
 
 fn convert(triple: Triple, statement: Statement, names: &mut Names, parts: &mut Parts) {

@@ -3,14 +3,16 @@
 //! OWL/XML and functional-style documents are first written as RDF by `crate::horned`, so that everything after
 //! this file sees triples only.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term, Triple};
 
+use super::structural::Structural;
 use super::syntax::{self, Syntax};
+use super::{encoding, entities, foreign};
 use crate::error::{Error, Position};
-use crate::horned;
 use crate::vocab::{owl, rdf};
 
 /// After so many syntax errors in one document its parser is stopped.
@@ -33,33 +35,30 @@ pub(crate) struct Document {
     pub triples: Vec<Triple>,
 }
 
+/// The text of a document in UTF-8, without a byte order mark.
+pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, Vec<Error>> {
+    encoding::decoded(bytes).map_err(|message| {
+        let position = Position::of_offset(name, bytes, 0);
+        vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]
+    })
+}
+
 /// Parses `text`. Relative IRIs are resolved against `base`; blank nodes get names that start with `prefix`.
 pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result<Document, Vec<Error>> {
+    if let Some(what) = foreign::recognized(text) {
+        return Err(vec![Error::OtherSyntax { position: Position::of_offset(name, text, 0), what }]);
+    }
     let syntax = Syntax::detect(text);
     let triples = match syntax {
         Syntax::Turtle => parse_turtle(text, name, base)?,
         Syntax::RdfXml => parse_rdf_xml(text, name, base)?,
-        Syntax::OwlXml | Syntax::Functional => {
-            let malformed = |offset, message: &str| {
-                let position = Position::of_offset(name, text, offset);
-                vec![Error::Malformed { position, syntax, message: shortened(message) }]
-            };
-            // The reader of OWL/XML takes memory without end where an element is not closed.
-            let unbalanced = (syntax == Syntax::OwlXml).then(|| syntax::mismatched_tag(text)).flatten();
-            if let Some(offset) = unbalanced {
-                return Err(malformed(offset, "an element is not closed, or another one than is open"));
-            }
-            let ntriples = match syntax {
-                Syntax::OwlXml => {
-                    let flat = syntax::flattened(text);
-                    horned::transcribe(&flat.text, syntax)
-                        .map_err(|fault| malformed(flat.origin(fault.offset), &fault.message))
-                }
-                _ => {
-                    horned::transcribe(text, syntax).map_err(|fault| malformed(fault.offset, &fault.message))
-                }
-            };
-            parse_turtle(&ntriples?, name, base)?
+        Syntax::OwlXml => {
+            let ntriples = Structural { name, text, syntax }.owl_xml()?;
+            parse_turtle(&ntriples, name, base)?
+        }
+        Syntax::Functional => {
+            let ntriples = Structural { name, text, syntax }.functional()?;
+            parse_turtle(&ntriples, name, base)?
         }
     };
     let triples = rename_blank_nodes(triples, prefix);
@@ -85,6 +84,9 @@ pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result
 /// The ontology IRI declared in `head`, the start of a document (its end may be cut off).
 pub(crate) fn ontology_iri(head: &[u8]) -> Option<String> {
     let base = "file:///";
+    let head = encoding::decoded(head).ok()?;
+    let head = entities::expanded(&head).ok()?.text.into_owned();
+    let head = head.as_slice();
     let is_header = |triple: &Triple| {
         triple.predicate.as_str() == rdf::TYPE && iri_of(&triple.object) == Some(owl::ONTOLOGY)
     };
@@ -117,7 +119,6 @@ fn parse_turtle(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<
     if let Ok(with_base) = parser.clone().with_base_iri(base) {
         parser = with_base;
     }
-    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let (mut triples, mut errors) = (Vec::new(), Vec::new());
     for result in parser.for_slice(text) {
         match result {
@@ -152,30 +153,31 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec
     if let Ok(with_base) = parser.clone().with_base_iri(base) {
         parser = with_base;
     }
-    let mut parser = parser.for_slice(text);
+    let malformed = |offset, message: &str| {
+        let position = Position::of_offset(name, text, offset);
+        vec![Error::Malformed { position, syntax: Syntax::RdfXml, message: shortened(message) }]
+    };
+    let flat = entities::expanded(text).map_err(|fault| malformed(fault.offset, &fault.message))?;
+    let mut parser = parser.for_slice(&flat.text);
     let mut triples = Vec::new();
     while let Some(result) = parser.next() {
         match result {
             Ok(triple) => triples.push(triple),
             Err(error) => {
                 let offset = usize::try_from(parser.buffer_position()).unwrap_or(usize::MAX);
-                let position = Position::of_offset(name, text, offset);
-                let message = shortened(&error.to_string());
-                return Err(vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]);
+                return Err(malformed(flat.origin(offset), &error.to_string()));
             }
         }
     }
     // The parser takes the end of the text for the end of the document, wherever it is.
-    if let Some(root) = syntax::unclosed_root(text) {
-        let position = Position::of_offset(name, text, text.len());
-        let message = format!("the document ends before </{root}>");
-        return Err(vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]);
+    if let Some(root) = syntax::unclosed_root(&flat.text) {
+        return Err(malformed(text.len(), &format!("the document ends before </{root}>")));
     }
     Ok(triples)
 }
 
 /// Parsers quote what they cannot read, which may be the whole document.
-fn shortened(message: &str) -> String {
+pub(super) fn shortened(message: &str) -> String {
     match message.char_indices().nth(LONGEST_MESSAGE) {
         Some((end, _)) => format!("{}…", &message[..end]),
         None => message.to_owned(),

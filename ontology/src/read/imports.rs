@@ -8,8 +8,10 @@
 //! 3. in the catalogs given, then in `catalog-v001.xml` beside the importing document (OASIS XML Catalogs);
 //! 4. beside the importing document, then in the directories given and below: by ontology IRI, then by the last
 //!    segment of the URL; among several files of that name, the one whose path has most segments of the URL;
-//! 5. among the documents already read, by file name;
-//! 6. among the knowledge bases that this crate embeds ([`crate::kb`]).
+//! 5. in a directory that is named as a part of the URL, beside those that the importing document lies in, as
+//!    repositories are that were checked out side by side;
+//! 6. among the documents already read, by file name;
+//! 7. among the knowledge bases that this crate embeds ([`crate::kb`]), by IRI or by where they have been published.
 
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
@@ -25,6 +27,9 @@ const CATALOG: &str = "catalog-v001.xml";
 
 /// How deep directories are searched.
 const DEPTH: usize = 4;
+
+/// In so many directories above that of a document, others are looked for by the segments of a URL.
+const LEVELS: usize = 3;
 
 /// Only the start of a file is searched for its ontology IRI, in bytes.
 const HEAD: usize = 1 << 16;
@@ -86,6 +91,7 @@ impl Resolver {
         }
         let beside = importer.and_then(Path::parent).map(|directory| candidates(directory, 0));
         let found = beside.and_then(|files| best(import, &files)).or_else(|| best(import, self.below()));
+        let found = found.or_else(|| checked_out(import, importer?));
         let named = || is_named_alike(import, documents).then_some(Resolution::Loaded);
         Ok(found.map(Resolution::File).or_else(named).or_else(|| embedded(import)))
     }
@@ -112,8 +118,40 @@ impl Resolver {
 }
 
 fn embedded(import: &str) -> Option<Resolution> {
-    let (iri, text) = kb::EMBEDDED.iter().find(|(iri, _)| same_iri(iri, import))?;
+    let published = is_published_tomasys(import).then_some(kb::EMBEDDED[0].0);
+    let (iri, text) = kb::EMBEDDED.iter().find(|(iri, _)| same_iri(iri, published.unwrap_or(import)))?;
     Some(Resolution::Embedded(iri, text))
+}
+
+/// Whether an IRI is a place where the TOMASys metamodel has been published: its repository, on whatever branch.
+fn is_published_tomasys(import: &str) -> bool {
+    let hosts = ["https://raw.githubusercontent.com/", "https://github.com/"];
+    let path = hosts.iter().find_map(|host| import.strip_prefix(host));
+    path.is_some_and(|path| {
+        path.starts_with("meta-control/mc_mdl_tomasys/") && path.ends_with("/tomasys.owl")
+    })
+}
+
+/// The file that an import means in a checked-out repository beside that of its importer.
+fn checked_out(import: &str, importer: &Path) -> Option<PathBuf> {
+    let plain = |segment: &&str| {
+        !segment.starts_with('.') && segment.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+    };
+    let (_, path) = import.split_once("://")?;
+    let segments: Vec<&str> = path.split('/').skip(1).filter(plain).collect();
+    let (_, directories) = segments.split_last()?;
+    for above in importer.ancestors().skip(2).take(LEVELS) {
+        // An owner and a repository.
+        for segment in directories.iter().take(2) {
+            let beside = above.join(segment);
+            if beside.is_dir()
+                && let Some(path) = best(import, &candidates(&beside, DEPTH))
+            {
+                return Some(path);
+            }
+        }
+    }
+    None
 }
 
 /// IRIs of ontologies are written with and without a final `#` or `/`.

@@ -7,8 +7,12 @@
 //! ```
 
 mod document;
+mod encoding;
+mod entities;
+mod foreign;
 mod imports;
 mod spelling;
+mod structural;
 mod syntax;
 
 pub(crate) use document::{Document, iri_of};
@@ -92,10 +96,14 @@ fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec
     let (documents, mut warnings) = closure(roots, options, &mut texts)?;
     let sources: Vec<Source> = documents.iter().map(source).collect();
     let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
-    let Normal { ntriples, plain, names, rules, warnings: more } = normalize::normalize(documents);
+    let Normal { ntriples, plain, names, rules, warnings: more } =
+        normalize::normalize(documents).map_err(|error| vec![error])?;
     warnings.extend(more);
-    let parts = horned::build(&ntriples, &about, &rules, plain, names)
-        .map_err(|reason| vec![Error::NotAnOntology { reason }])?;
+    let parts = horned::build(&ntriples, &about, &rules, plain, names).map_err(|reason| {
+        let place = spelling::place(&reason, &texts);
+        let file = sources.first().map(|source| source.name.clone()).unwrap_or_default();
+        vec![Error::NotAnOntology { file, position: place, reason }]
+    })?;
     warnings.extend(parts.warnings);
     spelling::locate(&mut warnings, &texts);
     warnings.sort();
@@ -200,6 +208,7 @@ fn load(
     if options.closed {
         document::require_ntriples(&text, &name)?;
     }
+    let text = document::decoded(&text, &name)?;
     let document = document::parse(&text, &name, &base, &format!("d{index}"))?;
     let text: Arc<[u8]> = text.into();
     Ok(if seen.insert(Arc::clone(&text)) { Some((document, path, text)) } else { None })

@@ -20,6 +20,15 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Arc<[u8]>)]) {
     }
 }
 
+/// Where documents spell the first IRI that a message names in angle brackets.
+pub(super) fn place(message: &str, texts: &[(String, Arc<[u8]>)]) -> Option<Position> {
+    let iri = message.split_once('<')?.1.split_once('>')?.0;
+    texts.iter().find_map(|(name, text)| {
+        let offset = offset(iri, std::str::from_utf8(text).ok()?)?;
+        Some(Position::of_offset(name, text, offset))
+    })
+}
+
 /// Where a text spells an IRI: whole between brackets or quotes, or its local name behind `:` or `#`.
 fn offset(iri: &str, text: &str) -> Option<usize> {
     let whole = spelled(text, iri, |c| matches!(c, '<' | '"' | '\''));

@@ -33,7 +33,6 @@ impl Syntax {
     /// The syntax that `text` looks like. Anything that is neither XML nor functional-style is taken for Turtle,
     /// whose parser then says what is wrong with it.
     pub fn detect(text: &[u8]) -> Self {
-        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
         let head = skip_comments(text);
         if head.starts_with(b"<") && !is_iri_reference(head) {
             return match xml_root(head) {
@@ -58,15 +57,22 @@ fn skip_comments(mut text: &[u8]) -> &[u8] {
     }
 }
 
-/// Whether a text that starts with `<` starts with an IRI, as Turtle does, and not with an XML tag: only an IRI has a
-/// colon and then a slash or no white space before its `>`, and is followed by something that is not a tag.
+/// Whether a text that starts with `<` starts with an IRI, as Turtle does, and not with an XML tag: an IRI ends without
+/// white space, and has a colon, or a character that no name of an element has. An element whose name has a colon needs
+/// white space, to declare its prefix, unless it stands within a document type.
 fn is_iri_reference(text: &[u8]) -> bool {
     let Some(end) = text.iter().position(|&byte| byte == b'>' || byte.is_ascii_whitespace()) else {
         return false;
     };
+    let inside = &text[1..end];
+    let named = |byte: &u8| byte.is_ascii_alphanumeric() || *byte >= 0x80 || b"_-.:/".contains(byte);
     text[end] == b'>'
-        && text[1..end].windows(3).any(|window| window == b"://" || window.starts_with(b"urn"))
-        && !text[1..end].starts_with(b"!")
+        && !inside.starts_with(b"!")
+        && !inside.starts_with(b"?")
+        && (inside.contains(&b':')
+            || inside.starts_with(b"#")
+            || !inside.iter().all(named)
+            || inside.is_empty())
 }
 
 /// The name of the first element after the XML declaration, comments and document type, and what follows the name.
@@ -110,32 +116,41 @@ pub(super) fn unclosed_root(text: &[u8]) -> Option<String> {
 }
 
 /// Where the first tag stands that closes another element than the one that is open; or the end of the text, if
-/// elements are open there.
-pub(super) fn mismatched_tag(text: &[u8]) -> Option<usize> {
+/// elements are open there. `Err` is where elements are nested too deep.
+pub(super) fn mismatched_tag(text: &[u8], deepest: usize) -> Result<Option<usize>, usize> {
     let (mut open, mut at) = (Vec::new(), 0);
     while let Some((start, end)) = next_markup(text, at) {
-        let Some(end) = end else { return Some(start) };
+        let Some(end) = end else { return Ok(Some(start)) };
+        if open.len() > deepest {
+            return Err(start);
+        }
         let inside = &text[start + 1..end - 1];
         let name = |text: &'_ [u8]| text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
         match inside.first() {
-            Some(b'/') if open.pop() != Some(inside[1..].trim_ascii()) => return Some(start),
+            Some(b'/') if open.pop() != Some(inside[1..].trim_ascii()) => return Ok(Some(start)),
             Some(b'/' | b'!' | b'?') => {}
             _ if inside.ends_with(b"/") => {}
             _ => open.push(&inside[..name(inside)]),
         }
         at = end;
     }
-    (!open.is_empty()).then_some(text.len())
+    Ok((!open.is_empty()).then_some(text.len()))
 }
 
-/// A document in which text between two tags is in one piece.
+/// A document that was rewritten, with the places that its parts had before.
+#[derive(Debug)]
 pub(super) struct Flattened<'a> {
     pub text: Cow<'a, [u8]>,
     /// After each change, the same place in the flattened and in the original text.
-    moved: Vec<(usize, usize)>,
+    pub moved: Vec<(usize, usize)>,
 }
 
-impl Flattened<'_> {
+impl<'a> Flattened<'a> {
+    /// The document as it was.
+    pub(super) fn unchanged(text: &'a [u8]) -> Self {
+        Self { text: Cow::Borrowed(text), moved: Vec::new() }
+    }
+
     /// Where in the original text a place of the flattened one is.
     pub(super) fn origin(&self, offset: usize) -> usize {
         let after = self.moved.partition_point(|&(here, _)| here <= offset);
@@ -224,7 +239,7 @@ mod tests {
             ("<a><!-- </b> ' --></a>", None),
             ("<!DOCTYPE a [ <!ENTITY b \"c\"> ]><?d <e> ?><a b='>'></a >", None),
         ] {
-            assert_eq!(mismatched_tag(text.as_bytes()), expected, "{text}");
+            assert_eq!(mismatched_tag(text.as_bytes(), 256), Ok(expected), "{text}");
         }
     }
 
@@ -249,11 +264,17 @@ mod tests {
         for (text, expected) in [
             ("<?xml version=\"1.0\"?>\n<rdf:RDF xmlns:rdf=\"r\">", Syntax::RdfXml),
             ("<!DOCTYPE rdf:RDF [ <!ENTITY a \"b\"> ]>\n<rdf:RDF>", Syntax::RdfXml),
-            ("\u{feff}<!-- a > b --><Ontology xmlns=\"http://www.w3.org/2002/07/owl#\">", Syntax::OwlXml),
+            ("<!-- a > b --><Ontology xmlns=\"http://www.w3.org/2002/07/owl#\">", Syntax::OwlXml),
             ("<owl:Ontology rdf:about=\"x\"/>", Syntax::RdfXml),
             ("# comment\n@prefix : <urn:x#> .", Syntax::Turtle),
             ("<http://e/#a> <http://e/#b> <http://e/#c> .", Syntax::Turtle),
             ("<urn:a> <urn:b> <urn:c> .", Syntax::Turtle),
+            ("<mailto:a@b> <urn:b> <urn:c> .", Syntax::Turtle),
+            ("<tag:x,2020:i> <urn:b> <urn:c> .", Syntax::Turtle),
+            ("<file:x> <urn:b> <urn:c> .", Syntax::Turtle),
+            ("<#i> <urn:b> <urn:c> .", Syntax::Turtle),
+            ("<Ontology>", Syntax::OwlXml),
+            ("<RDF/>", Syntax::RdfXml),
             ("Prefix(:=<http://e/#>)\nOntology(<http://e/>)", Syntax::Functional),
             ("", Syntax::Turtle),
         ] {

@@ -157,17 +157,15 @@ pub fn replace(engine: &Engine, property: Symbol, subject: Symbol, value: Option
 /// Whether no constraint of the program forbids a value because it lies outside the property's range: outside an
 /// enumeration, or in another datatype.
 fn allows(engine: &Engine, property: Symbol, value: Symbol) -> bool {
-    let symbols = engine.symbols();
+    let literal = |symbol| engine.symbols().value(symbol).as_literal();
+    let Some(value) = literal(value) else { return true };
     let forbids = |test: &Atom, tested: &Argument| match test {
-        Atom::Not { predicate, arguments } if arguments.first() == Some(tested) => {
-            is_enumeration(engine, *predicate) && !engine.holds(&Fact::new(*predicate, [value]))
+        Atom::Different(first, Argument::Constant(member)) if first == tested => {
+            literal(*member).is_some_and(|member| value.differs(member))
         }
         Atom::BuiltIn { built_in: BuiltIn::OutsideDataRange, arguments } => match arguments[..] {
             [first, Argument::Constant(datatype)] if first == *tested => {
-                match (symbols.value(value).as_literal(), symbols.value(datatype).as_literal()) {
-                    (Some(value), Some(Literal::Uri(datatype))) => !value.is_in(datatype),
-                    _ => false,
-                }
+                matches!(literal(datatype), Some(Literal::Uri(datatype)) if !value.is_in(datatype))
             }
             _ => false,
         },
@@ -175,19 +173,12 @@ fn allows(engine: &Engine, property: Symbol, value: Symbol) -> bool {
     };
     let constraints = engine.program().rules.iter().filter(|rule| rule.head.is_empty());
     let mut tests = constraints.filter_map(|rule| match &rule.body[..] {
-        [Atom::Relation { predicate, arguments }, test] if *predicate == property => {
-            Some((arguments.get(1)?, test))
+        [Atom::Relation { predicate, arguments }, tests @ ..]
+            if *predicate == property && !tests.is_empty() =>
+        {
+            Some((arguments.get(1)?, tests))
         }
         _ => None,
     });
-    !tests.any(|(tested, test)| forbids(test, tested))
-}
-
-/// Whether a range lists its members, and is not computed from the values that occur.
-fn is_enumeration(engine: &Engine, range: Symbol) -> bool {
-    let concluded = engine.program().rules.iter().flat_map(|rule| &rule.head);
-    !concluded.into_iter().any(|atom| {
-        matches!(atom, Atom::Relation { predicate, arguments }
-            if *predicate == range && matches!(arguments[..], [Argument::Variable(_)]))
-    })
+    !tests.any(|(tested, tests)| tests.iter().all(|test| forbids(test, tested)))
 }

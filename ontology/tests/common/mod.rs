@@ -7,6 +7,7 @@ use serde_json::Value;
 pub const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
 
 /// The JSON documents of a directory by name; none, with a message, where it is absent.
+#[allow(dead_code)] // not every suite reads recorded cases
 pub fn recorded(directory: &str) -> Vec<Value> {
     let directory = Path::new(SHARED).join(directory);
     let Ok(entries) = std::fs::read_dir(&directory) else {

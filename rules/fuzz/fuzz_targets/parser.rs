@@ -4,7 +4,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use metaplan_rules::{Engine, Prefixes, Program, Symbols, parse_rules, print_rules};
+use metaplan_rules::{Engine, Limits, Prefixes, Program, Symbols, parse_rules, print_rules};
 
 /// Rules without names of variables and labels, which the syntax cannot always spell.
 fn bare(program: &Program) -> Vec<String> {
@@ -17,5 +17,5 @@ fuzz_target!(|text: &str| {
     let printed = print_rules(&program, &symbols, &Prefixes::new());
     let again = parse_rules(&printed, "fuzz", &mut symbols, &Prefixes::new()).expect(&printed);
     assert_eq!(bare(&program), bare(&again), "{printed}");
-    let _ = Engine::with_step_budget(symbols, program, [], 1000);
+    let _ = Engine::with_limits(symbols, program, [], Limits { steps: 1000, ..Limits::default() });
 });

@@ -64,8 +64,8 @@ built_ins! {
     /// The first lies in the value space of the datatype whose IRI the second (an `xsd:anyURI`) is: SWRL's data range
     /// atom, not a member of `swrlb`. Rule text writes it `xsd:decimal(?x)`.
     DataRange "dataRange" 2..=2 Test,
-    /// The first is a literal outside the datatype's value space: the complement of a data range, which OWL has and SWRL
-    /// has not. Rule text writes it `not xsd:decimal(?x)`.
+    /// The first is a literal that certainly lies outside the datatype's value space: the complement of a data range, which
+    /// OWL has and SWRL has not. Rule text writes it `not xsd:decimal(?x)`.
     OutsideDataRange "outsideDataRange" 2..=2 Test,
     /// The values are equal.
     Equal "equal" 2..=2 Test,
@@ -270,7 +270,9 @@ impl BuiltIn {
         let order = || left.compare(right);
         match self {
             Self::DataRange => matches!(right, Literal::Uri(datatype) if left.is_in(datatype)),
-            Self::OutsideDataRange => matches!(right, Literal::Uri(datatype) if !left.is_in(datatype)),
+            Self::OutsideDataRange => {
+                matches!(right, Literal::Uri(datatype) if left.membership(datatype) == Some(false))
+            }
             Self::Equal => order() == Some(Ordering::Equal),
             // SWRL defines it as the negation of `equal`; what has no value satisfies neither.
             Self::NotEqual => {

@@ -11,6 +11,7 @@ use super::proof::edge_of;
 use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::Fact;
+use crate::forest::Forest;
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
@@ -34,16 +35,17 @@ struct Update<'e> {
 }
 
 impl Engine {
-    /// As [`Engine::apply`], under equality.
-    pub(crate) fn apply_equally(&mut self, equality: Arc<Equality>, delta: &Delta) -> Result<Delta, Error> {
+    /// As [`Engine::apply`], under equality; on an error also what takes the change back.
+    pub(crate) fn apply_equally(
+        &mut self,
+        equality: Arc<Equality>,
+        delta: &Delta,
+    ) -> Result<Delta, (Error, Delta)> {
         let mut update = Update::new(self, equality);
         let result = update.apply(delta);
-        let (equality, undo) = (update.equality, result.as_ref().err().map(|(_, undo)| undo.clone()));
+        let equality = update.equality;
         self.equality = Some(Arc::new(equality));
-        if let Some(undo) = undo {
-            self.restore(&undo);
-        }
-        result.map_err(|(error, _)| error)
+        result
     }
 
     /// Joins the classes that the first evaluation asks for; nothing is reported.
@@ -323,16 +325,15 @@ impl<'e> Update<'e> {
     /// Joins what is concluded to be one, until nothing more is.
     fn join_concluded(&mut self) -> Result<(), Error> {
         loop {
-            let mut scratch = Classes::default();
+            let mut connected = Forest::default();
             let mut edges: Vec<Edge> = Vec::new();
             for pair in std::mem::take(&mut self.joining) {
                 let (left, right) = (pair.arguments[0], pair.arguments[1]);
-                let is_new = left != right && scratch.find(left) != scratch.find(right);
-                if is_new
+                if left != right
                     && self.equality.is_pair(&pair, &self.engine.symbols)
                     && self.engine.row_state(&pair).is_some()
+                    && connected.connect(left, right)
                 {
-                    scratch.join(left, right);
                     edges.push(edge_of(self.engine, &self.equality, &pair));
                 }
             }

@@ -61,10 +61,19 @@ impl Equality {
         rows.map(|arguments| Fact { predicate, arguments }).collect()
     }
 
-    /// Everything that holds, in no order.
-    pub fn facts(&self, engine: &Engine) -> Vec<Fact> {
+    /// Everything that holds, in no order; of a class of more than `most` names, only the pairs with the first.
+    pub fn facts(&self, engine: &Engine, most: usize) -> Vec<Fact> {
         let names = |symbol| self.names(symbol);
-        let mut facts: Vec<Fact> = engine.rows_with(0).flat_map(|row| self.facts_of(&row, &names)).collect();
+        let facts = engine.rows_with(0).flat_map(|row| {
+            match row.arguments.first().and_then(|&name| self.names(name)) {
+                Some(class) if class.len() > most && self.is_reflexive(&row) => {
+                    let pair = |&name: &Symbol| Fact::new(self.same, [class[0], name]);
+                    class[1..].iter().map(pair).collect()
+                }
+                _ => self.facts_of(&row, &names),
+            }
+        });
+        let mut facts: Vec<Fact> = facts.collect();
         facts.extend(self.reflexive_pairs(None).map(|arguments| Fact { predicate: self.same, arguments }));
         facts
     }
@@ -97,7 +106,7 @@ impl Equality {
     /// Pairs with a literal that is not the other side.
     pub fn clashes(&self, engine: &Engine) -> Vec<Fact> {
         let rows = engine.matching_rows(self.same, &[None, None]);
-        let clashes = rows.filter(|row| row[0] != row[1]);
+        let clashes = rows.filter(|row| engine.symbols.differ(row[0], row[1]));
         clashes.map(|row| Fact::new(self.same, row.iter().copied())).collect()
     }
 }

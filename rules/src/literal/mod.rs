@@ -1,14 +1,21 @@
 //! RDF literals as values: lexical forms in, members of the XSD value spaces out ([1], [2]).
 //!
-//! Equality is equality of *values*: `"1.50"^^xsd:decimal`, `"1.5"^^xsd:decimal` and, where integral, every integer
+//! Equality is *identity* of values: `"1.50"^^xsd:decimal`, `"1.5"^^xsd:decimal` and, where integral, every integer
 //! type coincide; `"0"^^xsd:boolean` is `false`; a plain literal is an `xsd:string`. `xsd:float` and `xsd:double`
 //! are value spaces of their own (a float never *is* a decimal), but comparisons promote as `XPath` does: decimal to
-//! float, decimal or float to double.
+//! float, decimal or float to double. Values can be equal in that order without being identical ([3], sections 4.2 and
+//! 4.7): the two zeros of a floating-point type, one instant in two time zones.
+//!
+//! Of the values of a datatype that has no meaning here nothing is known but that equal forms are one value: whether two
+//! forms are one value, or lie in another datatype, is undecided ([`Literal::differs`], [`Literal::membership`]).
 //!
 //! [1] W3C XML Schema Definition Language 1.1 Part 2: Datatypes, 2012.
 //! [2] W3C RDF 1.1 Concepts, section 5.
+//! [3] W3C OWL 2 Structural Specification (Second Edition), 2012.
 
+mod binary;
 mod decimal;
+mod membership;
 mod temporal;
 mod text;
 
@@ -45,17 +52,23 @@ pub enum Literal {
     Boolean(bool),
     /// `xsd:decimal` and its integer types.
     Decimal(Decimal),
-    /// `xsd:float`, by bits (one NaN, no negative zero).
+    /// `xsd:float`, by bits (one NaN).
     Float(u32),
-    /// `xsd:double`, by bits (one NaN, no negative zero).
+    /// `xsd:double`, by bits (one NaN).
     Double(u64),
     /// `xsd:dateTime`, `xsd:date` or `xsd:time`.
     Moment(Moment),
     /// `xsd:duration` and its two derived types.
     Duration(Duration),
+    /// `xsd:gYear`, `gYearMonth`, `gMonth`, `gMonthDay` or `gDay`: canonical form and local name.
+    Recurring(Box<str>, &'static str),
+    /// `xsd:hexBinary`.
+    Hexadecimal(Box<[u8]>),
+    /// `xsd:base64Binary`.
+    Base64(Box<[u8]>),
     /// `xsd:anyURI`.
     Uri(Box<str>),
-    /// A datatype that has no meaning here; equal where lexical form and datatype are.
+    /// A datatype that has no meaning here, a rational number that is no decimal (in lowest terms), or an XML literal.
     Opaque {
         /// As written.
         lexical: Box<str>,
@@ -83,6 +96,7 @@ impl Literal {
         let value = match (datatype.strip_prefix(XSD), datatype.strip_prefix(RDF)) {
             (Some(local), _) => parse_xsd(lexical, local),
             (_, Some("PlainLiteral")) => Parsed::Value(parse_plain_literal(lexical)),
+            _ if datatype == OWL_RATIONAL => membership::parse_rational(lexical),
             _ => Parsed::Unknown,
         };
         let (lexical, datatype) = (Box::from(lexical), Box::from(datatype));
@@ -103,14 +117,14 @@ impl Literal {
         Self::Decimal(value.into())
     }
 
-    /// An `xsd:double`; every NaN is the same, zero has no sign.
+    /// An `xsd:double`; every NaN is the same, and zero has a sign.
     pub fn double(value: f64) -> Self {
-        Self::Double(if value.is_nan() { f64::NAN.to_bits() } else { (value + 0.0).to_bits() })
+        Self::Double(if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() })
     }
 
-    /// An `xsd:float`; every NaN is the same, zero has no sign.
+    /// An `xsd:float`; every NaN is the same, and zero has a sign.
     pub fn float(value: f32) -> Self {
-        Self::Float(if value.is_nan() { f32::NAN.to_bits() } else { (value + 0.0).to_bits() })
+        Self::Float(if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() })
     }
 
     /// Whether the lexical form is forbidden by its datatype.
@@ -130,6 +144,9 @@ impl Literal {
             Self::Double(_) => "http://www.w3.org/2001/XMLSchema#double",
             Self::Moment(moment) => moment.datatype(),
             Self::Duration(duration) => duration.datatype(),
+            Self::Recurring(_, local) => binary::recurring_datatype(local),
+            Self::Hexadecimal(_) => "http://www.w3.org/2001/XMLSchema#hexBinary",
+            Self::Base64(_) => "http://www.w3.org/2001/XMLSchema#base64Binary",
             Self::Uri(_) => "http://www.w3.org/2001/XMLSchema#anyURI",
             Self::Opaque { datatype, .. } | Self::IllTyped { datatype, .. } => datatype,
         }
@@ -138,7 +155,11 @@ impl Literal {
     /// The canonical lexical form.
     pub fn lexical(&self) -> String {
         match self {
-            Self::String(text) | Self::Uri(text) | Self::Language { text, .. } => text.to_string(),
+            Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
+                text.to_string()
+            }
+            Self::Hexadecimal(bytes) => binary::hexadecimal(bytes),
+            Self::Base64(bytes) => binary::base64(bytes),
             Self::Boolean(value) => value.to_string(),
             Self::Decimal(value) => value.to_string(),
             Self::Float(bits) => canonical_float(f32::from_bits(*bits)),
@@ -165,26 +186,6 @@ impl Literal {
             (Self::IllTyped { .. }, _) | (_, Self::IllTyped { .. }) => None,
             _ if self == other => Some(Ordering::Equal),
             _ => None,
-        }
-    }
-
-    /// Whether the value lies in the value space of a datatype: `5` is in `xsd:byte` and `xsd:decimal`, `1.5` in
-    /// `xsd:decimal` only, no float in `xsd:decimal`. Datatypes that have no meaning here contain their own literals.
-    pub fn is_in(&self, datatype_iri: &str) -> bool {
-        if self.is_ill_typed() {
-            return false;
-        }
-        match datatype_iri {
-            RDFS_LITERAL => true,
-            OWL_REAL | OWL_RATIONAL => matches!(self, Self::Decimal(_)),
-            _ => match (self, datatype_iri.strip_prefix(RDF)) {
-                // Zero has one spelling and lies in both kinds.
-                (Self::Duration(duration), _) => duration.is_in(datatype_iri),
-                (Self::Language { .. }, Some("langString" | "PlainLiteral"))
-                | (Self::String(_), Some("PlainLiteral")) => true,
-                (_, Some(_)) | (Self::Language { .. }, _) => false,
-                _ => *self == Self::parse(&self.lexical(), Some(datatype_iri), None),
-            },
         }
     }
 
@@ -290,6 +291,9 @@ fn parse_xsd(lexical: &str, local: &str) -> Parsed {
         "duration" | "dayTimeDuration" | "yearMonthDuration" => {
             Duration::parse(collapsed, local).map(Literal::Duration)
         }
+        "gYear" | "gYearMonth" | "gMonth" | "gMonthDay" | "gDay" => binary::recurring(collapsed, local),
+        "hexBinary" => binary::parse_hexadecimal(collapsed).map(Literal::Hexadecimal),
+        "base64Binary" => binary::parse_base64(collapsed).map(Literal::Base64),
         _ => match integer_range(local) {
             Some((minimum, maximum)) => parse_integer(collapsed, minimum, maximum),
             None => return Parsed::Unknown,

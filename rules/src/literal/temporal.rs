@@ -1,7 +1,8 @@
 //! `xsd:dateTime`, `xsd:date`, `xsd:time` and `xsd:duration`: lexical forms to seconds and months, partially ordered.
 //!
 //! A moment is seconds since 1970-01-01T00:00:00 in the proleptic Gregorian calendar, with its time zone subtracted
-//! if it has one. A moment without time zone compares with one that has only where every zone gives the same order.
+//! if it has one. A moment without time zone compares with one that has only where every zone gives the same order. One
+//! instant in two time zones is equal in that order, and two values.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -30,9 +31,10 @@ pub enum MomentKind {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Moment {
     kind: MomentKind,
-    /// Seconds since 1970-01-01T00:00:00, in UTC if `zoned`, else local.
+    /// Seconds since 1970-01-01T00:00:00, in UTC where there is a time zone, else local.
     seconds: Decimal,
-    zoned: bool,
+    /// The time zone, in seconds east of UTC.
+    zone: Option<i64>,
 }
 
 /// An `xsd:duration`: months and seconds do not convert into each other.
@@ -59,7 +61,7 @@ impl Moment {
         }
         let clock = time.map_or(Some(Decimal::from(0)), parse_clock)?;
         let offset = days.checked_mul(DAY)?.checked_sub(zone.unwrap_or(0))?;
-        Some(Self { kind, seconds: add_seconds(&clock, offset), zoned: zone.is_some() })
+        Some(Self { kind, seconds: add_seconds(&clock, offset), zone })
     }
 
     /// Seconds since 1970-01-01T00:00:00, in UTC where the moment has a time zone, else local.
@@ -68,11 +70,11 @@ impl Moment {
     }
 
     /// Later by a duration: months first, where a day that the month does not have becomes its last, then seconds. A
-    /// time of day wraps around midnight; a date takes whole days, rounded down. `None` for months on a time.
-    ///
-    /// A moment with a time zone is moved in UTC, which is where its months begin.
+    /// time of day wraps around midnight; a date takes whole days, rounded down. `None` for months on a time. The time
+    /// zone stays, and is where months and days begin.
     pub(crate) fn later(&self, duration: &Duration) -> Option<Self> {
-        let (day, _) = split_day(&self.seconds);
+        let local = self.local();
+        let (day, _) = split_day(&local);
         let (year, month, date) = civil_from_days(day);
         let moved = (year.checked_mul(12)?.checked_add(month - 1)?).checked_add(duration.months)?;
         let (year, month) = (moved.div_euclid(12), moved.rem_euclid(12) + 1);
@@ -85,19 +87,25 @@ impl Moment {
         };
         let date = (1..=date).rev().find(fits)?;
         let shift = days_from_civil(year, month, date) - day;
-        let seconds = add(&add_seconds(&self.seconds, shift.checked_mul(DAY)?), &duration.seconds);
+        let seconds = add(&add_seconds(&local, shift.checked_mul(DAY)?), &duration.seconds);
         let (day, _) = split_day(&seconds);
         let seconds = match self.kind {
             MomentKind::DateTime => seconds,
             MomentKind::Date => Decimal::from(day * DAY),
             MomentKind::Time => add_seconds(&seconds, -day * DAY),
         };
-        Some(Self { kind: self.kind, seconds, zoned: self.zoned })
+        let seconds = add_seconds(&seconds, -self.zone.unwrap_or(0));
+        Some(Self { kind: self.kind, seconds, zone: self.zone })
+    }
+
+    /// Seconds since 1970-01-01T00:00:00 on a clock of its time zone.
+    fn local(&self) -> Decimal {
+        add_seconds(&self.seconds, self.zone.unwrap_or(0))
     }
 
     /// The seconds from another moment of the same kind to this one; `None` where only one has a time zone.
     pub(crate) fn since(&self, other: &Self) -> Option<Duration> {
-        let comparable = self.kind == other.kind && self.zoned == other.zoned;
+        let comparable = self.kind == other.kind && self.zone.is_some() == other.zone.is_some();
         comparable.then(|| Duration { months: 0, seconds: add(&self.seconds, &negate(&other.seconds)) })
     }
 
@@ -106,7 +114,7 @@ impl Moment {
         let negative = self.since(other)?.seconds < Decimal::from(0);
         let (late, early) = if negative { (other, self) } else { (self, other) };
         let parts = |moment: &Self| {
-            let (day, _) = split_day(&moment.seconds);
+            let (day, _) = split_day(&moment.local());
             let (year, month, _) = civil_from_days(day);
             year * 12 + month
         };
@@ -137,7 +145,7 @@ impl PartialOrd for Moment {
         if self.kind != other.kind {
             return None;
         }
-        if self.zoned == other.zoned {
+        if self.zone.is_some() == other.zone.is_some() {
             return Some(self.seconds.cmp(&other.seconds));
         }
         let earliest = add_seconds(&self.seconds, -ZONE_LIMIT).cmp(&other.seconds);
@@ -146,14 +154,14 @@ impl PartialOrd for Moment {
     }
 }
 
-/// Canonical form, in UTC where there is a time zone.
+/// Canonical form.
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (day, clock) = split_day(&self.seconds);
+        let (day, clock) = split_day(&self.local());
         let (year, month, date) = civil_from_days(day);
         let sign = if year < 0 { "-" } else { "" };
         let calendar = format!("{sign}{:04}-{month:02}-{date:02}", year.unsigned_abs());
-        let zone = if self.zoned { "Z" } else { "" };
+        let zone = self.zone.map(zone_text).unwrap_or_default();
         match self.kind {
             MomentKind::Date => write!(f, "{calendar}{zone}"),
             MomentKind::Time => write!(f, "{clock}{zone}"),
@@ -295,8 +303,14 @@ fn add_seconds(value: &Decimal, whole: i64) -> Decimal {
     Decimal::new(unscaled + BigInt::from(whole) * super::ten_to(scale), scale)
 }
 
+/// A time zone, in seconds east of UTC, as text.
+pub(super) fn zone_text(zone: i64) -> String {
+    let (sign, minutes) = (if zone < 0 { '-' } else { '+' }, zone.abs() / 60);
+    if zone == 0 { "Z".into() } else { format!("{sign}{:02}:{:02}", minutes / 60, minutes % 60) }
+}
+
 /// The text before the time zone, and the zone in seconds east of UTC.
-fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
+pub(super) fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
     if let Some(body) = lexical.strip_suffix('Z') {
         return Some((body, Some(0)));
     }
@@ -310,7 +324,8 @@ fn split_zone(lexical: &str) -> Option<(&str, Option<i64>)> {
         _ => return Some((lexical, None)),
     };
     let (hours, minutes) = zone[1..].split_once(':')?;
-    let seconds = number(hours, 2)? * 3600 + number(minutes, 2)? * 60;
+    let minutes = number(minutes, 2).filter(|&minutes| minutes < 60)?;
+    let seconds = number(hours, 2)? * 3600 + minutes * 60;
     (seconds <= ZONE_LIMIT).then_some((body, Some(sign * seconds)))
 }
 

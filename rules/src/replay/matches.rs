@@ -161,7 +161,7 @@ impl Matcher<'_> {
                 (Some(left), Some(right)) => {
                     let is_name = |symbol| self.symbols.value(symbol).as_name().is_some();
                     self.names_differ |= self.equality && is_name(left) && is_name(right);
-                    left != right
+                    self.symbols.differ(left, right)
                 }
                 _ => false,
             },

@@ -10,6 +10,10 @@ use crate::literal::{Literal, XSD, is_datatype};
 use crate::rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
 
+/// Where the built-ins of `SWRLTab` and SQWRL live.
+const LIBRARIES: [&str; 2] =
+    ["http://swrl.stanford.edu/ontologies/built-ins/", "http://sqwrl.stanford.edu/ontologies/built-ins/"];
+
 /// Abbreviations of IRIs. `swrlb`, `xsd`, `rdf`, `rdfs` and `owl` are always there unless declared otherwise.
 ///
 /// A name without colon takes the empty prefix where that is declared, and else stands for itself.
@@ -260,6 +264,11 @@ impl Parser<'_> {
                 Some(built_in) => Ok(Atom::BuiltIn { built_in, arguments }),
                 None => Err(self.unknown_built_in(local, at)),
             };
+        }
+        // A predicate of a library of built-ins is none of the knowledge base, which would be empty.
+        if LIBRARIES.iter().any(|library| predicate.starts_with(library)) {
+            let (file, (line, column)) = (self.source.to_string(), at);
+            return Err(Error::ForeignBuiltIn { file, line, column, name: predicate });
         }
         if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
             return Ok(self.data_range(BuiltIn::DataRange, *value, predicate));

@@ -1,0 +1,238 @@
+//! Individuals of which a class expression is assumed, or asked for.
+
+use rules::{Delta, Engine, Error, Fact, Literal};
+
+use super::{Prover, Shown, contradiction, edge, literal, member, same, shown, value, with};
+use crate::lower::lower;
+use crate::owl::{AnnotatedAxiom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
+use crate::vocab::owl;
+
+/// So many cases are told apart for one question.
+const CASES: usize = 64;
+
+impl Prover {
+    /// What is known if an individual is in a class, in each case that the class leaves open.
+    pub(super) fn assume(
+        engine: &Engine,
+        class: &ClassExpression,
+        individual: &Iri,
+        next: &mut usize,
+    ) -> Result<Vec<Engine>, Error> {
+        use ClassExpression as C;
+        let mut copy = engine.clone();
+        let fact = match class {
+            C::Class(iri) => member(&mut copy, iri, individual),
+            C::HasValue(property, object) => edge(&mut copy, property, individual, object),
+            C::HasSelf(property) => edge(&mut copy, property, individual, individual),
+            C::DataHasValue(property, object) => value(&mut copy, property, individual, literal(object)),
+            C::IntersectionOf(classes) => {
+                let mut cases = vec![copy];
+                for class in classes {
+                    let mut more = Vec::new();
+                    for case in &cases {
+                        more.extend(Self::assume(case, class, individual, next)?);
+                    }
+                    cases = more;
+                }
+                return Ok(cases);
+            }
+            C::UnionOf(classes) if classes.len() <= CASES => {
+                let mut cases = Vec::new();
+                for class in classes {
+                    cases.extend(Self::assume(&copy, class, individual, next)?);
+                }
+                return Ok(cases);
+            }
+            C::OneOf(names) if names.len() <= CASES => {
+                let one = |name: &Iri| {
+                    let mut copy = copy.clone();
+                    let fact = same(&mut copy, individual, name);
+                    with(&copy, [fact])
+                };
+                return names.iter().map(one).collect();
+            }
+            C::SomeValuesFrom(property, filler) => {
+                return Self::witnesses(&copy, property, 1, filler, individual, next);
+            }
+            C::Cardinality(Bound::Min, n @ 1..=8, property, filler) => {
+                return Self::witnesses(&copy, property, *n, filler, individual, next);
+            }
+            C::Cardinality(Bound::Exact, n @ 1..=8, property, filler) => {
+                let most = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
+                let copy = by_rules(copy, &most, individual)?;
+                return Self::witnesses(&copy, property, *n, filler, individual, next);
+            }
+            C::DataSomeValuesFrom(property, _) | C::DataCardinality(Bound::Min, 1, property, _) => {
+                *next += 1;
+                value(&mut copy, property, individual, Literal::fresh(*next))
+            }
+            other => return Ok(vec![by_rules(copy, other, individual)?]),
+        };
+        Ok(vec![with(&copy, [fact])?])
+    }
+
+    /// So many values in a class, which differ.
+    fn witnesses(
+        engine: &Engine,
+        property: &ObjectPropertyExpression,
+        count: u32,
+        filler: &ClassExpression,
+        individual: &Iri,
+        next: &mut usize,
+    ) -> Result<Vec<Engine>, Error> {
+        let mut copy = engine.clone();
+        let names: Vec<Iri> = (0..count)
+            .map(|_| {
+                *next += 1;
+                Self::fresh(*next)
+            })
+            .collect();
+        let mut facts: Vec<Fact> =
+            names.iter().map(|name| edge(&mut copy, property, individual, name)).collect();
+        facts.extend(pairwise_different(&mut copy, &names));
+        let mut cases = vec![with(&copy, facts)?];
+        for name in &names {
+            let mut more = Vec::new();
+            for case in &cases {
+                more.extend(Self::assume(case, filler, name, next)?);
+            }
+            cases = more;
+        }
+        Ok(cases)
+    }
+
+    /// What shows that an individual is in a class.
+    pub(super) fn is_in(
+        engine: &Engine,
+        class: &ClassExpression,
+        individual: &Iri,
+        next: &mut usize,
+    ) -> Shown {
+        use ClassExpression as C;
+        if let Some(reason) = contradiction(engine) {
+            return Ok(Some(format!("the assumption contradicts itself: {reason}\n")));
+        }
+        let mut copy = engine.clone();
+        let goal = match class {
+            C::Class(iri) if &**iri == owl::THING => {
+                return Ok(Some("everything is in owl:Thing\n".to_owned()));
+            }
+            C::Class(iri) => member(&mut copy, iri, individual),
+            C::HasValue(property, object) => edge(&mut copy, property, individual, object),
+            C::HasSelf(property) => edge(&mut copy, property, individual, individual),
+            C::DataHasValue(property, object) => value(&mut copy, property, individual, literal(object)),
+            C::IntersectionOf(classes) => {
+                let mut reasons = String::new();
+                for class in classes {
+                    match Self::is_in(&copy, class, individual, next)? {
+                        Some(reason) => reasons += &reason,
+                        None => return Ok(None),
+                    }
+                }
+                return Ok(Some(reasons));
+            }
+            C::UnionOf(classes) => {
+                return first(classes, |class| Self::is_in(&copy, class, individual, next));
+            }
+            C::OneOf(names) => {
+                return first(names, |name| {
+                    let goal = same(&mut copy, individual, name);
+                    Ok(shown(&copy, &goal))
+                });
+            }
+            C::ComplementOf(class) => {
+                let cases = Self::assume(&copy, class, individual, next)?;
+                return Ok(refuted(&cases));
+            }
+            C::AllValuesFrom(property, filler) => {
+                *next += 1;
+                let name = Self::fresh(*next);
+                let fact = edge(&mut copy, property, individual, &name);
+                return Self::is_in(&with(&copy, [fact])?, filler, &name, next);
+            }
+            C::SomeValuesFrom(property, filler) | C::Cardinality(Bound::Min, 1, property, filler) => {
+                let values = values(&mut copy, property, individual);
+                return first(&values, |value| Self::is_in(&copy, filler, value, next));
+            }
+            C::Cardinality(Bound::Min, 0, ..) => return Ok(Some("nothing has fewer than none\n".to_owned())),
+            C::Cardinality(Bound::Max, n @ 0..=8, property, filler) => {
+                let cases = Self::witnesses(&copy, property, n + 1, filler, individual, next)?;
+                return Ok(refuted(&cases));
+            }
+            C::Cardinality(Bound::Exact, n, property, filler) => {
+                let [least, most] = [Bound::Min, Bound::Max]
+                    .map(|bound| C::Cardinality(bound, *n, property.clone(), filler.clone()));
+                return Self::is_in(&copy, &C::IntersectionOf(vec![least, most]), individual, next);
+            }
+            C::DataCardinality(Bound::Max, n @ 0..=8, property, _) => {
+                let facts = (0..=*n).map(|_| {
+                    *next += 1;
+                    value(&mut copy, property, individual, Literal::fresh(*next))
+                });
+                let facts: Vec<Fact> = facts.collect();
+                return Ok(refuted(&[with(&copy, facts)?]));
+            }
+            _ => return Ok(None),
+        };
+        Ok(shown(&copy, &goal))
+    }
+}
+
+/// The individuals that a property relates to one.
+pub(super) fn values(engine: &mut Engine, property: &ObjectPropertyExpression, individual: &Iri) -> Vec<Iri> {
+    let one = engine.symbols_mut().name(individual);
+    let (ObjectPropertyExpression::Property(iri) | ObjectPropertyExpression::Inverse(iri)) = property;
+    let predicate = engine.symbols_mut().name(iri);
+    let forward = matches!(property, ObjectPropertyExpression::Property(_));
+    let pattern = if forward { [Some(one), None] } else { [None, Some(one)] };
+    let name = |symbol| engine.symbols().value(symbol).as_name().map(Iri::from);
+    engine.matching(predicate, &pattern).filter_map(|row| name(row[usize::from(forward)])).collect()
+}
+
+/// The first of some ways that shows it.
+pub(super) fn first<T>(ways: &[T], mut show: impl FnMut(&T) -> Shown) -> Shown {
+    for way in ways {
+        if let Some(reason) = show(way)? {
+            return Ok(Some(reason));
+        }
+    }
+    Ok(None)
+}
+
+/// Why no case is possible, if none is.
+pub(super) fn refuted(cases: &[Engine]) -> Option<String> {
+    let reasons: Option<Vec<String>> = cases.iter().map(contradiction).collect();
+    Some(format!("the opposite is impossible: {}\n", reasons?.join("; and ")))
+}
+
+/// That names stand for different individuals.
+pub(super) fn pairwise_different(engine: &mut Engine, names: &[Iri]) -> Vec<Fact> {
+    let symbols = engine.symbols_mut();
+    let different = symbols.name(owl::DIFFERENT_FROM);
+    let names: Vec<_> = names.iter().map(|name| symbols.name(name)).collect();
+    let pairs = names
+        .iter()
+        .enumerate()
+        .flat_map(|(at, left)| names[at + 1..].iter().map(move |right| [*left, *right]));
+    pairs.map(|pair| Fact::new(different, pair)).collect()
+}
+
+/// Adds the rules of an assertion about a class that no facts say.
+fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Result<Engine, Error> {
+    let axiom = Axiom::ClassAssertion(class.clone(), individual.clone());
+    let axioms = vec![AnnotatedAxiom { axiom, annotations: Vec::new() }];
+    let lowered = lower(&Ontology { axioms, ..Ontology::default() }, engine.symbols_mut());
+    let known = engine.program().rules.clone();
+    let is_new =
+        |rule: &rules::Rule| !known.iter().any(|other| other.head == rule.head && other.body == rule.body);
+    let mut new: Vec<rules::Rule> = lowered.program.rules.into_iter().filter(is_new).collect();
+    for rule in &mut new {
+        // Nothing else has this identity.
+        rule.identity.source = "urn:metaplan:assumed".into();
+    }
+    if !new.is_empty() {
+        engine.add_rules(new).map_err(|mut errors| errors.remove(0))?;
+    }
+    engine.apply(Delta { insert: lowered.facts, delete: Vec::new() })?;
+    Ok(engine)
+}

@@ -1,0 +1,254 @@
+//! Axioms, kind by kind, as assumptions and goals.
+
+use rules::{Engine, Error, Fact, Literal};
+
+use super::assume::{pairwise_different, refuted};
+use super::{Answer, Prover, Shown, edge, literal, same, shown, value, with};
+use crate::owl::{Axiom, Characteristic, ClassExpression, Iri, ObjectPropertyExpression as Property};
+use crate::vocab::owl;
+
+impl Prover {
+    /// Whether an axiom follows.
+    pub(super) fn axiom(&self, axiom: &Axiom) -> Result<Answer, Error> {
+        if let Axiom::DataPropertyRange(..) | Axiom::DatatypeDefinition(..) = axiom {
+            return Ok(Answer::Open("what a data range contains is not asked for"));
+        }
+        let reason = match self.classes(axiom)? {
+            Some(reason) => Some(reason),
+            None => match self.properties(axiom)? {
+                Some(reason) => Some(reason),
+                None => self.individuals(axiom)?,
+            },
+        };
+        Ok(reason.map_or(Answer::Open("the rules do not conclude it"), Answer::Follows))
+    }
+
+    fn classes(&self, axiom: &Axiom) -> Shown {
+        match axiom {
+            Axiom::SubClassOf(sub, sup) => self.sub_class(sub, sup),
+            Axiom::EquivalentClasses(classes) => {
+                let next = classes.iter().cycle().skip(1);
+                all(classes.iter().zip(next), |(sub, sup)| self.sub_class(sub, sup))
+            }
+            Axiom::DisjointClasses(classes) => self.disjoint(classes),
+            Axiom::DisjointUnion(class, parts) => {
+                let (class, union) =
+                    (ClassExpression::Class(class.clone()), ClassExpression::UnionOf(parts.clone()));
+                let pairs = [(&class, &union), (&union, &class)];
+                let both = all(pairs.into_iter(), |(sub, sup)| self.sub_class(sub, sup))?;
+                Ok(both.zip(self.disjoint(parts)?).map(|(both, disjoint)| both + &disjoint))
+            }
+            Axiom::HasKey(class, objects, data) => {
+                let (x, y, mut next) = (Self::fresh(0), Self::fresh(1), 2);
+                let mut copy = self.base.clone();
+                let mut facts = Vec::new();
+                for property in objects {
+                    next += 1;
+                    let shared = Self::fresh(next);
+                    facts.extend([&x, &y].map(|end| edge(&mut copy, property, end, &shared)));
+                }
+                for property in data {
+                    next += 1;
+                    facts.extend([&x, &y].map(|end| value(&mut copy, property, end, Literal::fresh(next))));
+                }
+                let mut reasons = String::new();
+                for case in Self::assume(&with(&copy, facts)?, class, &x, &mut next)? {
+                    for mut case in Self::assume(&case, class, &y, &mut next)? {
+                        let goal = same(&mut case, &x, &y);
+                        match shown(&case, &goal) {
+                            Some(reason) => reasons += &reason,
+                            None => return Ok(None),
+                        }
+                    }
+                }
+                Ok(Some(reasons))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    fn sub_class(&self, sub: &ClassExpression, sup: &ClassExpression) -> Shown {
+        let (x, mut next) = (Self::fresh(0), 0);
+        let mut reasons = String::new();
+        for case in Self::assume(&self.base, sub, &x, &mut next)? {
+            match Self::is_in(&case, sup, &x, &mut next)? {
+                Some(reason) => reasons += &reason,
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(reasons))
+    }
+
+    fn disjoint(&self, classes: &[ClassExpression]) -> Shown {
+        let pairs = classes.iter().enumerate();
+        let pairs = pairs.flat_map(|(at, first)| classes[at + 1..].iter().map(move |second| (first, second)));
+        all(pairs, |(first, second)| {
+            let both = ClassExpression::IntersectionOf(vec![first.clone(), second.clone()]);
+            let cases = Self::assume(&self.base, &both, &Self::fresh(0), &mut 0)?;
+            Ok(refuted(&cases))
+        })
+    }
+
+    /// Assumes edges between fresh individuals and asks for one more.
+    fn implies(&self, body: &[(&Property, usize, usize)], head: (&Property, usize, usize)) -> Shown {
+        let mut copy = self.assumed(body)?;
+        let (property, from, to) = head;
+        let goal = edge(&mut copy, property, &Self::fresh(from), &Self::fresh(to));
+        Ok(shown_or_refuted(&copy, &goal))
+    }
+
+    fn assumed(&self, body: &[(&Property, usize, usize)]) -> Result<Engine, Error> {
+        let mut copy = self.base.clone();
+        let facts: Vec<Fact> = body
+            .iter()
+            .map(|(property, from, to)| edge(&mut copy, property, &Self::fresh(*from), &Self::fresh(*to)))
+            .collect();
+        with(&copy, facts)
+    }
+
+    fn merges(&self, body: &[(&Property, usize, usize)], left: usize, right: usize) -> Shown {
+        let mut copy = self.assumed(body)?;
+        let goal = same(&mut copy, &Self::fresh(left), &Self::fresh(right));
+        Ok(shown_or_refuted(&copy, &goal))
+    }
+
+    fn properties(&self, axiom: &Axiom) -> Shown {
+        match axiom {
+            Axiom::SubObjectPropertyOf(sub, sup) => self.implies(&[(sub, 0, 1)], (sup, 0, 1)),
+            Axiom::SubPropertyChainOf(chain, sup) => {
+                let body: Vec<_> = chain.iter().enumerate().map(|(at, link)| (link, at, at + 1)).collect();
+                self.implies(&body, (sup, 0, chain.len()))
+            }
+            Axiom::EquivalentObjectProperties(properties) => {
+                let next = properties.iter().cycle().skip(1);
+                all(properties.iter().zip(next), |(sub, sup)| self.implies(&[(sub, 0, 1)], (sup, 0, 1)))
+            }
+            Axiom::InverseObjectProperties(first, second) => {
+                let [first, second] = [first, second].map(|iri| Property::Property(iri.clone()));
+                let pairs = [(&first, &second), (&second, &first)];
+                all(pairs.into_iter(), |(sub, sup)| self.implies(&[(sub, 0, 1)], (sup, 1, 0)))
+            }
+            Axiom::DisjointObjectProperties(properties) => {
+                let pairs = properties.iter().enumerate();
+                let pairs = pairs.flat_map(|(at, p)| properties[at + 1..].iter().map(move |q| (p, q)));
+                all(pairs, |(p, q)| Ok(refuted(&[self.assumed(&[(p, 0, 1), (q, 0, 1)])?])))
+            }
+            Axiom::ObjectPropertyDomain(property, class) => {
+                Self::is_in(&self.assumed(&[(property, 0, 1)])?, class, &Self::fresh(0), &mut 1)
+            }
+            Axiom::ObjectPropertyRange(property, class) => {
+                Self::is_in(&self.assumed(&[(property, 0, 1)])?, class, &Self::fresh(1), &mut 1)
+            }
+            Axiom::ObjectPropertyCharacteristic(characteristic, p) => match characteristic {
+                Characteristic::Functional => self.merges(&[(p, 0, 1), (p, 0, 2)], 1, 2),
+                Characteristic::InverseFunctional => self.merges(&[(p, 1, 0), (p, 2, 0)], 1, 2),
+                Characteristic::Symmetric => self.implies(&[(p, 0, 1)], (p, 1, 0)),
+                Characteristic::Transitive => self.implies(&[(p, 0, 1), (p, 1, 2)], (p, 0, 2)),
+                Characteristic::Irreflexive => Ok(refuted(&[self.assumed(&[(p, 0, 0)])?])),
+                Characteristic::Asymmetric => Ok(refuted(&[self.assumed(&[(p, 0, 1), (p, 1, 0)])?])),
+                Characteristic::Reflexive => {
+                    let mut copy = self.base.clone();
+                    let symbols = copy.symbols_mut();
+                    let thing = Fact::new(symbols.name(owl::THING), [symbols.name(&Self::fresh(0))]);
+                    let mut copy = with(&copy, [thing])?;
+                    let goal = edge(&mut copy, p, &Self::fresh(0), &Self::fresh(0));
+                    Ok(shown(&copy, &goal))
+                }
+            },
+            _ => self.data_properties(axiom),
+        }
+    }
+
+    fn data_properties(&self, axiom: &Axiom) -> Shown {
+        let assumed = |properties: &[(&Iri, usize)]| -> Result<Engine, Error> {
+            let mut copy = self.base.clone();
+            let facts: Vec<Fact> = properties
+                .iter()
+                .map(|(property, number)| {
+                    value(&mut copy, property, &Self::fresh(0), Literal::fresh(*number))
+                })
+                .collect();
+            with(&copy, facts)
+        };
+        let implies = |(sub, sup): (&Iri, &Iri)| -> Shown {
+            let mut copy = assumed(&[(sub, 1)])?;
+            let goal = value(&mut copy, sup, &Self::fresh(0), Literal::fresh(1));
+            Ok(shown_or_refuted(&copy, &goal))
+        };
+        match axiom {
+            Axiom::SubDataPropertyOf(sub, sup) => implies((sub, sup)),
+            Axiom::EquivalentDataProperties(all_of) => {
+                all(all_of.iter().zip(all_of.iter().cycle().skip(1)), implies)
+            }
+            Axiom::DisjointDataProperties(properties) => {
+                let pairs = properties.iter().enumerate();
+                let pairs = pairs.flat_map(|(at, p)| properties[at + 1..].iter().map(move |q| (p, q)));
+                all(pairs, |(p, q)| Ok(refuted(&[assumed(&[(p, 1), (q, 1)])?])))
+            }
+            Axiom::FunctionalDataProperty(property) => {
+                Ok(refuted(&[assumed(&[(property, 1), (property, 2)])?]))
+            }
+            Axiom::DataPropertyDomain(property, class) => {
+                Self::is_in(&assumed(&[(property, 1)])?, class, &Self::fresh(0), &mut 1)
+            }
+            _ => Ok(None),
+        }
+    }
+
+    fn individuals(&self, axiom: &Axiom) -> Shown {
+        let mut copy = self.base.clone();
+        match axiom {
+            Axiom::ClassAssertion(class, individual) => Self::is_in(&copy, class, individual, &mut 0),
+            Axiom::ObjectPropertyAssertion(property, from, to) => {
+                let goal = edge(&mut copy, property, from, to);
+                Ok(shown(&copy, &goal))
+            }
+            Axiom::DataPropertyAssertion(property, from, to) => {
+                let goal = value(&mut copy, property, from, literal(to));
+                Ok(shown(&copy, &goal))
+            }
+            Axiom::NegativeObjectPropertyAssertion(property, from, to) => {
+                let opposite = edge(&mut copy, property, from, to);
+                Ok(refuted(&[with(&copy, [opposite])?]))
+            }
+            Axiom::NegativeDataPropertyAssertion(property, from, to) => {
+                let opposite = value(&mut copy, property, from, literal(to));
+                Ok(refuted(&[with(&copy, [opposite])?]))
+            }
+            Axiom::SameIndividual(names) => all(names.windows(2), |pair| {
+                let goal = same(&mut copy, &pair[0], &pair[1]);
+                Ok(shown(&copy, &goal))
+            }),
+            Axiom::DifferentIndividuals(names) => {
+                let pairs = names.iter().enumerate();
+                let pairs = pairs.flat_map(|(at, x)| names[at + 1..].iter().map(move |y| (x, y)));
+                all(pairs, |(x, y)| {
+                    let goal = pairwise_different(&mut copy, &[x.clone(), y.clone()]).remove(0);
+                    if let Some(reason) = shown(&copy, &goal) {
+                        return Ok(Some(reason));
+                    }
+                    let opposite = same(&mut copy, x, y);
+                    Ok(refuted(&[with(&copy, [opposite])?]))
+                })
+            }
+            _ => Ok(None),
+        }
+    }
+}
+
+/// The derivation of a goal, or why what was assumed for it is impossible.
+fn shown_or_refuted(engine: &Engine, goal: &Fact) -> Option<String> {
+    shown(engine, goal).or_else(|| refuted(std::slice::from_ref(engine)))
+}
+
+/// The reasons of all of some goals.
+fn all<T>(goals: impl Iterator<Item = T>, mut show: impl FnMut(T) -> Shown) -> Shown {
+    let mut reasons = String::new();
+    for goal in goals {
+        match show(goal)? {
+            Some(reason) => reasons += &reason,
+            None => return Ok(None),
+        }
+    }
+    Ok(Some(reasons))
+}

@@ -1,0 +1,95 @@
+//! What the classes and properties of OWL itself mean: `owl:Thing`, `owl:Nothing`, the top and the bottom properties, and
+//! that nothing differs from itself.
+//!
+//! What is empty by definition is forbidden in every knowledge base. `owl:Thing` holds of every individual that the
+//! knowledge base names or says anything about; it is derived only where something asks for it, because no conclusion
+//! about it is worth knowing.
+
+use std::collections::BTreeSet;
+
+use rules::{Atom, RuleIdentity, Symbol, Term};
+
+use super::AXIOM_SOURCE;
+use super::context::{Context, Variables};
+use crate::owl::{Axiom, EntityKind, Iri, Ontology};
+use crate::vocab::owl;
+
+fn identity(label: &str) -> RuleIdentity {
+    RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: 0 }
+}
+
+/// Adds the constraints, and the rules and facts of `owl:Thing` if anything asks for it: then its name is among the symbols.
+pub(crate) fn lower(ontology: &Ontology, context: &mut Context) {
+    let mut variables = Variables::default();
+    let (x, y) = (variables.fresh("x"), variables.fresh("y"));
+    let forbidden = [
+        ("cls-nothing2", owl::NOTHING, vec![x]),
+        ("eq-diff1", owl::DIFFERENT_FROM, vec![x, x]),
+        ("owl:bottomObjectProperty", owl::BOTTOM_OBJECT_PROPERTY, vec![x, y]),
+        ("owl:bottomDataProperty", owl::BOTTOM_DATA_PROPERTY, vec![x, y]),
+    ];
+    for (label, name, arguments) in forbidden {
+        let atom = Atom::relation(context.name(name), arguments);
+        context.rule(&identity(label), Vec::new(), vec![atom], &variables);
+    }
+    if context.symbols.find_name(owl::TOP_OBJECT_PROPERTY).is_some() {
+        let body = vec![context.relation(owl::THING, [x]), context.relation(owl::THING, [y])];
+        let head = vec![context.relation(owl::TOP_OBJECT_PROPERTY, [x, y])];
+        context.rule(&identity("owl:topObjectProperty"), head, body, &variables);
+    }
+    if let Some(thing) = context.symbols.find_name(owl::THING) {
+        things(ontology, thing, context);
+    }
+}
+
+fn things(ontology: &Ontology, thing: Symbol, context: &mut Context) {
+    let mut variables = Variables::default();
+    let (x, y) = (variables.fresh("x"), variables.fresh("y"));
+    let (label, mut names): (_, BTreeSet<Symbol>) = (identity("owl:Thing"), BTreeSet::new());
+    let of = |context: &mut Context, iri: &str, arguments: Vec<Term>, whose: Term| {
+        let atom = Atom::relation(context.name(iri), arguments);
+        context.rule(&label, vec![Atom::relation(thing, [whose])], vec![atom], &variables);
+    };
+    let own = [owl::THING, owl::NOTHING, owl::TOP_OBJECT_PROPERTY, owl::BOTTOM_OBJECT_PROPERTY];
+    let entities: Vec<&(EntityKind, Iri)> =
+        ontology.entities.iter().filter(|(_, iri)| !own.contains(&&**iri)).collect();
+    for (kind, iri) in entities {
+        match kind {
+            EntityKind::Class => of(context, iri, vec![x], x),
+            EntityKind::DataProperty => of(context, iri, vec![x, y], x),
+            EntityKind::ObjectProperty => {
+                of(context, iri, vec![x, y], x);
+                of(context, iri, vec![x, y], y);
+            }
+            EntityKind::NamedIndividual => {
+                names.insert(context.name(iri));
+            }
+            EntityKind::AnnotationProperty | EntityKind::Datatype => {}
+        }
+    }
+    of(context, owl::DIFFERENT_FROM, vec![x, y], x);
+    of(context, owl::DIFFERENT_FROM, vec![x, y], y);
+    for annotated in &ontology.axioms {
+        match &annotated.axiom {
+            Axiom::SameIndividual(individuals) => {
+                names.extend(individuals.iter().map(|individual| context.name(individual)));
+            }
+            Axiom::ClassAssertion(_, individual) => {
+                names.insert(context.name(individual));
+            }
+            _ => {}
+        }
+    }
+    let atoms = context.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
+    let terms = atoms.flat_map(|atom| match atom {
+        Atom::Relation { .. } | Atom::Same(..) | Atom::Different(..) => atom.terms(),
+        _ => Vec::new(),
+    });
+    names.extend(terms.filter_map(|term| match term {
+        Term::Constant(symbol) => context.symbols.value(symbol).as_name().map(|_| symbol),
+        Term::Variable(_) => None,
+    }));
+    for name in names {
+        context.state(thing, [name]);
+    }
+}

@@ -1,0 +1,67 @@
+//! What a document looks like that is in none of the syntaxes, so that its message can say so.
+
+/// What `text` looks like, and what to do about it.
+pub(super) fn recognized(text: &[u8]) -> Option<&'static str> {
+    let head = text.trim_ascii_start();
+    if head.is_empty() {
+        return Some("an empty document; an ontology has at least one statement");
+    }
+    let starts = |marks: &[&[u8]]| marks.iter().any(|mark| head.starts_with(mark));
+    if text.starts_with(b"\x1f\x8b") || text.starts_with(b"PK\x03\x04") || text.starts_with(b"BZh") {
+        Some("a compressed file; unpack it first")
+    } else if starts(&[b"{", b"[{", b"[\n", b"[ {"]) && !starts(&[b"[ a", b"[]"]) {
+        Some("JSON, perhaps JSON-LD, which is not read; convert it to Turtle")
+    } else if starts(&[b"format-version:", b"ontology:", b"[Term]"]) {
+        Some(
+            "OBO format, which is not read; convert it with ROBOT: `robot convert --input FILE --output FILE.ofn`",
+        )
+    } else if is_manchester(head) {
+        Some(
+            "Manchester syntax, which is not read; convert it with ROBOT: `robot convert --input FILE --output FILE.ofn`",
+        )
+    } else if starts(&[b"<!DOCTYPE html", b"<!doctype html", b"<html", b"<HTML"]) {
+        Some("a web page and no ontology")
+    } else {
+        None
+    }
+}
+
+/// Whether the first line that is not a comment starts with a keyword of Manchester syntax.
+fn is_manchester(head: &[u8]) -> bool {
+    let mut lines = head.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
+    let first = lines.find(|line| !line.is_empty() && !line.starts_with(b"#")).unwrap_or_default();
+    let keywords = ["Prefix:", "Ontology:", "Class:", "ObjectProperty:", "DataProperty:", "Individual:"];
+    keywords.iter().any(|keyword| {
+        let rest = first.strip_prefix(keyword.as_bytes());
+        rest.is_some_and(|rest| rest.is_empty() || rest[0].is_ascii_whitespace())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::recognized;
+
+    #[test]
+    fn other_formats_are_named() {
+        for (text, expected) in [
+            ("", "empty"),
+            (" \n\t", "empty"),
+            ("Prefix: : <http://x#>", "Manchester"),
+            ("# c\nOntology: <http://x>\n", "Manchester"),
+            ("{\"@context\": {}}", "JSON"),
+            ("\u{1f}\u{8b}", ""),
+            ("format-version: 1.2\n", "OBO"),
+            ("<!DOCTYPE html><html/>", "web page"),
+            ("[] a <http://x> .", ""),
+            ("[ a <http://x> ] .", ""),
+            ("@prefix : <http://x#> .", ""),
+            ("Prefix(:=<http://x#>)", ""),
+        ] {
+            let found = recognized(text.as_bytes());
+            let fits =
+                found.map_or(expected.is_empty(), |found| !expected.is_empty() && found.contains(expected));
+            assert!(fits, "{text}: {found:?}");
+        }
+        assert!(recognized(b"\x1f\x8b\x08").is_some_and(|found| found.contains("compressed")));
+    }
+}

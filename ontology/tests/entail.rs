@@ -1,0 +1,133 @@
+//! What is shown to follow, for each kind of statement, and what is not; and what follows about classes and properties.
+
+use ontology::entail::{Answer, entailments, schema};
+use ontology::{Ontology, ReadOptions, lower, read_text};
+use rules::{Engine, Symbols};
+
+const PREFIXES: &str = "@prefix : <http://e/#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+:A a owl:Class . :B a owl:Class . :C a owl:Class .
+:p a owl:ObjectProperty . :q a owl:ObjectProperty . :r a owl:ObjectProperty .
+:d a owl:DatatypeProperty . :e a owl:DatatypeProperty .
+";
+
+fn read(text: &str) -> Ontology {
+    read_text(&format!("{PREFIXES}{text}"), "t", &ReadOptions::default()).expect("well-formed")
+}
+
+fn engine(text: &str) -> Engine {
+    let mut symbols = Symbols::new();
+    let lowered = lower(&read(text), &mut symbols);
+    Engine::new(symbols, lowered.program, lowered.facts).expect("safe")
+}
+
+/// Whether all that the second text states follows from the first.
+fn follows(premise: &str, conclusion: &str) -> bool {
+    let found = entailments(&engine(premise), &read(conclusion)).expect("it ends");
+    assert!(!found.is_empty(), "{conclusion}");
+    let answered = |answer: &Answer| match answer {
+        Answer::Follows(reason) => {
+            assert!(!reason.is_empty(), "{conclusion}");
+            true
+        }
+        Answer::Open(_) => false,
+    };
+    found.iter().all(|entailment| answered(&entailment.answer))
+}
+
+#[test]
+fn statements_follow_or_are_not_shown() {
+    let restricted = |kind: &str| format!("[ a owl:Restriction ; owl:onProperty :p ; {kind} ]");
+    let (some, all) = (restricted("owl:someValuesFrom :B"), restricted("owl:allValuesFrom :B"));
+    let most = restricted("owl:maxCardinality 1");
+    let below = ":A rdfs:subClassOf :B . :B rdfs:subClassOf :C .";
+    for (premise, conclusion, other) in [
+        (below.to_owned(), ":A rdfs:subClassOf :C .".to_owned(), ":C rdfs:subClassOf :A .".to_owned()),
+        (format!("{below} :i a :A ."), ":i a :C .".into(), ":j a :C .".into()),
+        (":A owl:equivalentClass :B .".into(), ":B owl:equivalentClass :A .".into(), ":B owl:equivalentClass :C .".into()),
+        (
+            ":B owl:disjointWith :C . :A rdfs:subClassOf :B .".into(),
+            ":A owl:disjointWith :C .".into(),
+            ":A owl:disjointWith :B .".into(),
+        ),
+        (
+            ":B owl:disjointWith :C . :i a :B .".into(),
+            ":i a [ a owl:Class ; owl:complementOf :C ] .".into(),
+            ":i a [ a owl:Class ; owl:complementOf :A ] .".into(),
+        ),
+        (
+            format!("{some} rdfs:subClassOf :C . :A rdfs:subClassOf :B ."),
+            format!("{} rdfs:subClassOf :C .", restricted("owl:someValuesFrom :A")),
+            ":A rdfs:subClassOf :C .".into(),
+        ),
+        (format!(":A rdfs:subClassOf {all} ."), format!(":A rdfs:subClassOf {all} ."), format!(":B rdfs:subClassOf {all} .")),
+        (":p a owl:FunctionalProperty .".into(), format!(":A rdfs:subClassOf {most} ."), ":q a owl:FunctionalProperty .".into()),
+        (":p rdfs:subPropertyOf :q . :q rdfs:subPropertyOf :r .".into(), ":p rdfs:subPropertyOf :r .".into(), ":r rdfs:subPropertyOf :p .".into()),
+        (":p owl:inverseOf :q .".into(), ":q owl:inverseOf :p .".into(), ":q owl:inverseOf :r .".into()),
+        (":p a owl:TransitiveProperty .".into(), ":p owl:propertyChainAxiom ( :p :p ) .".into(), ":q a owl:TransitiveProperty .".into()),
+        (":p a owl:AsymmetricProperty .".into(), ":p a owl:IrreflexiveProperty .".into(), ":q a owl:IrreflexiveProperty .".into()),
+        (":p a owl:SymmetricProperty ; rdfs:domain :A .".into(), ":p rdfs:range :A .".into(), ":p rdfs:range :B .".into()),
+        (":d rdfs:subPropertyOf :e . :e rdfs:domain :A .".into(), ":d rdfs:domain :A .".into(), ":e rdfs:subPropertyOf :d .".into()),
+        (":e a owl:FunctionalProperty . :d rdfs:subPropertyOf :e .".into(), ":d a owl:FunctionalProperty .".into(), ":e rdfs:subPropertyOf :d .".into()),
+        (
+            ":p a owl:FunctionalProperty . :i :p :j . :k :p :l . :j owl:differentFrom :l .".into(),
+            ":i owl:differentFrom :k .".into(),
+            ":i owl:differentFrom :l .".into(),
+        ),
+        (":A owl:hasKey ( :d ) .".into(), ":A owl:hasKey ( :d :e ) .".into(), ":B owl:hasKey ( :d ) .".into()),
+        (
+            ":i :p :j . :j a :B .".into(),
+            ":i :p [ a :B ] .".into(),
+            ":i :p [ a :C ] .".into(),
+        ),
+        (
+            ":p a owl:IrreflexiveProperty . :i a :A .".into(),
+            "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :i ; owl:assertionProperty :p ; owl:targetIndividual :i .".into(),
+            ":i :p :i .".into(),
+        ),
+        (
+            ":A owl:equivalentClass [ a owl:Class ; owl:unionOf ( :B :C ) ] .".into(),
+            "[ a owl:Class ; owl:unionOf ( :B :C ) ] rdfs:subClassOf :A .".into(),
+            ":A rdfs:subClassOf :B .".into(),
+        ),
+        (":A rdfs:subClassOf :B , :C .".into(), ":A rdfs:subClassOf [ a owl:Class ; owl:intersectionOf ( :B :C ) ] .".into(), ":B rdfs:subClassOf :C .".into()),
+        (":A rdfs:subClassOf owl:Nothing .".into(), ":A rdfs:subClassOf :C .".into(), ":C rdfs:subClassOf :A .".into()),
+    ] {
+        assert!(follows(&premise, &conclusion), "{premise} entails {conclusion}");
+        assert!(!follows(&premise, &other), "{premise} does not entail {other}");
+    }
+    assert!(follows(":A owl:disjointWith :B . :i a :A , :B .", ":x :p :y ."), "anything follows");
+}
+
+#[test]
+fn classes_and_properties_are_ordered() {
+    let text = ":A rdfs:subClassOf :B . :B rdfs:subClassOf :C . :C owl:disjointWith :D . :D a owl:Class .
+        :E rdfs:subClassOf :C , :D . :E a owl:Class . :p rdfs:subPropertyOf :q . :q owl:equivalentProperty :r .";
+    let found = schema(&engine(text), &read(text).entities).expect("it ends");
+    let local = |iris: &[String]| -> String {
+        iris.iter().map(|iri| iri.trim_start_matches("http://e/#")).collect::<Vec<_>>().join(" ")
+    };
+    let shown: Vec<String> = found
+        .classes
+        .iter()
+        .chain(&found.object_properties)
+        .map(|entity| {
+            let empty = if entity.empty.is_some() { " empty" } else { "" };
+            let iri = std::slice::from_ref(&entity.iri);
+            format!("{}: {} < {}{empty}", local(iri), local(&entity.direct), local(&entity.above))
+        })
+        .collect();
+    let expected = [
+        "A: B < B C",
+        "B: C < C",
+        "C:  < ",
+        "D:  < ",
+        "E: C D < C D empty",
+        "p: q r < q r",
+        "q: r < r",
+        "r: q < q",
+    ];
+    assert_eq!(shown, expected);
+}

@@ -1,0 +1,149 @@
+//! The test cases of the W3C's OWL working group under the Direct Semantics: consistency, inconsistency and entailment. They
+//! lie beside the project; without them nothing is checked, with a message.
+
+mod common;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use ontology::entail::{Answer, entailments};
+use ontology::{Equality, Ontology, ReadOptions, lower_with, read_files};
+use oxrdf::{NamedOrBlankNode, Term};
+use rules::{Engine, Symbols};
+
+const TEST: &str = "http://www.w3.org/2007/OWL/testOntology#";
+
+/// Cases of the profile RL that are not decided as the W3C has it, each with its reason.
+const OPEN: [(&str, &str); 2] = [
+    ("WebOnt-AnnotationProperty-002", "what follows about annotations is nothing about individuals"),
+    ("WebOnt-miscellaneous-302", "what follows about annotations is nothing about individuals"),
+];
+
+/// Everything that the suite says of its cases: subject, local name of the predicate, objects.
+struct Suite(BTreeMap<String, BTreeMap<String, Vec<String>>>);
+
+impl Suite {
+    fn read(text: &[u8]) -> Self {
+        let mut said: BTreeMap<String, BTreeMap<String, Vec<String>>> = BTreeMap::new();
+        for triple in oxrdfxml::RdfXmlParser::new().for_slice(text) {
+            let triple = triple.expect("well-formed");
+            let subject = match &triple.subject {
+                NamedOrBlankNode::NamedNode(node) => node.as_str().to_owned(),
+                NamedOrBlankNode::BlankNode(node) => format!("_:{}", node.as_str()),
+            };
+            let object = match &triple.object {
+                Term::NamedNode(node) => node.as_str().to_owned(),
+                Term::BlankNode(node) => format!("_:{}", node.as_str()),
+                Term::Literal(literal) => literal.value().to_owned(),
+            };
+            let predicate = triple.predicate.as_str().rsplit('#').next().unwrap_or_default().to_owned();
+            said.entry(subject).or_default().entry(predicate).or_default().push(object);
+        }
+        Self(said)
+    }
+
+    fn all(&self, case: &str, predicate: &str) -> &[String] {
+        self.0.get(case).and_then(|said| said.get(predicate)).map_or(&[], Vec::as_slice)
+    }
+
+    /// A document of a case, in RDF/XML or else in functional-style syntax.
+    fn text(&self, case: &str, kind: &str) -> Option<&String> {
+        let forms = [format!("rdfXml{kind}Ontology"), format!("fs{kind}Ontology")];
+        forms.iter().find_map(|form| self.all(case, form).first())
+    }
+}
+
+fn read(suite: &Suite, case: &str, text: &str) -> Result<Ontology, String> {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let file = directory.path().join("premise.owl");
+    std::fs::write(&file, text).expect("written");
+    let mut catalog = "<catalog xmlns=\"urn:oasis:names:tc:entity:xmlns:xml:catalog\">".to_owned();
+    for (number, import) in suite.all(case, "importedOntology").iter().enumerate() {
+        let (Some(iri), Some(text)) =
+            (suite.all(import, "importedOntologyIRI").first(), suite.text(import, "Input"))
+        else {
+            continue;
+        };
+        std::fs::write(directory.path().join(format!("import{number}.owl")), text).expect("written");
+        catalog += &format!("<uri name=\"{iri}\" uri=\"import{number}.owl\"/>");
+    }
+    std::fs::write(directory.path().join("catalog-v001.xml"), catalog + "</catalog>").expect("written");
+    let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
+    read_files(&[file], &options).map_err(|errors| errors[0].to_string())
+}
+
+fn engine(ontology: &Ontology) -> Result<Engine, String> {
+    let mut symbols = Symbols::new();
+    let lowered = lower_with(ontology, Equality::Owl, &mut symbols);
+    Engine::new(symbols, lowered.program, lowered.facts).map_err(|errors| errors[0].to_string())
+}
+
+/// What is found for each of the case's questions: its kind, and whether that is as the W3C has it.
+fn decide(suite: &Suite, case: &str) -> Result<Vec<(&'static str, bool)>, String> {
+    let kinds: BTreeSet<&str> =
+        suite.all(case, "type").iter().filter_map(|kind| kind.strip_prefix(TEST)).collect();
+    let premise = suite.text(case, "Premise").or_else(|| suite.text(case, "Input"));
+    let Some(premise) = premise else { return Ok(Vec::new()) };
+    let engine = engine(&read(suite, case, premise)?)?;
+    let consistent = engine.violations().is_empty();
+    let follows = |kind: &str| -> Result<Option<bool>, String> {
+        let Some(text) = suite.text(case, kind) else { return Ok(None) };
+        let found = entailments(&engine, &read(suite, case, text)?).map_err(|error| error.to_string())?;
+        Ok(Some(found.iter().all(|one| matches!(one.answer, Answer::Follows(_)))))
+    };
+    let mut answers = Vec::new();
+    if kinds.contains("ConsistencyTest") {
+        answers.push(("consistent", consistent));
+    }
+    if kinds.contains("InconsistencyTest") {
+        answers.push(("inconsistent", !consistent));
+    }
+    if kinds.contains("PositiveEntailmentTest") {
+        answers.extend(follows("Conclusion")?.map(|follows| ("entailed", follows)));
+    }
+    if kinds.contains("NegativeEntailmentTest") {
+        answers.extend(follows("NonConclusion")?.map(|follows| ("not entailed", !follows)));
+    }
+    Ok(answers)
+}
+
+#[test]
+#[ignore = "takes minutes without optimisation"]
+fn cases_of_the_working_group() {
+    let path = Path::new(common::SHARED).join("real/owl_w3c/semantics-direct.rdf");
+    let Ok(text) = std::fs::read(&path) else {
+        println!("skipped: {} is not there", path.display());
+        return;
+    };
+    let suite = Suite::read(&text);
+    let (mut counts, mut wrong) = (BTreeMap::<(bool, &str, bool), usize>::new(), Vec::new());
+    let cases = suite.0.iter().filter(|(_, said)| said.contains_key("identifier"));
+    for (case, said) in cases {
+        let name = &said["identifier"][0];
+        let rl = suite.all(case, "profile").iter().any(|profile| profile == &format!("{TEST}RL"));
+        match decide(&suite, case) {
+            Ok(answers) => {
+                for (kind, right) in answers {
+                    *counts.entry((rl, kind, right)).or_default() += 1;
+                    let must = rl || ["consistent", "not entailed"].contains(&kind);
+                    if !right && must && !OPEN.iter().any(|(open, _)| open == name) {
+                        wrong.push(format!("{name}: {kind}"));
+                    }
+                }
+            }
+            Err(error) => {
+                *counts.entry((rl, "not read", false)).or_default() += 1;
+                if rl {
+                    wrong.push(format!("{name}: {error}"));
+                } else {
+                    println!("{name}: {error}");
+                }
+            }
+        }
+    }
+    for ((rl, kind, right), count) in counts {
+        let (profile, verdict) = (if rl { "RL" } else { "other" }, if right { "right" } else { "open" });
+        println!("{profile}, {kind}, {verdict}: {count}");
+    }
+    assert_eq!(wrong, [""; 0]);
+}

@@ -1,0 +1,204 @@
+//! Whether two literals are two values, and whether a value lies in a datatype: yes, no, or undecided.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use super::{Decimal, Literal, OWL_RATIONAL, OWL_REAL, Parsed, RDF, RDFS_LITERAL, XSD, parse_xsd};
+
+const XML_LITERAL: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#XMLLiteral";
+
+/// What is known of a literal's value.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// The value itself.
+    Known,
+    /// A rational number that is no decimal.
+    Rational,
+    /// That it is a piece of XML; two spellings can be one.
+    Xml,
+    /// That it is none of the values that anybody names, see [`Literal::fresh`].
+    Fresh,
+    /// Nothing.
+    Unknown,
+}
+
+impl Literal {
+    /// A value of which nothing is known but that it differs from those of other numbers: for conclusions about any value.
+    pub fn fresh(number: usize) -> Self {
+        Self::Opaque { lexical: number.to_string().into(), datatype: FRESH.into() }
+    }
+
+    /// Whether two literals are certainly two values. `false` where they are one, and where that is undecided.
+    pub fn differs(&self, other: &Self) -> bool {
+        if self == other {
+            return false;
+        }
+        match (self.kind(), other.kind()) {
+            (Kind::Unknown, _) | (_, Kind::Unknown) | (Kind::Xml, Kind::Xml) => false,
+            (Kind::Fresh, other) | (other, Kind::Fresh) => other == Kind::Fresh,
+            _ => true,
+        }
+    }
+
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Opaque { datatype, .. } => match &**datatype {
+                OWL_RATIONAL => Kind::Rational,
+                XML_LITERAL => Kind::Xml,
+                FRESH => Kind::Fresh,
+                _ => Kind::Unknown,
+            },
+            _ => Kind::Known,
+        }
+    }
+
+    /// Whether the value certainly lies in the value space of a datatype: `5` is in `xsd:byte` and `xsd:decimal`, `1.5` in
+    /// `xsd:decimal` only, no float in `xsd:decimal`.
+    pub fn is_in(&self, datatype_iri: &str) -> bool {
+        self.membership(datatype_iri) == Some(true)
+    }
+
+    /// Whether the value lies in the value space of a datatype; `None` where that is undecided, because the literal or
+    /// the datatype has no meaning here.
+    pub fn membership(&self, datatype_iri: &str) -> Option<bool> {
+        if self.is_ill_typed() {
+            return Some(false);
+        }
+        if datatype_iri == RDFS_LITERAL {
+            return Some(true);
+        }
+        let is_real = [OWL_REAL, OWL_RATIONAL].contains(&datatype_iri);
+        match (self.kind(), self) {
+            (_, Self::Opaque { datatype, .. }) if **datatype == *datatype_iri => Some(true),
+            (Kind::Rational, _) if is_real => Some(true),
+            (Kind::Unknown | Kind::Fresh, _) => None,
+            (Kind::Rational | Kind::Xml, _) => is_known(datatype_iri).then_some(false),
+            (Kind::Known, _) if datatype_iri == XML_LITERAL => Some(false),
+            (Kind::Known, _) if is_real => Some(matches!(self, Self::Decimal(_))),
+            (Kind::Known, _) => is_known(datatype_iri).then(|| self.is_in_known(datatype_iri)),
+        }
+    }
+
+    fn is_in_known(&self, datatype_iri: &str) -> bool {
+        match (self, datatype_iri.strip_prefix(RDF)) {
+            // Zero has one spelling and lies in both kinds.
+            (Self::Duration(duration), _) => duration.is_in(datatype_iri),
+            (Self::Language { .. }, Some("langString" | "PlainLiteral"))
+            | (Self::String(_), Some("PlainLiteral")) => true,
+            (_, Some(_)) | (Self::Language { .. }, _) => false,
+            _ => *self == Self::parse(&self.lexical(), Some(datatype_iri), None),
+        }
+    }
+}
+
+/// The datatype of [`Literal::fresh`].
+const FRESH: &str = "urn:metaplan:fresh";
+
+/// Whether the value space of a datatype is known.
+fn is_known(iri: &str) -> bool {
+    match (iri.strip_prefix(XSD), iri.strip_prefix(RDF)) {
+        (Some(local), _) => !matches!(parse_xsd("", local), Parsed::Unknown),
+        (_, Some(local)) => ["PlainLiteral", "langString"].contains(&local),
+        _ => [OWL_REAL, OWL_RATIONAL].contains(&iri),
+    }
+}
+
+/// `numerator / denominator` of `owl:rational`; a decimal where it is one.
+pub(super) fn parse_rational(lexical: &str) -> Parsed {
+    let text = lexical.trim_matches([' ', '\t', '\n', '\r']);
+    let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
+    let plain = |text: &str| text.trim().strip_prefix('+').unwrap_or(text.trim()).parse::<BigInt>().ok();
+    let (Some(numerator), Some(denominator)) = (plain(numerator), plain(denominator)) else {
+        return Parsed::IllTyped;
+    };
+    if denominator <= BigInt::zero() {
+        return Parsed::IllTyped;
+    }
+    let exact = BigRational::new(numerator, denominator);
+    let decimal = Decimal::from_rational(&exact);
+    Parsed::Value(if decimal.to_rational() == exact {
+        Literal::Decimal(decimal)
+    } else {
+        let lexical = format!("{}/{}", exact.numer(), exact.denom());
+        Literal::Opaque { lexical: lexical.into(), datatype: OWL_RATIONAL.into() }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Literal {
+        let (lexical, datatype) = text.split_once('^').unwrap_or((text, "string"));
+        let datatype = match datatype {
+            "rational" => OWL_RATIONAL.to_owned(),
+            "xml" => XML_LITERAL.to_owned(),
+            "own" => "http://x#own".to_owned(),
+            local => format!("{XSD}{local}"),
+        };
+        Literal::parse(lexical, Some(&datatype), None)
+    }
+
+    #[test]
+    fn two_values_or_one_or_undecided() {
+        // 1: one value; 2: two; 0: undecided.
+        for (left, right, expected) in [
+            ("1.0^decimal", "1^integer", 1),
+            ("1^decimal", "1^float", 2),
+            ("0^float", "-0^float", 2),
+            ("2020-01-01T00:00:00Z^dateTime", "2020-01-01T01:00:00+01:00^dateTime", 2),
+            ("2020-01-01T00:00:00Z^dateTime", "2020-01-01T00:00:00+00:00^dateTime", 1),
+            ("0A^hexBinary", "0a^hexBinary", 1),
+            ("0A^hexBinary", "0B^hexBinary", 2),
+            ("Zm9v^base64Binary", "Z m 9 v^base64Binary", 1),
+            ("1980^gYear", "1981^gYear", 2),
+            ("--01^gMonth", "01^string", 2),
+            ("1/2^rational", "0.5^decimal", 1),
+            ("2/6^rational", "1/3^rational", 1),
+            ("1/3^rational", "2/3^rational", 2),
+            ("1/3^rational", "0.33^decimal", 2),
+            ("<a/>^xml", "<a></a>^xml", 0),
+            ("<a/>^xml", "<a/>^string", 2),
+            ("1^own", "2^own", 0),
+            ("1^own", "1^integer", 0),
+            ("1^own", "1^own", 1),
+        ] {
+            let (left, right) = (read(left), read(right));
+            let found = match (left == right, left.differs(&right)) {
+                (true, false) => 1,
+                (false, true) => 2,
+                (false, false) => 0,
+                (true, true) => 3,
+            };
+            assert_eq!(found, expected, "{left} {right}");
+            assert_eq!(left.differs(&right), right.differs(&left), "{left} {right}");
+        }
+        assert!(Literal::fresh(1).differs(&Literal::fresh(2)) && !Literal::fresh(1).differs(&read("1")));
+    }
+
+    #[test]
+    fn in_a_datatype_or_outside_or_undecided() {
+        for (literal, datatype, expected) in [
+            ("1^own", "decimal", None),
+            ("1^decimal", "own", None),
+            ("1^own", "own", Some(true)),
+            ("<a/>^xml", "string", Some(false)),
+            ("1/3^rational", "decimal", Some(false)),
+            ("1/2^rational", "decimal", Some(true)),
+            ("1/3^rational", "rational", Some(true)),
+            ("1980^gYear", "gYear", Some(true)),
+            ("1980^gYear", "integer", Some(false)),
+            ("x^integer", "integer", Some(false)),
+            ("0a^hexBinary", "hexBinary", Some(true)),
+            ("0^gYear", "gYear", Some(false)),
+        ] {
+            let iri = match datatype {
+                "own" => "http://x#own".to_owned(),
+                "rational" => OWL_RATIONAL.to_owned(),
+                local => format!("{XSD}{local}"),
+            };
+            assert_eq!(read(literal).membership(&iri), expected, "{literal} {datatype}");
+        }
+    }
+}

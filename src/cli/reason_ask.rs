@@ -1,0 +1,297 @@
+//! The questions of `metaplan reason`: whether statements follow, why a fact holds or not, and what follows about classes
+//! and properties.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use metaplan::knowledge::Knowledge;
+use metaplan::message::Message;
+use ontology::entail::{Answer, Schema, SchemaEntity, entailments, schema};
+use ontology::vocab::{local_name, rdf};
+use rules::{Atom, Engine, Fact, Literal, Symbol, Term, Value};
+use serde_json::{Value as Json, json};
+
+use crate::cli::{Common, Exit, Failure, Format, Imports, output};
+
+/// Questions; at most one kind at a time.
+#[derive(Debug, Args)]
+pub struct Questions {
+    /// Whether what a document states follows, and from what (repeatable).
+    #[arg(long, value_name = "FILE", group = "question")]
+    entails: Vec<PathBuf>,
+    /// What follows about classes and properties: which are below which, which are empty.
+    #[arg(long, group = "question")]
+    schema: bool,
+    /// Why an assertion holds: `SUBJECT PROPERTY VALUE`, or `SUBJECT a CLASS`; names may be local (repeatable).
+    #[arg(long, value_name = "ASSERTION", group = "question")]
+    why: Vec<String>,
+    /// Why an assertion does not hold: how near each rule comes to concluding it (repeatable).
+    #[arg(long, value_name = "ASSERTION", group = "question")]
+    why_not: Vec<String>,
+}
+
+impl Questions {
+    /// Answers the question, if there is one.
+    pub fn answer(
+        &self,
+        knowledge: &mut Knowledge,
+        imports: &Imports,
+        common: &Common,
+    ) -> Result<Option<Exit>, Failure> {
+        let (text, json, exit) = if !self.entails.is_empty() {
+            self.follows(knowledge, imports)?
+        } else if self.schema {
+            let schema = schema(knowledge.engine(), knowledge.entities())
+                .map_err(|error| Message::from_rules(&error))?;
+            (schema_text(&schema), schema_json(&schema), Exit::Done)
+        } else if !self.why.is_empty() {
+            reasons(knowledge, &self.why, why)?
+        } else if !self.why_not.is_empty() {
+            reasons(knowledge, &self.why_not, why_not)?
+        } else {
+            return Ok(None);
+        };
+        match common.format {
+            Format::Json => output::json_answer(&json),
+            _ => output::answer(&text),
+        }
+        Ok(Some(exit))
+    }
+
+    fn follows(&self, knowledge: &Knowledge, imports: &Imports) -> Result<(String, Json, Exit), Failure> {
+        let options = ontology::ReadOptions { allow_missing_imports: true, ..imports.options() };
+        let conclusions = ontology::read_files(&self.entails, &options)
+            .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
+        let found =
+            entailments(knowledge.engine(), &conclusions).map_err(|error| Message::from_rules(&error))?;
+        let (mut text, mut all) = (String::new(), true);
+        for entailment in &found {
+            match &entailment.answer {
+                Answer::Follows(reason) => {
+                    let _ = writeln!(text, "follows: {}", entailment.statement);
+                    for line in reason.lines() {
+                        let _ = writeln!(text, "    {line}");
+                    }
+                }
+                Answer::Open(reason) => {
+                    all = false;
+                    let _ = writeln!(text, "not shown: {} ({reason})", entailment.statement);
+                }
+            }
+        }
+        let count = found.iter().filter(|one| matches!(one.answer, Answer::Follows(_))).count();
+        let _ = writeln!(text, "{count} of {} statements follow", found.len());
+        let statements: Vec<Json> = found
+            .iter()
+            .map(|one| match &one.answer {
+                Answer::Follows(reason) => {
+                    json!({ "statement": one.statement, "follows": true, "reason": reason })
+                }
+                Answer::Open(reason) => {
+                    json!({ "statement": one.statement, "follows": false, "reason": reason })
+                }
+            })
+            .collect();
+        let json = json!({ "format": "metaplan-entails/1", "entailed": all, "statements": statements });
+        Ok((text, json, if all { Exit::Done } else { Exit::NotProved }))
+    }
+}
+
+/// Answers a question about each assertion; `answer` says whether there is one.
+fn reasons(
+    knowledge: &mut Knowledge,
+    assertions: &[String],
+    answer: impl Fn(&Engine, &Fact) -> (bool, String),
+) -> Result<(String, Json, Exit), Failure> {
+    let (mut text, mut answers, mut all) = (String::new(), Vec::new(), true);
+    for assertion in assertions {
+        let fact = read(knowledge, assertion).map_err(Failure::usage)?;
+        let (is_answer, reason) = answer(knowledge.engine(), &fact);
+        all &= is_answer;
+        text += &reason;
+        answers.push(json!({ "assertion": assertion, "answered": is_answer, "reason": reason }));
+    }
+    let json = json!({ "format": "metaplan-reasons/1", "answers": answers });
+    Ok((text, json, if all { Exit::Done } else { Exit::NotProved }))
+}
+
+fn why(engine: &Engine, fact: &Fact) -> (bool, String) {
+    let shown = fact.display(engine.symbols());
+    match engine.why(fact) {
+        Some(derivation) => (true, derivation.display(engine.symbols()).to_string()),
+        None => (false, format!("{shown} does not hold; `--why-not` says what is missing\n")),
+    }
+}
+
+fn why_not(engine: &Engine, fact: &Fact) -> (bool, String) {
+    let shown = fact.display(engine.symbols());
+    if engine.holds(fact) {
+        return (false, format!("{shown} holds; `--why` says why\n"));
+    }
+    let mut text = format!("{shown} does not hold\n");
+    let misses = engine.why_not(fact);
+    if misses.is_empty() {
+        text += "    no rule or axiom could conclude it\n";
+    }
+    for miss in misses {
+        let _ = writeln!(text, "    by rule {}", miss.identity);
+        for obstacle in &miss.obstacles {
+            let _ = writeln!(text, "        {}", obstacle.display(engine.symbols()));
+        }
+    }
+    (true, text)
+}
+
+/// The words of an assertion: IRIs in brackets, literals in quotes with what follows them, and names.
+fn words(text: &str) -> Vec<&str> {
+    let (mut words, mut start, mut inside) = (Vec::new(), None::<usize>, None::<char>);
+    for (at, character) in text.char_indices() {
+        match (inside, character) {
+            (Some(end), _) if character == end => inside = None,
+            (Some(_), _) => {}
+            (None, '<') => inside = Some('>'),
+            (None, '"') => inside = Some('"'),
+            (None, _) if character.is_whitespace() => {
+                words.extend(start.take().map(|start| &text[start..at]));
+                continue;
+            }
+            _ => {}
+        }
+        start = start.or(Some(at));
+    }
+    words.extend(start.map(|start| &text[start..]));
+    words.retain(|word| *word != ".");
+    words
+}
+
+/// The fact that an assertion states.
+fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
+    let words = words(assertion.trim().trim_end_matches(" ."));
+    let [subject, predicate, object] = words[..] else {
+        let text = format!("`{assertion}` is not of the form SUBJECT PROPERTY VALUE, or SUBJECT a CLASS");
+        return Err(Message::error("M102", text));
+    };
+    let names = names(knowledge.engine());
+    let subject = name(subject, &names)?;
+    let is_type =
+        predicate == "a" || predicate.trim_matches(['<', '>']) == rdf::TYPE || predicate == "rdf:type";
+    let symbols = knowledge.runtime_mut().engine_mut().symbols_mut();
+    if is_type {
+        let class = name(object, &names)?;
+        return Ok(Fact::new(symbols.name(&class), [symbols.name(&subject)]));
+    }
+    let predicate = name(predicate, &names)?;
+    let object = match literal(object) {
+        Some(literal) => symbols.literal(literal),
+        None => symbols.name(&name(object, &names)?),
+    };
+    Ok(Fact::new(symbols.name(&predicate), [symbols.name(&subject), object]))
+}
+
+/// All names that facts and rules mention.
+fn names(engine: &Engine) -> BTreeSet<String> {
+    let mut symbols: BTreeSet<Symbol> = BTreeSet::new();
+    for fact in engine.facts() {
+        symbols.insert(fact.predicate);
+        symbols.extend(fact.arguments);
+    }
+    for atom in engine.program().rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body)) {
+        if let Atom::Relation { predicate, .. } | Atom::Not { predicate, .. } = atom {
+            symbols.insert(*predicate);
+        }
+        symbols.extend(atom.terms().into_iter().filter_map(|term| match term {
+            Term::Constant(symbol) => Some(symbol),
+            Term::Variable(_) => None,
+        }));
+    }
+    let text = |symbol| match engine.symbols().value(symbol) {
+        Value::Name(name) => Some(name.to_string()),
+        Value::Literal(_) => None,
+    };
+    symbols.into_iter().filter_map(text).collect()
+}
+
+/// The IRI of a name: in brackets, in full, or the only one with this local name, whatever its prefix.
+fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
+    if let Some(iri) = word.strip_prefix('<').and_then(|rest| rest.strip_suffix('>')) {
+        return Ok(iri.to_owned());
+    }
+    if names.contains(word) {
+        return Ok(word.to_owned());
+    }
+    let local = word.rsplit(':').next().unwrap_or(word);
+    let found: Vec<&String> = names.iter().filter(|iri| local_name(iri) == local).collect();
+    match found[..] {
+        [iri] => Ok(iri.clone()),
+        [] => Err(Message::error("M102", format!("nothing is called `{word}`; write an IRI as <IRI>"))),
+        _ => {
+            let all: Vec<String> = found.iter().map(|iri| format!("<{iri}>")).collect();
+            Err(Message::error("M102", format!("`{word}` may be {}; write one of them", all.join(" or "))))
+        }
+    }
+}
+
+/// `"text"`, `"text"@en`, `"5"^^xsd:int`, a number, `true` or `false`.
+fn literal(word: &str) -> Option<Literal> {
+    const XSD: &str = ontology::vocab::xsd::NS;
+    if let Some(rest) = word.strip_prefix('"') {
+        let (text, kind) = rest.rsplit_once('"')?;
+        if let Some(language) = kind.strip_prefix('@') {
+            return Some(Literal::parse(text, None, Some(language)));
+        }
+        let datatype = kind.strip_prefix("^^").map(|datatype| match datatype.strip_prefix("xsd:") {
+            Some(local) => format!("{XSD}{local}"),
+            None => datatype.trim_matches(['<', '>']).to_owned(),
+        });
+        return Some(Literal::parse(text, datatype.as_deref(), None));
+    }
+    let kind = match word {
+        "true" | "false" => "boolean",
+        _ if !word.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+') => return None,
+        _ if word.contains(['e', 'E']) => "double",
+        _ if word.contains('.') => "decimal",
+        _ => "integer",
+    };
+    let literal = Literal::parse(word, Some(&format!("{XSD}{kind}")), None);
+    (!literal.is_ill_typed()).then_some(literal)
+}
+
+fn schema_text(schema: &Schema) -> String {
+    let mut text = String::new();
+    let kinds = [
+        ("classes", &schema.classes),
+        ("object properties", &schema.object_properties),
+        ("data properties", &schema.data_properties),
+    ];
+    for (title, entities) in kinds.iter().filter(|(_, entities)| !entities.is_empty()) {
+        let _ = writeln!(text, "{title}");
+        for entity in *entities {
+            let above: Vec<String> = entity.direct.iter().map(|iri| format!("<{iri}>")).collect();
+            match (&entity.empty, above.is_empty()) {
+                (Some(reason), _) => {
+                    let _ = writeln!(text, "    <{}> is always empty: {reason}", entity.iri);
+                }
+                (None, true) => {
+                    let _ = writeln!(text, "    <{}>", entity.iri);
+                }
+                (None, false) => {
+                    let _ = writeln!(text, "    <{}> below {}", entity.iri, above.join(", "));
+                }
+            }
+        }
+    }
+    text
+}
+
+fn schema_json(schema: &Schema) -> Json {
+    let entity = |entity: &SchemaEntity| json!({ "iri": entity.iri, "direct": entity.direct, "above": entity.above, "empty": entity.empty });
+    let all = |entities: &[SchemaEntity]| entities.iter().map(entity).collect::<Vec<_>>();
+    json!({
+        "format": "metaplan-schema/1",
+        "classes": all(&schema.classes),
+        "object_properties": all(&schema.object_properties),
+        "data_properties": all(&schema.data_properties),
+    })
+}
