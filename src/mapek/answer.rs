@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::number;
 use super::step::PlannedStep;
+use crate::knowledge::Contradiction;
 
 /// One line of output.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +17,11 @@ pub enum Answer {
         designs: Vec<DesignChange>,
         /// Objectives whose status has changed.
         objectives: Vec<ObjectiveChange>,
+    },
+    /// What is known contradicts itself, or does so no more. What was observed stays, and so does what follows from it.
+    Contradicted {
+        /// All contradictions from now on; none where what is known is consistent again.
+        contradictions: Vec<Contradiction>,
     },
     /// A plan is looked for.
     PlanRequested {
@@ -148,6 +154,11 @@ impl Answer {
                 "designs": designs.iter().map(DesignChange::to_json).collect::<Vec<_>>(),
                 "objectives": objectives.iter().map(ObjectiveChange::to_json).collect::<Vec<_>>(),
             }),
+            Self::Contradicted { contradictions } => {
+                let object = |own: &Contradiction| json!({ "violated": own.violated, "facts": own.facts });
+                let contradictions: Vec<Value> = contradictions.iter().map(object).collect();
+                json!({ "answer": "contradicted", "contradictions": contradictions })
+            }
             Self::PlanRequested { because } => json!({ "answer": "plan_requested", "because": because }),
             Self::PlanFound { cost, optimal, steps } => json!({
                 "answer": "plan_found",

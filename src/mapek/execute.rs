@@ -85,6 +85,7 @@ impl Loop {
         if let Err(error) = knowledge.pursue(wanted) {
             answers.push(Answer::Error { code: error.code.clone(), message: error.message.clone() });
         }
+        self.contradict(answers);
         self.analyze(answers);
     }
 }

@@ -23,6 +23,8 @@ pub struct Knowledge {
     pub(super) available: BTreeSet<String>,
     /// Objectives that have a status, with it.
     pub(super) statuses: BTreeMap<String, Vec<String>>,
+    /// The axioms and rules that what is known violates.
+    pub(super) violated: BTreeSet<String>,
     /// Function to the design that it has.
     pub(super) configuration: BTreeMap<String, String>,
     /// What is still to be requested, if there is a plan.
@@ -75,6 +77,7 @@ impl Knowledge {
             goal: None,
             available: BTreeSet::new(),
             statuses: BTreeMap::new(),
+            violated: BTreeSet::new(),
             configuration: BTreeMap::new(),
             plan: None,
             running: None,
@@ -100,6 +103,11 @@ impl Knowledge {
     /// The designs that are available, by local name.
     pub fn available(&self) -> &BTreeSet<String> {
         &self.available
+    }
+
+    /// Objectives in error, by local name, with their statuses.
+    pub fn statuses(&self) -> &BTreeMap<String, Vec<String>> {
+        &self.statuses
     }
 
     /// Function to the design that it has.

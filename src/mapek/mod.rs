@@ -156,7 +156,7 @@ impl Loop {
                 }
             }
         }
-        if understood {
+        if understood || changes.any() {
             self.adapt(changes, &mut answers);
             self.execute(&mut answers);
             self.forget();

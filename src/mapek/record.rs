@@ -76,6 +76,7 @@ impl Loop {
             "removed": statements.removed.iter().map(statement_to_record).collect::<Vec<_>>(),
             "available": known.available,
             "statuses": known.statuses,
+            "violated": known.violated,
             "configuration": known.configuration,
             "plan": known.plan.as_ref().map(steps),
             "running": running,
@@ -141,6 +142,7 @@ impl Loop {
         known.available = texts(data.get("available")?)?.into_iter().collect();
         let status = |(name, value): (&String, &Value)| Some((name.clone(), texts(value)?));
         known.statuses = pairs("statuses")?.iter().map(status).collect::<Option<BTreeMap<_, _>>>()?;
+        known.violated = texts(data.get("violated")?)?.into_iter().collect();
         let pair = |(name, value): (&String, &Value)| Some((name.clone(), text(value)?));
         known.configuration = pairs("configuration")?.iter().map(pair).collect::<Option<BTreeMap<_, _>>>()?;
         known.plan = match data.get("plan")? {

@@ -1,6 +1,7 @@
 //! The adaptation loop as a library: the paper's experiments event by event, the journal under crashes, random events.
 
 mod common;
+mod damage;
 mod experiments;
 mod failures;
 mod fleet;
@@ -8,3 +9,4 @@ mod fuzz;
 mod journal;
 mod kill;
 mod soak;
+mod worlds;
