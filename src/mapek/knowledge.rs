@@ -9,6 +9,7 @@ use std::time::Duration;
 use num_rational::BigRational;
 
 use super::answer::Effect;
+use super::sequence::Numbers;
 use super::step::PlannedStep;
 use crate::mission::Mission;
 
@@ -49,8 +50,8 @@ pub struct Knowledge {
     pub(super) outstanding: BTreeMap<u64, Effect>,
     /// How many lines were handled.
     pub(super) lines: u64,
-    /// The greatest number of a line that had one.
-    pub(super) sequence: Option<u64>,
+    /// The numbers of the lines that had one and were taken over.
+    pub(super) numbers: Numbers,
     /// The time of the last line, since the start of the mission.
     pub(super) now: Duration,
 }
@@ -90,7 +91,7 @@ impl Knowledge {
             effects: 0,
             outstanding: BTreeMap::new(),
             lines: 0,
-            sequence: None,
+            numbers: Numbers::default(),
             now: Duration::ZERO,
         }
     }
@@ -145,9 +146,9 @@ impl Knowledge {
         self.lines
     }
 
-    /// The greatest number of a line that had one.
+    /// The greatest number of a line that was taken over.
     pub fn sequence(&self) -> Option<u64> {
-        self.sequence
+        self.numbers.greatest()
     }
 
     /// The time of the last line, since the start of the mission.

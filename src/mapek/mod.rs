@@ -28,6 +28,7 @@ mod parts;
 mod plan;
 mod record;
 mod resume;
+mod sequence;
 mod step;
 
 use std::borrow::Cow;
@@ -53,6 +54,7 @@ pub(crate) use monitor::value_of;
 use plan::Planner;
 pub(crate) use resume::resume;
 use resume::resumed_goal;
+use sequence::Place;
 
 /// How eager the loop is.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,6 +132,7 @@ impl Loop {
     /// Makes the first plan and requests the first action.
     pub fn start(&mut self) -> Vec<Answer> {
         let mut answers = Vec::new();
+        self.planner.made.clear();
         self.execute(&mut answers);
         answers
     }
@@ -137,14 +140,14 @@ impl Loop {
     /// Takes an observation over, at a time since the start of the mission that never goes back, and says what follows.
     pub fn handle(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
         let mut answers = Vec::new();
+        // Plans that nobody has asked for are of no use to anybody.
+        self.planner.made.clear();
         self.knowledge.lines += 1;
-        self.knowledge.now = self.knowledge.now.max(observation.time.unwrap_or(now));
-        if let Some(sequence) = observation.sequence {
-            if self.knowledge.sequence.is_some_and(|last| sequence <= last) {
-                return vec![Answer::Duplicate { sequence }];
-            }
-            self.knowledge.sequence = Some(sequence);
+        if let Some(refusal) = observation.sequence.and_then(|sequence| self.refused(sequence)) {
+            self.knowledge.now = self.knowledge.now.max(now);
+            return vec![refusal];
         }
+        self.knowledge.now = self.knowledge.now.max(observation.time.unwrap_or(now));
         let mut changes = Changes::default();
         let mut understood = false;
         for event in &observation.events {
@@ -157,11 +160,29 @@ impl Loop {
             }
         }
         if understood || changes.any() {
+            if let Some(sequence) = observation.sequence {
+                self.knowledge.numbers.insert(sequence);
+            }
             self.adapt(changes, &mut answers);
             self.execute(&mut answers);
             self.forget();
         }
         answers
+    }
+
+    /// Why a line with this number is not taken over, if it is not.
+    fn refused(&self, sequence: u64) -> Option<Answer> {
+        match self.knowledge.numbers.place(sequence) {
+            Place::New => None,
+            Place::Seen => Some(Answer::Duplicate { sequence }),
+            Place::Stale(mark) => Some(Answer::Stale { sequence, mark }),
+            Place::Ahead(most) => {
+                let text = format!(
+                    "`seq` is {sequence}, but may be {most} at most: numbers grow from line to line, and skip a million at most"
+                );
+                Some(Answer::Error { code: "M307".to_owned(), message: text })
+            }
+        }
     }
 
     /// Effects that were asked for and not acknowledged, to be asked for again after a restart.

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::answer::{Answer, Command, Effect};
 use super::knowledge::Running;
 use super::plan::Outcome;
+use super::sequence::Numbers;
 use super::step::PlannedStep;
 use super::{Loop, Observation, analyze};
 use crate::knowledge::{Part, Statement, Statements};
@@ -89,7 +90,7 @@ impl Loop {
             "effects": known.effects,
             "outstanding": known.outstanding.values().map(effect_to_record).collect::<Vec<_>>(),
             "lines": known.lines,
-            "sequence": known.sequence,
+            "numbers": known.numbers.to_record(),
             "now": micros(known.now),
         }))
     }
@@ -162,7 +163,7 @@ impl Loop {
         known.hoped = Duration::from_micros(number("hoped")?);
         (known.actions, known.effects, known.lines) =
             (number("actions")?, number("effects")?, number("lines")?);
-        known.sequence = number("sequence");
+        known.numbers = Numbers::from_record(data.get("numbers")?)?;
         known.now = Duration::from_micros(number("now")?);
         let effects = data.get("outstanding")?.as_array()?.iter().map(effect_from_record);
         known.outstanding =
@@ -193,7 +194,7 @@ fn effect_to_record(effect: &Effect) -> Value {
         Command::Suspend { because } => json!(["suspend", because]),
         Command::Resume => json!(["resume"]),
     };
-    json!([effect.number, effect.action, command])
+    json!([effect.number, effect.action, command, effect.supersedes])
 }
 
 fn effect_from_record(record: &Value) -> Option<Effect> {
@@ -212,7 +213,8 @@ fn effect_from_record(record: &Value) -> Option<Effect> {
         _ => return None,
     };
     let (number, action) = (record.get(0)?.as_u64()?, record.get(1)?.as_u64()?);
-    Some(Effect { number, action, command, repeated: false })
+    let supersedes = record.get(3)?.as_array()?.iter().map(Value::as_u64).collect::<Option<_>>()?;
+    Some(Effect { number, action, command, repeated: false, supersedes })
 }
 
 fn statement_to_record(statement: &Statement) -> Value {

@@ -113,6 +113,13 @@ fn go_on(journal: &mut Journal, control: &mut Loop, robot: &mut Robot) {
     }
 }
 
+/// All that a loop knows, but for how many lines it was sent: a line that was refused may be sent again.
+pub fn state(control: &Loop) -> serde_json::Value {
+    let mut state = control.snapshot().0;
+    state.as_object_mut().expect("an object").remove("lines");
+    state
+}
+
 /// The state and the effects of a run that nothing disturbs.
 fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir) {
     let directory = tempfile::tempdir().expect("a directory");
@@ -121,7 +128,7 @@ fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir)
     robot.take(&control, &recovery.answers);
     go_on(&mut journal, &mut control, &mut robot);
     assert!(control.knowledge().reached(), "{:?}", control.snapshot());
-    (control.snapshot().0, robot, directory)
+    (state(&control), robot, directory)
 }
 
 #[test]
@@ -167,7 +174,7 @@ fn check(cuts: usize) {
         assert_eq!(recovery.cut > 0, torn);
         robot.take(&control, &recovery.answers);
         go_on(&mut journal, &mut control, &mut robot);
-        assert_eq!(control.snapshot().0, state, "stopped after {stop}, kept {keep} of {}", text.len());
+        assert_eq!(self::state(&control), state, "stopped after {stop}, kept {keep} of {}", text.len());
         assert_eq!(robot, effects);
     }
 }

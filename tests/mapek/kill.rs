@@ -11,7 +11,7 @@ use metaplan::journal::Journal;
 use serde_json::Value;
 
 use crate::common::control;
-use crate::journal::{POLICY, script, uuv_script};
+use crate::journal::{POLICY, script, state, uuv_script};
 
 /// A mission, and what its robot reports.
 struct Story {
@@ -100,7 +100,7 @@ impl Robot {
         let mut control = control(story.mission);
         let (_, recovery) = Journal::open(journal, POLICY, &mut control).expect("the journal opens");
         assert_eq!(recovery.cut, 0);
-        self.state = control.snapshot().0;
+        self.state = state(&control);
     }
 
     /// Sends the lines that were not handled, waiting for each but the last of `patience` to be handled.

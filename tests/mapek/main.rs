@@ -8,5 +8,6 @@ mod fleet;
 mod fuzz;
 mod journal;
 mod kill;
+mod numbers;
 mod soak;
 mod worlds;
