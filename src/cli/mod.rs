@@ -9,6 +9,7 @@ mod convert;
 mod explain;
 mod export;
 mod import;
+mod journal;
 mod memory;
 mod objectives;
 mod output;
@@ -125,6 +126,8 @@ enum Command {
     Export(export::Arguments),
     /// The adaptation loop: events in, adaptations out, one JSON object a line.
     Run(run::Arguments),
+    /// What is in the journal of a loop, and whether it can be used; nothing is changed.
+    Journal(journal::Arguments),
     /// The loop against a simulated robot, beside other ways of control.
     Simulate(simulate::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
@@ -310,6 +313,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Explain(arguments) => explain::run(arguments, &cli.common),
         Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Run(arguments) => run::run(arguments, &cli.common),
+        Command::Journal(arguments) => journal::run(arguments, &cli.common),
         Command::Simulate(arguments) => simulate::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),
         Command::Verify(arguments) => verify::run(arguments, &cli.common),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::mapek::{Answer, Clock as _, LONGEST_LINE, Loop, Observation, SystemClock};
+use metaplan::mapek::{Answer, Clock as _, FORMAT, LONGEST_LINE, Loop, Observation, SystemClock};
 use metaplan::message::Message;
 use serde_json::{Value, json};
 
@@ -54,9 +54,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mut control = Loop::new(mission, settings)?;
     let mut events = Lines::open(&arguments.events)?;
     let mut stdout = io::stdout().lock();
-    let mut ready = json!({ "answer": "ready", "format": "metaplan-events/1", "mission": name });
-    let (mut journal, answers) = match &arguments.journal {
-        None => (None, control.start()),
+    let mut ready = json!({ "answer": "ready", "format": FORMAT, "mission": name });
+    let mut journal = match &arguments.journal {
+        None => None,
         Some(directory) => {
             let sync = match arguments.fsync {
                 Fsync::Always => Sync::Always,
@@ -69,12 +69,22 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             ready["lines"] = json!(control.knowledge().lines());
             ready["seq"] = json!(control.knowledge().sequence());
             ready["cut_bytes"] = json!(recovery.cut);
-            (Some(journal), recovery.answers)
+            ready["warnings"] = json!(recovery.warnings.iter().map(|own| &own.message).collect::<Vec<_>>());
+            output::warnings(common, &recovery.warnings);
+            Some(journal)
         }
     };
     let lost = |error: io::Error| Message::error("M109", format!("the answer cannot be written: {error}"));
-    writeln!(stdout, "{ready}").map_err(lost)?;
-    write(&mut stdout, control.knowledge().lines(), &answers).map_err(lost)?;
+    writeln!(stdout, "{ready}").and_then(|()| stdout.flush()).map_err(lost)?;
+    let begun = Instant::now();
+    let answers = match &mut journal {
+        None => control.start(),
+        Some(journal) => journal.begin(&mut control).map_err(|error| unwritten(&error))?,
+    };
+    let number = control.knowledge().lines();
+    write(&mut stdout, number, &answers)
+        .and_then(|()| handled(&mut stdout, number, begun.elapsed()))
+        .map_err(lost)?;
     let mut clock = SystemClock::default();
     let begun = control.knowledge().now();
     while let Some(line) = events.next()? {
@@ -82,9 +92,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let now = begun + clock.now();
         let answers = match &mut journal {
             None => control.handle(&Observation::parse(&line), now),
-            Some(journal) => journal
-                .handle(&mut control, &line, now)
-                .map_err(|error| Message::error("M321", format!("the journal cannot be written: {error}")))?,
+            Some(journal) => journal.handle(&mut control, &line, now).map_err(|error| unwritten(&error))?,
         };
         let number = control.knowledge().lines();
         let written =
@@ -95,6 +103,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         }
     }
     Ok(Exit::Done)
+}
+
+fn unwritten(error: &io::Error) -> Message {
+    Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 
 /// Writes the answers to a line, each with the line's number.

@@ -37,6 +37,7 @@ use std::time::Duration;
 
 use encodings::pddl::ast::{Domain, Problem};
 use num_rational::BigRational;
+use sha2::{Digest as _, Sha256};
 
 use crate::message::Message;
 use crate::mission::Mission;
@@ -55,6 +56,9 @@ use plan::Planner;
 pub(crate) use resume::resume;
 use resume::resumed_goal;
 use sequence::Place;
+
+/// The version of events and answers.
+pub const FORMAT: &str = "metaplan-events/1";
 
 /// How eager the loop is.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,7 +119,7 @@ impl Loop {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
         let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
-        let digest = digest(&mission);
+        let digest = digest(&mission, &settings);
         let planner = Planner { time_limit: settings.time_limit, ..Planner::default() };
         let mut knowledge = Knowledge::new(mission);
         if let Some(base) = knowledge.mission.knowledge() {
@@ -143,11 +147,10 @@ impl Loop {
         // Plans that nobody has asked for are of no use to anybody.
         self.planner.made.clear();
         self.knowledge.lines += 1;
+        self.knowledge.now = self.knowledge.now.max(observation.time.unwrap_or(now));
         if let Some(refusal) = observation.sequence.and_then(|sequence| self.refused(sequence)) {
-            self.knowledge.now = self.knowledge.now.max(now);
             return vec![refusal];
         }
-        self.knowledge.now = self.knowledge.now.max(observation.time.unwrap_or(now));
         let mut changes = Changes::default();
         let mut understood = false;
         for event in &observation.events {
@@ -226,14 +229,31 @@ impl Loop {
     }
 }
 
-fn digest(mission: &Mission) -> String {
-    let mut text = encodings::pddl::print_domain(mission.domain());
+/// Everything that decisions rest on before anything has happened: what is said and follows, the rules, the domain and the
+/// problem with its settings, the bindings, how eager the loop is, and the versions of the formats.
+fn digest(mission: &Mission, settings: &Settings) -> String {
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);
-    text += &encodings::pddl::print_problem(&problem);
+    let mut parts = vec![
+        env!("CARGO_PKG_VERSION").to_owned(),
+        FORMAT.to_owned(),
+        mission.name.clone(),
+        format!("{settings:?}"),
+        format!("{:?}", mission.bindings()),
+        encodings::pddl::print_domain(mission.domain()),
+        encodings::pddl::print_problem(&problem),
+    ];
     if let Some(knowledge) = mission.knowledge() {
-        let facts: Vec<rules::Fact> = knowledge.engine().facts().collect();
-        text += &ontology::ntriples(knowledge.engine().symbols(), &facts);
+        let engine = knowledge.engine();
+        let facts: Vec<rules::Fact> = engine.facts().collect();
+        parts.push(ontology::ntriples(engine.symbols(), &facts));
+        parts.push(rules::print_rules(engine.program(), engine.symbols(), &rules::Prefixes::default()));
     }
-    format!("{:08x}", crc32fast::hash(text.as_bytes()))
+    let mut hash = Sha256::new();
+    for part in parts {
+        hash.update((part.len() as u64).to_le_bytes());
+        hash.update(part);
+    }
+    let half = hash.finalize().iter().take(16).fold(0_u128, |sum, byte| sum << 8 | u128::from(*byte));
+    format!("{half:032x}")
 }

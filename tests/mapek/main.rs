@@ -4,6 +4,7 @@ mod common;
 mod damage;
 mod experiments;
 mod failures;
+mod faults;
 mod fleet;
 mod fuzz;
 mod journal;

@@ -115,6 +115,17 @@ const DOMAIN: &str = "(define (domain m) (:requirements :typing :fluents :durati
 
 /// A mission with random designs, bounds and dependencies, on a ring of places.
 pub fn generated(seed: u64) -> Place {
+    let (directory, depends) = files(seed);
+    Place::new(&format!("generated {seed}"), &directory.path().join("m.toml"), depends, true)
+}
+
+/// The files of a generated mission, the manifest `m.toml` among them.
+pub fn own_files(seed: u64) -> tempfile::TempDir {
+    files(seed).0
+}
+
+/// The same, and which component depends on which.
+fn files(seed: u64) -> (tempfile::TempDir, Vec<(String, String)>) {
     let mut random = Rng::with_seed(seed);
     let (functions, components) = (random.usize(1..=2), random.usize(3..=5));
     let mut text = PREFIXES.to_owned();
@@ -187,5 +198,5 @@ pub fn generated(seed: u64) -> Place {
     for (name, text) in files {
         std::fs::write(directory.path().join(name), text).expect("a file");
     }
-    Place::new(&format!("generated {seed}"), &directory.path().join("m.toml"), depends, true)
+    (directory, depends)
 }

@@ -7,6 +7,7 @@ mod common;
 mod concurrent;
 mod explain;
 mod export;
+mod journal;
 mod mutation;
 mod probabilistic;
 mod real;
