@@ -78,13 +78,14 @@ fn line(entry: &Entry) -> String {
     if let Some(time) = entry.time {
         let _ = write!(text, "  {:.3} s", time as f64 / 1e6);
     }
-    match &entry.content {
-        Value::String(line) => text += &format!("  {line}"),
+    let content = match &entry.content {
+        Value::String(line) => line.clone(),
+        Value::Array(answers) if answers.is_empty() => "nothing".to_owned(),
         Value::Array(answers) => {
             let kinds: Vec<&str> = answers.iter().filter_map(|answer| answer["answer"].as_str()).collect();
-            text += &format!("  {}", if kinds.is_empty() { "nothing".to_owned() } else { kinds.join(", ") });
+            kinds.join(", ")
         }
-        _ => {}
-    }
-    text
+        _ => return text,
+    };
+    text + "  " + &content
 }

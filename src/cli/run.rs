@@ -3,11 +3,13 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::mapek::{Answer, Clock as _, FORMAT, LONGEST_LINE, Loop, Observation, SystemClock};
+use metaplan::mapek::{Answer, Clock as _, FORMAT, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
 use metaplan::message::Message;
 use serde_json::{Value, json};
 
@@ -53,7 +55,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (name, settings) = (mission.name.clone(), mission.settings().clone());
     let mut control = Loop::new(mission, settings)?;
     let mut events = Lines::open(&arguments.events)?;
-    let mut stdout = io::stdout().lock();
+    let mut stdout = io::stdout();
     let mut ready = json!({ "answer": "ready", "format": FORMAT, "mission": name });
     let mut journal = match &arguments.journal {
         None => None,
@@ -76,27 +78,27 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let lost = |error: io::Error| Message::error("M109", format!("the answer cannot be written: {error}"));
     writeln!(stdout, "{ready}").and_then(|()| stdout.flush()).map_err(lost)?;
-    let begun = Instant::now();
+    let line = Arc::new(AtomicU64::new(control.knowledge().lines()));
+    heartbeat(control.watch(), Arc::clone(&line));
+    let read = Instant::now();
     let answers = match &mut journal {
         None => control.start(),
         Some(journal) => journal.begin(&mut control).map_err(|error| unwritten(&error))?,
     };
     let number = control.knowledge().lines();
-    write(&mut stdout, number, &answers)
-        .and_then(|()| handled(&mut stdout, number, begun.elapsed()))
-        .map_err(lost)?;
+    write(&mut stdout, number, &answers, read).map_err(lost)?;
     let mut clock = SystemClock::default();
     let begun = control.knowledge().now();
-    while let Some(line) = events.next()? {
+    while let Some(text) = events.next()? {
         let read = Instant::now();
         let now = begun + clock.now();
+        line.store(control.knowledge().lines() + 1, Ordering::Relaxed);
         let answers = match &mut journal {
-            None => control.handle(&Observation::parse(&line), now),
-            Some(journal) => journal.handle(&mut control, &line, now).map_err(|error| unwritten(&error))?,
+            None => control.handle(&Observation::parse(&text), now),
+            Some(journal) => journal.handle(&mut control, &text, now).map_err(|error| unwritten(&error))?,
         };
         let number = control.knowledge().lines();
-        let written =
-            write(&mut stdout, number, &answers).and_then(|()| handled(&mut stdout, number, read.elapsed()));
+        let written = write(&mut stdout, number, &answers, read);
         match written {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Done),
             other => other.map_err(lost)?,
@@ -109,19 +111,55 @@ fn unwritten(error: &io::Error) -> Message {
     Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 
-/// Writes the answers to a line, each with the line's number.
-fn write(stdout: &mut impl io::Write, number: u64, answers: &[Answer]) -> io::Result<()> {
+/// So long planning may take before a word is said, and from one word to the next.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+
+/// Says every second how planning goes, for as long as the program runs.
+fn heartbeat(watch: Watch, line: Arc<AtomicU64>) {
+    std::thread::spawn(move || {
+        let mut known: Option<(u64, Instant, Instant)> = None;
+        loop {
+            std::thread::sleep(HEARTBEAT / 10);
+            let Some(planning) = watch.look() else {
+                known = None;
+                continue;
+            };
+            let now = Instant::now();
+            let (begun, said) = match known {
+                Some((number, begun, said)) if number == planning.number => (begun, said),
+                _ => (now, now),
+            };
+            known = Some((planning.number, begun, said));
+            if now - said >= HEARTBEAT {
+                known = Some((planning.number, begun, now));
+                let object = json!({
+                    "answer": "planning",
+                    "seconds": (now - begun).as_secs(),
+                    "cost": planning.cost.as_ref().map(output::decimal_number),
+                    "lower_bound": planning.lower_bound.as_ref().map(output::decimal_number),
+                    "line": line.load(Ordering::Relaxed),
+                });
+                // Who does not read any more will be noticed when the answers are written.
+                let _ = io::stdout().write_all(format!("{object}\n").as_bytes());
+            }
+        }
+    });
+}
+
+/// Writes the answers to a line, each with the line's number, and that it was handled.
+fn write(stdout: &mut impl io::Write, number: u64, answers: &[Answer], read: Instant) -> io::Result<()> {
+    let mut text = String::new();
     for answer in answers {
         let mut object = answer.to_json();
         object["line"] = Value::from(number);
-        writeln!(stdout, "{object}")?;
+        text += &object.to_string();
+        text.push('\n');
     }
-    stdout.flush()
-}
-
-fn handled(stdout: &mut impl io::Write, number: u64, latency: Duration) -> io::Result<()> {
-    let micros = u64::try_from(latency.as_micros()).unwrap_or(u64::MAX);
-    writeln!(stdout, "{}", json!({ "answer": "handled", "line": number, "microseconds": micros }))?;
+    let micros = u64::try_from(read.elapsed().as_micros()).unwrap_or(u64::MAX);
+    text += &json!({ "answer": "handled", "line": number, "microseconds": micros }).to_string();
+    text.push('\n');
+    // At once, so that no other thread's line comes in between.
+    stdout.write_all(text.as_bytes())?;
     stdout.flush()
 }
 

@@ -91,6 +91,9 @@ impl Loop {
         let before = hopes.len();
         hopes.extend(findings.gained.iter().cloned());
         hopes.extend(changes.predicates.then(|| FACTS.to_owned()));
+        // Time was up when the plan was made, and now the question is another one.
+        let is_news = changes.facts || !findings.gained.is_empty() || !findings.lost.is_empty();
+        hopes.extend((is_news && self.knowledge.unproved).then(|| FACTS.to_owned()));
         if hopes.len() > before {
             self.knowledge.hoped = self.knowledge.now;
         }
@@ -228,6 +231,7 @@ impl Loop {
     /// Takes a plan over; the action under way gets its designs.
     fn adopt(&mut self, outcome: Outcome, answers: &mut Vec<Answer>) {
         let Outcome { steps, proved, .. } = outcome;
+        self.knowledge.unproved = !proved;
         let steps = steps.unwrap_or_default();
         let cost = steps.iter().map(|step| step.cost.clone()).sum();
         answers.push(Answer::PlanFound { cost, optimal: proved, steps: steps.clone() });

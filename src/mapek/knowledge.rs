@@ -36,6 +36,8 @@ pub struct Knowledge {
     pub(super) reached: bool,
     /// Why no plan is looked for until something changes.
     pub(super) stuck: bool,
+    /// Whether the plan at hand may not be the best, since time was up.
+    pub(super) unproved: bool,
     /// The last step that failed, and how often in a row.
     pub(super) failures: Option<(PlannedStep, u32)>,
     /// Designs that have come back, or a word for facts that have changed, without another plan being looked for.
@@ -84,6 +86,7 @@ impl Knowledge {
             running: None,
             reached: false,
             stuck: false,
+            unproved: false,
             failures: None,
             hopes: BTreeSet::new(),
             hoped: Duration::ZERO,

@@ -30,6 +30,7 @@ mod record;
 mod resume;
 mod sequence;
 mod step;
+mod watch;
 
 use std::borrow::Cow;
 use std::collections::{BTreeSet, HashSet};
@@ -48,6 +49,7 @@ pub use event::{Event, Fault, LONGEST_LINE, Observation};
 pub use knowledge::Knowledge;
 pub use record::{Decision, Snapshot};
 pub use step::PlannedStep;
+pub use watch::{Planning, Watch};
 
 pub(crate) use analyze::ruled_out;
 use monitor::Changes;
@@ -67,7 +69,7 @@ pub struct Settings {
     pub minimum_benefit: BigRational,
     /// So long must a design be available again before a better plan is looked for.
     pub settle: Duration,
-    /// How long one plan may take; the best so far is used then.
+    /// How long one plan may take; the best so far is used then, if there is one. Ten seconds unless said otherwise.
     pub time_limit: Option<Duration>,
     /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand. The choice then
     /// depends on what has happened, and no longer on the situation alone.
@@ -79,11 +81,14 @@ impl Default for Settings {
         Self {
             minimum_benefit: BigRational::from_integer(0.into()),
             settle: Duration::ZERO,
-            time_limit: None,
+            time_limit: Some(TIME_LIMIT),
             stay_close: false,
         }
     }
 }
+
+/// How long one plan may take unless said otherwise. A robot waits meanwhile.
+const TIME_LIMIT: Duration = Duration::from_secs(10);
 
 /// So many names and values may be interned before the knowledge is made anew without what is not used any more.
 const GROWTH: usize = 1024;
@@ -131,6 +136,11 @@ impl Loop {
     /// What the loop knows.
     pub fn knowledge(&self) -> &Knowledge {
         &self.knowledge
+    }
+
+    /// To look at how planning goes, from another thread.
+    pub fn watch(&self) -> Watch {
+        self.planner.watch.clone()
     }
 
     /// Makes the first plan and requests the first action.

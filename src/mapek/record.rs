@@ -83,6 +83,7 @@ impl Loop {
             "running": running,
             "reached": known.reached,
             "stuck": known.stuck,
+            "unproved": known.unproved,
             "failures": known.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
             "hopes": known.hopes,
             "hoped": micros(known.hoped),
@@ -159,6 +160,7 @@ impl Loop {
             record => Some((PlannedStep::from_record(record.get(0)?)?, record.get(1)?.as_u64()? as u32)),
         };
         (known.reached, known.stuck) = (truth("reached")?, truth("stuck")?);
+        known.unproved = truth("unproved")?;
         known.hopes = texts(data.get("hopes")?)?.into_iter().collect();
         known.hoped = Duration::from_micros(number("hoped")?);
         (known.actions, known.effects, known.lines) =

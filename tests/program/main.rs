@@ -3,6 +3,7 @@
 mod certificate;
 mod check;
 mod cli;
+mod client;
 mod common;
 mod concurrent;
 mod explain;
