@@ -33,7 +33,7 @@ use files::{digest_of, text};
 use crate::message::Message;
 use crate::mission::Mission;
 
-const FORMAT: &str = "metaplan-certificate/2";
+const FORMAT: &str = "metaplan-certificate/3";
 /// All files that are never in memory as a whole are together at most this large, in bytes.
 const SIZE_LIMIT: u64 = 1 << 30;
 /// All files that are in memory as a whole are together at most this large, in bytes.
@@ -100,8 +100,8 @@ struct File {
 /// What came of one part of a verification.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`, `formula`, `proof` or `steps`; or `limits`,
-    /// where time or memory was up.
+    /// `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`, `formula`, `proof`, `steps` or `mission`; or
+    /// `limits`, where time or memory was up.
     pub part: &'static str,
     /// What was checked; or why it fails, with the first thing that is wrong.
     pub result: Result<String, String>,

@@ -20,10 +20,11 @@ use super::{
 };
 use crate::measure::measure;
 use crate::message::Message;
+use crate::mission::Mission;
 
-/// Checks a certificate without trusting what wrote it. Where the files have to be grounded again, `limits` is asked when that
+/// Checks a certificate without trusting what wrote it, and whether it is about a mission, if one is given. Where the files have to be grounded again, `limits` is asked when that
 /// has to end.
-pub fn verify(directory: &Path, limits: &dyn Fn() -> Limits) -> Report {
+pub fn verify(directory: &Path, mission: Option<&Mission>, limits: &dyn Fn() -> Limits) -> Report {
     let mut report = Report { claim: None, parts: Vec::new() };
     match read(directory) {
         Ok((manifest, contents)) => {
@@ -32,6 +33,12 @@ pub fn verify(directory: &Path, limits: &dyn Fn() -> Limits) -> Report {
             let files = format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());
             report.parts.push(Part { part: "files", result: Ok(files) });
             report.parts.extend(parts(directory, &manifest, &contents, limits));
+            if let Some(mission) = mission {
+                let written = written(&contents);
+                let domain = text(&contents, DOMAIN);
+                let result = knowledge::about(written.as_ref(), (domain, text(&contents, PROBLEM)), mission);
+                report.parts.push(Part { part: "mission", result });
+            }
         }
         Err(reason) => report.parts.push(Part { part: "files", result: Err(reason) }),
     }
@@ -72,12 +79,7 @@ fn parts(
         Err(reason) => return vec![Part { part: "files", result: Err(reason) }],
     };
     let mut parts = Vec::new();
-    if contents.iter().any(|(name, _)| name == knowledge::ORIGIN) {
-        let written = knowledge::Written {
-            document: text(knowledge::DOCUMENT),
-            origin: text(knowledge::ORIGIN),
-            derivations: text(derivations::DERIVATIONS),
-        };
+    if let Some(written) = written(contents) {
         let [derivations, filled] = knowledge::check(&written, &domain, &problem);
         parts.push(Part { part: "derivations", result: derivations });
         parts.push(Part { part: "knowledge", result: filled });
@@ -117,6 +119,15 @@ fn parts(
         }
     });
     parts
+}
+
+/// What a certificate says about knowledge, if it does.
+fn written(contents: &[(String, String)]) -> Option<knowledge::Written<'_>> {
+    contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::Written {
+        document: text(contents, knowledge::DOCUMENT),
+        origin: text(contents, knowledge::ORIGIN),
+        derivations: text(contents, derivations::DERIVATIONS),
+    })
 }
 
 fn refuted(

@@ -10,6 +10,7 @@ mod explain;
 mod export;
 mod import;
 mod journal;
+mod limits;
 mod memory;
 mod objectives;
 mod output;
@@ -81,7 +82,7 @@ struct Cli {
     common: Common,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 struct Common {
     /// How the answer is written.
     #[arg(long, global = true, value_enum, default_value_t = Format::Text)]
@@ -191,6 +192,12 @@ fn setting(text: &str) -> Result<(String, String), String> {
 }
 
 impl Situation {
+    /// A situation of a mission that has a manifest.
+    fn of_mission(scenario: Option<String>, set: Vec<(String, String)>, fail: Vec<String>) -> Self {
+        let imports = Imports { catalog: Vec::new(), directory: Vec::new() };
+        Self { knowledge: Vec::new(), rules: Vec::new(), imports, scenario, set, fail }
+    }
+
     /// The mission in this situation, from one input (a manifest) or two (domain and problem).
     fn mission(&self, inputs: &[PathBuf]) -> Result<Mission, Failure> {
         let mut mission = match inputs {

@@ -49,13 +49,11 @@ pub fn note(text: &str) {
     let _ = std::io::stderr().write_all(text.as_bytes());
 }
 
-/// Warnings, on standard error unless asked to be quiet.
+/// Messages beside the answer, on standard error; warnings only unless asked to be quiet.
 pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Message>) {
-    if !common.quiet {
-        let mut stderr = std::io::stderr().lock();
-        for message in messages {
-            let _ = stderr.write_all(message.text().as_bytes());
-        }
+    let mut stderr = std::io::stderr().lock();
+    for message in messages.into_iter().filter(|message| message.is_error() || !common.quiet) {
+        let _ = stderr.write_all(message.text().as_bytes());
     }
 }
 

@@ -43,9 +43,13 @@ fn parcels() -> String {
     let mut text = "(define (problem p) (:domain d) (:objects".to_owned();
     let place = |x: usize, y: usize| format!("p{x}_{y}");
     let all = || (0..side).flat_map(move |x| (0..side).map(move |y| (x, y)));
-    all().for_each(|(x, y)| text += &format!(" {}", place(x, y)));
+    for (x, y) in all() {
+        let _ = write!(text, " {}", place(x, y));
+    }
     text += " - place";
-    (0..count).for_each(|item| text += &format!(" i{item}"));
+    for item in 0..count {
+        let _ = write!(text, " i{item}");
+    }
     let _ = write!(text, " - item) (:init (at {}) (free)", place(0, 0));
     for (x, y) in all() {
         for (other_x, other_y) in [(x + 1, y), (x, y + 1)] {
@@ -56,9 +60,13 @@ fn parcels() -> String {
         }
     }
     let spot = |number: usize| place(number * 5 % side, number * 7 % side);
-    (0..count).for_each(|item| text += &format!(" (lies i{item} {})", spot(item)));
+    for item in 0..count {
+        let _ = write!(text, " (lies i{item} {})", spot(item));
+    }
     text += ") (:goal (and";
-    (0..count).for_each(|item| text += &format!(" (lies i{item} {})", spot(3 * item + 4)));
+    for item in 0..count {
+        let _ = write!(text, " (lies i{item} {})", spot(3 * item + 4));
+    }
     text + ")))"
 }
 

@@ -9,6 +9,7 @@ mod concurrent;
 mod explain;
 mod export;
 mod journal;
+mod limits;
 mod mutation;
 mod probabilistic;
 mod real;
