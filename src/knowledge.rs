@@ -408,7 +408,9 @@ pub(crate) fn rule_text(file: &str) -> Result<String, Message> {
         COADAPTATION => Ok(rules::COADAPTATION_RULES.to_owned()),
         TOMASYS => Ok(rules::TOMASYS_RULES.to_owned()),
         "-" => std::io::read_to_string(std::io::stdin()),
-        path => std::fs::read_to_string(path),
+        path => crate::mission::read(Path::new(path)).and_then(|bytes| {
+            String::from_utf8(bytes).map_err(|_| std::io::Error::other("it is no UTF-8 text"))
+        }),
     };
     text.map_err(|error| Message::at("M101", file, None, format!("cannot be read: {error}")))
 }

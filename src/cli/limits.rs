@@ -73,7 +73,7 @@ fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, common: Common) {
         }
         if !has_read.swap(true, Ordering::Relaxed) {
             let text = "a limit was reached while files were read and reasoned about; nothing was planned";
-            output::failure(&common, &[Message::error("M116", text)]);
+            output::failure(&common, &[Message::error("M130", text)]);
             std::process::exit(Exit::NothingFound as i32);
         }
     });

@@ -29,7 +29,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
-use metaplan::message::Message;
+use metaplan::message::{Message, did_you_mean};
 use metaplan::mission::{Bindings, Mission, source};
 use ontology::ReadOptions;
 
@@ -213,8 +213,11 @@ impl Situation {
                 if let Some(name) = &self.scenario {
                     let scenario = manifest.scenarios.get(name).ok_or_else(|| {
                         let known: Vec<_> = manifest.scenarios.keys().map(String::as_str).collect();
-                        let text =
-                            format!("the mission has no scenario `{name}`; it has: {}", known.join(", "));
+                        let text = format!(
+                            "the mission has no scenario `{name}`; it has: {}{}",
+                            known.join(", "),
+                            did_you_mean(name, known.iter().copied())
+                        );
                         Failure::usage(Message::error("M108", text))
                     })?;
                     mission.apply(scenario).map_err(|message| {
@@ -258,6 +261,7 @@ impl Situation {
             mission.set(name, value).map_err(Failure::usage)?;
         }
         consistent(mission.knowledge())?;
+        mission.note_doubts();
         Ok(mission)
     }
 }

@@ -77,7 +77,14 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         }
     };
     let lost = |error: io::Error| Message::error("M109", format!("the answer cannot be written: {error}"));
-    writeln!(stdout, "{ready}").and_then(|()| stdout.flush()).map_err(lost)?;
+    let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
+    let first =
+        writeln!(stdout, "{}", output::visible_json(&ready.to_string())).and_then(|()| stdout.flush());
+    match first {
+        // Who does not read any more has had enough.
+        Err(error) if is_gone(&error) => return Ok(Exit::Done),
+        other => other.map_err(lost)?,
+    }
     let line = Arc::new(AtomicU64::new(control.knowledge().lines()));
     heartbeat(control.watch(), Arc::clone(&line));
     let read = Instant::now();
@@ -86,7 +93,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Some(journal) => journal.begin(&mut control).map_err(|error| unwritten(&error))?,
     };
     let number = control.knowledge().lines();
-    write(&mut stdout, number, &answers, read).map_err(lost)?;
+    match write(&mut stdout, number, &answers, read) {
+        Err(error) if is_gone(&error) => return Ok(Exit::Done),
+        other => other.map_err(lost)?,
+    }
     let mut clock = SystemClock::default();
     let begun = control.knowledge().now();
     while let Some(text) = events.next()? {
@@ -100,7 +110,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let number = control.knowledge().lines();
         let written = write(&mut stdout, number, &answers, read);
         match written {
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Done),
+            Err(error) if is_gone(&error) => return Ok(Exit::Done),
             other => other.map_err(lost)?,
         }
     }
@@ -159,7 +169,7 @@ fn write(stdout: &mut impl io::Write, number: u64, answers: &[Answer], read: Ins
     text += &json!({ "answer": "handled", "line": number, "microseconds": micros }).to_string();
     text.push('\n');
     // At once, so that no other thread's line comes in between.
-    stdout.write_all(text.as_bytes())?;
+    stdout.write_all(output::visible_json(&text).as_bytes())?;
     stdout.flush()
 }
 
@@ -170,13 +180,23 @@ struct Lines {
     reader: Box<dyn BufRead>,
 }
 
+/// Opens a file; a pipe is read as it comes, and anything else that is no file is not.
+fn regular(path: &Path) -> io::Result<File> {
+    let kind = std::fs::metadata(path)?.file_type();
+    #[cfg(unix)]
+    let is_pipe = std::os::unix::fs::FileTypeExt::is_fifo(&kind);
+    #[cfg(not(unix))]
+    let is_pipe = false;
+    if kind.is_file() || is_pipe { File::open(path) } else { Err(io::Error::other("it is no file")) }
+}
+
 impl Lines {
     fn open(path: &Path) -> Result<Self, Message> {
         let name = path.display().to_string();
         let reader: Box<dyn BufRead> = if name == "-" {
             Box::new(BufReader::new(io::stdin()))
         } else {
-            let file = File::open(path)
+            let file = regular(path)
                 .map_err(|error| Message::at("M101", &name, None, format!("cannot be read: {error}")))?;
             Box::new(BufReader::new(file))
         };

@@ -11,7 +11,7 @@ use super::event::{Event, Fault};
 use super::knowledge::Running;
 use super::number;
 use super::step::PlannedStep;
-use crate::message::Message;
+use crate::message::{Message, did_you_mean};
 
 /// What a line has changed, for the analysis.
 #[derive(Debug, Default)]
@@ -132,8 +132,20 @@ impl Loop {
         }
         let known: Vec<&str> =
             self.attributes.iter().map(String::as_str).filter(|name| !name.contains(':')).collect();
-        let text =
-            format!("there is no attribute or function `{attribute}`; attributes are: {}", known.join(", "));
+        let functions: Vec<&str> = self
+            .knowledge
+            .mission
+            .domain()
+            .functions
+            .iter()
+            .filter(|own| own.parameters.is_empty())
+            .map(|own| own.identifier.name.as_str())
+            .collect();
+        let meant = did_you_mean(attribute, known.iter().chain(&functions).copied());
+        let text = format!(
+            "there is no attribute or function `{attribute}`; attributes are: {}{meant}",
+            known.join(", ")
+        );
         Err(Fault::new("M306", text))
     }
 

@@ -265,7 +265,7 @@ fn certificates_that_are_none_are_rejected() {
     );
     check(&manifest(|text| text.replacen("\"bytes\": ", "\"bytes\": 99999999999", 1)), "larger than");
     check(
-        &manifest(|text| text.replace("certificate/2", "certificate/9")),
+        &manifest(|text| text.replace("certificate/3", "certificate/9")),
         "format `metaplan-certificate/9`",
     );
     check(&manifest(|_| "[".repeat(500_000)), "manifest.json: ");

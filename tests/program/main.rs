@@ -6,6 +6,7 @@ mod cli;
 mod client;
 mod common;
 mod concurrent;
+mod doubts;
 mod explain;
 mod export;
 mod journal;
