@@ -115,7 +115,8 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
     let Some(found) = designs.iter().find(|design| design.individual.name == name) else {
         let known: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
-        let text = format!("there is no design `{name}`; there are: {}", known.join(", "));
+        let meant = crate::message::did_you_mean(name, known.iter().map(|own| &**own));
+        let text = format!("there is no design `{name}`; there are: {}{meant}", known.join(", "));
         return Err(vec![Message::error("M112", text)]);
     };
     let rivals: BTreeSet<&str> = designs

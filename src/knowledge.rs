@@ -7,7 +7,7 @@ use std::sync::Arc;
 use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
-use ontology::tomasys::change::{self, Status};
+use ontology::tomasys::change::Status;
 use ontology::{EntityKind, Equality, Iri, Ontology, ReadOptions};
 use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Symbols, Value};
 use serde::{Deserialize, Serialize};
@@ -158,7 +158,7 @@ impl Stated {
 }
 
 /// Something that the knowledge contradicts.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Contradiction {
     /// The axiom or rule that is violated.
     pub violated: String,
@@ -252,10 +252,11 @@ impl Knowledge {
         self.report(component, Status::Failed).map(|_| ())
     }
 
-    /// A component, named by IRI or local name, has a status from now on; returns what holds since, and what no more.
+    /// A component, named by IRI or local name, has a status from now on; returns what holds since, and what no more. What
+    /// was reported holds whatever follows from it: see [`Knowledge::contradictions`].
     ///
     /// # Errors
-    /// There is no such component.
+    /// There is no such component, or a rule runs away.
     pub fn report(&mut self, component: &str, status: Status) -> Result<Delta, Message> {
         self.runtime.report_component(component, status).map_err(|error| Message::from_ontology(&error))
     }
@@ -276,46 +277,18 @@ impl Knowledge {
         self.runtime.measure(attribute, literal).map_err(|error| Message::from_ontology(&error))
     }
 
-    /// A component has a status from now on, unless that contradicts what is known; returns what holds since, and what
-    /// no more.
+    /// An attribute has a measured value from now on; returns what holds since, and what no more. What was measured holds
+    /// whatever follows from it: see [`Knowledge::contradictions`].
     ///
     /// # Errors
-    /// There is no such component, or a contradiction; nothing has changed then.
-    pub fn try_report(&mut self, component: &str, status: Status) -> Result<Delta, Message> {
-        let delta = change::component_status(self.runtime.engine_mut(), component, status);
-        self.change(delta.map_err(|error| Message::from_ontology(&error))?)
-    }
-
-    /// An attribute has a measured value from now on, unless that contradicts what is known; returns what holds since,
-    /// and what no more.
-    ///
-    /// # Errors
-    /// There is no such attribute, or a contradiction; nothing has changed then.
-    pub fn try_measure(&mut self, attribute: &str, value: &BigRational) -> Result<Delta, Message> {
+    /// There is no such attribute, or a rule runs away.
+    pub fn observe(&mut self, attribute: &str, value: &BigRational) -> Result<Delta, Message> {
         let literal = Literal::Decimal(rules::Decimal::from_rational(value));
-        let delta = change::measured_value(self.runtime.engine_mut(), attribute, literal);
-        self.change(delta.map_err(|error| Message::from_ontology(&error))?)
-    }
-
-    /// Changes statements, or nothing where a contradiction follows.
-    fn change(&mut self, delta: Delta) -> Result<Delta, Message> {
-        let engine = self.runtime.engine();
-        let inverse = Delta {
-            insert: delta.delete.iter().filter(|fact| engine.is_asserted(fact)).cloned().collect(),
-            delete: delta.insert.iter().filter(|fact| !engine.is_asserted(fact)).cloned().collect(),
-        };
-        let net = self.runtime.apply(delta).map_err(|error| Message::from_ontology(&error))?;
-        if let Some(first) = self.contradictions().first() {
-            let text =
-                format!("this contradicts what is known: {}: {}", first.violated, first.facts.join(", "));
-            self.apply(inverse)?;
-            return Err(Message::error("M110", text));
-        }
-        Ok(net)
+        self.runtime.measure(attribute, literal).map_err(|error| Message::from_ontology(&error))
     }
 
     /// Makes functions, and no others, the objectives of the robot, each grounded with a design; both by local name.
-    /// Objectives of a function are named `o_<function>`.
+    /// Objectives of a function are named `o_<function>`. What components have reported stays as it is.
     ///
     /// # Errors
     /// There is no such function or design.
@@ -347,7 +320,7 @@ impl Knowledge {
                 self.runtime.add_objective(&new).map_err(error)?;
             }
             if !grounded {
-                self.runtime.ground(&objective, design).map_err(error)?;
+                self.runtime.assign(&objective, design).map_err(error)?;
             }
         }
         Ok(())
@@ -458,7 +431,9 @@ pub(crate) fn rule_text(file: &str) -> Result<String, Message> {
         COADAPTATION => Ok(rules::COADAPTATION_RULES.to_owned()),
         TOMASYS => Ok(rules::TOMASYS_RULES.to_owned()),
         "-" => std::io::read_to_string(std::io::stdin()),
-        path => std::fs::read_to_string(path),
+        path => crate::mission::read(Path::new(path)).and_then(|bytes| {
+            String::from_utf8(bytes).map_err(|_| std::io::Error::other("it is no UTF-8 text"))
+        }),
     };
     text.map_err(|error| Message::at("M101", file, None, format!("cannot be read: {error}")))
 }

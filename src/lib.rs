@@ -16,3 +16,8 @@ pub mod message;
 pub mod mission;
 pub mod probabilistic;
 pub mod simulate;
+
+/// The example of the README is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -55,6 +55,11 @@ impl Message {
         Self::plain("warning", code, message.into(), None)
     }
 
+    /// A warning about a line and column of a file.
+    pub fn warning_at(code: &str, file: &str, place: (usize, usize), message: impl Into<String>) -> Self {
+        Self::plain("warning", code, message.into(), Some((file.to_owned(), Some(place))))
+    }
+
     /// An error about a file as a whole, or about a line and column in it.
     pub fn at(code: &str, file: &str, place: Option<(usize, usize)>, message: impl Into<String>) -> Self {
         Self::plain("error", code, message.into(), Some((file.to_owned(), place)))
@@ -122,10 +127,14 @@ impl Message {
 
     /// An error of reading a knowledge base.
     pub fn from_ontology(error: &ontology::Error) -> Self {
-        if let ontology::Error::Engine(error) = error {
-            return Self::from_rules(error);
+        match error {
+            ontology::Error::Engine(error) => Self::from_rules(error),
+            ontology::Error::Unknown { name, known, .. } => {
+                let meant = did_you_mean(name, known.iter().map(String::as_str));
+                Self::from_text("error", error.code(), &(error.to_string() + &meant))
+            }
+            _ => Self::from_text("error", error.code(), &error.to_string()),
         }
-        Self::from_text("error", error.code(), &error.to_string())
     }
 
     /// A warning of reading or lowering a knowledge base.
@@ -167,4 +176,19 @@ impl Message {
     pub fn text(&self) -> &str {
         &self.text
     }
+}
+
+/// `; did you mean ...?` with the known name that is most like what was written, or nothing.
+pub fn did_you_mean<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> String {
+    nearest(written, known).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
+/// The known name that is most like what was written, if one is: at most a third of its letters differ, and three.
+pub(crate) fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let written = written.to_lowercase();
+    let length = written.chars().count();
+    let distance = |name: &str| strsim::osa_distance(&written, &name.to_lowercase());
+    let near = known.into_iter().map(|name| (distance(name), name));
+    let near = near.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
+    near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
 }

@@ -151,6 +151,7 @@ impl Generated {
             documents: vec![file("kb.ttl", &self.knowledge)],
             rules: vec![COADAPTATION.to_owned()],
             options: ReadOptions::default(),
+            limits: metaplan::rules::Limits::default(),
         };
         let bindings = if domain == self.plain { self.bindings.clone() } else { BTreeMap::new() };
         let mission: Result<Mission, Vec<Message>> = Mission::new(

@@ -24,7 +24,7 @@ pub(super) fn digest_of(path: &Path) -> std::io::Result<(u64, String)> {
     Ok((bytes, hexadecimal(&hasher.finalize())))
 }
 
-fn digest(bytes: &[u8]) -> String {
+pub(super) fn digest(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 

@@ -10,7 +10,8 @@ use rules::replay::{Replayed, replay};
 use serde::{Deserialize, Serialize};
 
 use super::derivations::{self, DERIVATIONS};
-use crate::knowledge::{Knowledge, Sources, Stated, Statements, rule_text};
+use super::files::digest;
+use crate::knowledge::{COADAPTATION, Knowledge, Sources, Stated, Statements, TOMASYS, rule_text};
 use crate::message::Message;
 use crate::mission::{Bindings, Mission};
 
@@ -30,6 +31,8 @@ struct Origin {
     bindings: BTreeMap<String, String>,
     /// Names and texts of rule files.
     rules: Vec<(String, String)>,
+    /// The SHA-256 of those that the program ships, by name.
+    shipped: BTreeMap<String, String>,
     changes: Statements,
 }
 
@@ -44,11 +47,15 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
     let (document, _) = ontology::convert_files(&sources.documents, &sources.options, OutputSyntax::NTriples)
         .map_err(|errors| first(errors.iter().map(Message::from_ontology).collect()))?;
     let rules = sources.rules.iter().map(|name| Ok((name.clone(), rule_text(name)?)));
+    let rules: Vec<(String, String)> = rules.collect::<Result<_, Message>>()?;
+    let shipped = rules.iter().filter(|(name, text)| is_shipped(name, text));
+    let shipped = shipped.map(|(name, text)| (name.clone(), digest(text.as_bytes()))).collect();
     let origin = Origin {
         domain: mission.domain_source().text().to_owned(),
         problem: print_problem(mission.problem()),
         bindings: mission.bindings().written().clone(),
-        rules: rules.collect::<Result<_, Message>>()?,
+        rules,
+        shipped,
         changes: knowledge.statements(),
     };
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
@@ -80,6 +87,80 @@ pub(super) fn check(
         Err(reason) => return [Err(reason), Err("the derivations do not say what follows".to_owned())],
     };
     [Ok(said), filled(knowledge, &origin, domain, problem)]
+}
+
+/// Whether a rule file is the shipped one of that name.
+fn is_shipped(name: &str, text: &str) -> bool {
+    [(COADAPTATION, rules::COADAPTATION_RULES), (TOMASYS, rules::TOMASYS_RULES)].contains(&(name, text))
+}
+
+/// Which rules are ours, and which are not whatever they are called.
+fn provenance(origin: &Origin) -> Result<String, String> {
+    let mut said = Vec::new();
+    for (name, text) in &origin.rules {
+        let sum = digest(text.as_bytes());
+        let short = &sum[..12];
+        if let Some(claimed) = origin.shipped.get(name)
+            && *claimed != sum
+        {
+            return Err(format!("the rules `{name}` have the SHA-256 {sum}, where {claimed} is named"));
+        }
+        said.push(if is_shipped(name, text) {
+            format!("`{name}` (shipped)")
+        } else if [COADAPTATION, TOMASYS].contains(&name.as_str()) {
+            format!("`{name}` (NOT the shipped rules of this version, SHA-256 {short}…)")
+        } else {
+            format!("`{}` (not shipped, SHA-256 {short}…)", name.rsplit('/').next().unwrap_or(name))
+        });
+    }
+    let other = origin.shipped.keys().find(|name| !origin.rules.iter().any(|(own, _)| own == *name));
+    match other {
+        Some(name) => Err(format!("the rules `{name}` are named and not there")),
+        None if said.is_empty() => Ok("no rule files".to_owned()),
+        None => Ok(format!("rules: {}", said.join(", "))),
+    }
+}
+
+/// Whether a certificate is about a mission, as its files and the situation are now.
+pub(super) fn about(
+    written: Option<&Written<'_>>,
+    (domain, problem): (&str, &str),
+    mission: &Mission,
+) -> Result<String, String> {
+    let said = format!("it is about `{}` as it is now", mission.name);
+    let other = |what: &str| Err(format!("it is not about `{}` as it is now: {what}", mission.name));
+    let (written, base) = match (written, mission.knowledge()) {
+        (Some(written), Some(base)) => (written, base),
+        (None, None) => {
+            let (filled, _) = mission.filled().map_err(|messages| said_first(&messages))?;
+            let same = print_domain(mission.domain()) == domain && print_problem(&filled) == problem;
+            return if same { Ok(said) } else { other("domain or problem differ") };
+        }
+        _ => return other("one has a knowledge base, and the other has none"),
+    };
+    let origin: Origin =
+        serde_json::from_str(written.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
+    let sources = base.sources();
+    let (document, _) = ontology::convert_files(&sources.documents, &sources.options, OutputSyntax::NTriples)
+        .map_err(|_| "the mission's knowledge base cannot be read again".to_owned())?;
+    let texts = sources.rules.iter().map(|name| rule_text(name)).collect::<Result<Vec<_>, _>>();
+    let texts = texts.map_err(|message| message.message.clone())?;
+    if mission.domain_source().text() != origin.domain {
+        return other("the domain differs");
+    }
+    if document != written.document {
+        return other("the knowledge base differs");
+    }
+    if !origin.rules.iter().map(|(_, text)| text).eq(&texts) {
+        return other("the rules differ");
+    }
+    if *mission.bindings().written() != origin.bindings {
+        return other("the bindings differ");
+    }
+    if print_problem(mission.problem()) != origin.problem || base.statements() != origin.changes {
+        return other("the problem or the situation (`--scenario`, `--set`, `--fail`) differs");
+    }
+    Ok(said)
 }
 
 fn said_first(messages: &[Message]) -> String {
@@ -129,6 +210,7 @@ fn replayed(written: &Written<'_>) -> Result<(Knowledge, String, Origin), String
     );
     let facts = derivation.steps.into_iter().map(|step| step.fact).collect();
     let knowledge = Knowledge::closed(stated.symbols, facts, stated.program.equality);
+    let said = format!("{said}; {}", provenance(&origin)?);
     Ok((knowledge.map_err(|messages| said_first(&messages))?, said, origin))
 }
 

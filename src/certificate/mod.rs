@@ -102,8 +102,8 @@ struct File {
 /// What came of one part of a verification.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`, `formula`, `proof` or `steps`; or `limits`,
-    /// where time or memory was up.
+    /// `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`, `formula`, `proof`, `steps` or `mission`; or
+    /// `limits`, where time or memory was up.
     pub part: &'static str,
     /// What was checked; or why it fails, with the first thing that is wrong.
     pub result: Result<String, String>,

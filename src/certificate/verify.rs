@@ -21,9 +21,11 @@ use super::{
 };
 use crate::measure::measure;
 use crate::message::Message;
+use crate::mission::Mission;
 
-/// Checks a certificate without trusting what wrote it. The comparison of the task with the files ends when the limits say so.
-pub fn verify(directory: &Path, limits: &Limits) -> Report {
+/// Checks a certificate without trusting what wrote it, and whether it is about a mission, if one is given. The comparison of the task
+/// with the files ends when the limits say so.
+pub fn verify(directory: &Path, mission: Option<&Mission>, limits: &Limits) -> Report {
     let mut report = Report { claim: None, parts: Vec::new() };
     match read(directory) {
         Ok((manifest, contents)) => {
@@ -32,6 +34,12 @@ pub fn verify(directory: &Path, limits: &Limits) -> Report {
             let files = format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());
             report.parts.push(Part { part: "files", result: Ok(files) });
             report.parts.extend(parts(directory, &manifest, &contents, limits));
+            if let Some(mission) = mission {
+                let written = written(&contents);
+                let domain = text(&contents, DOMAIN);
+                let result = knowledge::about(written.as_ref(), (domain, text(&contents, PROBLEM)), mission);
+                report.parts.push(Part { part: "mission", result });
+            }
         }
         Err(reason) => report.parts.push(Part { part: "files", result: Err(reason) }),
     }
@@ -68,12 +76,7 @@ fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)], l
         Err(reason) => return vec![Part { part: "files", result: Err(reason) }],
     };
     let mut parts = Vec::new();
-    if contents.iter().any(|(name, _)| name == knowledge::ORIGIN) {
-        let written = knowledge::Written {
-            document: text(knowledge::DOCUMENT),
-            origin: text(knowledge::ORIGIN),
-            derivations: text(derivations::DERIVATIONS),
-        };
+    if let Some(written) = written(contents) {
         let [derivations, filled] = knowledge::check(&written, &domain, &problem);
         parts.push(Part { part: "derivations", result: derivations });
         parts.push(Part { part: "knowledge", result: filled });
@@ -113,6 +116,15 @@ fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)], l
         }
     });
     parts
+}
+
+/// What a certificate says about knowledge, if it does.
+fn written(contents: &[(String, String)]) -> Option<knowledge::Written<'_>> {
+    contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::Written {
+        document: text(contents, knowledge::DOCUMENT),
+        origin: text(contents, knowledge::ORIGIN),
+        derivations: text(contents, derivations::DERIVATIONS),
+    })
 }
 
 fn refuted(

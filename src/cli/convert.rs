@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     output::warnings(common, &warnings);
     match &arguments.output {
         Some(file) => output::write_file(file, &text)?,
-        None => output::answer(&text),
+        None => output::document(&text),
     }
     Ok(Exit::Done)
 }

@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             let answer = json!({ "format": "metaplan-export/1", "domain": domain, "problem": problem });
             output::json_answer(&answer);
         }
-        None => output::answer(&format!("{domain}\n{problem}")),
+        None => output::document(&format!("{domain}\n{problem}")),
     }
     Ok(Exit::Done)
 }
@@ -115,7 +115,7 @@ fn process(
         None if common.format == Format::Json => {
             output::json_answer(&json!({ "format": "metaplan-export/1", "model": text }));
         }
-        None => output::answer(&text),
+        None => output::document(&text),
     }
     Ok(Exit::Done)
 }

@@ -9,6 +9,8 @@ mod convert;
 mod explain;
 mod export;
 mod import;
+mod journal;
+mod limits;
 mod memory;
 mod objectives;
 mod output;
@@ -29,7 +31,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
-use metaplan::message::Message;
+use metaplan::message::{Message, did_you_mean};
 use metaplan::mission::{Bindings, Mission, source};
 use ontology::ReadOptions;
 
@@ -82,7 +84,7 @@ struct Cli {
     common: Common,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 struct Common {
     /// How the answer is written.
     #[arg(long, global = true, value_enum, default_value_t = Format::Text)]
@@ -127,6 +129,8 @@ enum Command {
     Export(export::Arguments),
     /// The adaptation loop: events in, adaptations out, one JSON object a line.
     Run(run::Arguments),
+    /// What is in the journal of a loop, and whether it can be used; nothing is changed.
+    Journal(journal::Arguments),
     /// The loop against a simulated robot, beside other ways of control.
     Simulate(simulate::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
@@ -194,6 +198,12 @@ fn setting(text: &str) -> Result<(String, String), String> {
 }
 
 impl Situation {
+    /// A situation of a mission that has a manifest.
+    fn of_mission(scenario: Option<String>, set: Vec<(String, String)>, fail: Vec<String>) -> Self {
+        let imports = Imports { catalog: Vec::new(), directory: Vec::new(), ignore_missing_imports: false };
+        Self { knowledge: Vec::new(), rules: Vec::new(), imports, scenario, set, fail }
+    }
+
     /// The mission in this situation, from one input (a manifest) or two (domain and problem).
     fn mission(&self, inputs: &[PathBuf]) -> Result<Mission, Failure> {
         let mut mission = match inputs {
@@ -210,8 +220,11 @@ impl Situation {
                 if let Some(name) = &self.scenario {
                     let scenario = manifest.scenarios.get(name).ok_or_else(|| {
                         let known: Vec<_> = manifest.scenarios.keys().map(String::as_str).collect();
-                        let text =
-                            format!("the mission has no scenario `{name}`; it has: {}", known.join(", "));
+                        let text = format!(
+                            "the mission has no scenario `{name}`; it has: {}{}",
+                            known.join(", "),
+                            did_you_mean(name, known.iter().copied())
+                        );
                         Failure::usage(Message::error("M108", text))
                     })?;
                     mission.apply(scenario).map_err(|message| {
@@ -256,6 +269,7 @@ impl Situation {
             mission.set(name, value).map_err(Failure::usage)?;
         }
         consistent(mission.knowledge())?;
+        mission.note_doubts();
         Ok(mission)
     }
 }
@@ -318,6 +332,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Explain(arguments) => explain::run(arguments, &cli.common),
         Command::Export(arguments) => export::run(arguments, &cli.common),
         Command::Run(arguments) => run::run(arguments, &cli.common),
+        Command::Journal(arguments) => journal::run(arguments, &cli.common),
         Command::Simulate(arguments) => simulate::run(arguments, &cli.common),
         Command::Validate(arguments) => validate::run(arguments, &cli.common),
         Command::Verify(arguments) => verify::run(arguments, &cli.common),

@@ -1,5 +1,6 @@
 //! Writing: answers, messages, tables, files that are either whole or not there.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
@@ -21,8 +22,43 @@ const MESSAGE_LIMIT: usize = 20;
 /// How many warnings of one code are shown before the rest is only counted.
 const KIND_LIMIT: usize = 10;
 
-/// Writes to standard output; a reader that has gone away is no fault, a full disk is.
+/// Writes an answer for people to standard output, see [`visible`].
 pub fn answer(text: &str) {
+    document(&visible(text));
+}
+
+/// The text with everything escaped that would change what a terminal shows, or in which order: control characters but line
+/// breaks and tabs, and the marks of bidirectional text. Names come from files that may be hostile.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    escaped(text, |character| format!("\\u{{{:x}}}", u32::from(character)))
+}
+
+/// The same for JSON, in which such characters are in strings only.
+pub fn visible_json(text: &str) -> Cow<'_, str> {
+    escaped(text, |character| format!("\\u{:04x}", u32::from(character)))
+}
+
+fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
+    let hides = |c: char| {
+        c.is_control() && !matches!(c, '\n' | '\t')
+            || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(hides) {
+        return Cow::Borrowed(text);
+    }
+    let mut all = String::with_capacity(text.len());
+    for character in text.chars() {
+        if hides(character) {
+            all += &escape(character);
+        } else {
+            all.push(character);
+        }
+    }
+    Cow::Owned(all)
+}
+
+/// Writes a document as it is to standard output; a reader that has gone away is no fault, a full disk is.
+pub fn document(text: &str) {
     let mut stdout = std::io::stdout().lock();
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
         && error.kind() != ErrorKind::BrokenPipe
@@ -40,7 +76,7 @@ pub fn answer_lost() -> bool {
 
 /// Writes a JSON value to standard output.
 pub fn json_answer(value: &Value) {
-    answer(&pretty(value));
+    document(&visible_json(&pretty(value)));
 }
 
 /// A JSON value as text, with a line break at its end.
@@ -50,24 +86,23 @@ pub fn pretty(value: &Value) -> String {
 
 /// A sentence for people beside the answer, on standard error.
 pub fn note(text: &str) {
-    let _ = std::io::stderr().write_all(text.as_bytes());
+    let _ = std::io::stderr().write_all(visible(text).as_bytes());
 }
 
-/// Warnings, on standard error unless asked to be quiet.
+/// Messages beside the answer, on standard error; warnings only unless asked to be quiet.
 pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Message>) {
-    if !common.quiet {
-        let mut stderr = std::io::stderr().lock();
-        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-        for message in messages {
-            let count = counts.entry(&message.code).or_default();
-            *count += 1;
-            if *count <= KIND_LIMIT {
-                let _ = stderr.write_all(message.text().as_bytes());
-            }
+    let mut stderr = std::io::stderr().lock();
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for message in messages.into_iter().filter(|message| message.is_error() || !common.quiet) {
+        let count = counts.entry(&message.code).or_default();
+        *count += 1;
+        if message.is_error() || *count <= KIND_LIMIT {
+            let _ = stderr.write_all(visible(&message.text()).as_bytes());
         }
-        for (code, count) in counts.into_iter().filter(|(_, count)| *count > KIND_LIMIT) {
-            let _ = writeln!(stderr, "… and {} more {code}; `--format json` lists all", count - KIND_LIMIT);
-        }
+    }
+    let more = counts.into_iter().filter(|(_, count)| !common.quiet && *count > KIND_LIMIT);
+    for (code, count) in more {
+        let _ = writeln!(stderr, "… and {} more {code}; `--format json` lists all", count - KIND_LIMIT);
     }
 }
 
@@ -80,7 +115,7 @@ pub fn failure(common: &Common, messages: &[Message]) {
     let mut stderr = std::io::stderr().lock();
     let shown: Vec<_> = messages.iter().filter(|message| message.is_error() || !common.quiet).collect();
     for message in shown.iter().take(MESSAGE_LIMIT) {
-        let _ = stderr.write_all(message.text().as_bytes());
+        let _ = stderr.write_all(visible(message.text()).as_bytes());
     }
     if shown.len() > MESSAGE_LIMIT {
         let rest = shown.len() - MESSAGE_LIMIT;

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -20,11 +19,12 @@ use metaplan::mission::{Blocking, Mission};
 use serde_json::json;
 
 use crate::cli::concurrent::{self, Overlap, Reading};
+use crate::cli::limits::Guard;
 use crate::cli::objectives::Objectives;
 use crate::cli::plan_json::json as plan_json;
 use crate::cli::plan_text::{plan_text, steps_text};
 use crate::cli::plan_verdict::{blocking_text, verdict};
-use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, memory, output, plan_exact};
+use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, output, plan_exact};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -141,26 +141,6 @@ pub(super) struct Stages {
     pub(super) ground: Duration,
 }
 
-/// The limits that the user has set, and Ctrl-C.
-fn limits(arguments: &Arguments) -> Result<Limits, Failure> {
-    let mut limits = Limits::none();
-    if let Some(time) = arguments.time_limit {
-        limits = limits.with_time(time);
-    }
-    if let Some(megabytes) = arguments.memory_limit {
-        memory::watch(megabytes, limits.interrupt())?;
-    }
-    let interrupt = limits.interrupt();
-    // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual. Who presses it again
-    // does not want the best plan so far, either.
-    let _ = ctrlc::set_handler(move || {
-        if interrupt.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
-    Ok(limits)
-}
-
 /// What the user asks of the optimizer.
 fn configuration(arguments: &Arguments, limits: Limits) -> Config {
     let backend = arguments.solver.clone();
@@ -179,13 +159,14 @@ impl Arguments {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let started = Instant::now();
-    let limits = limits(arguments)?;
+    let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
     let usage = |error: &BackendError| Failure::usage(Message::error("M113", error.to_string()));
     arguments.solver.check().map_err(|error| usage(&error))?;
 
     let mission = arguments.situation.mission(&arguments.inputs)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
+    let limits = guard.plan();
     let read = started.elapsed();
     let objectives = Objectives::read(&mission, &problem, &arguments.minimize, arguments.pareto.as_deref())?;
     let progress = progress(common);
@@ -245,10 +226,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return Err(fault(reason));
     }
     objectives.confirm(&mission, &problem, &point, &Reading::sequential(task.is_timed()))?;
-    if let Some(directory) = &arguments.certificate {
-        certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
-            .unwrap_or_else(|message| output::warnings(common, &[message]));
-    }
+    let certified = match &arguments.certificate {
+        Some(directory) => {
+            certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
+        }
+        None => Ok(()),
+    };
     if let Some(reason) = &point.solution.statistics.failure {
         let text = format!("the SAT solver gave up: {reason}");
         output::warnings(common, &[Message::warning("M114", text)]);
@@ -262,7 +245,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         _ => None,
     };
     let beside = Beside { others, blocking };
-    finish(point, &beside, &mission, &objectives, &stages, (arguments, common))
+    let exit = finish(point, &beside, &mission, &objectives, &stages, (arguments, common))?;
+    // The plan is there, and what was asked for besides is not.
+    if let Err(message) = certified {
+        output::note(message.text());
+        return Ok(Exit::BadInput);
+    }
+    Ok(exit)
 }
 
 /// Shows the answer, or writes it to a file.

@@ -70,11 +70,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let contradictions = knowledge.contradictions();
     match common.format {
         Format::Ntriples => {
-            output::answer(&ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred()));
+            output::document(&ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred()));
         }
         Format::Turtle => {
             let triples = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
-            output::answer(&ontology::turtle(&triples).map_err(|error| Message::from_ontology(&error))?);
+            output::document(&ontology::turtle(&triples).map_err(|error| Message::from_ontology(&error))?);
         }
         Format::Json => output::json_answer(&json(&knowledge, &contradictions)),
         Format::Text => output::answer(&text(&knowledge, &contradictions)),

@@ -3,11 +3,13 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::mapek::{Answer, Clock as _, LONGEST_LINE, Loop, Observation, SystemClock};
+use metaplan::mapek::{Answer, Clock as _, FORMAT, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
 use metaplan::message::Message;
 use serde_json::{Value, json};
 
@@ -53,10 +55,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (name, settings) = (mission.name.clone(), mission.settings().clone());
     let mut control = Loop::new(mission, settings)?;
     let mut events = Lines::open(&arguments.events)?;
-    let mut stdout = io::stdout().lock();
-    let mut ready = json!({ "answer": "ready", "format": "metaplan-events/1", "mission": name });
-    let (mut journal, answers) = match &arguments.journal {
-        None => (None, control.start()),
+    let mut stdout = io::stdout();
+    let mut ready = json!({ "answer": "ready", "format": FORMAT, "mission": name });
+    let mut journal = match &arguments.journal {
+        None => None,
         Some(directory) => {
             let sync = match arguments.fsync {
                 Fsync::Always => Sync::Always,
@@ -69,47 +71,105 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             ready["lines"] = json!(control.knowledge().lines());
             ready["seq"] = json!(control.knowledge().sequence());
             ready["cut_bytes"] = json!(recovery.cut);
-            (Some(journal), recovery.answers)
+            ready["warnings"] = json!(recovery.warnings.iter().map(|own| &own.message).collect::<Vec<_>>());
+            output::warnings(common, &recovery.warnings);
+            Some(journal)
         }
     };
     let lost = |error: io::Error| Message::error("M109", format!("the answer cannot be written: {error}"));
-    writeln!(stdout, "{ready}").map_err(lost)?;
-    write(&mut stdout, control.knowledge().lines(), &answers).map_err(lost)?;
+    let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
+    let first =
+        writeln!(stdout, "{}", output::visible_json(&ready.to_string())).and_then(|()| stdout.flush());
+    match first {
+        // Who does not read any more has had enough.
+        Err(error) if is_gone(&error) => return Ok(Exit::Done),
+        other => other.map_err(lost)?,
+    }
+    let line = Arc::new(AtomicU64::new(control.knowledge().lines()));
+    heartbeat(control.watch(), Arc::clone(&line));
+    let read = Instant::now();
+    let answers = match &mut journal {
+        None => control.start(),
+        Some(journal) => journal.begin(&mut control).map_err(|error| unwritten(&error))?,
+    };
+    let number = control.knowledge().lines();
+    match write(&mut stdout, number, &answers, read) {
+        Err(error) if is_gone(&error) => return Ok(Exit::Done),
+        other => other.map_err(lost)?,
+    }
     let mut clock = SystemClock::default();
     let begun = control.knowledge().now();
-    while let Some(line) = events.next()? {
+    while let Some(text) = events.next()? {
         let read = Instant::now();
         let now = begun + clock.now();
+        line.store(control.knowledge().lines() + 1, Ordering::Relaxed);
         let answers = match &mut journal {
-            None => control.handle(&Observation::parse(&line), now),
-            Some(journal) => journal
-                .handle(&mut control, &line, now)
-                .map_err(|error| Message::error("M321", format!("the journal cannot be written: {error}")))?,
+            None => control.handle(&Observation::parse(&text), now),
+            Some(journal) => journal.handle(&mut control, &text, now).map_err(|error| unwritten(&error))?,
         };
         let number = control.knowledge().lines();
-        let written =
-            write(&mut stdout, number, &answers).and_then(|()| handled(&mut stdout, number, read.elapsed()));
+        let written = write(&mut stdout, number, &answers, read);
         match written {
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Done),
+            Err(error) if is_gone(&error) => return Ok(Exit::Done),
             other => other.map_err(lost)?,
         }
     }
     Ok(Exit::Done)
 }
 
-/// Writes the answers to a line, each with the line's number.
-fn write(stdout: &mut impl io::Write, number: u64, answers: &[Answer]) -> io::Result<()> {
+fn unwritten(error: &io::Error) -> Message {
+    Message::error("M321", format!("the journal cannot be written: {error}"))
+}
+
+/// So long planning may take before a word is said, and from one word to the next.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+
+/// Says every second how planning goes, for as long as the program runs.
+fn heartbeat(watch: Watch, line: Arc<AtomicU64>) {
+    std::thread::spawn(move || {
+        let mut known: Option<(u64, Instant, Instant)> = None;
+        loop {
+            std::thread::sleep(HEARTBEAT / 10);
+            let Some(planning) = watch.look() else {
+                known = None;
+                continue;
+            };
+            let now = Instant::now();
+            let (begun, said) = match known {
+                Some((number, begun, said)) if number == planning.number => (begun, said),
+                _ => (now, now),
+            };
+            known = Some((planning.number, begun, said));
+            if now - said >= HEARTBEAT {
+                known = Some((planning.number, begun, now));
+                let object = json!({
+                    "answer": "planning",
+                    "seconds": (now - begun).as_secs(),
+                    "cost": planning.cost.as_ref().map(output::decimal_number),
+                    "lower_bound": planning.lower_bound.as_ref().map(output::decimal_number),
+                    "line": line.load(Ordering::Relaxed),
+                });
+                // Who does not read any more will be noticed when the answers are written.
+                let _ = io::stdout().write_all(format!("{object}\n").as_bytes());
+            }
+        }
+    });
+}
+
+/// Writes the answers to a line, each with the line's number, and that it was handled.
+fn write(stdout: &mut impl io::Write, number: u64, answers: &[Answer], read: Instant) -> io::Result<()> {
+    let mut text = String::new();
     for answer in answers {
         let mut object = answer.to_json();
         object["line"] = Value::from(number);
-        writeln!(stdout, "{object}")?;
+        text += &object.to_string();
+        text.push('\n');
     }
-    stdout.flush()
-}
-
-fn handled(stdout: &mut impl io::Write, number: u64, latency: Duration) -> io::Result<()> {
-    let micros = u64::try_from(latency.as_micros()).unwrap_or(u64::MAX);
-    writeln!(stdout, "{}", json!({ "answer": "handled", "line": number, "microseconds": micros }))?;
+    let micros = u64::try_from(read.elapsed().as_micros()).unwrap_or(u64::MAX);
+    text += &json!({ "answer": "handled", "line": number, "microseconds": micros }).to_string();
+    text.push('\n');
+    // At once, so that no other thread's line comes in between.
+    stdout.write_all(output::visible_json(&text).as_bytes())?;
     stdout.flush()
 }
 
@@ -120,13 +180,23 @@ struct Lines {
     reader: Box<dyn BufRead>,
 }
 
+/// Opens a file; a pipe is read as it comes, and anything else that is no file is not.
+fn regular(path: &Path) -> io::Result<File> {
+    let kind = std::fs::metadata(path)?.file_type();
+    #[cfg(unix)]
+    let is_pipe = std::os::unix::fs::FileTypeExt::is_fifo(&kind);
+    #[cfg(not(unix))]
+    let is_pipe = false;
+    if kind.is_file() || is_pipe { File::open(path) } else { Err(io::Error::other("it is no file")) }
+}
+
 impl Lines {
     fn open(path: &Path) -> Result<Self, Message> {
         let name = path.display().to_string();
         let reader: Box<dyn BufRead> = if name == "-" {
             Box::new(BufReader::new(io::stdin()))
         } else {
-            let file = File::open(path)
+            let file = regular(path)
                 .map_err(|error| Message::at("M101", &name, None, format!("cannot be read: {error}")))?;
             Box::new(BufReader::new(file))
         };

@@ -76,8 +76,21 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Some((scenario, settings)) =
         scenario.and_then(|scenario| Some((scenario, scenario.simulation.as_ref()?)))
     else {
-        let text =
-            format!("the mission has no scenario `{}` to simulate; it has: {}", arguments.scenario, known());
+        let name = &arguments.scenario;
+        let (known, why) = (
+            known(),
+            if scenario.is_some() {
+                "its scenario has no `simulation` section"
+            } else {
+                "there is none of that name"
+            },
+        );
+        let known = if known.is_empty() {
+            "no scenario of this mission can".to_owned()
+        } else {
+            format!("these can: {known}")
+        };
+        let text = format!("`{name}` cannot be simulated: {why}; {known}");
         return Err(Failure::usage(Message::error("M108", text)));
     };
     mission.apply(scenario)?;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use encodings::Limits;
@@ -12,12 +12,13 @@ use metaplan::certificate::{Claim, Part, Report, conditions, verify};
 use serde_json::json;
 
 use crate::cli::plan::seconds;
-use crate::cli::{Common, Exit, Failure, Format, memory, output};
+use crate::cli::{Common, Exit, Failure, Format, Situation, memory, output, setting};
 
 /// The process may take so much, in megabytes of 2^20 bytes: a certificate may come from anybody.
 const MEMORY_LIMIT: u64 = 4096;
 /// So long after a limit has been reached the verification is given up from outside.
 const GRACE: Duration = Duration::from_secs(2);
+const LATE: &str = "it takes longer than `--time-limit` allows";
 const INTERVAL: Duration = Duration::from_millis(50);
 
 /// Arguments of `verify`.
@@ -31,10 +32,23 @@ pub struct Arguments {
     /// The verification fails if it takes more seconds.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true, default_value = "600")]
     time_limit: Duration,
+    /// Whether the certificate is about this mission, too: its manifest.
+    #[arg(long, value_name = "MISSION")]
+    mission: Option<PathBuf>,
+    /// The mission in this situation: a scenario of its manifest.
+    #[arg(long, value_name = "NAME", requires = "mission")]
+    scenario: Option<String>,
+    /// As with `plan` (repeatable).
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting, requires = "mission")]
+    set: Vec<(String, String)>,
+    /// As with `plan` (repeatable).
+    #[arg(long, value_name = "COMPONENT", requires = "mission")]
+    fail: Vec<String>,
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let started = Instant::now();
     let limits = Limits::none().with_time(arguments.time_limit);
     let answered = Arc::new(AtomicBool::new(false));
     give_up_late(limits.clone(), Arc::clone(&answered), common.format);
@@ -43,7 +57,21 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(file) = &arguments.smt {
         output::write_file(file, &conditions(&arguments.directory, &limits)?)?;
     }
-    let report = verify(&arguments.directory, &limits);
+    let mission = match &arguments.mission {
+        Some(manifest) => {
+            let situation = Situation::of_mission(
+                arguments.scenario.clone(),
+                arguments.set.clone(),
+                arguments.fail.clone(),
+            );
+            Some(situation.mission(std::slice::from_ref(manifest))?)
+        }
+        None => None,
+    };
+    let mut report = verify(&arguments.directory, mission.as_ref(), &limits);
+    if started.elapsed() > arguments.time_limit {
+        report.parts.push(Part { part: "limits", result: Err(LATE.to_owned()) });
+    }
     while answered.swap(true, Ordering::Relaxed) {
         std::thread::park();
     }
@@ -58,8 +86,7 @@ fn give_up_late(limits: Limits, answered: Arc<AtomicBool>, format: Format) {
         }
         std::thread::sleep(GRACE);
         if !answered.swap(true, Ordering::Relaxed) {
-            let reason =
-                format!("it takes longer than `--time-limit` allows, or more than {MEMORY_LIMIT} MB");
+            let reason = format!("{LATE}, or more than {MEMORY_LIMIT} MB");
             let report = Report { claim: None, parts: vec![Part { part: "limits", result: Err(reason) }] };
             std::process::exit(show(&report, format) as i32);
         }

@@ -11,7 +11,7 @@ use super::Loop;
 use super::analyze::Findings;
 use super::answer::Answer;
 use super::knowledge::Running;
-use super::monitor::Changes;
+use super::monitor::{Base, Changes};
 use super::number;
 use super::plan::{Ask, Outcome};
 use super::step::{PlannedStep, plan_text};
@@ -25,7 +25,11 @@ const FACTS: &str = "facts";
 impl Loop {
     /// Reacts to what has changed, up to a plan.
     pub(super) fn adapt(&mut self, mut changes: Changes, answers: &mut Vec<Answer>) {
-        let findings = if changes.knowledge { self.analyze(answers) } else { Findings::default() };
+        if changes.base > Base::Nothing {
+            self.contradict(answers);
+        }
+        let findings =
+            if changes.base == Base::Watched { self.analyze(answers) } else { Findings::default() };
         self.chances(&findings, &changes);
         let is_change = changes.facts || !changes.must.is_empty() || !findings.gained.is_empty();
         if self.gave_up(&changes, answers) {
@@ -87,6 +91,9 @@ impl Loop {
         let before = hopes.len();
         hopes.extend(findings.gained.iter().cloned());
         hopes.extend(changes.predicates.then(|| FACTS.to_owned()));
+        // Time was up when the plan was made, and now the question is another one.
+        let is_news = changes.facts || !findings.gained.is_empty() || !findings.lost.is_empty();
+        hopes.extend((is_news && self.knowledge.unproved).then(|| FACTS.to_owned()));
         if hopes.len() > before {
             self.knowledge.hoped = self.knowledge.now;
         }
@@ -186,7 +193,20 @@ impl Loop {
             old: old.as_deref(),
             stay_close: self.settings.stay_close,
         };
-        self.planner.plan(&ask)
+        let outcome = self.planner.plan(&ask);
+        let unavailable = |step: &PlannedStep| {
+            step.configuration.iter().find(|(_, design)| !self.is_available(design)).map(|(_, d)| d.clone())
+        };
+        match outcome.steps.iter().flatten().find_map(unavailable) {
+            // The domain does not ask for what the knowledge base says.
+            Some(design) => Outcome {
+                steps: None,
+                proved: false,
+                because: format!("the plan uses {design}, which is not available"),
+                ..outcome
+            },
+            None => outcome,
+        }
     }
 
     /// Whether these are the action under way and the plan at hand.
@@ -211,6 +231,7 @@ impl Loop {
     /// Takes a plan over; the action under way gets its designs.
     fn adopt(&mut self, outcome: Outcome, answers: &mut Vec<Answer>) {
         let Outcome { steps, proved, .. } = outcome;
+        self.knowledge.unproved = !proved;
         let steps = steps.unwrap_or_default();
         let cost = steps.iter().map(|step| step.cost.clone()).sum();
         answers.push(Answer::PlanFound { cost, optimal: proved, steps: steps.clone() });

@@ -26,6 +26,20 @@ pub(super) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
 }
 
 impl Loop {
+    /// Reports what contradicts itself where that has changed; what was observed stays.
+    pub(super) fn contradict(&mut self, answers: &mut Vec<Answer>) {
+        let Some(knowledge) = self.knowledge.mission.knowledge() else { return };
+        let mut contradictions = knowledge.contradictions();
+        for fact in contradictions.iter_mut().flat_map(|own| own.facts.iter_mut()) {
+            *fact = local(fact);
+        }
+        let violated: BTreeSet<String> = contradictions.iter().map(|own| own.violated.clone()).collect();
+        if violated != self.knowledge.violated {
+            self.knowledge.violated = violated;
+            answers.push(Answer::Contradicted { contradictions });
+        }
+    }
+
     /// Compares what follows now with what followed before, and reports the difference.
     pub(super) fn analyze(&mut self, answers: &mut Vec<Answer>) -> Findings {
         let mut findings = Findings::default();

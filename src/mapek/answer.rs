@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::number;
 use super::step::PlannedStep;
+use crate::knowledge::Contradiction;
 
 /// One line of output.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +17,11 @@ pub enum Answer {
         designs: Vec<DesignChange>,
         /// Objectives whose status has changed.
         objectives: Vec<ObjectiveChange>,
+    },
+    /// What is known contradicts itself, or does so no more. What was observed stays, and so does what follows from it.
+    Contradicted {
+        /// All contradictions from now on; none where what is known is consistent again.
+        contradictions: Vec<Contradiction>,
     },
     /// A plan is looked for.
     PlanRequested {
@@ -54,6 +60,13 @@ pub enum Answer {
     Duplicate {
         /// Its number.
         sequence: u64,
+    },
+    /// The line has changed nothing: its number is so old that nobody knows whether it was seen.
+    Stale {
+        /// Its number.
+        sequence: u64,
+        /// Numbers up to this one are too old.
+        mark: u64,
     },
     /// The line, or a part of it, has changed nothing.
     Error {
@@ -97,6 +110,8 @@ pub struct Effect {
     pub command: Command,
     /// Whether it may have been asked for before the program was started again.
     pub repeated: bool,
+    /// Effects that were not acknowledged and need not be carried out any more, since this one replaces them.
+    pub supersedes: Vec<u64>,
 }
 
 /// What the managed system is to do.
@@ -132,6 +147,16 @@ pub enum Command {
 }
 
 impl Command {
+    /// Whether this command makes another one, about the same action, pointless.
+    pub(super) fn replaces(&self, other: &Self, same_action: bool) -> bool {
+        match (self, other) {
+            (Self::Reconfigure { function: own, .. }, Self::Reconfigure { function: other, .. }) => {
+                own == other
+            }
+            _ => same_action && self.is_about_going_on() && other.is_about_going_on(),
+        }
+    }
+
     /// Whether it says if an action goes on. A report of that action may have been on its way before the command, so that
     /// it does not show that the command has arrived.
     pub(super) fn is_about_going_on(&self) -> bool {
@@ -148,6 +173,11 @@ impl Answer {
                 "designs": designs.iter().map(DesignChange::to_json).collect::<Vec<_>>(),
                 "objectives": objectives.iter().map(ObjectiveChange::to_json).collect::<Vec<_>>(),
             }),
+            Self::Contradicted { contradictions } => {
+                let object = |own: &Contradiction| json!({ "violated": own.violated, "facts": own.facts });
+                let contradictions: Vec<Value> = contradictions.iter().map(object).collect();
+                json!({ "answer": "contradicted", "contradictions": contradictions })
+            }
             Self::PlanRequested { because } => json!({ "answer": "plan_requested", "because": because }),
             Self::PlanFound { cost, optimal, steps } => json!({
                 "answer": "plan_found",
@@ -162,6 +192,12 @@ impl Answer {
             Self::Effect(effect) => effect.to_json(),
             Self::GoalReached => json!({ "answer": "goal_reached" }),
             Self::Duplicate { sequence } => json!({ "answer": "duplicate", "seq": sequence }),
+            Self::Stale { sequence, mark } => {
+                let because = format!(
+                    "too many numbers are missing: of those up to {mark} it is not known any more which were seen"
+                );
+                json!({ "answer": "stale", "seq": sequence, "because": because })
+            }
             Self::Error { code, message } => json!({ "answer": "error", "code": code, "message": message }),
         }
     }
@@ -209,6 +245,9 @@ impl Effect {
         object["effect"] = json!(self.number);
         if self.repeated {
             object["repeated"] = json!(true);
+        }
+        if !self.supersedes.is_empty() {
+            object["supersedes"] = json!(self.supersedes);
         }
         // The kind of the answer comes first.
         let fields = object.as_object_mut().map(std::mem::take).unwrap_or_default();

@@ -12,6 +12,7 @@ use ontology::tomasys::change::Status;
 use serde_json::{Map, Value, json};
 
 use super::number;
+use crate::message::did_you_mean;
 
 /// Lines of more bytes are not read as events.
 pub const LONGEST_LINE: usize = 1 << 20;
@@ -133,6 +134,9 @@ impl Observation {
         }
         let value: Value = serde_json::from_str(text)
             .map_err(|error| Fault::new("M301", format!("this is no JSON: {error}")))?;
+        if let Some(key) = doubled_key(text) {
+            return Err(Fault::new("M302", format!("the field `{key}` is there twice")));
+        }
         let Value::Object(mut fields) = value else {
             return Err(Fault::new("M301", "an event is a JSON object"));
         };
@@ -143,6 +147,38 @@ impl Observation {
         self.sequence = take(&mut fields, "seq", "a whole number", Value::as_u64)?;
         self.time = take(&mut fields, "time", "a number of seconds, not negative", seconds)?;
         event(&mut fields).map(|event| vec![Ok(event)])
+    }
+}
+
+/// A field that an object has twice; of objects within it nothing is said.
+fn doubled_key(text: &str) -> Option<String> {
+    let Keys(keys) = serde_json::from_str(text).ok()?;
+    let doubled = keys.iter().enumerate().find(|(index, key)| keys[..*index].contains(key));
+    doubled.map(|(_, key)| key.clone())
+}
+
+/// The keys of an object, in their order.
+struct Keys(Vec<String>);
+
+impl<'de> serde::Deserialize<'de> for Keys {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> serde::de::Visitor<'de> for Visitor {
+            type Value = Keys;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("an object")
+            }
+
+            fn visit_map<M: serde::de::MapAccess<'de>>(self, mut map: M) -> Result<Keys, M::Error> {
+                let mut keys = Vec::new();
+                while let Some((key, _)) = map.next_entry::<String, serde::de::IgnoredAny>()? {
+                    keys.push(key);
+                }
+                Ok(Keys(keys))
+            }
+        }
+        deserializer.deserialize_map(Visitor)
     }
 }
 
@@ -229,7 +265,8 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Fault> {
         }
         "tick" => Event::Tick,
         other => {
-            let text = format!("there is no event `{other}`; there are: {}", KINDS.join(", "));
+            let meant = did_you_mean(other, KINDS);
+            let text = format!("there is no event `{other}`; there are: {}{meant}", KINDS.join(", "));
             return Err(Fault::new("M303", text));
         }
     };

@@ -73,8 +73,14 @@ impl Loop {
     /// Asks the managed system for something.
     pub(super) fn effect(&mut self, action: u64, command: Command, answers: &mut Vec<Answer>) {
         self.knowledge.effects += 1;
-        let effect = Effect { number: self.knowledge.effects, action, command, repeated: false };
-        self.knowledge.outstanding.insert(effect.number, effect.clone());
+        let number = self.knowledge.effects;
+        let outstanding = &mut self.knowledge.outstanding;
+        let is_replaced = |old: &Effect| command.replaces(&old.command, old.action == action);
+        let supersedes: Vec<u64> =
+            outstanding.values().filter(|old| is_replaced(old)).map(|old| old.number).collect();
+        outstanding.retain(|number, _| !supersedes.contains(number));
+        let effect = Effect { number, action, command, repeated: false, supersedes };
+        outstanding.insert(number, effect.clone());
         answers.push(Answer::Effect(effect));
     }
 
@@ -85,6 +91,7 @@ impl Loop {
         if let Err(error) = knowledge.pursue(wanted) {
             answers.push(Answer::Error { code: error.code.clone(), message: error.message.clone() });
         }
+        self.contradict(answers);
         self.analyze(answers);
     }
 }

@@ -81,7 +81,7 @@ impl Loop {
 
     fn cancel(&mut self, running: Running, because: String, answers: &mut Vec<Answer>) {
         self.knowledge.plan = None;
-        self.about_going_on(running.action, Command::Cancel { because }, answers);
+        self.effect(running.action, Command::Cancel { because }, answers);
         self.knowledge.running = Some(Running { cancelling: true, ..running });
     }
 
@@ -92,21 +92,14 @@ impl Loop {
             return;
         }
         let because = format!("{reason}; no other design serves, and there is no plan without it");
-        self.about_going_on(running.action, Command::Suspend { because }, answers);
+        self.effect(running.action, Command::Suspend { because }, answers);
         self.knowledge.running = Some(Running { suspended: true, ..running });
     }
 
     /// Lets a suspended action go on.
     pub(super) fn resume_suspended(&mut self, running: &mut Running, answers: &mut Vec<Answer>) {
         if std::mem::take(&mut running.suspended) {
-            self.about_going_on(running.action, Command::Resume, answers);
+            self.effect(running.action, Command::Resume, answers);
         }
-    }
-
-    /// Says whether an action is to go on; only the last word on that counts.
-    fn about_going_on(&mut self, action: u64, command: Command, answers: &mut Vec<Answer>) {
-        let outstanding = &mut self.knowledge.outstanding;
-        outstanding.retain(|_, effect| effect.action != action || !effect.command.is_about_going_on());
-        self.effect(action, command, answers);
     }
 }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use num_rational::BigRational;
 
 use super::answer::Effect;
+use super::sequence::Numbers;
 use super::step::PlannedStep;
 use crate::mission::Mission;
 
@@ -23,6 +24,8 @@ pub struct Knowledge {
     pub(super) available: BTreeSet<String>,
     /// Objectives that have a status, with it.
     pub(super) statuses: BTreeMap<String, Vec<String>>,
+    /// The axioms and rules that what is known violates.
+    pub(super) violated: BTreeSet<String>,
     /// Function to the design that it has.
     pub(super) configuration: BTreeMap<String, String>,
     /// What is still to be requested, if there is a plan.
@@ -33,6 +36,8 @@ pub struct Knowledge {
     pub(super) reached: bool,
     /// Why no plan is looked for until something changes.
     pub(super) stuck: bool,
+    /// Whether the plan at hand may not be the best, since time was up.
+    pub(super) unproved: bool,
     /// The last step that failed, and how often in a row.
     pub(super) failures: Option<(PlannedStep, u32)>,
     /// Designs that have come back, or a word for facts that have changed, without another plan being looked for.
@@ -47,8 +52,8 @@ pub struct Knowledge {
     pub(super) outstanding: BTreeMap<u64, Effect>,
     /// How many lines were handled.
     pub(super) lines: u64,
-    /// The greatest number of a line that had one.
-    pub(super) sequence: Option<u64>,
+    /// The numbers of the lines that had one and were taken over.
+    pub(super) numbers: Numbers,
     /// The time of the last line, since the start of the mission.
     pub(super) now: Duration,
 }
@@ -75,11 +80,13 @@ impl Knowledge {
             goal: None,
             available: BTreeSet::new(),
             statuses: BTreeMap::new(),
+            violated: BTreeSet::new(),
             configuration: BTreeMap::new(),
             plan: None,
             running: None,
             reached: false,
             stuck: false,
+            unproved: false,
             failures: None,
             hopes: BTreeSet::new(),
             hoped: Duration::ZERO,
@@ -87,7 +94,7 @@ impl Knowledge {
             effects: 0,
             outstanding: BTreeMap::new(),
             lines: 0,
-            sequence: None,
+            numbers: Numbers::default(),
             now: Duration::ZERO,
         }
     }
@@ -100,6 +107,11 @@ impl Knowledge {
     /// The designs that are available, by local name.
     pub fn available(&self) -> &BTreeSet<String> {
         &self.available
+    }
+
+    /// Objectives in error, by local name, with their statuses.
+    pub fn statuses(&self) -> &BTreeMap<String, Vec<String>> {
+        &self.statuses
     }
 
     /// Function to the design that it has.
@@ -137,9 +149,9 @@ impl Knowledge {
         self.lines
     }
 
-    /// The greatest number of a line that had one.
+    /// The greatest number of a line that was taken over.
     pub fn sequence(&self) -> Option<u64> {
-        self.sequence
+        self.numbers.greatest()
     }
 
     /// The time of the last line, since the start of the mission.

@@ -28,7 +28,9 @@ mod parts;
 mod plan;
 mod record;
 mod resume;
+mod sequence;
 mod step;
+mod watch;
 
 use std::borrow::Cow;
 use std::collections::{BTreeSet, HashSet};
@@ -36,6 +38,7 @@ use std::time::Duration;
 
 use encodings::pddl::ast::{Domain, Problem};
 use num_rational::BigRational;
+use sha2::{Digest as _, Sha256};
 
 use crate::message::Message;
 use crate::mission::Mission;
@@ -46,6 +49,7 @@ pub use event::{Event, Fault, LONGEST_LINE, Observation};
 pub use knowledge::Knowledge;
 pub use record::{Decision, Snapshot};
 pub use step::PlannedStep;
+pub use watch::{Planning, Watch};
 
 pub(crate) use analyze::ruled_out;
 use monitor::Changes;
@@ -53,6 +57,10 @@ pub(crate) use monitor::value_of;
 use plan::Planner;
 pub(crate) use resume::resume;
 use resume::resumed_goal;
+use sequence::Place;
+
+/// The version of events and answers.
+pub const FORMAT: &str = "metaplan-events/1";
 
 /// How eager the loop is.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +69,7 @@ pub struct Settings {
     pub minimum_benefit: BigRational,
     /// So long must a design be available again before a better plan is looked for.
     pub settle: Duration,
-    /// How long one plan may take; the best so far is used then.
+    /// How long one plan may take; the best so far is used then, if there is one. Ten seconds unless said otherwise.
     pub time_limit: Option<Duration>,
     /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand. The choice then
     /// depends on what has happened, and no longer on the situation alone.
@@ -73,11 +81,14 @@ impl Default for Settings {
         Self {
             minimum_benefit: BigRational::from_integer(0.into()),
             settle: Duration::ZERO,
-            time_limit: None,
+            time_limit: Some(TIME_LIMIT),
             stay_close: false,
         }
     }
 }
+
+/// How long one plan may take unless said otherwise. A robot waits meanwhile.
+const TIME_LIMIT: Duration = Duration::from_secs(10);
 
 /// So many names and values may be interned before the knowledge is made anew without what is not used any more.
 const GROWTH: usize = 1024;
@@ -113,7 +124,7 @@ impl Loop {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
         let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
-        let digest = digest(&mission);
+        let digest = digest(&mission, &settings);
         let planner = Planner { time_limit: settings.time_limit, ..Planner::default() };
         let mut knowledge = Knowledge::new(mission);
         if let Some(base) = knowledge.mission.knowledge() {
@@ -127,9 +138,15 @@ impl Loop {
         &self.knowledge
     }
 
+    /// To look at how planning goes, from another thread.
+    pub fn watch(&self) -> Watch {
+        self.planner.watch.clone()
+    }
+
     /// Makes the first plan and requests the first action.
     pub fn start(&mut self) -> Vec<Answer> {
         let mut answers = Vec::new();
+        self.planner.made.clear();
         self.execute(&mut answers);
         answers
     }
@@ -137,13 +154,12 @@ impl Loop {
     /// Takes an observation over, at a time since the start of the mission that never goes back, and says what follows.
     pub fn handle(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
         let mut answers = Vec::new();
+        // Plans that nobody has asked for are of no use to anybody.
+        self.planner.made.clear();
         self.knowledge.lines += 1;
         self.knowledge.now = self.knowledge.now.max(observation.time.unwrap_or(now));
-        if let Some(sequence) = observation.sequence {
-            if self.knowledge.sequence.is_some_and(|last| sequence <= last) {
-                return vec![Answer::Duplicate { sequence }];
-            }
-            self.knowledge.sequence = Some(sequence);
+        if let Some(refusal) = observation.sequence.and_then(|sequence| self.refused(sequence)) {
+            return vec![refusal];
         }
         let mut changes = Changes::default();
         let mut understood = false;
@@ -156,12 +172,30 @@ impl Loop {
                 }
             }
         }
-        if understood {
+        if understood || changes.any() {
+            if let Some(sequence) = observation.sequence {
+                self.knowledge.numbers.insert(sequence);
+            }
             self.adapt(changes, &mut answers);
             self.execute(&mut answers);
             self.forget();
         }
         answers
+    }
+
+    /// Why a line with this number is not taken over, if it is not.
+    fn refused(&self, sequence: u64) -> Option<Answer> {
+        match self.knowledge.numbers.place(sequence) {
+            Place::New => None,
+            Place::Seen => Some(Answer::Duplicate { sequence }),
+            Place::Stale(mark) => Some(Answer::Stale { sequence, mark }),
+            Place::Ahead(most) => {
+                let text = format!(
+                    "`seq` is {sequence}, but may be {most} at most: numbers grow from line to line, and skip a million at most"
+                );
+                Some(Answer::Error { code: "M307".to_owned(), message: text })
+            }
+        }
     }
 
     /// Effects that were asked for and not acknowledged, to be asked for again after a restart.
@@ -205,14 +239,31 @@ impl Loop {
     }
 }
 
-fn digest(mission: &Mission) -> String {
-    let mut text = encodings::pddl::print_domain(mission.domain());
+/// Everything that decisions rest on before anything has happened: what is said and follows, the rules, the domain and the
+/// problem with its settings, the bindings, how eager the loop is, and the versions of the formats.
+fn digest(mission: &Mission, settings: &Settings) -> String {
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);
-    text += &encodings::pddl::print_problem(&problem);
+    let mut parts = vec![
+        env!("CARGO_PKG_VERSION").to_owned(),
+        FORMAT.to_owned(),
+        mission.name.clone(),
+        format!("{settings:?}"),
+        format!("{:?}", mission.bindings()),
+        encodings::pddl::print_domain(mission.domain()),
+        encodings::pddl::print_problem(&problem),
+    ];
     if let Some(knowledge) = mission.knowledge() {
-        let facts: Vec<rules::Fact> = knowledge.engine().facts().collect();
-        text += &ontology::ntriples(knowledge.engine().symbols(), &facts);
+        let engine = knowledge.engine();
+        let facts: Vec<rules::Fact> = engine.facts().collect();
+        parts.push(ontology::ntriples(engine.symbols(), &facts));
+        parts.push(rules::print_rules(engine.program(), engine.symbols(), &rules::Prefixes::default()));
     }
-    format!("{:08x}", crc32fast::hash(text.as_bytes()))
+    let mut hash = Sha256::new();
+    for part in parts {
+        hash.update((part.len() as u64).to_le_bytes());
+        hash.update(part);
+    }
+    let half = hash.finalize().iter().take(16).fold(0_u128, |sum, byte| sum << 8 | u128::from(*byte));
+    format!("{half:032x}")
 }

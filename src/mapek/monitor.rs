@@ -4,20 +4,20 @@ use encodings::pddl::ast::{InitialElement, Problem};
 use encodings::validate::{Advance, advance};
 use num_rational::BigRational;
 use ontology::vocab::local_name;
-use rules::Delta;
+use rules::{Delta, Fact};
 
 use super::Loop;
 use super::event::{Event, Fault};
 use super::knowledge::Running;
 use super::number;
 use super::step::PlannedStep;
-use crate::message::Message;
+use crate::message::{Message, did_you_mean};
 
 /// What a line has changed, for the analysis.
 #[derive(Debug, Default)]
 pub(super) struct Changes {
-    /// Facts of the knowledge base from which availability and statuses are read.
-    pub(super) knowledge: bool,
+    /// What the knowledge base says.
+    pub(super) base: Base,
     /// Facts or values of the problem.
     pub(super) facts: bool,
     /// Facts of the problem, and not only values.
@@ -26,8 +26,42 @@ pub(super) struct Changes {
     pub(super) must: Vec<String>,
 }
 
+/// What has changed in the knowledge base.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Base {
+    #[default]
+    Nothing,
+    /// What is stated, or follows.
+    Stated,
+    /// That from which availability and statuses are read.
+    Watched,
+}
+
+impl Changes {
+    /// Whether anything has changed, though the line was not taken over as a whole.
+    pub(super) fn any(&self) -> bool {
+        self.base > Base::Nothing || self.facts || self.predicates || !self.must.is_empty()
+    }
+}
+
 /// The properties from which availability and statuses are read, by local name.
 const WATCHED: [&str; 5] = ["fd_realisability", "fd_available", "o_status", "o_updatable", "fg_status"];
+
+/// What else of the knowledge base plans rest on, by local name.
+const PLANNED: [&str; 9] = [
+    "solvesF",
+    "requiresF",
+    "hasQAestimation",
+    "isQAtype",
+    "hasMinimum",
+    "hasMaximum",
+    "requiresQuality",
+    "inContext",
+    "FunctionDesign",
+];
+
+/// Values, by local name: those that were not reported are estimations.
+const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
 impl Loop {
     /// Takes an event over.
@@ -42,7 +76,7 @@ impl Loop {
                     let text = format!("there is no knowledge base that has a component `{component}`");
                     return Err(Fault::new("M306", text));
                 };
-                let delta = knowledge.try_report(component, *status).map_err(|message| fault(&message))?;
+                let delta = knowledge.report(component, *status).map_err(|message| fault(&message))?;
                 self.note(&delta, changes);
                 Ok(())
             }
@@ -83,14 +117,14 @@ impl Loop {
     fn measured(&mut self, attribute: &str, value: &BigRational, changes: &mut Changes) -> Result<(), Fault> {
         let is_known = self.attributes.contains(attribute);
         if let Some(knowledge) = self.knowledge.mission.knowledge_mut().filter(|_| is_known) {
-            let delta = knowledge.try_measure(attribute, value).map_err(|message| fault(&message))?;
+            let delta = knowledge.observe(attribute, value).map_err(|message| fault(&message))?;
+            self.note(&delta, changes);
             if let Some(function) = self.knowledge.mission.fed_by(local_name(attribute)) {
+                changes.facts = true;
                 if self.value(&function).is_some() {
                     self.fact(&function, &number::decimal(value), changes)?;
                 }
-                changes.facts = true;
             }
-            self.note(&delta, changes);
             return Ok(());
         }
         if self.knowledge.mission.is_function(attribute) {
@@ -98,18 +132,43 @@ impl Loop {
         }
         let known: Vec<&str> =
             self.attributes.iter().map(String::as_str).filter(|name| !name.contains(':')).collect();
-        let text =
-            format!("there is no attribute or function `{attribute}`; attributes are: {}", known.join(", "));
+        let functions: Vec<&str> = self
+            .knowledge
+            .mission
+            .domain()
+            .functions
+            .iter()
+            .filter(|own| own.parameters.is_empty())
+            .map(|own| own.identifier.name.as_str())
+            .collect();
+        let meant = did_you_mean(attribute, known.iter().chain(&functions).copied());
+        let text = format!(
+            "there is no attribute or function `{attribute}`; attributes are: {}{meant}",
+            known.join(", ")
+        );
         Err(Fault::new("M306", text))
     }
 
-    /// Whether a change of the knowledge base matters for the analysis.
+    /// What a change of the knowledge base matters for.
     fn note(&self, delta: &Delta, changes: &mut Changes) {
         let Some(knowledge) = self.knowledge.mission.knowledge() else { return };
-        let symbols = knowledge.engine().symbols();
-        changes.knowledge |= delta.insert.iter().chain(&delta.delete).any(|fact| {
-            symbols.value(fact.predicate).as_name().is_some_and(|name| WATCHED.contains(&local_name(name)))
-        });
+        changes.base = changes.base.max(Base::Stated);
+        let engine = knowledge.engine();
+        let name = |fact: &Fact| engine.symbols().value(fact.predicate).as_name().map_or("", local_name);
+        for fact in delta.insert.iter().chain(&delta.delete) {
+            let name = name(fact);
+            if WATCHED.contains(&name) {
+                changes.base = Base::Watched;
+            }
+            changes.facts |= PLANNED.contains(&name);
+        }
+        let is_concluded = |fact: &Fact| VALUES.contains(&name(fact)) && !engine.is_asserted(fact);
+        let is_replaced = |gone: &Fact| {
+            let same = |new: &Fact| new.predicate == gone.predicate && new.arguments[0] == gone.arguments[0];
+            delta.insert.iter().any(same)
+        };
+        let is_lost = |fact: &Fact| VALUES.contains(&name(fact)) && !is_replaced(fact);
+        changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
     }
 
     /// The action with that number, which must be under way; whatever was asked for it has arrived, then.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::monitor::Changes;
+use super::monitor::{Base, Changes};
 use super::{Answer, Loop, Observation, PlannedStep};
 
 impl Loop {
@@ -15,7 +15,7 @@ impl Loop {
             // What the loop would answer with an error changes nothing.
             let _ = self.monitor(event, &mut changes);
         }
-        if changes.knowledge {
+        if changes.base == Base::Watched {
             self.analyze(&mut Vec::new());
         }
     }

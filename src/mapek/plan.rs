@@ -17,6 +17,7 @@ use super::live::Live;
 use super::number;
 use super::resume::{resume, resumed_goal};
 use super::step::PlannedStep;
+use super::watch::Watch;
 use crate::mission::Mission;
 
 /// What planning has come to.
@@ -59,6 +60,8 @@ pub(crate) struct Planner {
     pub made: Vec<Outcome>,
     /// What is kept from one plan to the next.
     pub live: Live,
+    /// Who looks on.
+    pub watch: Watch,
 }
 
 impl Planner {
@@ -72,12 +75,15 @@ impl Planner {
 
     fn solve(&mut self, ask: &Ask<'_>) -> Outcome {
         let limits = self.time_limit.map_or_else(Limits::none, |time| Limits::none().with_time(time));
-        self.live.plan(ask, &limits).unwrap_or_else(|| from_scratch(ask, limits))
+        self.watch.begin();
+        let outcome = self.live.plan(ask, &limits).unwrap_or_else(|| from_scratch(ask, limits, &self.watch));
+        self.watch.end();
+        outcome
     }
 }
 
 /// The best plan of a task that is ground for it alone.
-pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits) -> Outcome {
+pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits, watch: &Watch) -> Outcome {
     let none = |proved, because: String| Outcome {
         steps: None,
         cost: BigRational::default(),
@@ -99,7 +105,10 @@ pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits) -> Outcome {
         }
     };
     let config = Config { limits, ..Config::default() };
-    let solution = optimize(&task, &config, &mut |_| {});
+    let mut report = |better: encodings::Improvement| {
+        watch.improve(number::of_plan(&better.cost), number::of_plan(&better.lower_bound));
+    };
+    let solution = optimize(&task, &config, &mut report);
     match (solution.status, solution.plan) {
         (status, Some(plan)) => Outcome {
             cost: number::of_plan(&plan.cost),

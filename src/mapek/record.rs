@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::answer::{Answer, Command, Effect};
 use super::knowledge::Running;
 use super::plan::Outcome;
+use super::sequence::Numbers;
 use super::step::PlannedStep;
 use super::{Loop, Observation, analyze};
 use crate::knowledge::{Part, Statement, Statements};
@@ -76,11 +77,13 @@ impl Loop {
             "removed": statements.removed.iter().map(statement_to_record).collect::<Vec<_>>(),
             "available": known.available,
             "statuses": known.statuses,
+            "violated": known.violated,
             "configuration": known.configuration,
             "plan": known.plan.as_ref().map(steps),
             "running": running,
             "reached": known.reached,
             "stuck": known.stuck,
+            "unproved": known.unproved,
             "failures": known.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
             "hopes": known.hopes,
             "hoped": micros(known.hoped),
@@ -88,7 +91,7 @@ impl Loop {
             "effects": known.effects,
             "outstanding": known.outstanding.values().map(effect_to_record).collect::<Vec<_>>(),
             "lines": known.lines,
-            "sequence": known.sequence,
+            "numbers": known.numbers.to_record(),
             "now": micros(known.now),
         }))
     }
@@ -141,6 +144,7 @@ impl Loop {
         known.available = texts(data.get("available")?)?.into_iter().collect();
         let status = |(name, value): (&String, &Value)| Some((name.clone(), texts(value)?));
         known.statuses = pairs("statuses")?.iter().map(status).collect::<Option<BTreeMap<_, _>>>()?;
+        known.violated = texts(data.get("violated")?)?.into_iter().collect();
         let pair = |(name, value): (&String, &Value)| Some((name.clone(), text(value)?));
         known.configuration = pairs("configuration")?.iter().map(pair).collect::<Option<BTreeMap<_, _>>>()?;
         known.plan = match data.get("plan")? {
@@ -156,11 +160,12 @@ impl Loop {
             record => Some((PlannedStep::from_record(record.get(0)?)?, record.get(1)?.as_u64()? as u32)),
         };
         (known.reached, known.stuck) = (truth("reached")?, truth("stuck")?);
+        known.unproved = truth("unproved")?;
         known.hopes = texts(data.get("hopes")?)?.into_iter().collect();
         known.hoped = Duration::from_micros(number("hoped")?);
         (known.actions, known.effects, known.lines) =
             (number("actions")?, number("effects")?, number("lines")?);
-        known.sequence = number("sequence");
+        known.numbers = Numbers::from_record(data.get("numbers")?)?;
         known.now = Duration::from_micros(number("now")?);
         let effects = data.get("outstanding")?.as_array()?.iter().map(effect_from_record);
         known.outstanding =
@@ -191,7 +196,7 @@ fn effect_to_record(effect: &Effect) -> Value {
         Command::Suspend { because } => json!(["suspend", because]),
         Command::Resume => json!(["resume"]),
     };
-    json!([effect.number, effect.action, command])
+    json!([effect.number, effect.action, command, effect.supersedes])
 }
 
 fn effect_from_record(record: &Value) -> Option<Effect> {
@@ -210,7 +215,8 @@ fn effect_from_record(record: &Value) -> Option<Effect> {
         _ => return None,
     };
     let (number, action) = (record.get(0)?.as_u64()?, record.get(1)?.as_u64()?);
-    Some(Effect { number, action, command, repeated: false })
+    let supersedes = record.get(3)?.as_array()?.iter().map(Value::as_u64).collect::<Option<_>>()?;
+    Some(Effect { number, action, command, repeated: false, supersedes })
 }
 
 fn statement_to_record(statement: &Statement) -> Value {

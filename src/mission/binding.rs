@@ -82,6 +82,18 @@ impl Bindings {
         }
     }
 
+    /// Whether a predicate says which functions an action of the knowledge base requires.
+    pub(super) fn says_needs(&self, predicate: &Name, known: &str) -> bool {
+        match self.predicate(predicate) {
+            Some(Query::Requires(None)) => true,
+            Some(Query::Requires(Some(action))) => {
+                [Name::new(known), Name::new(known.strip_prefix("a_").unwrap_or(known))]
+                    .contains(&Name::new(&action))
+            }
+            _ => false,
+        }
+    }
+
     /// The attribute that a function sums over chosen designs, if that is stated.
     pub(super) fn chosen(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {

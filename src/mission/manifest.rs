@@ -10,8 +10,9 @@ use serde::Deserialize;
 
 use crate::knowledge::{COADAPTATION, Sources, TOMASYS};
 use crate::mapek::{Settings, number};
-use crate::message::Message;
+use crate::message::{Message, did_you_mean};
 use crate::mission::binding::Bindings;
+use crate::mission::kind::{self, Kind};
 use crate::mission::source;
 use crate::simulate::Simulation;
 
@@ -102,9 +103,10 @@ impl Manifest {
     pub fn read(file: &Path) -> Result<Self, Message> {
         let source = source(file)?;
         let (name, text) = (source.name().to_owned(), source.text());
+        kind::expect(Kind::Manifest, &name, text)?;
         let mut manifest: Self = toml::from_str(text).map_err(|error| {
             let place = error.span().map(|span| line_and_column(text, span.start));
-            Message::at("M104", &name, place, error.message().to_owned())
+            Message::at("M104", &name, place, error.message().to_owned() + &meant(error.message()))
         })?;
         manifest.directory = file.parent().map(Path::to_owned).unwrap_or_default();
         manifest.file = name;
@@ -192,6 +194,15 @@ impl Manifest {
     /// A query that is none.
     pub fn bindings(&self) -> Result<Bindings, Message> {
         Bindings::with(&self.bindings).map_err(|message| Message::at("M105", &self.file, None, message))
+    }
+}
+
+/// Which key was meant, where the message of the parser lists those that there are.
+fn meant(message: &str) -> String {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    match (message.starts_with("unknown field"), quoted.next()) {
+        (true, Some(written)) => did_you_mean(written, quoted),
+        _ => String::new(),
     }
 }
 

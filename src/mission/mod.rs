@@ -5,6 +5,8 @@
 
 mod binding;
 mod blocking;
+mod doubts;
+mod kind;
 mod live;
 mod manifest;
 mod native;
@@ -21,9 +23,11 @@ use crate::knowledge::Knowledge;
 use crate::mapek::Settings;
 use crate::message::Message;
 use crate::probabilistic::Roles;
+use kind::Kind;
 
 pub use binding::Bindings;
 pub use blocking::Blocking;
+pub(crate) use kind::read;
 pub use manifest::{Manifest, Scenario};
 pub use native::CoAdaptation;
 
@@ -91,6 +95,13 @@ impl Mission {
                 return Err(errors);
             }
         };
+        for (kind, source) in [(Kind::Domain, &domain_source), (Kind::Problem, &problem_source)] {
+            errors.extend(kind::expect(kind, source.name(), source.text()).err());
+        }
+        // Of what is no PDDL nothing is shown.
+        if errors.iter().any(|error| error.code == kind::CODE) {
+            return Err(errors);
+        }
         let parsed = parse(&domain_source, &problem_source);
         let (domain, problem, warnings) = match parsed {
             Ok(parsed) if errors.is_empty() => parsed,
@@ -126,6 +137,11 @@ impl Mission {
     /// What is questionable about the files.
     pub fn warnings(&self) -> impl Iterator<Item = &Message> {
         self.warnings.iter().chain(self.knowledge.iter().flat_map(Knowledge::warnings))
+    }
+
+    /// Adds [`Mission::doubts`] to the warnings, once the situation is complete.
+    pub fn note_doubts(&mut self) {
+        self.warnings.extend(self.doubts());
     }
 
     /// How eager the adaptation loop is.
@@ -331,7 +347,7 @@ pub fn source(path: &Path) -> Result<Source, Message> {
         let mut bytes = Vec::new();
         std::io::Read::read_to_end(&mut std::io::stdin(), &mut bytes).map(|_| bytes)
     } else {
-        std::fs::read(path)
+        read(path)
     };
     match bytes {
         Ok(bytes) => Ok(Source::from_bytes(name, &bytes)),

@@ -4,7 +4,7 @@ use encodings::pddl::ast::{InitialElement, Name, Span, Term};
 use num_rational::BigRational;
 
 use crate::knowledge::Knowledge;
-use crate::message::Message;
+use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
 use crate::mission::binding::atom;
 
@@ -120,7 +120,11 @@ impl Mission {
             declared(&self.domain.functions),
             declared(&self.domain.predicates),
         );
-        Message::error("M106", text)
+        let declared = self.domain.functions.iter().chain(&self.domain.predicates);
+        let known =
+            declared.map(|own| own.identifier.name.as_str()).chain(attributes.iter().map(String::as_str));
+        let symbol = name.split_whitespace().next().unwrap_or(name);
+        Message::error("M106", text + &did_you_mean(symbol, known))
     }
 }
 

@@ -332,7 +332,7 @@ impl World {
             let value = signal.mean + signal.amplitude * turn.sin();
             let value = exact((value * 100.0).round() / 100.0);
             if let Some(knowledge) = self.truth.knowledge_mut() {
-                knowledge.try_measure(&signal.attribute, &value)?;
+                knowledge.observe(&signal.attribute, &value)?;
             }
             events.push(Event::Measured { attribute: signal.attribute.clone(), value });
         }

@@ -53,7 +53,8 @@ const PROBLEM: &str = "
 (define (problem fleet) (:domain suave) (:init) (:goal (inspected)) (:metric minimize (total-time)))
 ";
 
-fn fleet() -> Option<Vec<Loop>> {
+/// The files of the mission, the manifest `m.toml` among them.
+pub fn files() -> Option<tempfile::TempDir> {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
     if !shared.is_dir() {
         println!("skipped: there is no ../shared beside the project");
@@ -70,6 +71,11 @@ fn fleet() -> Option<Vec<Loop>> {
     for (name, text) in files {
         std::fs::write(directory.path().join(name), text).expect("a file");
     }
+    Some(directory)
+}
+
+fn fleet() -> Option<Vec<Loop>> {
+    let directory = files()?;
     let (mission, _) = Mission::read(&directory.path().join("m.toml")).expect("the mission is read");
     let settings = mission.settings().clone();
     let first = Loop::new(mission, settings).expect("the mission can be planned for");

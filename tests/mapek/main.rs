@@ -1,10 +1,14 @@
 //! The adaptation loop as a library: the paper's experiments event by event, the journal under crashes, random events.
 
 mod common;
+mod damage;
 mod experiments;
 mod failures;
+mod faults;
 mod fleet;
 mod fuzz;
 mod journal;
 mod kill;
+mod numbers;
 mod soak;
+mod worlds;

@@ -3,10 +3,14 @@
 mod certificate;
 mod check;
 mod cli;
+mod client;
 mod common;
 mod concurrent;
+mod doubts;
 mod explain;
 mod export;
+mod journal;
+mod limits;
 mod mutation;
 mod probabilistic;
 mod real;

@@ -43,6 +43,7 @@ fn errors_change_nothing_and_the_loop_goes_on() {
             "0 plan_found",
             "0 reconfigure",
             "0 request_action",
+            "0 handled",
             "1 error",
             "1 handled",
             "2 handled",
@@ -76,6 +77,7 @@ fn a_situation_without_a_plan_is_left_when_it_changes() {
         &[
             "0 plan_requested",
             "0 plan_none",
+            "0 handled",
             "1 inferred",
             "1 plan_requested",
             "1 plan_found",
@@ -110,6 +112,7 @@ fn events_come_from_files_and_plain_pddl_runs_too() {
             "0 reconfigure",
             "0 reconfigure",
             "0 request_action",
+            "0 handled",
             "1 handled",
         ],
     );

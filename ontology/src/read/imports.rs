@@ -205,6 +205,9 @@ fn candidates(directory: &Path, depth: usize) -> Vec<Candidate> {
 /// The ontology IRI that a file declares, or `None` where its start declares none.
 fn declared_iri(path: &Path) -> Option<String> {
     use std::io::Read;
+    if !path.is_file() {
+        return None;
+    }
     let mut head = Vec::with_capacity(HEAD);
     std::fs::File::open(path).ok()?.take(HEAD as u64).read_to_end(&mut head).ok()?;
     document::ontology_iri(&head)

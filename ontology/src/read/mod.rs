@@ -199,7 +199,7 @@ fn load(
             if !seen.insert(path.as_os_str().as_encoded_bytes().into()) {
                 return Ok(None);
             }
-            let text = std::fs::read(&path).map_err(unreadable)?;
+            let text = regular_file(&path).map_err(unreadable)?;
             (file.display().to_string(), text, Some(path))
         }
     };
@@ -212,6 +212,23 @@ fn load(
     let document = document::parse(&text, &name, &base, &format!("d{index}"))?;
     let text: Arc<[u8]> = text.into();
     Ok(if seen.insert(Arc::clone(&text)) { Some((document, path, text)) } else { None })
+}
+
+/// Documents with more bytes are not read.
+const LARGEST: u64 = 1 << 30;
+
+/// The bytes of a regular file: a pipe would keep us waiting, and some devices have no end.
+fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
+    use std::io::Read;
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is no regular file"));
+    }
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST {
+        return Err(std::io::Error::other(format!("it has more than {LARGEST} bytes")));
+    }
+    Ok(bytes)
 }
 
 fn standard_input() -> Result<Vec<u8>, Vec<Error>> {

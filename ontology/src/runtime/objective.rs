@@ -87,14 +87,30 @@ impl Runtime {
     /// # Errors
     /// [`Error::Unknown`], [`Error::Engine`].
     pub fn ground(&mut self, objective: &str, design: &str) -> Result<Individual, Error> {
-        let facts = self.facts();
+        let (found, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
+        let noted = self.mode == Mode::Retract && self.facts().is_true(found, terms::UPDATABLE);
+        let recoveries = if noted { self.recoveries() } else { Vec::new() };
+        self.ground_and_forget(objective, design, recoveries)
+    }
+
+    /// As [`Runtime::ground`], and what components have reported stays as it is, recoveries among it.
+    ///
+    /// # Errors
+    /// [`Error::Unknown`], [`Error::Engine`].
+    pub fn assign(&mut self, objective: &str, design: &str) -> Result<Individual, Error> {
+        self.ground_and_forget(objective, design, Vec::new())
+    }
+
+    fn ground_and_forget(
+        &mut self,
+        objective: &str,
+        design: &str,
+        forgotten: Vec<Fact>,
+    ) -> Result<Individual, Error> {
         let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
         let (design, _) = self.all().find("function design", terms::FUNCTION_DESIGN, design)?;
-        let noted = self.mode == Mode::Retract && facts.is_true(objective, terms::UPDATABLE);
         let mut delete = self.release(objective);
-        if noted {
-            delete.extend(self.recoveries());
-        }
+        delete.extend(forgotten);
         let iri = self.grounding_name(objective, design);
         let measurements = self.measurements(design);
         let grounding = self.engine.symbols_mut().name(&iri);

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use encodings::Limits;
 
 use crate::mapek::plan::{Ask, from_scratch};
-use crate::mapek::{Loop, Observation, PlannedStep};
+use crate::mapek::{Loop, Observation, PlannedStep, Watch};
 use crate::mission::Mission;
 
 /// A mission, and what can happen in it.
@@ -151,7 +151,7 @@ impl Tally {
         let found = control.planner.live.plan(&ask, &Limits::none());
         self.live += begun.elapsed();
         let begun = Instant::now();
-        let expected = from_scratch(&ask, Limits::none());
+        let expected = from_scratch(&ask, Limits::none(), &Watch::default());
         self.scratch += begun.elapsed();
         let Some(found) = found else {
             self.left += 1;

@@ -102,6 +102,11 @@ impl CoAdaptation {
         if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors) }
     }
 
+    /// Whether a function stands for the chosen designs, or for those that a change has brought.
+    pub(super) fn stands_for_designs(&self, function: &Name) -> bool {
+        self.chosen.contains_key(function) || self.changed.contains_key(function)
+    }
+
     fn errors(&self, domain: &Domain) -> Vec<Message> {
         let mut errors = Vec::new();
         let declared = domain.predicates.iter().chain(&domain.functions).map(|d| &d.identifier.name);

@@ -1,0 +1,91 @@
+//! `metaplan journal`: what is in the journal of a loop.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use metaplan::journal::{Entry, Report};
+use serde_json::{Value, json};
+
+use crate::cli::{Common, Exit, Failure, Format, output};
+
+/// Arguments of `journal`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Whether the journal can be used, and what is wrong with it.
+    Check {
+        /// The journal's directory.
+        #[arg(value_name = "DIR")]
+        directory: PathBuf,
+    },
+    /// All sound records: events, and what was decided.
+    Show {
+        /// The journal's directory.
+        #[arg(value_name = "DIR")]
+        directory: PathBuf,
+    },
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let (What::Check { directory } | What::Show { directory }) = &arguments.what;
+    let report = Report::read(directory)?;
+    let shows = matches!(arguments.what, What::Show { .. });
+    if common.format == Format::Json {
+        let mut answer = json!({
+            "format": "metaplan-journal-report/1",
+            "sound": report.is_sound(),
+            "parts": report.parts,
+            "messages": report.messages,
+        });
+        if shows {
+            answer["records"] = report.entries.iter().map(record).collect();
+        }
+        output::json_answer(&answer);
+    } else {
+        let lines = if shows { report.entries.iter().map(line).collect() } else { report.parts.clone() };
+        let mut text = lines.into_iter().fold(String::new(), |text, line| text + &line + "\n");
+        if !shows {
+            text +=
+                if report.is_sound() { "the journal can be used\n" } else { "the journal cannot be used\n" };
+        }
+        output::answer(&text);
+        output::warnings(common, &report.messages);
+    }
+    Ok(if report.is_sound() { Exit::Done } else { Exit::BadInput })
+}
+
+fn record(entry: &Entry) -> Value {
+    let content = if entry.kind == "decision" { "answers" } else { "line" };
+    let mut object = json!({ "record": entry.record, "segment": entry.segment, "kind": entry.kind });
+    if let Some(time) = entry.time {
+        object["microseconds"] = json!(time);
+    }
+    if !entry.content.is_null() {
+        object[content] = entry.content.clone();
+    }
+    object
+}
+
+fn line(entry: &Entry) -> String {
+    let mut text = format!("{:>7}  {:<8}", entry.record, entry.kind);
+    if let Some(time) = entry.time {
+        let _ = write!(text, "  {:.3} s", time as f64 / 1e6);
+    }
+    let content = match &entry.content {
+        Value::String(line) => line.clone(),
+        Value::Array(answers) if answers.is_empty() => "nothing".to_owned(),
+        Value::Array(answers) => {
+            let kinds: Vec<&str> = answers.iter().filter_map(|answer| answer["answer"].as_str()).collect();
+            kinds.join(", ")
+        }
+        _ => return text,
+    };
+    text + "  " + &content
+}

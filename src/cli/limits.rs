@@ -1,0 +1,80 @@
+//! Time limits and signals, from the first file read to the last proof.
+//!
+//! While a mission is read and reasoned about there is no answer that could be saved, so that a signal ends the program at
+//! once, and a thread of its own ends it when time is up. From then on the planner listens: it answers with the best plan so
+//! far, and a second signal ends the program at once.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use encodings::Limits;
+use metaplan::message::Message;
+
+use crate::cli::{Common, Exit, Failure, memory, output};
+
+/// How often the reading thread looks at the clock.
+const INTERVAL: Duration = Duration::from_millis(10);
+
+/// The limits of a command that reads first, and plans then.
+pub(super) struct Guard {
+    limits: Limits,
+    has_read: Arc<AtomicBool>,
+}
+
+impl Guard {
+    /// Begins to measure time and memory.
+    ///
+    /// # Errors
+    /// The platform does not tell how much memory the process occupies.
+    pub(super) fn new(time: Option<Duration>, memory: Option<u64>, common: &Common) -> Result<Self, Failure> {
+        let mut limits = Limits::none();
+        if let Some(time) = time {
+            limits = limits.with_time(time);
+        }
+        if let Some(megabytes) = memory {
+            memory::watch(megabytes, limits.interrupt())?;
+        }
+        let has_read = Arc::new(AtomicBool::new(false));
+        if time.is_some() || memory.is_some() {
+            give_up_late(limits.clone(), Arc::clone(&has_read), common.clone());
+        }
+        Ok(Self { limits, has_read })
+    }
+
+    /// All has been read. Signals, time and memory are the planner's business from now on.
+    pub(super) fn plan(self) -> Limits {
+        if self.has_read.swap(true, Ordering::Relaxed) {
+            // The other thread has begun to say that time is up, and ends the program.
+            loop {
+                std::thread::park();
+            }
+        }
+        let interrupt = self.limits.interrupt();
+        // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual. Who presses it
+        // again does not want the best plan so far, either.
+        let _ = ctrlc::set_handler(move || {
+            if interrupt.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
+        self.limits
+    }
+}
+
+/// Reading does not look at the limits.
+fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, common: Common) {
+    std::thread::spawn(move || {
+        while !limits.reached() {
+            if has_read.load(Ordering::Relaxed) {
+                return;
+            }
+            std::thread::sleep(INTERVAL);
+        }
+        if !has_read.swap(true, Ordering::Relaxed) {
+            let text = "a limit was reached while files were read and reasoned about; nothing was planned";
+            output::failure(&common, &[Message::error("M130", text)]);
+            std::process::exit(Exit::NothingFound as i32);
+        }
+    });
+}

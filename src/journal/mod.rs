@@ -1,0 +1,298 @@
+//! The journal: every observation and every decision of a loop on disk before anything is done about it.
+//!
+//! A directory holds segments `journal-N` and, but for the first, the snapshot `snapshot-N` that each begins from; two
+//! generations are kept. Records are numbered and chained, see `record`. An observation is written before it is
+//! handled, and the decision before any of its answers leaves the program \[1\]. On opening, the loop is brought
+//! back by the newest sound snapshot and by handling the observations since again, with the plans as they were made then;
+//! what it answers must be what is written, explanations apart, or else the journal is refused.
+//!
+//! A crash may leave the last record incomplete. It is cut off, kept in a file beside, and reported. Nothing whole is ever
+//! cut off: whatever else is wrong with what is needed is an error, and whatever is wrong with what is not needed is a
+//! warning.
+//!
+//! A new segment is there before the old one ends with a record that says so, and that before the snapshot. So a
+//! segment that is missing is noticed, and a crash in between is not taken for one.
+//!
+//! One process at a time has the journal: it holds a lock on the file `lock`, which the operating system releases when the
+//! process ends, however it ends. The file says, too, how many records there are, so that missing ones are noticed.
+//!
+//! - \[1\] C. Mohan et al.: ARIES, a transaction recovery method, ACM TODS 17, 1992.
+
+mod directory;
+mod lock;
+mod record;
+mod recover;
+mod report;
+
+use std::fs::File;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::mapek::{Answer, Decision, Loop, Observation, Snapshot};
+use crate::message::Message;
+use directory::{Contents, broken, closing, name, path};
+use lock::Lock;
+use record::{Link, header};
+use recover::{Replay, Unfinished, settle, usable};
+
+pub use report::{Entry, Report};
+
+/// When the operating system is made to write to the disk itself. A program that is killed loses nothing either way;
+/// a machine that loses power may lose what was not yet written.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Sync {
+    /// After every observation, before its answers leave the program.
+    Always,
+    /// Before effects leave the program.
+    #[default]
+    Effects,
+    /// When the operating system sees fit.
+    Never,
+}
+
+/// How a journal is kept.
+#[derive(Debug, Clone, Copy)]
+pub struct Policy {
+    /// When the disk is written to.
+    pub sync: Sync,
+    /// After so many observations a snapshot is made, and a new segment begun.
+    pub snapshot_every: u64,
+}
+
+impl Default for Policy {
+    fn default() -> Self {
+        Self { sync: Sync::default(), snapshot_every: 1000 }
+    }
+}
+
+/// What opening a journal has come to.
+#[derive(Debug, Clone, Default)]
+pub struct Recovery {
+    /// How many observations were handled again; none for a new journal.
+    pub replayed: Option<u64>,
+    /// How many bytes of an incomplete record were cut off.
+    pub cut: u64,
+    /// What is wrong with the journal and has changed nothing.
+    pub warnings: Vec<Message>,
+}
+
+/// An open journal.
+#[derive(Debug)]
+pub struct Journal {
+    directory: PathBuf,
+    policy: Policy,
+    segment: u64,
+    file: File,
+    link: Link,
+    /// Locked for as long as it is open.
+    lock: Lock,
+    /// Observations since the snapshot.
+    observations: u64,
+    /// What was begun and not decided when the program ended.
+    unfinished: Option<Unfinished>,
+    digest: String,
+}
+
+impl Journal {
+    /// Opens the journal in a directory, which is made if there is none, for a loop that has not begun. The loop is
+    /// then as it was when the last decision was written, or has not begun yet; [`Journal::begin`] has to follow.
+    ///
+    /// # Errors
+    /// The directory cannot be used, or another process uses it; or the journal is damaged or belongs to another
+    /// mission. Nothing has changed then.
+    pub fn open(directory: &Path, policy: Policy, control: &mut Loop) -> Result<(Self, Recovery), Message> {
+        let failed = |error: io::Error| broken(directory, &error.to_string());
+        directory::make_directory(directory).map_err(failed)?;
+        let lock = Lock::take(directory)?;
+        let contents = Contents::read(directory).map_err(failed)?;
+        let digest = control.digest();
+        let mut recovery = Recovery::default();
+        let directory = directory.to_owned();
+        if contents.segments.is_empty() && contents.snapshots.is_empty() {
+            if lock.records > 0 {
+                return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
+            }
+            let (file, link) = create_segment(&directory, &Link::first(), &digest, 0)
+                .map_err(|error| broken(&directory, &error.to_string()))?;
+            let unfinished = Some(Unfinished::Start);
+            let (segment, observations) = (0, 0);
+            let journal =
+                Self { directory, policy, segment, file, link, lock, observations, unfinished, digest };
+            return Ok((journal, recovery));
+        }
+        let failed = |error: io::Error| broken(&directory, &error.to_string());
+        let (from, segments) =
+            usable(&contents, &mut recovery.warnings).map_err(|text| broken(&directory, &text))?;
+        if segments.iter().any(|segment| segment.digest != digest) {
+            let text = "it belongs to another mission, or the mission's files or settings have changed";
+            return Err(broken(&directory, text));
+        }
+        if from > 0 {
+            let snapshot = contents.start(from).map_err(|text| broken(&directory, &text))?;
+            control.restore(&Snapshot(snapshot.data.clone()))?;
+        }
+        recovery.replayed = Some(0);
+        let (directory_, recovery_) = (&directory, &mut recovery);
+        let mut replay =
+            Replay { directory: directory_, control, recovery: recovery_, observations: 0, unfinished: None };
+        let mut anew = Vec::new();
+        for segment in &segments {
+            if segment.number > from && contents.start(segment.number).is_err() {
+                anew.push((
+                    segment.number,
+                    snapshot_line(&segment.before, &digest, segment.number, replay.control),
+                ));
+            }
+            replay.segment(segment)?;
+        }
+        let Replay { observations, unfinished, .. } = replay;
+        let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
+        for (number, line) in anew {
+            write_snapshot(&directory, number, &line).map_err(failed)?;
+        }
+        if lock.records > link.next {
+            let text = format!(
+                "the last {} records of the journal are missing; send again what follows `seq`",
+                lock.records - link.next
+            );
+            recovery.warnings.push(Message::warning("M323", text));
+        }
+        let segment = segments.last().map_or(from, |last| last.number);
+        let journal = Self { directory, policy, segment, file, link, lock, observations, unfinished, digest };
+        Ok((journal, recovery))
+    }
+
+    /// Decides what was begun, which may take as long as a plan takes. The answers have not left the program, or may not
+    /// have: those to what was begun, then effects that were not acknowledged.
+    ///
+    /// # Errors
+    /// The journal cannot be written; the answers must not leave the program.
+    pub fn begin(&mut self, control: &mut Loop) -> io::Result<Vec<Answer>> {
+        let mut answers = Vec::new();
+        if let Some(unfinished) = self.unfinished.take() {
+            answers = match unfinished {
+                Unfinished::Start => control.start(),
+                Unfinished::Observation(line, now) => {
+                    self.observations += 1;
+                    control.handle(&Observation::parse(&line), Duration::from_micros(now))
+                }
+            };
+            let decision = control.decision(&answers);
+            self.decide(&decision)?;
+        }
+        self.file.sync_data()?;
+        self.lock.note(self.link.next)?;
+        let fresh: Vec<u64> = answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
+        let again = control.repeat().into_iter();
+        let is_fresh = |answer: &Answer| answer.effect().is_some_and(|effect| fresh.contains(&effect.number));
+        answers.extend(again.filter(|answer| !is_fresh(answer)));
+        Ok(answers)
+    }
+
+    /// Writes an observation, lets the loop handle it, and writes what it has decided; the answers may leave the program
+    /// then.
+    ///
+    /// # Errors
+    /// The journal cannot be written; the answers must not leave the program.
+    pub fn handle(&mut self, control: &mut Loop, line: &str, now: Duration) -> io::Result<Vec<Answer>> {
+        let micros = u64::try_from(now.as_micros()).unwrap_or(u64::MAX);
+        self.append("event", &[json!(micros), json!(line)])?;
+        let answers = control.handle(&Observation::parse(line), Duration::from_micros(micros));
+        let decision = control.decision(&answers);
+        self.decide(&decision)?;
+        let must = match self.policy.sync {
+            Sync::Always => true,
+            Sync::Effects => answers.iter().any(|answer| answer.effect().is_some()),
+            Sync::Never => false,
+        };
+        if must {
+            self.file.sync_data()?;
+        }
+        self.lock.note(self.link.next)?;
+        self.observations += 1;
+        if self.observations >= self.policy.snapshot_every {
+            self.checkpoint(control)?;
+        }
+        Ok(answers)
+    }
+
+    fn decide(&mut self, decision: &Decision) -> io::Result<()> {
+        self.append("decision", &[json!(decision.answers), json!(decision.plans)])
+    }
+
+    fn append(&mut self, kind: &str, fields: &[Value]) -> io::Result<()> {
+        let (line, link) = self.link.line(kind, fields);
+        self.file.write_all(line.as_bytes())?;
+        self.link = link;
+        Ok(())
+    }
+
+    /// Begins a new segment, ends this one and writes a snapshot, in this order; older generations are removed.
+    fn checkpoint(&mut self, control: &Loop) -> io::Result<()> {
+        let next = self.segment + 1;
+        let (end, at) = closing(&self.link, self.segment);
+        let (file, link) = create_segment(&self.directory, &at, &self.digest, next)?;
+        self.file.write_all(end.as_bytes())?;
+        self.file.sync_data()?;
+        (self.file, self.link, self.segment, self.observations) = (file, link, next, 0);
+        self.lock.note(self.link.next)?;
+        let line = snapshot_line(&at, &self.digest, next, control);
+        write_snapshot(&self.directory, next, &line)?;
+        for entry in std::fs::read_dir(&self.directory)? {
+            let name = entry?.file_name();
+            let part = name.to_str().and_then(|name| name.split_once('-'));
+            let is_old = part.is_some_and(|(kind, number)| {
+                ["journal", "snapshot"].contains(&kind) && number.parse().is_ok_and(|n: u64| n + 1 < next)
+            });
+            if is_old {
+                // Nothing rests on it.
+                let _ = std::fs::remove_file(self.directory.join(&name));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Makes a segment that holds nothing but its header. It is whole or not there.
+fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> io::Result<(File, Link)> {
+    let (line, link) = header(after, digest, number);
+    let mut file = tempfile::NamedTempFile::new_in(directory)?;
+    file.write_all(line.as_bytes())?;
+    file.as_file().sync_all()?;
+    let file = file.persist(path(directory, "journal", number)).map_err(|error| error.error)?;
+    sync_directory(directory)?;
+    Ok((file, link))
+}
+
+fn snapshot_line(at: &Link, digest: &str, number: u64, control: &Loop) -> String {
+    record::snapshot(at, digest, number, &control.snapshot().0)
+}
+
+/// Writes a snapshot; one that did not serve is kept beside.
+fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
+    let name = path(directory, "snapshot", number);
+    let mut file = tempfile::NamedTempFile::new_in(directory)?;
+    file.write_all(line.as_bytes())?;
+    file.as_file().sync_all()?;
+    if name.exists() {
+        let mut beside = name.clone().into_os_string();
+        beside.push(".damaged");
+        std::fs::rename(&name, beside)?;
+    }
+    file.persist(name).map_err(|error| error.error)?;
+    sync_directory(directory)
+}
+
+#[cfg(unix)]
+fn sync_directory(directory: &Path) -> io::Result<()> {
+    File::open(directory)?.sync_all()
+}
+
+/// Where directories cannot be opened, files are as durable as the system makes them.
+#[cfg(not(unix))]
+fn sync_directory(_: &Path) -> io::Result<()> {
+    Ok(())
+}

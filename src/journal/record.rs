@@ -1,0 +1,104 @@
+//! Records of a journal as lines of text, each bound to the one before it.
+//!
+//! A line is sixteen hexadecimal digits, a space and a JSON array that begins with the record's number. The digits are the
+//! first half of a SHA-256 of the digits of the line before and of the array, so that a line that is changed,
+//! missing, doubled or elsewhere does not fit. This finds damage; it does not keep out who can write to the directory.
+
+use serde_json::{Value, json};
+use sha2::{Digest as _, Sha256};
+
+/// The version of all that is written.
+pub(super) const FORMAT: &str = "metaplan-journal/2";
+
+/// How many digits stand before a record.
+const DIGITS: usize = 16;
+
+/// A place between two records: the number of the next one, and the digits of the last one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Link {
+    pub(super) next: u64,
+    pub(super) digits: String,
+}
+
+impl Link {
+    /// Before the first record.
+    pub(super) fn first() -> Self {
+        Self { next: 0, digits: "0".repeat(DIGITS) }
+    }
+
+    /// The line of a record that comes here, and the place after it.
+    pub(super) fn line(&self, kind: &str, fields: &[Value]) -> (String, Self) {
+        let mut array = vec![json!(self.next), json!(kind)];
+        array.extend_from_slice(fields);
+        let text = Value::Array(array).to_string();
+        let digits = digits(&self.digits, text.as_bytes());
+        (format!("{digits} {text}\n"), Self { next: self.next + 1, digits })
+    }
+
+    /// The record that a line without its line break holds, and the place after it, if it belongs here.
+    pub(super) fn read(&self, line: &[u8]) -> Option<(Record, Self)> {
+        let (record, digits) = parse(line)?;
+        let text = line.get(DIGITS + 1..)?;
+        let fits = record.number == self.next && digits == self::digits(&self.digits, text);
+        fits.then(|| (record, Self { next: self.next + 1, digits }))
+    }
+}
+
+/// A record.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Record {
+    pub(super) number: u64,
+    pub(super) kind: String,
+    /// What follows number and kind.
+    pub(super) fields: Vec<Value>,
+}
+
+impl Record {
+    pub(super) fn text(&self, index: usize) -> Option<&str> {
+        self.fields.get(index).and_then(Value::as_str)
+    }
+
+    pub(super) fn count(&self, index: usize) -> Option<u64> {
+        self.fields.get(index).and_then(Value::as_u64)
+    }
+
+    pub(super) fn list(&self, index: usize) -> Vec<Value> {
+        self.fields.get(index).and_then(Value::as_array).cloned().unwrap_or_default()
+    }
+}
+
+/// The first line of a segment, which says after what it comes, and the place after it.
+pub(super) fn header(after: &Link, digest: &str, segment: u64) -> (String, Link) {
+    after.line("segment", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits)])
+}
+
+/// The only line of the snapshot with which a segment begins that comes after `after`.
+pub(super) fn snapshot(after: &Link, digest: &str, segment: u64, data: &Value) -> String {
+    after
+        .line("snapshot", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits), data.clone()])
+        .0
+}
+
+/// A line that says itself after what it comes: a header or a snapshot. The place before it, and after.
+pub(super) fn opening(line: &[u8], kind: &str) -> Option<(Record, Link, Link)> {
+    let (record, _) = parse(line)?;
+    let before = Link { next: record.number, digits: record.text(3)?.to_owned() };
+    let (record, after) = before.read(line)?;
+    (record.kind == kind).then_some((record, before, after))
+}
+
+/// What a line says, whether or not it belongs there.
+fn parse(line: &[u8]) -> Option<(Record, String)> {
+    let (digits, text) = line.split_at_checked(DIGITS)?;
+    let digits = std::str::from_utf8(digits).ok()?.to_owned();
+    let Value::Array(fields) = serde_json::from_slice(text.strip_prefix(b" ")?).ok()? else { return None };
+    let mut fields = fields.into_iter();
+    let (number, kind) = (fields.next()?.as_u64()?, fields.next()?.as_str()?.to_owned());
+    Some((Record { number, kind, fields: fields.collect() }, digits))
+}
+
+fn digits(before: &str, text: &[u8]) -> String {
+    let hash = Sha256::new().chain_update(before).chain_update(text).finalize();
+    let half = hash.iter().take(DIGITS / 2).fold(0_u64, |sum, byte| sum << 8 | u64::from(*byte));
+    format!("{half:016x}")
+}

@@ -1,0 +1,190 @@
+//! What is in a directory to a loop as it was: which records serve, handling them again, and completing what a crash has
+//! left.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Seek as _, Write as _};
+use std::path::Path;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::Recovery;
+use super::directory::{Contents, End, Segment, broken, closing, open_private, path};
+use super::record::{Link, Record};
+use crate::mapek::{Answer, Loop, Observation};
+use crate::message::Message;
+
+/// What is to be decided first.
+#[derive(Debug)]
+pub(super) enum Unfinished {
+    /// What the loop does before the first observation.
+    Start,
+    /// An observation, and its time in microseconds.
+    Observation(String, u64),
+}
+
+/// The segments to go on from, and the number of the first: from the newest snapshot that serves.
+///
+/// # Errors
+/// All that is wrong with what is needed.
+pub(super) fn usable<'a>(
+    contents: &'a Contents,
+    warnings: &mut Vec<Message>,
+) -> Result<(u64, Vec<&'a Segment>), String> {
+    let mut problems = Vec::new();
+    let last = contents.segments.keys().chain(contents.snapshots.keys()).max().copied().unwrap_or(0);
+    let first = contents.segments.keys().chain(contents.snapshots.keys()).min().copied().unwrap_or(0);
+    for from in (first..=last).rev() {
+        let start = if from == 0 { Ok(()) } else { contents.start(from).map(|_| ()) };
+        match start.and_then(|()| contents.chain(from)) {
+            Ok(segments) => {
+                // Older generations are of no use any more; that they are damaged is worth a word.
+                let older = (first..from).filter(|&number| number > 0);
+                problems.extend(older.filter_map(|number| contents.start(number).err()));
+                problems.extend(contents.chain(first).err());
+                problems.sort();
+                problems.dedup();
+                let warning = |text: &String| {
+                    Message::warning("M323", format!("the journal: {text}; it was not needed"))
+                };
+                warnings.extend(problems.iter().map(warning));
+                return Ok((from, segments));
+            }
+            Err(text) => problems.push(text),
+        }
+    }
+    problems.sort();
+    problems.dedup();
+    let way_out = "nothing was changed; `metaplan journal show` lists what is sound; restore what is damaged from a copy, or \
+                   take another directory";
+    Err(format!("{}; {way_out}", problems.join(", ")))
+}
+
+/// Brings a loop to where records end.
+pub(super) struct Replay<'a> {
+    pub(super) directory: &'a Path,
+    pub(super) control: &'a mut Loop,
+    pub(super) recovery: &'a mut Recovery,
+    /// Observations since the last segment began.
+    pub(super) observations: u64,
+    pub(super) unfinished: Option<Unfinished>,
+}
+
+impl Replay<'_> {
+    /// Handles a segment again.
+    pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
+        self.observations = 0;
+        let mut records = segment.records.iter().filter(|record| record.kind != "end").peekable();
+        // What a loop does first stands in the first segment only.
+        if segment.number == 0 {
+            match records.next_if(|record| record.kind == "decision") {
+                Some(decision) => {
+                    let answers = self.control.start_again(&decision.list(1));
+                    self.compare(decision, &answers)?;
+                }
+                None => self.unfinished = Some(Unfinished::Start),
+            }
+        }
+        while let Some(record) = records.next() {
+            let wrong =
+                || broken(self.directory, &format!("record {} is not where it belongs", record.number));
+            let (Some(now), Some(line)) = (record.count(0), record.text(1)) else { return Err(wrong()) };
+            if record.kind != "event" || self.unfinished.is_some() {
+                return Err(wrong());
+            }
+            match records.next_if(|record| record.kind == "decision") {
+                Some(decision) => {
+                    let observation = Observation::parse(line);
+                    let now = Duration::from_micros(now);
+                    let answers = self.control.handle_again(&observation, now, &decision.list(1));
+                    self.compare(decision, &answers)?;
+                    self.observations += 1;
+                }
+                None => self.unfinished = Some(Unfinished::Observation(line.to_owned(), now)),
+            }
+            self.recovery.replayed = self.recovery.replayed.map(|count| count + 1);
+        }
+        Ok(())
+    }
+
+    /// Compares answers with those that were written.
+    fn compare(&mut self, written: &Record, answers: &[Answer]) -> Result<(), Message> {
+        let made = self.control.decision(answers).answers;
+        let essence = |answers: Vec<Value>| answers.into_iter().map(essence).collect::<Vec<_>>();
+        if essence(written.list(0)) == essence(made) {
+            return Ok(());
+        }
+        let text =
+            format!("the mission now leads to another decision than the one in record {}", written.number);
+        Err(broken(self.directory, &text))
+    }
+}
+
+/// An answer without explanations: of several that are right, which one is given depends on what came before the
+/// snapshot.
+fn essence(mut answer: Value) -> Value {
+    let kind = answer["answer"].as_str().unwrap_or_default().to_owned();
+    let mut strip = |list: &str, field: &str| {
+        let objects = answer.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
+        for object in objects.filter_map(Value::as_object_mut) {
+            object.remove(field);
+        }
+    };
+    match kind.as_str() {
+        "inferred" => {
+            strip("designs", "because");
+            strip("objectives", "because");
+        }
+        "contradicted" => strip("contradictions", "facts"),
+        _ => {}
+    }
+    answer
+}
+
+/// Completes what a crash has left at the end of the last segments, and opens the last one to be written on.
+pub(super) fn settle(
+    directory: &Path,
+    segments: &[&Segment],
+    recovery: &mut Recovery,
+) -> io::Result<(File, Link)> {
+    for (position, segment) in segments.iter().enumerate() {
+        let is_last = position + 1 == segments.len();
+        if !is_last && segment.end == End::Whole && segment.is_closed() {
+            continue;
+        }
+        let name = path(directory, "journal", segment.number);
+        let mut file = open_private(&name, OpenOptions::new().read(true).write(true))?;
+        if let End::Incomplete(bytes) = segment.end {
+            recovery.cut += bytes;
+            keep_cut(&name, segment.sound)?;
+        }
+        file.set_len(segment.sound)?;
+        file.seek(io::SeekFrom::End(0))?;
+        if segment.end == End::Unbroken {
+            file.write_all(b"\n")?;
+        }
+        if !is_last && !segment.is_closed() {
+            file.write_all(closing(&segment.after, segment.number).0.as_bytes())?;
+        }
+        file.sync_data()?;
+        if is_last {
+            return Ok((file, segment.after.clone()));
+        }
+    }
+    Err(io::Error::other("nothing is in it"))
+}
+
+/// Keeps what is to be cut off a file in another one beside it.
+fn keep_cut(name: &Path, sound: u64) -> io::Result<()> {
+    let bytes = std::fs::read(name)?;
+    let rest = bytes.get(sound as usize..).unwrap_or_default();
+    let mut number = 0;
+    loop {
+        let mut beside = name.as_os_str().to_owned();
+        beside.push(format!(".cut{number}"));
+        match open_private(Path::new(&beside), OpenOptions::new().create_new(true).write(true)) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            other => return other.and_then(|mut file| file.write_all(rest)),
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! What is in a journal, for people and programs; no mission is needed, and nothing is changed.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::directory::{Contents, End, Segment, broken, name};
+use super::recover::usable;
+use crate::message::Message;
+
+/// What is in a journal.
+#[derive(Debug)]
+pub struct Report {
+    /// One sentence for each segment and snapshot.
+    pub parts: Vec<String>,
+    /// What is wrong: an error where the journal cannot be used, a warning otherwise.
+    pub messages: Vec<Message>,
+    /// All sound records that are there, in their order.
+    pub entries: Vec<Entry>,
+}
+
+/// A record.
+#[derive(Debug)]
+pub struct Entry {
+    /// Its number.
+    pub record: u64,
+    /// The number of its segment.
+    pub segment: u64,
+    /// `event`, `decision` or `end`.
+    pub kind: String,
+    /// Of an event: its time since the start of the mission, in microseconds.
+    pub time: Option<u64>,
+    /// Of an event the line, of a decision the answers.
+    pub content: Value,
+}
+
+impl Report {
+    /// Reads the journal in a directory.
+    ///
+    /// # Errors
+    /// The directory cannot be read, or there is no journal in it.
+    pub fn read(directory: &Path) -> Result<Self, Message> {
+        let contents = Contents::read(directory).map_err(|error| broken(directory, &error.to_string()))?;
+        if contents.segments.is_empty() && contents.snapshots.is_empty() {
+            return Err(broken(directory, "there is none"));
+        }
+        let (mut parts, mut messages, mut entries) = (Vec::new(), Vec::new(), Vec::new());
+        if let Err(text) = usable(&contents, &mut messages) {
+            messages.push(broken(directory, &text));
+        }
+        for (number, segment) in &contents.segments {
+            match segment {
+                Ok(segment) => {
+                    parts.push(format!("{}: {}", name("journal", *number), describe(segment)));
+                    entries.extend(segment.records.iter().map(|record| Entry {
+                        record: record.number,
+                        segment: *number,
+                        kind: record.kind.clone(),
+                        time: record.count(0).filter(|_| record.kind == "event"),
+                        content: match record.kind.as_str() {
+                            "event" => json!(record.text(1)),
+                            "decision" => json!(record.list(0)),
+                            _ => Value::Null,
+                        },
+                    }));
+                }
+                Err(text) => parts.push(format!("{}: {text}", name("journal", *number))),
+            }
+        }
+        for (number, snapshot) in &contents.snapshots {
+            let text = match snapshot {
+                Ok(snapshot) => format!("the state before record {}", snapshot.before.next),
+                Err(text) => text.clone(),
+            };
+            parts.push(format!("{}: {text}", name("snapshot", *number)));
+        }
+        Ok(Self { parts, messages, entries })
+    }
+
+    /// Whether the journal can be used.
+    pub fn is_sound(&self) -> bool {
+        self.messages.iter().all(|message| message.severity == "warning")
+    }
+}
+
+fn describe(segment: &Segment) -> String {
+    let (first, next) = (segment.before.next, segment.after.next);
+    let records = format!("records {first} to {}, {} bytes", next - 1, segment.sound);
+    match segment.end {
+        End::Whole => records,
+        End::Unbroken => format!("{records}; the last line break is missing"),
+        End::Incomplete(bytes) => {
+            format!("{records}; then {bytes} bytes of a record that was not written completely")
+        }
+        End::Damaged(line) => format!("{records}; line {line} is damaged, or does not belong there"),
+    }
+}

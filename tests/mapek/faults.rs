@@ -1,0 +1,311 @@
+//! A journal that was damaged in every way that is small enough to try: it is refused, or what is wrong is said, or the loop
+//! is as it would be undamaged. Never is it wrong without a word.
+#![expect(clippy::print_stdout, reason = "figures are what the long test is for")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use metaplan::journal::{Journal, Policy, Report, Sync};
+use metaplan::mapek::{Answer, Loop};
+use metaplan::mission::Mission;
+use serde_json::Value;
+
+use crate::common::control;
+use crate::journal::{script, state};
+
+/// Two generations and a segment that has begun.
+const POLICY: Policy = Policy { sync: Sync::Never, snapshot_every: 9 };
+
+type Files = BTreeMap<String, Vec<u8>>;
+
+/// Runs the script; what is in the directory then.
+fn written(pristine: &Loop) -> Files {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut control = pristine.clone();
+    let (mut journal, _) = Journal::open(directory.path(), POLICY, &mut control).expect("it opens");
+    journal.begin(&mut control).expect("written");
+    for line in script() {
+        journal.handle(&mut control, &line, Duration::ZERO).expect("written");
+    }
+    drop(journal);
+    let entries = std::fs::read_dir(directory.path()).expect("a directory");
+    entries
+        .map(|entry| {
+            let path = entry.expect("an entry").path();
+            let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+            (name, std::fs::read(path).expect("a file"))
+        })
+        .collect()
+}
+
+#[derive(Debug, PartialEq)]
+enum Outcome {
+    Refused,
+    /// Something was cut off, or is missing, and that was said.
+    Said,
+    /// State, and effects that are asked for again.
+    Sound(Value, Vec<Answer>),
+}
+
+fn open(files: &Files, pristine: &Loop) -> Outcome {
+    let directory = tempfile::tempdir().expect("a directory");
+    for (name, bytes) in files {
+        std::fs::write(directory.path().join(name), bytes).expect("a file");
+    }
+    let mut control = pristine.clone();
+    let Ok((mut journal, recovery)) = Journal::open(directory.path(), POLICY, &mut control) else {
+        for (name, bytes) in files.iter().filter(|(name, _)| *name != "lock") {
+            let now = std::fs::read(directory.path().join(name)).expect("the file is still there");
+            assert_eq!(now, *bytes, "{name} was changed by what was refused");
+        }
+        return Outcome::Refused;
+    };
+    if recovery.cut > 0 {
+        let cut =
+            std::fs::read_dir(directory.path()).expect("a directory").map(|entry| entry.expect("an entry"));
+        let cut: u64 = cut
+            .filter(|entry| entry.file_name().to_string_lossy().contains(".cut"))
+            .map(|entry| entry.metadata().expect("a file").len())
+            .sum();
+        assert_eq!(cut, recovery.cut, "what was cut off is kept");
+    }
+    let answers = journal.begin(&mut control).expect("written");
+    let is_lost = recovery.warnings.iter().any(|warning| warning.message.contains("are missing"));
+    if recovery.cut > 0 || is_lost {
+        return Outcome::Said;
+    }
+    let sound = Outcome::Sound(state(&control), answers);
+    drop(journal);
+    // What was completed is complete, and says so.
+    let again = Report::read(directory.path()).expect("a journal");
+    assert!(again.is_sound(), "{:?}", again.messages);
+    sound
+}
+
+/// What became of so many faults.
+#[derive(Debug, Default)]
+struct Count {
+    refused: usize,
+    said: usize,
+    harmless: usize,
+}
+
+struct Suite {
+    pristine: Loop,
+    files: Files,
+    sound: Outcome,
+    count: Count,
+}
+
+impl Suite {
+    fn new() -> Self {
+        let pristine = control("ugv");
+        let files = written(&pristine);
+        let sound = open(&files, &pristine);
+        assert!(matches!(sound, Outcome::Sound(..)), "{sound:?}");
+        assert!(files.values().map(Vec::len).sum::<usize>() > 10_000);
+        Self { pristine, files, sound, count: Count::default() }
+    }
+
+    fn check(&mut self, what: &str, change: impl FnOnce(&mut Files)) {
+        let mut files = self.files.clone();
+        change(&mut files);
+        match open(&files, &self.pristine) {
+            Outcome::Refused => self.count.refused += 1,
+            Outcome::Said => self.count.said += 1,
+            sound @ Outcome::Sound(..) => {
+                assert!(sound == self.sound, "{what}: wrong without a word");
+                self.count.harmless += 1;
+            }
+        }
+    }
+
+    /// All faults, of those by bits and bytes every so many.
+    fn all(&mut self, stride: usize) {
+        let names: Vec<String> = self.files.keys().cloned().collect();
+        for name in &names {
+            let length = self.files[name].len();
+            let stride = stride.min(length);
+            let mut tried = 0;
+            for bit in (0..length * 8).step_by(stride) {
+                self.check(&format!("bit {bit} of {name}"), |files| {
+                    files.get_mut(name).expect("a file")[bit / 8] ^= 1 << (bit % 8);
+                });
+                tried += 1;
+            }
+            for keep in (0..length).step_by(stride.div_ceil(8)) {
+                self.check(&format!("{name} cut to {keep}"), |files| {
+                    files.get_mut(name).expect("a file").truncate(keep);
+                });
+                tried += 1;
+            }
+            assert!(tried > 4, "{name}");
+        }
+        self.lines(&names, stride == 1);
+        for name in &names {
+            self.check(&format!("no {name}"), |files| {
+                files.remove(name);
+            });
+            for other in &names {
+                self.check(&format!("{name} for {other}"), |files| {
+                    files.insert(other.clone(), files[name].clone());
+                });
+                self.check(&format!("neither {name} nor {other}"), |files| {
+                    files.remove(name);
+                    files.remove(other);
+                });
+            }
+            for (what, tail) in [("zeros", &[0; 512][..]), ("a text", b"hello"), ("a line", b"hello\n")] {
+                self.check(&format!("{what} after {name}"), |files| {
+                    files.get_mut(name).expect("a file").extend_from_slice(tail);
+                });
+            }
+        }
+        self.check("CRLF everywhere", |files| files.values_mut().for_each(|bytes| *bytes = crlf(bytes)));
+    }
+
+    /// Records removed, doubled and exchanged.
+    fn lines(&mut self, names: &[String], thorough: bool) {
+        for name in names {
+            let bytes = self.files[name].clone();
+            let lines: Vec<&[u8]> = bytes.split_inclusive(|&byte| byte == b'\n').collect();
+            self.check(&format!("CRLF in {name}"), |files| {
+                files.insert(name.clone(), crlf(&bytes));
+            });
+            let mut with = |what: &str, lines: Vec<&[u8]>| {
+                self.check(&format!("{what} of {name}"), |files| {
+                    files.insert(name.clone(), lines.concat());
+                });
+            };
+            for index in 0..lines.len() {
+                let mut less = lines.clone();
+                less.remove(index);
+                with(&format!("line {index} removed"), less);
+                let rest = lines.len() - index;
+                for count in (2..=rest).filter(|&count| thorough || count == rest) {
+                    let mut less = lines.clone();
+                    less.drain(index..index + count);
+                    with(&format!("lines from {index}, {count} of them, removed"), less);
+                }
+                let mut more = lines.clone();
+                more.insert(index, lines[index]);
+                with(&format!("line {index} doubled"), more);
+                for other in (0..index).filter(|&other| thorough || other + 1 == index) {
+                    let mut exchanged = lines.clone();
+                    exchanged.swap(index, other);
+                    with(&format!("lines {index} and {other} exchanged"), exchanged);
+                }
+            }
+        }
+    }
+}
+
+fn crlf(bytes: &[u8]) -> Vec<u8> {
+    String::from_utf8_lossy(bytes).replace('\n', "\r\n").into_bytes()
+}
+
+#[test]
+fn a_damaged_journal_is_never_wrong_without_a_word() {
+    let mut suite = Suite::new();
+    suite.all(997);
+}
+
+#[test]
+#[ignore = "takes minutes; only a release build is of interest"]
+fn every_bit_and_every_byte_of_a_journal() {
+    let mut suite = Suite::new();
+    suite.all(1);
+    println!("{:?}", suite.count);
+}
+
+/// Opening a journal must fail with these words, and leave the file as it is.
+fn refused(directory: &Path, control: &Loop, words: &str) {
+    let refused = Journal::open(directory, POLICY, &mut control.clone());
+    let message = refused.map(|(journal, _)| journal).expect_err("it is refused").message.clone();
+    assert!(message.contains(words), "{message}");
+}
+
+#[test]
+fn what_is_no_journal_is_left_as_it_is() {
+    let pristine = control("ugv");
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("journal-000000");
+    for text in ["my diary", "my diary\n", ""] {
+        std::fs::write(&file, text).expect("a file");
+        refused(directory.path(), &pristine, "is no journal");
+        assert_eq!(std::fs::read_to_string(&file).expect("a file"), text);
+    }
+    std::fs::remove_file(&file).expect("removed");
+    std::fs::create_dir(&file).expect("a directory");
+    refused(directory.path(), &pristine, "is no regular file");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_and_pipes_are_refused_at_once_and_files_are_private() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let pristine = control("ugv");
+    for name in ["journal-000000", "snapshot-000001", "lock"] {
+        let directory = tempfile::tempdir().expect("a directory");
+        let place = directory.path().join(name);
+        let status = std::process::Command::new("mkfifo").arg(&place).status().expect("mkfifo");
+        assert!(status.success());
+        refused(directory.path(), &pristine, "is no regular file");
+        std::fs::remove_file(&place).expect("removed");
+        std::os::unix::fs::symlink("/etc/hostname", &place).expect("a link");
+        refused(directory.path(), &pristine, "is no regular file");
+    }
+    let directory = tempfile::tempdir().expect("a directory");
+    let below = directory.path().join("below");
+    let mut control = pristine.clone();
+    let (mut journal, _) = Journal::open(&below, POLICY, &mut control).expect("it opens");
+    journal.begin(&mut control).expect("written");
+    for line in script() {
+        journal.handle(&mut control, &line, Duration::ZERO).expect("written");
+    }
+    let mode = |path: &Path| std::fs::metadata(path).expect("it is there").permissions().mode() & 0o777;
+    assert_eq!(mode(&below), 0o700);
+    for entry in std::fs::read_dir(&below).expect("a directory") {
+        let path = entry.expect("an entry").path();
+        assert_eq!(mode(&path), 0o600, "{}", path.display());
+    }
+}
+
+#[test]
+fn a_journal_belongs_to_all_that_decisions_rest_on() {
+    let directory = crate::worlds::own_files(7);
+    let read = |directory: &Path| {
+        let (mission, _) = Mission::read(&directory.join("m.toml")).expect("the mission is read");
+        let settings = mission.settings().clone();
+        Loop::new(mission, settings).expect("the mission can be planned for")
+    };
+    let journal = tempfile::tempdir().expect("a directory");
+    let mut control = read(directory.path());
+    let (mut open, _) = Journal::open(journal.path(), POLICY, &mut control).expect("it opens");
+    open.begin(&mut control).expect("written");
+    drop(open);
+    let edits = [
+        ("m.toml", "name = \"m\"", "name = \"n\""),
+        ("m.toml", "[planning]", "[adaptation]\nsettle = 5\n[planning]"),
+        ("m.toml", "[planning]", "[adaptation]\nminimum_benefit = 5\n[planning]"),
+        ("m.toml", "[planning]", "[adaptation]\ntime_limit = 5\n[planning]"),
+        ("m.toml", "[planning]", "[adaptation]\nstay_close = true\n[planning]"),
+        ("m.toml", "[planning]", "[bindings]\nusage = \"measured:light\"\n[planning]"),
+        ("own.swrl", "\"FALSE\") -> ", "\"ERROR\") -> "),
+        ("own.swrl", "[dependency]", "# [dependency]"),
+        ("kb.ttl", "t:hasValue 0.5", "t:hasValue 0.4"),
+        ("domain.pddl", "(+ 1 (usage))", "(+ 2 (usage))"),
+        ("problem.pddl", "(done p2)", "(done p0)"),
+    ];
+    for (file, old, new) in edits {
+        let path = directory.path().join(file);
+        let text = std::fs::read_to_string(&path).expect("text");
+        assert!(text.contains(old), "{file} has no `{old}`");
+        std::fs::write(&path, text.replacen(old, new, 1)).expect("written");
+        refused(journal.path(), &read(directory.path()), "have changed");
+        std::fs::write(&path, text).expect("written");
+    }
+    let mut control = read(directory.path());
+    Journal::open(journal.path(), POLICY, &mut control).expect("nothing has changed");
+}

@@ -1,0 +1,141 @@
+//! The numbers of lines: none is lost, and none spoils those that follow. And memory: nothing grows with the history.
+#![expect(clippy::print_stdout, reason = "the table is what the long test is for")]
+
+use metaplan::mapek::{Answer, Loop};
+use serde_json::json;
+
+use crate::common::{control, feed};
+use crate::soak::resident;
+
+fn ugv() -> Loop {
+    let mut control = control("ugv");
+    control.start();
+    control
+}
+
+/// The kinds of the answers that say what became of a line.
+fn check(control: &mut Loop, line: &str, expected: Option<&str>) {
+    let kind = |answer: &Answer| match answer {
+        Answer::Duplicate { .. } => Some("duplicate".to_owned()),
+        Answer::Stale { .. } => Some("stale".to_owned()),
+        Answer::Error { code, .. } => Some(code.clone()),
+        _ => None,
+    };
+    assert_eq!(feed(control, line).iter().find_map(kind).as_deref(), expected, "{line}");
+}
+
+#[test]
+fn a_line_that_comes_late_is_not_lost() {
+    let mut ugv = ugv();
+    check(&mut ugv, r#"{"event":"tick","seq":5}"#, None);
+    let late = r#"{"event":"component_status","component":"c_kinect","status":"FALSE","seq":4}"#;
+    check(&mut ugv, late, None);
+    assert!(!ugv.knowledge().available().contains("fd_amcl_kinect"));
+    check(&mut ugv, late, Some("duplicate"));
+    check(&mut ugv, r#"{"event":"tick","seq":5}"#, Some("duplicate"));
+    assert_eq!(ugv.knowledge().sequence(), Some(5));
+}
+
+#[test]
+fn a_number_that_is_far_ahead_spoils_nothing() {
+    let mut ugv = ugv();
+    check(&mut ugv, r#"{"event":"tick","seq":18446744073709551615}"#, Some("M307"));
+    check(&mut ugv, r#"{"event":"tick","seq":1}"#, None);
+    check(&mut ugv, r#"{"event":"tick","seq":18446744073709551615}"#, Some("M307"));
+    check(&mut ugv, r#"{"event":"tick","seq":2}"#, None);
+    assert_eq!(ugv.knowledge().sequence(), Some(2));
+}
+
+#[test]
+fn the_number_of_a_line_that_was_refused_can_be_used_again() {
+    let mut ugv = ugv();
+    check(&mut ugv, r#"{"event":"unheard_of","seq":1}"#, Some("M303"));
+    check(
+        &mut ugv,
+        r#"{"event":"component_status","component":"c_none","status":"FALSE","seq":1}"#,
+        Some("M306"),
+    );
+    check(&mut ugv, r#"{"event":"tick","seq":1}"#, None);
+    check(&mut ugv, r#"{"event":"tick","seq":1}"#, Some("duplicate"));
+}
+
+#[test]
+fn very_many_gaps_make_old_numbers_stale() {
+    let mut ugv = ugv();
+    for number in 0..300 {
+        check(&mut ugv, &format!(r#"{{"event":"tick","seq":{}}}"#, 10 + 2 * number), None);
+    }
+    check(&mut ugv, r#"{"event":"tick","seq":11}"#, Some("stale"));
+    check(&mut ugv, r#"{"event":"tick","seq":607}"#, None);
+}
+
+/// The Kinect fails and recovers, and nobody acknowledges anything.
+fn flap(control: &mut Loop, number: u64) {
+    let status = if number.is_multiple_of(2) { "FALSE" } else { "TRUE" };
+    feed(
+        control,
+        &json!({ "event": "component_status", "component": "c_kinect", "status": status }).to_string(),
+    );
+}
+
+#[test]
+fn nothing_grows_while_nobody_listens() {
+    let mut ugv = ugv();
+    let mut sizes = Vec::new();
+    for number in 0..400 {
+        flap(&mut ugv, number);
+        if number % 100 == 99 {
+            sizes.push(ugv.snapshot().0.to_string().len());
+        }
+    }
+    let (first, last) = (sizes[0], sizes[3]);
+    assert!(last < first + 200, "{sizes:?}");
+    assert!(
+        ugv.knowledge().outstanding().count() <= 2,
+        "{:?}",
+        ugv.knowledge().outstanding().collect::<Vec<_>>()
+    );
+    // Plans of earlier lines are not kept for the journal that is not there.
+    assert!(ugv.decision(&[]).plans.len() <= 2);
+    let superseded: usize = ugv.knowledge().outstanding().map(|effect| effect.supersedes.len()).sum();
+    assert!(superseded > 0);
+}
+
+#[test]
+#[ignore = "takes an hour; only a release build is of interest"]
+fn memory_over_ten_million_events() {
+    let most: u64 =
+        std::env::var("METAPLAN_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(10_000_000);
+    for acknowledging in [true, false] {
+        let mut ugv = ugv();
+        let (mut sizes, mut next) = (Vec::new(), 10_000);
+        let mut number = 0;
+        while number < most {
+            if number % 10 == 0 {
+                flap(&mut ugv, number / 10);
+            } else {
+                // Across the bound and back, with all its digits.
+                let value = 0.8 + 0.1 * (number as f64).sin();
+                feed(
+                    &mut ugv,
+                    &json!({ "event": "measured", "attribute": "ambient_light", "value": value }).to_string(),
+                );
+            }
+            number += 1;
+            if acknowledging {
+                let waiting: Vec<u64> = ugv.knowledge().outstanding().map(|effect| effect.number).collect();
+                for effect in waiting {
+                    feed(&mut ugv, &json!({ "event": "acknowledged", "effect": effect }).to_string());
+                    number += 1;
+                }
+            }
+            if number >= next {
+                let memory = resident().unwrap_or(0);
+                println!("{number} events, acknowledged: {acknowledging}, {:.1} MB", memory as f64 / 1024.0);
+                sizes.push(memory);
+                next *= 10;
+            }
+        }
+        assert!(sizes.last() <= sizes.first().map(|first| first + first / 5).as_ref(), "{sizes:?}");
+    }
+}

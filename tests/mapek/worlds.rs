@@ -1,0 +1,202 @@
+//! Missions with what their robots can report: those that are shipped, SUAVE's knowledge base, and generated ones.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use fastrand::Rng;
+use metaplan::mapek::{Loop, Settings};
+use metaplan::mission::Mission;
+use num_rational::BigRational;
+
+/// What a design needs, as its knowledge base states it.
+#[derive(Debug, Clone)]
+pub struct Design {
+    pub name: String,
+    pub components: Vec<String>,
+    /// Attribute, least and greatest value.
+    pub bounds: Vec<(String, Option<BigRational>, Option<BigRational>)>,
+}
+
+/// A mission with what can be reported of it.
+pub struct Place {
+    pub name: String,
+    /// A loop that has begun, and to which nothing has happened.
+    pub begun: Loop,
+    pub components: Vec<String>,
+    /// Attributes with values on, between and beyond all bounds.
+    pub attributes: Vec<(String, Vec<String>)>,
+    pub designs: Vec<Design>,
+    /// Component, and another one that it does not work without.
+    pub depends: Vec<(String, String)>,
+    /// Whether the shipped rules, and dependencies, are all that says what is available.
+    pub is_plain: bool,
+}
+
+impl Place {
+    fn new(name: &str, manifest: &Path, depends: Vec<(String, String)>, is_plain: bool) -> Self {
+        let (mission, _) = Mission::read(manifest).unwrap_or_else(|errors| panic!("{name}: {errors:?}"));
+        let settings = Settings { time_limit: None, ..mission.settings().clone() };
+        let mut begun = Loop::new(mission, settings).expect("the mission can be planned for");
+        begun.start();
+        let knowledge = begun.knowledge().mission().knowledge().expect("a knowledge base");
+        let view = knowledge.view();
+        let components = view.components().into_iter().map(|component| component.individual.name).collect();
+        let designs: Vec<Design> = view
+            .function_designs()
+            .into_iter()
+            .map(|design| Design {
+                name: design.individual.name,
+                components: design.components.into_iter().map(|component| component.name).collect(),
+                bounds: design
+                    .requirements
+                    .into_iter()
+                    .map(|bound| (bound.attribute, bound.minimum, bound.maximum))
+                    .collect(),
+            })
+            .collect();
+        let mut attributes: Vec<(String, Vec<String>)> = Vec::new();
+        for (attribute, minimum, maximum) in designs.iter().flat_map(|design| &design.bounds) {
+            let known = attributes.iter().position(|(name, _)| name == attribute).unwrap_or_else(|| {
+                attributes.push((attribute.clone(), vec!["0".to_owned(), "1000".to_owned()]));
+                attributes.len() - 1
+            });
+            for bound in minimum.iter().chain(maximum) {
+                for difference in [-1, 0, 1] {
+                    let value = bound + BigRational::new(difference.into(), 100.into());
+                    attributes[known].1.push(rules::Decimal::from_rational(&value).to_string());
+                }
+            }
+        }
+        if attributes.is_empty() {
+            let measured = view.measurements().into_iter().map(|m| (m.attribute, Vec::new()));
+            attributes.extend(measured);
+            for (_, values) in &mut attributes {
+                values.extend(["0", "0.5", "1.2", "2", "2.4", "3", "4"].map(ToOwned::to_owned));
+            }
+        }
+        Self { name: name.to_owned(), begun, components, attributes, designs, depends, is_plain }
+    }
+}
+
+/// The missions that are shipped.
+pub fn shipped() -> Vec<Place> {
+    let place = |name: &str| {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
+        Place::new(name, &manifest, Vec::new(), true)
+    };
+    ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"].map(place).into()
+}
+
+/// SUAVE's own knowledge base, where the shared material is beside the project.
+pub fn suave() -> Option<Place> {
+    let directory = crate::fleet::files()?;
+    Some(Place::new("suave", &directory.path().join("m.toml"), Vec::new(), false))
+}
+
+const PREFIXES: &str = "@prefix : <http://example.org/m#> .\n\
+    @prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
+    @prefix t: <http://metacontrol.org/tomasys#> .\n\
+    <http://example.org/m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n\
+    :dependsOn a owl:ObjectProperty .\n";
+
+/// A component does not work without those that it depends on, whatever it says itself.
+const DEPENDENCY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://metacontrol.org/tomasys#> .\n\
+    [dependency] :dependsOn(?a, ?b) ^ t:c_status(?b, \"FALSE\") -> t:c_status(?a, \"FALSE\") .\n";
+
+const DOMAIN: &str = "(define (domain m) (:requirements :typing :fluents :durative-actions)
+  (:types place)
+  (:predicates (robot_at ?p - place) (way ?from ?to - place) (done ?p - place))
+  (:functions (usage))
+  (:durative-action move :parameters (?from ?to - place) :duration (= ?duration (+ 1 (usage)))
+    :condition (and (at start (robot_at ?from)) (over all (way ?from ?to)))
+    :effect (and (at start (not (robot_at ?from))) (at end (robot_at ?to))))
+  (:durative-action work :parameters (?p - place) :duration (= ?duration (+ 2 (usage)))
+    :condition (over all (robot_at ?p)) :effect (at end (done ?p))))";
+
+/// A mission with random designs, bounds and dependencies, on a ring of places.
+pub fn generated(seed: u64) -> Place {
+    let (directory, depends) = files(seed);
+    Place::new(&format!("generated {seed}"), &directory.path().join("m.toml"), depends, true)
+}
+
+/// The files of a generated mission, the manifest `m.toml` among them.
+pub fn own_files(seed: u64) -> tempfile::TempDir {
+    files(seed).0
+}
+
+/// The same, and which component depends on which.
+fn files(seed: u64) -> (tempfile::TempDir, Vec<(String, String)>) {
+    let mut random = Rng::with_seed(seed);
+    let (functions, components) = (random.usize(1..=2), random.usize(3..=5));
+    let mut text = PREFIXES.to_owned();
+    text += ":usage a t:QualityAttributeType .\n";
+    for attribute in ["light", "depth"] {
+        let _ = writeln!(text, ":{attribute} a t:QualityAttributeType .");
+        let _ = writeln!(
+            text,
+            ":obs_{attribute} a t:QAvalue ; t:isQAtype :{attribute} ; t:isMeasured true ; t:hasValue 0.5 ."
+        );
+    }
+    for component in 0..components {
+        let _ = writeln!(text, ":c_{component} a t:Component .");
+    }
+    let mut depends = Vec::new();
+    for component in 1..components {
+        if random.u32(..3) == 0 {
+            let other = random.usize(..component);
+            let _ = writeln!(text, ":c_{component} :dependsOn :c_{other} .");
+            depends.push((format!("c_{component}"), format!("c_{other}")));
+        }
+    }
+    for function in 0..functions {
+        let _ = writeln!(text, ":f_{function} a t:Function .");
+        for number in 0..random.usize(2..=4) {
+            let design = format!("fd_{function}_{number}");
+            let _ = writeln!(text, ":{design} a t:FunctionDesign ; t:solvesF :f_{function} .");
+            for _ in 0..random.usize(0..=2) {
+                let _ = writeln!(text, ":{design} t:requiresC :c_{} .", random.usize(..components));
+            }
+            let usage = random.u32(..5);
+            let _ = writeln!(
+                text,
+                ":{design} t:hasQAestimation :u_{design} . :u_{design} a t:QAvalue ; t:isQAtype :usage ; t:hasValue {usage}.0 ."
+            );
+            for attribute in ["light", "depth"] {
+                let side = ["hasMinimum 0.3", "hasMaximum 0.7"][random.usize(..2)];
+                if random.u32(..3) == 0 {
+                    let _ = writeln!(
+                        text,
+                        ":{design} t:hasRequirement :r_{design}_{attribute} . :r_{design}_{attribute} a t:Requirement ; t:isQAtype :{attribute} ; t:{side} ."
+                    );
+                }
+            }
+        }
+    }
+    text += ":a_move a t:Action ; t:requiresF :f_0 .\n:a_work a t:Action ; t:requiresF :f_0";
+    text += if functions == 2 { " , :f_1 .\n" } else { " .\n" };
+    let places = random.usize(3..=5);
+    let mut problem = "(define (problem p) (:domain m) (:objects".to_owned();
+    for place in 0..places {
+        let _ = write!(problem, " p{place}");
+    }
+    problem += " - place) (:init (robot_at p0)";
+    for place in 0..places {
+        let next = (place + 1) % places;
+        let _ = write!(problem, " (way p{place} p{next}) (way p{next} p{place})");
+    }
+    problem += ") (:goal (and (done p1) (done p2) (robot_at p0))) (:metric minimize (total-time)))";
+    let manifest = "name = \"m\"\n[knowledge]\nfiles = [\"kb.ttl\"]\nrules = [\"coadaptation\", \"own.swrl\"]\n\
+        [planning]\ndomain = \"domain.pddl\"\nproblem = \"problem.pddl\"\n";
+    let directory = tempfile::tempdir().expect("a directory");
+    let files = [
+        ("kb.ttl", text.as_str()),
+        ("own.swrl", DEPENDENCY),
+        ("domain.pddl", DOMAIN),
+        ("problem.pddl", &problem),
+        ("m.toml", manifest),
+    ];
+    for (name, text) in files {
+        std::fs::write(directory.path().join(name), text).expect("a file");
+    }
+    (directory, depends)
+}

@@ -1,0 +1,95 @@
+//! The protocol of `metaplan run`: the client of the README, and what is said while planning takes long.
+#![expect(clippy::print_stdout, reason = "what is skipped says so")]
+
+use std::fmt::Write as _;
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::common::{metaplan_in, root};
+
+#[test]
+fn the_client_of_the_readme_brings_a_mission_to_its_end() {
+    let readme = std::fs::read_to_string(root().join("README.md")).expect("the README");
+    let (_, rest) = readme.split_once("<!-- test client:").expect("the mark");
+    let (_, rest) = rest.split_once("```python\n").expect("a block");
+    let (client, _) = rest.split_once("```\n").expect("its end");
+    assert!(client.lines().filter(|line| !line.trim().is_empty()).count() <= 32);
+    let mut python = Command::new("python3");
+    python.args(["-c", client, env!("CARGO_BIN_EXE_metaplan"), "run", "missions/ugv.toml"]);
+    let output = match python.current_dir(root()).stdin(Stdio::null()).output() {
+        Ok(output) => output,
+        Err(error) => {
+            println!("skipped: there is no python3: {error}");
+            return;
+        }
+    };
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(text, "doing 1\ndoing 2\ndoing 3\ndoing 4\ndone 0\n", "{output:?}");
+}
+
+const DOMAIN: &str = "(define (domain d) (:requirements :typing) (:types place item)
+  (:predicates (at ?p - place) (way ?a ?b - place) (lies ?i - item ?p - place) (has ?i - item) (free))
+  (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+    :effect (and (not (at ?a)) (at ?b)))
+  (:action take :parameters (?i - item ?p - place) :precondition (and (at ?p) (lies ?i ?p) (free))
+    :effect (and (has ?i) (not (lies ?i ?p)) (not (free))))
+  (:action put :parameters (?i - item ?p - place) :precondition (and (at ?p) (has ?i))
+    :effect (and (lies ?i ?p) (not (has ?i)) (free))))";
+
+/// More than can be planned in a few seconds: parcels on a grid, each to be brought elsewhere.
+fn parcels() -> String {
+    let (side, count) = (9, 14);
+    let mut text = "(define (problem p) (:domain d) (:objects".to_owned();
+    let place = |x: usize, y: usize| format!("p{x}_{y}");
+    let all = || (0..side).flat_map(move |x| (0..side).map(move |y| (x, y)));
+    for (x, y) in all() {
+        let _ = write!(text, " {}", place(x, y));
+    }
+    text += " - place";
+    for item in 0..count {
+        let _ = write!(text, " i{item}");
+    }
+    let _ = write!(text, " - item) (:init (at {}) (free)", place(0, 0));
+    for (x, y) in all() {
+        for (other_x, other_y) in [(x + 1, y), (x, y + 1)] {
+            if other_x < side && other_y < side {
+                let (a, b) = (place(x, y), place(other_x, other_y));
+                let _ = write!(text, " (way {a} {b}) (way {b} {a})");
+            }
+        }
+    }
+    let spot = |number: usize| place(number * 5 % side, number * 7 % side);
+    for item in 0..count {
+        let _ = write!(text, " (lies i{item} {})", spot(item));
+    }
+    text += ") (:goal (and";
+    for item in 0..count {
+        let _ = write!(text, " (lies i{item} {})", spot(3 * item + 4));
+    }
+    text + ")))"
+}
+
+#[test]
+fn ready_comes_first_and_planning_says_that_it_goes_on() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let manifest = "name = \"parcels\"\n[knowledge]\nfiles = [\"kb.ttl\"]\n[planning]\ndomain = \"d.pddl\"\n\
+        problem = \"p.pddl\"\n[adaptation]\ntime_limit = 2.6\n";
+    let knowledge = "<http://example.org/m> a <http://www.w3.org/2002/07/owl#Ontology> .\n";
+    for (name, text) in
+        [("m.toml", manifest), ("kb.ttl", knowledge), ("d.pddl", DOMAIN), ("p.pddl", &parcels())]
+    {
+        std::fs::write(directory.path().join(name), text).expect("a file");
+    }
+    let outcome = metaplan_in(directory.path(), &["run", "m.toml"], "{\"event\":\"tick\"}\n");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let answers: Vec<Value> =
+        outcome.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let kinds: Vec<&str> = answers.iter().filter_map(|answer| answer["answer"].as_str()).collect();
+    assert_eq!(kinds[..3], ["ready", "planning", "planning"], "{kinds:?}");
+    assert_eq!(answers[2]["seconds"], 2, "{answers:#?}");
+    assert_eq!(kinds.iter().filter(|kind| **kind == "handled").count(), 2, "{kinds:?}");
+    let end = kinds.iter().position(|kind| *kind == "handled").expect("line 0 ends");
+    assert_eq!(answers[end]["line"], 0);
+    assert!(kinds[..end].contains(&"plan_requested"), "{kinds:?}");
+}

@@ -1,0 +1,171 @@
+//! Models that are silently less than their authors meant, files of the wrong kind, and files that nobody should read.
+
+use std::path::Path;
+
+use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, root};
+
+/// Plans a copy of a mission in which something was replaced; standard error must have these words.
+fn check(mission: &str, (file, old, new): (&str, &str, &str), words: &[&str]) -> Outcome {
+    let copy = copy_of_mission(mission.trim_end_matches("_plain"));
+    for plain in [
+        format!("missions/{mission}.toml"),
+        format!("encodings/{}/plain.pddl", mission.trim_end_matches("_plain")),
+    ] {
+        let from = root().join(&plain);
+        if from.exists() {
+            std::fs::copy(from, copy.path().join(&plain)).expect("a copy");
+        }
+    }
+    edit(copy.path(), file, old, new);
+    let outcome = metaplan_in(copy.path(), &["plan", &format!("missions/{mission}.toml")], "");
+    for word in words {
+        assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
+    }
+    outcome
+}
+
+#[test]
+fn names_that_meet_nothing_are_warned_of_with_their_place() {
+    let kb = "ontology/kb/ugv.ttl";
+    check(
+        "ugv",
+        (kb, "t:requiresC :c_kinect ;", "t:requiresC :c_kinetc ;"),
+        &["M207", "ugv.ttl:", "did you mean `c_kinect`?"],
+    );
+    check(
+        "ugv",
+        (kb, ":c_camera a owl", ":c_spare a owl:NamedIndividual , t:Component .\n:c_camera a owl"),
+        &["M208", "c_spare", "ugv.ttl:"],
+    );
+    check(
+        "ugv",
+        (kb, ":safety a owl", ":beauty a t:QualityAttributeType .\n:safety a owl"),
+        &["M209", "beauty", "ugv.ttl:"],
+    );
+    let outcome = check(
+        "ugv",
+        (
+            kb,
+            "t:isQAtype :minimum_illuminance ; t:hasMaximum 0.0",
+            "t:isQAtype :minimum_iluminance ; t:hasMaximum 0.0",
+        ),
+        &["M210", "minimum_iluminance", "did you mean `minimum_illuminance`?"],
+    );
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+}
+
+#[test]
+fn a_plain_domain_that_meets_nothing_is_warned_of() {
+    let kb = "ontology/kb/ugv.ttl";
+    check("ugv_plain", (kb, ":a_move a", ":a_mvoe a"), &["M205", "a_mvoe", "if it is `move`", "ugv.ttl:"]);
+    let domain = "encodings/ugv/plain.pddl";
+    let text = std::fs::read_to_string(root().join(domain)).expect("a domain");
+    let old = ["(battery_usage)", "(battery_usage )"]
+        .into_iter()
+        .find(|old| text.contains(old))
+        .expect("the function");
+    check("ugv_plain", (domain, old, "(batery_usage)"), &["M206", "batery_usage", "plain.pddl"]);
+}
+
+#[test]
+fn shipped_missions_raise_no_doubts() {
+    for mission in ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"] {
+        let outcome = metaplan(&["plan", &format!("missions/{mission}.toml")]);
+        assert!(!outcome.stderr.contains("warning"), "{mission}: {outcome:#?}");
+    }
+}
+
+#[test]
+fn who_misspells_a_name_is_told_which_one_was_meant() {
+    let ugv = "missions/ugv.toml";
+    for (arguments, meant) in [
+        (&["plan", ugv, "--fail", "c_kinct"][..], "c_kinect"),
+        (&["plan", ugv, "--set", "batery=3"], "battery"),
+        (&["plan", ugv, "--set", "ambient_ligt=3"], "ambient_light"),
+        (&["plan", ugv, "--set", "robot_att=wp2"], "robot_at"),
+        (&["plan", ugv, "--scenario", "bright_sum"], "bright_sun"),
+        (&["explain", ugv, "fd_amcl_kinct"], "fd_amcl_kinect"),
+    ] {
+        let outcome = metaplan(arguments);
+        assert!(outcome.stderr.contains(&format!("did you mean `{meant}`?")), "{outcome:#?}");
+    }
+    let copy = copy_of_mission("ugv");
+    edit(copy.path(), ugv, "[planning]", "[plannning]");
+    let outcome = metaplan_in(copy.path(), &["plan", ugv], "");
+    assert!(outcome.stderr.contains("did you mean `planning`?"), "{outcome:#?}");
+    let lines = "{\"event\":\"mesured\",\"attribute\":\"x\",\"value\":1}\n{\"event\":\"measured\",\"attribute\":\"batery\",\"value\":1}\n";
+    let outcome = metaplan_in(&root(), &["run", ugv], lines);
+    for meant in ["measured", "battery"] {
+        assert!(outcome.stdout.contains(&format!("did you mean `{meant}`?")), "{outcome:#?}");
+    }
+}
+
+#[test]
+fn the_wrong_kind_of_file_is_recognised() {
+    let (domain, problem) = ("encodings/ugv/domain.pddl", "encodings/ugv/problem.pddl");
+    for (arguments, words) in [
+        (&["plan", domain][..], "this should be a mission's manifest, but is a PDDL domain"),
+        (&["plan", "ontology/kb/ugv.ttl"], "this should be a mission's manifest, but is a knowledge base"),
+        (&["plan", problem, domain], "this should be a PDDL domain, but is a PDDL problem"),
+        (
+            &["plan", "missions/ugv.toml", problem],
+            "this should be a PDDL domain, but is a mission's manifest",
+        ),
+    ] {
+        let outcome = metaplan(arguments);
+        assert_eq!(outcome.status, 3, "{outcome:#?}");
+        assert!(outcome.stderr.contains(words), "{outcome:#?}");
+    }
+}
+
+#[test]
+fn a_hostile_manifest_learns_nothing_and_hangs_nobody() {
+    let copy = copy_of_mission("ugv");
+    let secret = copy.path().join("secret");
+    std::fs::write(&secret, "root:*:20228:0:99999:7:::\ndaemon:*:20228:0:99999:7:::\n").expect("a file");
+    let manifest = "missions/ugv.toml";
+    let plan = |directory: &Path, what: &str| {
+        let outcome = metaplan_in(directory, &["plan", manifest, "--time-limit", "300"], "");
+        assert!(outcome.status == 3, "{what}: {outcome:#?}");
+        assert!(!outcome.stderr.contains("20228"), "{what}: {outcome:#?}");
+    };
+    let text = std::fs::read_to_string(copy.path().join(manifest)).expect("text");
+    let parts = ["../ontology/kb/ugv.ttl", "../encodings/ugv/domain.pddl", "../encodings/ugv/problem.pddl"];
+    for old in parts {
+        for new in ["../secret", "/dev/zero", "/dev/tty"] {
+            std::fs::write(copy.path().join(manifest), text.replace(old, new)).expect("written");
+            plan(copy.path(), &format!("{new} for {old}"));
+        }
+    }
+    std::fs::write(copy.path().join(manifest), &text).expect("written");
+    edit(
+        copy.path(),
+        "ontology/kb/ugv.ttl",
+        "owl:imports <http",
+        &format!("owl:imports <file://{}> , <http", secret.display()),
+    );
+    plan(copy.path(), "an import");
+}
+
+#[test]
+fn names_do_not_change_what_a_terminal_shows() {
+    let copy = copy_of_mission("ugv");
+    edit(copy.path(), "missions/ugv.toml", "name = \"ugv\"", "name = \"u\\u001b[31mg\\u202ev\"");
+    for format in ["text", "json"] {
+        let outcome = metaplan_in(copy.path(), &["plan", "missions/ugv.toml", "--format", format], "");
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        assert!(!outcome.stdout.contains(['\u{1b}', '\u{202e}']), "{outcome:#?}");
+        assert!(outcome.stdout.contains("202e"), "{outcome:#?}");
+    }
+    let outcome = metaplan_in(copy.path(), &["run", "missions/ugv.toml"], "");
+    assert!(outcome.stdout.contains("\\u202e") && !outcome.stdout.contains('\u{202e}'), "{outcome:#?}");
+}
+
+#[test]
+fn small_things() {
+    let doubled = "{\"event\":\"tick\",\"event\":\"tick\"}\n";
+    let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml"], doubled);
+    assert!(outcome.stdout.contains("the field `event` is there twice"), "{outcome:#?}");
+    let outcome = metaplan(&["simulate", "missions/ugv.toml", "--scenario", "bright_sun"]);
+    assert!(outcome.stderr.contains("has no `simulation` section; these can: "), "{outcome:#?}");
+}

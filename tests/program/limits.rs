@@ -1,0 +1,160 @@
+//! Limits and signals from the first file read, and certificates that could not be written or say what they are not.
+#![expect(clippy::print_stdout, reason = "what is skipped says so")]
+
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::certificate::{certificate, change};
+use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
+
+/// Waits for the program to end, at most so long.
+fn wait(child: &mut Child) -> Option<std::process::ExitStatus> {
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_secs(20) {
+        if let Some(status) = child.try_wait().expect("it is ours") {
+            return Some(status);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let _ = child.kill();
+    None
+}
+
+fn start(arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_metaplan"))
+        .args(arguments)
+        .current_dir(root())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts")
+}
+
+/// Whether this process, and what it starts, ignores a signal, as what a shell runs in the background does.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> (signal - 1) & 1 == 1
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_the_program_while_it_reads() {
+    use std::os::unix::process::ExitStatusExt as _;
+    for arguments in
+        [&["plan", "-", "encodings/ugv/problem.pddl"][..], &["plan", "encodings/ugv/domain.pddl", "-"]]
+    {
+        for (name, number) in [("-INT", 2), ("-TERM", 15)] {
+            if is_ignored(number) {
+                println!("skipped: who runs the tests ignores {name}, and so does all that is started");
+                continue;
+            }
+            // Its standard input stays open, so that it has more to read.
+            let mut child = start(arguments);
+            std::thread::sleep(Duration::from_millis(300));
+            let status = Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
+            assert!(status.success());
+            let status = wait(&mut child).unwrap_or_else(|| panic!("{arguments:?} goes on after {name}"));
+            assert_eq!(status.signal(), Some(number), "{status:?}");
+        }
+    }
+}
+
+#[test]
+fn the_time_limit_covers_reading() {
+    let mut child = start(&["plan", "-", "encodings/ugv/problem.pddl", "--time-limit", "0.3"]);
+    let status = wait(&mut child).expect("it ends");
+    assert_eq!(status.code(), Some(12));
+}
+
+#[test]
+fn a_certificate_that_cannot_be_written_is_an_error() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let full = directory.path().join("full");
+    std::fs::create_dir(&full).expect("a directory");
+    std::fs::write(full.join("a"), "").expect("a file");
+    let full = full.display().to_string();
+    for more in [&[][..], &["-q"], &["--format", "json"], &["-q", "--format", "json"]] {
+        let arguments: Vec<&str> = ["plan", "missions/ugv.toml", "--certificate", &full]
+            .into_iter()
+            .chain(more.iter().copied())
+            .collect();
+        let outcome = metaplan(&arguments);
+        assert_eq!(outcome.status, 3, "{outcome:#?}");
+        assert!(outcome.stderr.contains("M109"), "{outcome:#?}");
+        assert!(outcome.stdout.contains("408"), "the plan is there: {outcome:#?}");
+    }
+}
+
+#[test]
+fn a_verification_that_takes_longer_fails_however_short_it_is() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
+    let outcome = metaplan(&["verify", &target, "--time-limit", "0"]);
+    assert_eq!(outcome.status, 30, "{outcome:#?}");
+    assert!(outcome.stdout.contains("limits"), "{outcome:#?}");
+}
+
+/// Rules with one more, so that the claim is another one, are not taken for ours whatever they are called.
+#[test]
+fn rules_are_shipped_only_if_they_are_ours() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
+    let outcome = metaplan(&["verify", &target]);
+    assert!(outcome.stdout.contains("`coadaptation` (shipped)"), "{outcome:#?}");
+
+    let copy = copy_of_mission("ugv");
+    let rules = std::fs::read_to_string(root().join("rules/swrl/coadaptation.swrl")).expect("the rules");
+    let more = "[more] t:FunctionDesign(?fd) ^ t:requiresC(?fd, ?c) ^ t:solvesF(?fd, ?f) -> t:fd_efficacy(?fd, 1) .\n";
+    std::fs::write(copy.path().join("missions/my.swrl"), rules + more).expect("written");
+    edit(copy.path(), "missions/ugv.toml", "[planning]", "rules = [\"my.swrl\"]\n\n[planning]");
+    let made = metaplan_in(copy.path(), &["plan", "missions/ugv.toml", "--certificate", "c"], "");
+    assert_eq!(made.status, 0, "{made:#?}");
+    let outcome = metaplan_in(copy.path(), &["verify", "c"], "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    assert!(outcome.stdout.contains("`my.swrl` (not shipped"), "{outcome:#?}");
+
+    // Relabelled in both files that name it.
+    let own = copy.path().join("c").display().to_string();
+    let relabel = |text: String| {
+        let mut value: Value = serde_json::from_str(&text).expect("JSON");
+        let rename = |name: &mut Value| {
+            if name.as_str().is_some_and(|name| name.ends_with("my.swrl")) {
+                *name = "coadaptation".into();
+            }
+        };
+        value["rules"].as_array_mut().expect("rules").iter_mut().for_each(|rule| {
+            if rule.is_array() { rename(&mut rule[0]) } else { rename(&mut rule["source"]) }
+        });
+        value.to_string()
+    };
+    change(&own, "origin.json", &relabel);
+    change(&own, "derivations.json", &relabel);
+    let outcome = metaplan_in(copy.path(), &["verify", "c"], "");
+    assert!(outcome.stdout.contains("`coadaptation` (NOT the shipped rules"), "{outcome:#?}");
+}
+
+#[test]
+fn a_certificate_is_about_a_mission_or_not() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let situation = ["--fail", "c_kinect", "--set", "robot_at=wp2"];
+    let plan: Vec<&str> = ["plan", "missions/ugv.toml"].into_iter().chain(situation).collect();
+    let target = certificate(directory.path(), &plan);
+    let check = |more: &[&str], status: i32, words: &str| {
+        let all: Vec<&str> =
+            ["verify", target.as_str(), "--mission"].into_iter().chain(more.iter().copied()).collect();
+        let outcome = metaplan(&all);
+        assert_eq!(outcome.status, status, "{outcome:#?}");
+        assert!(outcome.stdout.contains(words), "{outcome:#?}");
+    };
+    let same: Vec<&str> = ["missions/ugv.toml"].into_iter().chain(situation).collect();
+    check(&same, 0, "it is about `ugv` as it is now");
+    check(&["missions/ugv.toml", "--scenario", "kinect_failure"], 0, "it is about `ugv` as it is now");
+    check(&["missions/ugv.toml"], 30, "the situation");
+    check(&["missions/uuv.toml"], 30, "not about `uuv`");
+}
