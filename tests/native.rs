@@ -14,6 +14,7 @@ use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission};
 use ontology::ReadOptions;
 use random::Random;
+use rules::Limits as StepLimits;
 
 /// The status and cost of a mission's best plan, and its configurations by step.
 type Answer = (Status, Option<String>, Vec<Vec<(String, String)>>);
@@ -151,7 +152,7 @@ impl Generated {
             documents: vec![file("kb.ttl", &self.knowledge)],
             rules: vec![COADAPTATION.to_owned()],
             options: ReadOptions::default(),
-            limits: metaplan::rules::Limits::default(),
+            limits: StepLimits::default(),
         };
         let bindings = if domain == self.plain { self.bindings.clone() } else { BTreeMap::new() };
         let mission: Result<Mission, Vec<Message>> = Mission::new(

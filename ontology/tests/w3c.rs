@@ -1,6 +1,8 @@
 //! The test cases of the W3C's OWL working group under the Direct Semantics: consistency, inconsistency and entailment. They
 //! lie beside the project; without them nothing is checked, with a message.
 
+#![allow(clippy::print_stdout, clippy::format_push_string)]
+
 mod common;
 
 use std::collections::{BTreeMap, BTreeSet};

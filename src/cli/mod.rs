@@ -172,6 +172,7 @@ struct Imports {
     directory: Vec<PathBuf>,
     /// Goes on with a warning where an import is found nowhere.
     #[arg(long)]
+    #[allow(clippy::struct_field_names)]
     ignore_missing_imports: bool,
 }
 

@@ -97,7 +97,7 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
         let count = counts.entry(&message.code).or_default();
         *count += 1;
         if message.is_error() || *count <= KIND_LIMIT {
-            let _ = stderr.write_all(visible(&message.text()).as_bytes());
+            let _ = stderr.write_all(visible(message.text()).as_bytes());
         }
     }
     let more = counts.into_iter().filter(|(_, count)| !common.quiet && *count > KIND_LIMIT);

@@ -150,7 +150,6 @@ fn words(text: &str) -> Vec<&str> {
     for (at, character) in text.char_indices() {
         match (inside, character) {
             (Some(end), _) if character == end => inside = None,
-            (Some(_), _) => {}
             (None, '<') => inside = Some('>'),
             (None, '"') => inside = Some('"'),
             (None, _) if character.is_whitespace() => {

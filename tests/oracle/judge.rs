@@ -455,7 +455,7 @@ fn check_certificate(
     if let Err(message) = certificate::write(&directory, &contents, &limits()) {
         return tally.count(format!("no certificate: {}", message.code));
     }
-    let report = certificate::verify(&directory, &limits());
+    let report = certificate::verify(&directory, None, &limits());
     let refuted = match (&case.truth, &solution.plan) {
         (Truth::Best(best, _), Some(plan)) => rational(&plan.cost) != *best,
         (Truth::Open(Some((found, _))), Some(plan)) => {

@@ -164,7 +164,8 @@ fn limits_and_missing_imports_are_options() {
 /// Of many warnings of one kind, ten are shown.
 #[test]
 fn warnings_are_summed_up() {
-    let model: String = (0..15).map(|n| format!("<http://x#i{n}> a <http://x#C{n}> .\n")).collect();
+    let models: Vec<String> = (0..15).map(|n| format!("<http://x#i{n}> a <http://x#C{n}> .\n")).collect();
+    let model = models.concat();
     let outcome = run(&["reason", "-"], &model);
     check(&outcome, 0, &["and 5 more O201"]);
     assert_eq!(outcome.stderr.matches("warning[O201]").count(), 10, "{outcome:#?}");

@@ -254,7 +254,7 @@ mod tests {
     fn a_bomb_is_refused_at_once() {
         let mut text = "<!DOCTYPE a [<!ENTITY e0 'aaaaaaaaaa'>".to_owned();
         for level in 1..12 {
-            text += &format!("<!ENTITY e{level} '{}'>", format!("&e{};", level - 1).repeat(10));
+            text.extend([format!("<!ENTITY e{level} '{}'>", format!("&e{};", level - 1).repeat(10))]);
         }
         let start = text.len() + "]><a>".len();
         check(&format!("{text}]><a>&e11;</a>"), Err((start, "more than 16 times")));

@@ -1,5 +1,7 @@
 //! Recorded cases, which lie beside the project.
 
+#![allow(clippy::print_stdout)]
+
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
