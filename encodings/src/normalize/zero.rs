@@ -48,6 +48,10 @@ pub(crate) fn split(lifted: &mut Lifted) -> Result<(), Vec<Error>> {
                 };
                 let (none, some) = (compare(Comparison::Equal), compare(Comparison::Greater));
                 let mut other = instant(schema);
+                // A happening reads its duration.
+                if let Some(joint) = &mut other.joint {
+                    joint.start = Formula::And(vec![none.clone(), schema.start_condition.clone()]);
+                }
                 other.start_condition = Formula::And(vec![none, other.start_condition]);
                 instants.push(other);
                 let own = std::mem::replace(&mut schema.start_condition, Formula::truth());

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use num_traits::Zero as _;
 
-use super::model::{Action, Atom, Body, Effect, Fluent, Operation, Part, Q, Task, Term, q};
+use super::model::{Action, Atom, Body, Effect, Expression, Fluent, Operation, Part, Q, Task, Term, q};
 
 /// Why an action cannot be executed.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -220,18 +220,33 @@ impl World {
         let (action, bound) = &self.instances[instance];
         let action: &Action = &self.task.actions[*action];
         match (&action.body, end) {
-            (Body::Instantaneous(part), _) | (Body::Durative { start: part, .. }, End::Start) => {
-                self.part(part, state, bound)
+            (Body::Instantaneous(part), _) => self.part(part, state, bound),
+            (Body::Durative { start, duration, .. }, End::Start) => {
+                self.beginning(start, duration, state, bound)
             }
             (Body::Durative { end: part, .. }, End::Finish) => self.part(part, state, bound),
-            (Body::Durative { start, end, .. }, End::Both) => {
-                let (start, end) = (self.part(start, state, bound)?, self.part(end, state, bound)?);
+            (Body::Durative { start, duration, end, .. }, End::Both) => {
+                let start = self.beginning(start, duration, state, bound)?;
+                let end = self.part(end, state, bound)?;
                 if start.interferes(&end) {
                     return Err(Obstacle::Blocked("start and end of an action of duration 0 interfere"));
                 }
                 start.joined(end)
             }
         }
+    }
+
+    /// A start, which reads how long the action takes as well.
+    fn beginning(
+        &self,
+        start: &Part,
+        duration: &Expression,
+        state: &State,
+        bound: &[usize],
+    ) -> Result<Happening, Obstacle> {
+        let mut happening = self.part(start, state, bound)?;
+        self.read_values(duration, bound, &mut happening);
+        Ok(happening)
     }
 
     fn part(&self, part: &Part, state: &State, bound: &[usize]) -> Result<Happening, Obstacle> {
