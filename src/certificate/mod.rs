@@ -24,7 +24,8 @@ use std::path::Path;
 use encodings::pddl::ast::Problem;
 use encodings::pddl::{print_domain, print_problem};
 use encodings::{
-    Faithful, Limits, RefutationOutputs, Solution, Status, StepBound, Task, certify, refute, witness,
+    Faithful, Limits, RefutationOutputs, Solution, Status, StepBound, Task, certify, check_certificate,
+    refute, witness,
 };
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
@@ -195,6 +196,9 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     };
     let whole = tempfile::tempdir_in(parent).map_err(failed)?;
     let metric = contents.metric().map_err(|reason| wrong(&reason))?;
+    // What `verify` would refuse, because its numbers have less room than the planner's, is not written.
+    check_certificate(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref())
+        .map_err(|fault| wrong(&fault))?;
     let refutation =
         refutation(whole.path(), (text(&files, TASK), text(&files, ARGUMENT)), metric.as_ref(), limits)
             .map_err(failed)?;

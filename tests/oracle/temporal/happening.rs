@@ -220,11 +220,12 @@ impl World {
         let (action, bound) = &self.instances[instance];
         let action: &Action = &self.task.actions[*action];
         match (&action.body, end) {
-            (Body::Instantaneous(part), _) => self.part(part, state, bound),
             (Body::Durative { start, duration, .. }, End::Start) => {
                 self.beginning(start, duration, state, bound)
             }
-            (Body::Durative { end: part, .. }, End::Finish) => self.part(part, state, bound),
+            (Body::Instantaneous(part), _) | (Body::Durative { end: part, .. }, End::Finish) => {
+                self.part(part, state, bound)
+            }
             (Body::Durative { start, duration, end, .. }, End::Both) => {
                 let start = self.beginning(start, duration, state, bound)?;
                 let end = self.part(end, state, bound)?;
