@@ -22,15 +22,7 @@ impl Run<'_> {
         let steps = match (&shortest.ground, shortest.status) {
             (Some(plan), Status::Optimal) => plan.steps.len(),
             // The plan that there may be is measured by its steps, not by the metric: of no use to the user.
-            (Some(_), _) => {
-                return Solution {
-                    status: Status::Unknown,
-                    plan: None,
-                    ground: None,
-                    lower_bound: None,
-                    ..shortest
-                };
-            }
+            (Some(_), _) => return unknown(shortest),
             (None, _) => return Solution { lower_bound: None, ..shortest },
         };
         // Every plan of the task with this horizon has exactly this many steps, so a constant for each step
@@ -50,13 +42,7 @@ impl Run<'_> {
             symmetry: OnceCell::new(),
         };
         let Ok(bounds) = Bounds::new(&shifted, &self.config.limits) else {
-            return Solution {
-                status: Status::Unknown,
-                plan: None,
-                ground: None,
-                lower_bound: None,
-                ..shortest
-            };
+            return unknown(shortest);
         };
         let plan = match run.first_plan(&bounds) {
             Ok(plan) => plan,
@@ -90,6 +76,11 @@ impl Run<'_> {
             statistics,
         }
     }
+}
+
+/// What is left of an answer by the number of steps where nothing is known by the metric.
+fn unknown(by_steps: Solution) -> Solution {
+    Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, ..by_steps }
 }
 
 impl Task {
