@@ -4,18 +4,23 @@
 //! do that. So each action in turn is tried at its earlier passages, with waits before the next one where that needs events;
 //! what still is a plan, and costs no more, is kept.
 
+use crate::limits::Limits;
 use crate::number::TaskNumber;
 use crate::plan::{GroundPlan, GroundStep, replay};
 use crate::task::{Operator, OperatorId, Task};
 
-/// The same actions, each as early as the ones before it and the rest of the plan admit.
-pub(crate) fn earliest<N: TaskNumber>(task: &Task<N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
+/// The same actions, each as early as the ones before it and the rest of the plan admit; as far as the limits let it.
+pub(crate) fn earliest<N: TaskNumber>(
+    task: &Task<N>,
+    plan: &GroundPlan<N>,
+    limits: &Limits,
+) -> GroundPlan<N> {
     let mut plan = plan.clone();
     if task.operators.iter().all(|operator| operator.wait.is_none()) {
         return plan;
     }
     let mut position = 0;
-    while position < plan.steps.len() {
+    while position < plan.steps.len() && !limits.reached() {
         let id = plan.steps[position].operator;
         if task.operators[id.index()].wait.is_none() {
             let own = starts(task, &plan.steps);

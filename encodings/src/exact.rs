@@ -18,7 +18,7 @@ use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, Rational, dense};
 use crate::optimize::Config;
 use crate::pddl::ast::{Domain, Problem};
-use crate::plan::{GroundPlan, decode, metric};
+use crate::plan::{GroundPlan, Plan, decode, metric};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::search::{Estimate, Found, search_states};
 use crate::solution::{Proof, Solution, Statistics, Status, Unbounded};
@@ -61,7 +61,7 @@ pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     let started = Instant::now();
     let task = &task.0;
     let mut solution = match &task.unreachable {
-        Some(reason) => answer(task, Status::Unsolvable, None, Some(Proof::Relaxation(reason.clone()))),
+        Some(reason) => answer(Status::Unsolvable, None, Some(Proof::Relaxation(reason.clone()))),
         None if task.operators.iter().any(|operator| operator.cost.minimum().is_negative()) => {
             fewest_steps(task, config)
         }
@@ -75,22 +75,23 @@ pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
 /// For a task whose operators all cost at least 0.
 fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     let any = explore(task, &config.limits);
+    let show = |plan: &GroundPlan<Rational>| decode(task, plan, &config.limits);
     let too_long =
         |plan: &GroundPlan<Rational>| config.horizon.is_some_and(|horizon| plan.steps.len() > horizon);
     match (any, config.horizon) {
         (Explored::Known(solution), _) => *solution,
         (Explored::Optimal(plan), _) if !too_long(&plan) => {
             let lower = Some(metric(task, plan.cost.clone()));
-            let solution = answer(task, Status::Optimal, Some(&plan), Some(Proof::Search));
+            let solution = answer(Status::Optimal, Some(show(&plan)), Some(Proof::Search));
             Solution { lower_bound: lower, ..solution }
         }
         (Explored::Optimal(plan), Some(horizon)) => within(task, horizon, &plan.cost, &config.limits),
         (Explored::Unknown(_, lower), Some(horizon)) => within(task, horizon, &lower, &config.limits),
-        (Explored::Optimal(plan), None) => answer(task, Status::Feasible, Some(&plan), None),
+        (Explored::Optimal(plan), None) => answer(Status::Feasible, Some(show(&plan)), None),
         (Explored::Unknown(plan, lower), None) => {
             let status = if plan.is_some() { Status::Feasible } else { Status::Unknown };
             let lower = Some(metric(task, lower));
-            Solution { lower_bound: lower, ..answer(task, status, plan.as_ref(), None) }
+            Solution { lower_bound: lower, ..answer(status, plan.as_ref().map(show), None) }
         }
     }
 }
@@ -102,14 +103,15 @@ fn within(task: &Task<Rational>, horizon: usize, lower: &Rational, limits: &Limi
         Explored::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof),
         Explored::Unknown(None, _) => (Status::Unknown, None, None),
     };
-    let solution = answer(task, status, plan.as_ref(), proof);
+    let show = |plan: &GroundPlan<Rational>| decode(task, plan, limits);
+    let solution = answer(status, plan.as_ref().map(show), proof);
     Solution { lower_bound: Some(metric(task, lower.clone())), horizon, ..solution }
 }
 
 /// For a metric that actions improve: fewest steps first, then the best metric among those plans.
 fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let nothing = |solution: Solution| Solution { lower_bound: None, ..solution };
-    let unknown = || nothing(answer(task, Status::Unknown, None, None));
+    let unknown = || nothing(answer(Status::Unknown, None, None));
     let by_steps = task.with_costs(|_| Quantity::constant(Rational::one()));
     let steps = match explore(&by_steps, &config.limits) {
         Explored::Optimal(plan) => plan.steps.len(),
@@ -117,7 +119,7 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
         Explored::Unknown(..) => return unknown(),
     };
     if config.horizon.is_some_and(|horizon| steps > horizon) {
-        let solution = answer(task, Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
+        let solution = answer(Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
         return Solution { horizon: config.horizon.unwrap_or(steps), ..nothing(solution) };
     }
     // No plan has fewer steps, so a constant for each step changes nothing but the sign of the costs.
@@ -138,7 +140,7 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     Solution {
         horizon: steps,
         unbounded: Some(if proved { Unbounded::Proved } else { Unbounded::Suspected }),
-        ..nothing(answer(task, Status::Feasible, Some(&plan), proof))
+        ..nothing(answer(Status::Feasible, Some(decode(task, &plan, &config.limits)), proof))
     }
 }
 
@@ -155,7 +157,7 @@ fn explore(task: &Task<Rational>, limits: &Limits) -> Explored {
     let Ok(bounds) = RoundedBounds::new(task, limits) else {
         return Explored::Unknown(None, Rational::zero());
     };
-    let none = |proof| Explored::Known(Box::new(answer(task, Status::Unsolvable, None, Some(proof))));
+    let none = |proof| Explored::Known(Box::new(answer(Status::Unsolvable, None, Some(proof))));
     let Some(lower) = bounds.estimate(&task.initial) else {
         let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
         return none(Proof::Relaxation(reason.into()));
@@ -167,15 +169,10 @@ fn explore(task: &Task<Rational>, limits: &Limits) -> Explored {
     }
 }
 
-fn answer(
-    task: &Task<Rational>,
-    status: Status,
-    plan: Option<&GroundPlan<Rational>>,
-    proof: Option<Proof>,
-) -> Solution {
+fn answer(status: Status, plan: Option<Plan>, proof: Option<Proof>) -> Solution {
     Solution {
         status,
-        plan: plan.map(|plan| decode(task, plan)),
+        plan,
         ground: None,
         lower_bound: None,
         horizon: 0,

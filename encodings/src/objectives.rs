@@ -7,6 +7,7 @@
 //! [1] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
 //! and system optimization, IEEE Trans. SMC 1(3), 1971.
 
+use crate::limits::Limits;
 use crate::number::Int;
 use crate::optimize::{Config, optimize};
 use crate::plan::{Exact, GroundPlan};
@@ -89,7 +90,7 @@ fn in_order(
         let Some(plan) = &solution.ground else {
             // The plan that was best so far stays a plan; that nothing better was found for the rest is not proved.
             let known = best.map(|known| Solution { status: Status::Feasible, proof: None, ..known });
-            return finish(task, known.unwrap_or(solution));
+            return finish(task, known.unwrap_or(solution), &config.limits);
         };
         budgets.push((*objective, task.cost_by(*objective, plan)));
         let proved = solution.status == Status::Optimal;
@@ -107,15 +108,15 @@ fn in_order(
             break;
         }
     }
-    finish(task, best.unwrap_or_else(|| optimize(task, config, report)))
+    finish(task, best.unwrap_or_else(|| optimize(task, config, report)), &config.limits)
 }
 
 /// Shows the plan by the task's own objectives.
-fn finish(task: &Task, mut solution: Solution) -> Point {
+fn finish(task: &Task, mut solution: Solution, limits: &Limits) -> Point {
     let mut values = Vec::new();
     if let Some(plan) = &solution.ground {
         let plan = GroundPlan { steps: plan.steps.clone(), cost: task.cost_by(0, plan) };
-        solution.plan = Some(crate::plan::decode(task, &plan));
+        solution.plan = Some(crate::plan::decode(task, &plan, limits));
         let objectives = std::iter::once(&task.objective).chain(&task.others);
         values.extend(
             objectives

@@ -6,6 +6,7 @@ use num_traits::{ToPrimitive, Zero};
 
 use crate::earliest::{earliest, starts};
 use crate::lifted::ObjectId;
+use crate::limits::Limits;
 use crate::number::{Int, Rational, TaskNumber};
 use crate::pddl::number::to_decimal;
 use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
@@ -104,9 +105,9 @@ pub struct Plan {
     pub cost: Exact,
 }
 
-/// The plan in the names of the task.
-pub(crate) fn decode<N: TaskNumber>(task: &Task<N>, plan: &GroundPlan<N>) -> Plan {
-    let plan = earliest(task, plan);
+/// The plan in the names of the task, each action as early as can be found within the limits.
+pub(crate) fn decode<N: TaskNumber>(task: &Task<N>, plan: &GroundPlan<N>, limits: &Limits) -> Plan {
+    let plan = earliest(task, plan, limits);
     let mut steps = Vec::new();
     let mut current: Vec<(String, String)> = Vec::new();
     let actions = plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none());

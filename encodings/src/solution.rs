@@ -83,6 +83,8 @@ pub struct Statistics {
     pub failure: Option<String>,
     /// Two parts of the planner contradict each other: a fault of ours, and nothing is claimed to be proved.
     pub contradiction: Option<String>,
+    /// The program by whose word alone a formula has no model, if the answer rests on that: its refutation was not checked.
+    pub unchecked: Option<String>,
     /// Time for bounds and the quick search.
     pub search: Duration,
     /// Time for building formulas.

@@ -2,6 +2,7 @@
 //!
 //! Every function design is chosen here, so an action appears once for each combination of its designs.
 
+use crate::limits::Limits;
 use crate::number::Int;
 use crate::plan::{Exact, GroundPlan, GroundStep, Step, decode, metric};
 use crate::task::{OperatorId, State, Task};
@@ -65,7 +66,7 @@ impl Task {
 
     fn step(&self, operator: OperatorId, choice: Vec<u32>) -> Option<Step> {
         let plan = GroundPlan { steps: vec![GroundStep { operator, choice }], cost: 0 };
-        decode(self, &plan).steps.pop()
+        decode(self, &plan, &Limits::none()).steps.pop()
     }
 
     /// How many operators there are, each standing for all combinations of its designs.

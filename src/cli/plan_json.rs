@@ -28,7 +28,10 @@ pub(super) fn json(name: &str, solution: &Solution, stages: &Stages) -> Value {
         statistics.families.iter().map(|(family, count)| ((*family).to_owned(), json!(count))).collect();
     let proof = match &solution.proof {
         None => Value::Null,
-        Some(Proof::Sat { step_bound }) => json!({ "by": "sat", "step_bound": step_bound }),
+        Some(Proof::Sat { step_bound }) => match &statistics.unchecked {
+            Some(program) => json!({ "by": "sat", "step_bound": step_bound, "unchecked": program }),
+            None => json!({ "by": "sat", "step_bound": step_bound }),
+        },
         Some(Proof::Bound) => json!({ "by": "bound" }),
         Some(Proof::Search) => json!({ "by": "search" }),
         Some(Proof::Relaxation(reason)) => json!({ "by": "relaxation", "reason": reason }),

@@ -6,9 +6,12 @@ use metaplan::mission::Blocking;
 /// The answer in a sentence: what is claimed, and whether it is proved.
 pub(super) fn verdict(solution: &Solution) -> String {
     let horizon = solution.horizon;
+    let program = solution.statistics.unchecked.as_ref();
+    let proved =
+        program.map_or("proved".to_owned(), |program| format!("by the word of `{program}`, unchecked"));
     match (solution.status, &solution.proof, solution.unbounded) {
         (Status::Optimal, Some(Proof::Sat { step_bound }), _) => format!(
-            "optimal, proved: no cheaper plan has up to {} (unsatisfiable), and none with more can be cheaper\n",
+            "optimal, {proved}: no cheaper plan has up to {} (unsatisfiable), and none with more can be cheaper\n",
             steps(*step_bound)
         ),
         (Status::Optimal, Some(Proof::Bound), _) => {
@@ -37,14 +40,14 @@ pub(super) fn verdict(solution: &Solution) -> String {
             format!("no plan exists, proved: {reason}\n")
         }
         (Status::Unsolvable, Some(Proof::Sat { step_bound }), _) => format!(
-            "no plan exists, proved: none has up to {} (unsatisfiable), and a shortest one has no more\n",
+            "no plan exists, {proved}: none has up to {} (unsatisfiable), and a shortest one has no more\n",
             steps(*step_bound)
         ),
         (Status::Unsolvable, _, _) => {
             "no plan exists, proved: every reachable state was visited or is dominated\n".to_owned()
         }
         (Status::UnsolvableWithinHorizon, _, _) => {
-            format!("no plan with up to {}, proved; longer ones were not considered\n", steps(horizon))
+            format!("no plan with up to {}, {proved}; longer ones were not considered\n", steps(horizon))
         }
         (Status::Unknown, _, _) => {
             "a limit was reached before a plan was found; nothing is proved\n".to_owned()

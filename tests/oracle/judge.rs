@@ -483,12 +483,20 @@ pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
+/// Whether nothing more is judged after a failure.
+pub fn is_over(tally: &Tally) -> bool {
+    !tally.failures.is_empty() && std::env::var_os("ORACLE_STOP").is_some()
+}
+
 /// Judges as many tasks of a generator as the environment says (`default` if it does not), each from its seed.
 pub fn run(default: u64, cases: impl Fn(u64) -> Vec<Case>) -> Tally {
     let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", default));
     let mut tally = Tally::default();
     for seed in from..from + tasks {
         cases(seed).iter().for_each(|case| judge(case, &mut tally));
+        if is_over(&tally) {
+            break;
+        }
     }
     tally
 }

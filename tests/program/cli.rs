@@ -354,6 +354,25 @@ fn every_solver_proves_the_same() {
 }
 
 #[test]
+#[cfg(unix)]
+fn the_word_of_a_program_is_not_a_proof() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let script = directory.path().join("solver.sh");
+    // It answers right as long as it is asked whether it serves.
+    let text = "case $(grep -vc '^p') in 1) printf 's SATISFIABLE\\nv 1 0\\n'; exit 10;; *) echo s UNSATISFIABLE; exit $1;; esac";
+    std::fs::write(&script, text).expect("a file");
+    let plan = |status: &str, more: &[&str]| {
+        let solver = format!("sh {} {status}", script.display());
+        metaplan(&[&["plan", "missions/ugv.toml", "--solver", &solver], more].concat())
+    };
+    let unproved = plan("20", &["--horizon", "2"]);
+    check(&unproved, 11, &["no plan with up to 2 steps, by the word of `sh ", "solver.sh 20`, unchecked"]);
+    // What the search has proved is proved.
+    check(&plan("20", &[]), 0, &["optimal, proved: the search"]);
+    check(&plan("7", &[]), 2, &["does not serve", "it failed: exit status: 7"]);
+}
+
+#[test]
 fn memory_is_limited() {
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "0"]), 2, &["0 is not in"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "4000"]), 0, &["optimal, proved"]);

@@ -15,7 +15,7 @@ use crate::encode::{CostLimit, Counting, Encoding, Meaning, Semantics};
 use crate::number::dense;
 use crate::optimize::Config;
 use crate::plan::{GroundPlan, GroundStep, Plan, decode, replay};
-use crate::sat::{Answer, Lit, Solver};
+use crate::sat::{Answer, Backend, Lit, Solver};
 use crate::solution::{Solution, Status};
 use crate::task::{Argument, Task};
 
@@ -46,8 +46,10 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
     let bounds = Bounds::new(task, &config.limits).ok()?;
     let window = bounds.window(task, Some(first.cost), config.horizon, &config.limits).ok()?;
-    let complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
-    let allowed = if complete || config.horizon.is_some() {
+    let is_complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
+    // Nobody has checked what a program says of a formula without a model.
+    let complete = is_complete && !matches!(config.backend, Backend::Program { .. });
+    let allowed = if is_complete || config.horizon.is_some() {
         window.allowed
     } else {
         bounds.window(task, Some(first.cost), Some(first.steps.len()), &config.limits).ok()?.allowed
@@ -59,23 +61,35 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
         solver.add_clause(clause.ok()?.1);
     }
     let mut run = Run { task, encoding, solver };
+    let plan = |steps: &[GroundStep]| {
+        decode(task, &GroundPlan { steps: steps.to_vec(), cost: first.cost }, &config.limits)
+    };
     let mut found = vec![first.steps.clone()];
+    // What differs in waits only is one plan to its reader.
+    let mut plans = vec![plan(&first.steps)];
     let mut exhausted = false;
     // Excludes the plans that are known as long as it is assumed.
     let others = run.encoding.formula.fresh(Meaning::Others);
-    while found.len() <= most && !exhausted {
-        if let Some(plan) = found.last() {
-            run.exclude(plan, others);
+    while plans.len() <= most && !exhausted {
+        if let Some(known) = found.last() {
+            run.exclude(known, others);
         }
         match run.solve(&[others]) {
-            (Answer::Satisfiable, Some(plan)) => found.push(plan),
+            (Answer::Satisfiable, Some(other)) => {
+                let shown = plan(&other);
+                found.push(other);
+                if !plans.contains(&shown) {
+                    plans.push(shown);
+                }
+            }
             (Answer::Unsatisfiable, _) => exhausted = true,
             _ => break,
         }
     }
-    let forced = if complete { run.forced(&first.steps, &found) } else { None };
-    let plan = |steps: Vec<GroundStep>| decode(task, &GroundPlan { steps, cost: first.cost });
-    let plans = found.into_iter().skip(1).map(plan).collect();
+    // Where there are waits, one action is several operators, at one place or another.
+    let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
+    let forced = if complete && !has_waits { run.forced(&first.steps, &found) } else { None };
+    plans.remove(0);
     Some(Alternatives { plans, complete: complete && exhausted, forced })
 }
 

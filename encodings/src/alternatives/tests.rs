@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Forced, alternatives};
 use crate::ground::{Config as GroundConfig, ground};
+use crate::limits::Limits;
 use crate::number::Int;
 use crate::optimize::{Config, optimize};
 use crate::pddl::{Source, read};
@@ -78,8 +79,10 @@ fn check(seed: u64) -> usize {
     let ground = solution.ground.as_ref().expect("a plan");
     let mut expected = Vec::new();
     all(&task, &task.initial, ground.cost, &mut Vec::new(), &mut expected);
-    let plans: Vec<Plan> =
-        expected.into_iter().map(|steps| decode(&task, &GroundPlan { steps, cost: ground.cost })).collect();
+    let plans: Vec<Plan> = expected
+        .into_iter()
+        .map(|steps| decode(&task, &GroundPlan { steps, cost: ground.cost }, &Limits::none()))
+        .collect();
     let first = solution.plan.as_ref().expect("a plan");
     let found = alternatives(&task, &solution, 1_000, &config).expect("alternatives");
     let texts: BTreeSet<_> = found.plans.iter().chain([first]).map(steps).collect();

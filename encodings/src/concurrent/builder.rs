@@ -11,6 +11,7 @@ use crate::ground::evaluate::{AtomId, Binding, World};
 use crate::ground::reach::Reached;
 use crate::ground::reads::Reads;
 use crate::lifted::{Change, Effect, ObjectId};
+use crate::limits::Limits;
 use crate::number::Int;
 use crate::quantity::NumericId;
 use crate::task::{Argument, Operator, OperatorId, Task};
@@ -76,10 +77,11 @@ impl<'a> Builder<'a> {
     }
 
     /// Pairs the halves of instances, and collects what operators write.
-    pub(super) fn collect(&mut self, task: &Task) -> Result<(), Vec<Error>> {
+    pub(super) fn collect(&mut self, task: &Task, limits: &Limits) -> Result<(), Vec<Error>> {
         let mut errors = Vec::new();
         let mut refused = FxHashSet::default();
-        for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+        for item in limits.watch(task.operators.iter().zip((0..).map(OperatorId))) {
+            let (operator, id) = item.map_err(|interrupted| vec![interrupted.into()])?;
             let origin = self.split.origins[operator.schema as usize];
             let schema = &self.split.lifted.schemas[operator.schema as usize];
             let arguments: Vec<ObjectId> = operator.arguments.iter().copied().filter_map(object).collect();
@@ -137,9 +139,11 @@ impl<'a> Builder<'a> {
         task: &Task,
         unit: Unit,
         roles: &mut [Role],
+        limits: &Limits,
     ) -> Result<Vec<Instance>, Error> {
         let mut instances = Vec::new();
-        for key in &self.order {
+        for key in limits.watch(&self.order) {
+            let key = key?;
             let Halves { start: Some(start), over_all, end: Some(end) } = self.instances[key] else {
                 continue;
             };
@@ -175,7 +179,7 @@ impl<'a> Builder<'a> {
     }
 
     /// The operators whose start and end are one happening although they interfere.
-    pub(super) fn contradictory(&self, task: &Task) -> FxHashSet<OperatorId> {
+    pub(super) fn contradictory(&self, task: &Task, limits: &Limits) -> Result<FxHashSet<OperatorId>, Error> {
         let index = self.footprints.index();
         let contradicts = |(id, [start, end]): &(OperatorId, [Footprint; 2])| {
             let operator = &task.operators[id.index()];
@@ -191,7 +195,11 @@ impl<'a> Builder<'a> {
             let start = complete(start, &schema.start_condition, &schema.start_effects);
             start.interferes(&complete(end, &schema.at_end, &schema.end_effects)).then_some(*id)
         };
-        self.joined.iter().filter_map(contradicts).collect()
+        let contradictory = limits.watch(&self.joined).filter_map(|pair| match pair {
+            Ok(pair) => contradicts(pair).map(Ok),
+            Err(interrupted) => Some(Err(interrupted.into())),
+        });
+        contradictory.collect()
     }
 
     /// What each operator waits for and lets others wait for, and how many kinds of access there are.
@@ -200,16 +208,17 @@ impl<'a> Builder<'a> {
         task: &Task,
         roles: &[Role],
         instances: &mut [Instance],
-    ) -> (Vec<Happening>, usize) {
+        limits: &Limits,
+    ) -> Result<(Vec<Happening>, usize), Error> {
         let whole = (0..roles.len()).filter(|id| roles[*id] == Role::Whole);
         let whole = whole.flat_map(|id| designs(task, OperatorId(id as u32)));
         let used = instances.iter().flat_map(|instance| instance.designs.iter().copied());
         let mut keys = Keys::new(self.separation, used.chain(whole).collect());
         let index = self.footprints.index();
         let mut happenings = Vec::new();
-        for (id, (role, mut written)) in
-            (0..).map(OperatorId).zip(roles.iter().zip(std::mem::take(&mut self.written)))
-        {
+        let written = std::mem::take(&mut self.written);
+        for item in limits.watch((0..).map(OperatorId).zip(roles.iter().zip(written))) {
+            let (id, (role, mut written)) = item?;
             let mut happening = Happening { role: *role, ..Happening::default() };
             if let Role::Timed(_) = role {
                 happening.accesses = keys.of(&written);
@@ -224,7 +233,7 @@ impl<'a> Builder<'a> {
             happenings.push(happening);
         }
         prune(happenings.iter_mut().map(|happening| &mut happening.accesses));
-        (happenings, keys.len())
+        Ok((happenings, keys.len()))
     }
 
     /// What an operator reads when it happens, and what its condition over all reads; none if it never happens, or by itself.

@@ -10,6 +10,7 @@ use crate::concurrent::split::{Half, Split};
 use crate::error::{Error, File, Place};
 use crate::ground::reach::Reached;
 use crate::lifted::Rational;
+use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, checked_lcm};
 use crate::pddl::ast::Span;
 use crate::task::{OperatorId, Task};
@@ -109,17 +110,18 @@ pub(super) fn compile(
     reached: &Reached,
     separation: &Rational,
     time_weight: Rational,
+    limits: &Limits,
 ) -> Result<Concurrent, Vec<Error>> {
     let one = |error| vec![error];
     let unit = Unit::new(&task, split, separation).map_err(one)?;
     let separation = unit.of(separation).map_err(one)?;
     refuse_rewards(&task, split).map_err(one)?;
     let mut builder = Builder::new(split, reached, separation);
-    builder.collect(&task)?;
+    builder.collect(&task, limits)?;
     let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(one)?;
     let mut roles = vec![Role::Never; task.operators.len()];
-    let mut instances = builder.instances(&task, unit, &mut roles).map_err(one)?;
-    let contradictory = builder.contradictory(&task);
+    let mut instances = builder.instances(&task, unit, &mut roles, limits).map_err(one)?;
+    let contradictory = builder.contradictory(&task, limits).map_err(one)?;
     for ((operator, role), id) in task.operators.iter().zip(&mut roles).zip((0..).map(OperatorId)) {
         match split.origins[operator.schema as usize].half {
             Half::Whole if !contradictory.contains(&id) => *role = Role::Whole,
@@ -127,7 +129,7 @@ pub(super) fn compile(
             _ => {}
         }
     }
-    let (happenings, keys) = builder.happenings(&task, &roles, &mut instances);
+    let (happenings, keys) = builder.happenings(&task, &roles, &mut instances, limits).map_err(one)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();
     for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
         events.extend(if let Role::Timed(time) = role { Some((*time, id)) } else { None });
@@ -137,7 +139,7 @@ pub(super) fn compile(
     drop_held(&mut task, &instances);
     let guards = vec![None; keys];
     let mut concurrent = Concurrent { task, happenings, instances, events, guards, measure, separation };
-    concurrent.guard();
+    concurrent.guard(limits).map_err(|interrupted| vec![interrupted.into()])?;
     Ok(concurrent)
 }
 
@@ -156,9 +158,10 @@ fn refuse_rewards(task: &Task, split: &Split) -> Result<(), Error> {
 
 impl Concurrent {
     /// Finds the variables that tell of accesses that they are past, and what happenings set.
-    fn guard(&mut self) {
+    fn guard(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let mut common: Vec<Option<Vec<u32>>> = vec![None; self.guards.len()];
-        for (operator, happening) in self.task.operators.iter().zip(&mut self.happenings) {
+        for pair in limits.watch(self.task.operators.iter().zip(&mut self.happenings)) {
+            let (operator, happening) = pair?;
             happening.sets = operator.effects.iter().map(|fact| fact.variable.0).collect();
             let facts = operator.condition.facts.iter().map(|fact| fact.variable);
             let facts: Vec<u32> = facts
@@ -188,5 +191,6 @@ impl Concurrent {
         for happening in &mut self.happenings {
             happening.sets.retain(|variable| heeded.contains(variable));
         }
+        Ok(())
     }
 }

@@ -79,7 +79,7 @@ impl<'a> Footprints<'a> {
             self.world.each_binding(&effect.bound, &[], &mut own, &mut |_, binding| {
                 bindings.push(binding.clone());
                 true
-            });
+            })?;
             for mut binding in bindings {
                 match self.world.residual(&effect.condition, &mut binding) {
                     Ok(Residual::True) => self.write(&effect.change, &binding, &mut footprint)?,

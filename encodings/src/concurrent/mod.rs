@@ -86,7 +86,7 @@ pub fn ground_concurrent(
     let none = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
     let (task, reached) = ground_lifted(lifted, designs, &none, &Generality::default(), &config.limits)?;
-    compile::compile(task, &split, &reached, &separation, weight)
+    compile::compile(task, &split, &reached, &separation, weight, &config.limits)
 }
 
 /// Durations that the planner would have to choose.

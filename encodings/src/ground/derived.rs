@@ -15,6 +15,7 @@ use crate::ground::instantiate::GroundTask;
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::residual::Residual;
 use crate::lifted::{ObjectId, PredicateId};
+use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
 /// A rule: the head holds where the body does. The body has no clauses.
@@ -58,8 +59,11 @@ impl World<'_> {
     /// The rules of all derived atoms that have been met, and of those that their bodies lead to.
     pub(crate) fn instantiate_axioms(&mut self) -> Result<(), Failure> {
         let lifted = self.lifted;
+        let limits = self.limits.clone();
+        let mut pulse = limits.pulse();
         let mut next = 0;
         while let Some(((predicate, arguments), ())) = self.atoms.get_index(next) {
+            pulse.beat()?;
             let (predicate, arguments, head) = (*predicate, arguments.clone(), AtomId(dense(next)));
             next += 1;
             for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
@@ -78,31 +82,56 @@ impl World<'_> {
 }
 
 /// Folds what is always or never true, and replaces atoms with one rule.
-pub(crate) fn simplify(task: &mut GroundTask<'_>) {
+pub(crate) fn simplify(task: &mut GroundTask<'_>, limits: &Limits) -> Result<(), Interrupted> {
     let mut axioms = std::mem::take(&mut task.world.definitions.axioms);
     let mut seen = FxHashSet::default();
     axioms.retain(|axiom| seen.insert(axiom.clone()));
-    fold(task, &mut axioms);
-    let bodies = single_bodies(&axioms);
+    fold(task, &mut axioms, limits)?;
+    let bodies = single_bodies(&axioms, limits)?;
     let mut kept = Vec::with_capacity(axioms.len());
-    for mut axiom in axioms {
+    for axiom in limits.watch(axioms) {
+        let mut axiom = axiom?;
         if inline(&mut axiom.body, &bodies) {
             kept.push(axiom);
         }
     }
-    task.operators.retain_mut(|operator| {
+    let mut pulse = limits.pulse();
+    retain(&mut task.operators, |operator| {
+        pulse.beat()?;
         let conditions = operator.conditional.iter_mut().flat_map(|effect| &mut effect.condition);
         conditions.for_each(|literal| rename(literal, &bodies));
-        inline(&mut operator.condition, &bodies)
-    });
+        Ok(inline(&mut operator.condition, &bodies))
+    })?;
     if task.goal.as_mut().is_some_and(|goal| !inline(goal, &bodies)) {
         task.goal = None;
     }
     task.world.definitions.axioms = kept;
+    Ok(())
+}
+
+/// Keeps the items that a function says are to be kept, unless it fails.
+fn retain<T>(
+    items: &mut Vec<T>,
+    mut keep: impl FnMut(&mut T) -> Result<bool, Interrupted>,
+) -> Result<(), Interrupted> {
+    let mut interrupted = Ok(());
+    items.retain_mut(|item| match (interrupted, interrupted.and_then(|()| keep(item))) {
+        (Err(_), _) => true,
+        (Ok(()), Ok(is_kept)) => is_kept,
+        (Ok(()), Err(error)) => {
+            interrupted = Err(error);
+            true
+        }
+    });
+    interrupted
 }
 
 /// Whether each derived atom is known to be true or false, as long as that leads to more.
-fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) {
+fn fold(
+    task: &mut GroundTask<'_>,
+    axioms: &mut Vec<GroundAxiom>,
+    limits: &Limits,
+) -> Result<(), Interrupted> {
     let world = &task.world;
     let derived: Vec<AtomId> =
         (0..dense(world.atoms.len())).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
@@ -110,7 +139,8 @@ fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) {
     loop {
         let before = known.len();
         let mut has_rule = FxHashSet::default();
-        for axiom in axioms.iter() {
+        for axiom in limits.watch(axioms.iter()) {
+            let axiom = axiom?;
             has_rule.insert(axiom.head);
             if axiom.body == GroundCondition::default() {
                 known.insert(axiom.head, true);
@@ -124,13 +154,16 @@ fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) {
         }
         axioms.retain_mut(|axiom| !known.contains_key(&axiom.head) && substitute(&mut axiom.body, &known));
     }
-    task.operators.retain_mut(|operator| {
+    let mut pulse = limits.pulse();
+    retain(&mut task.operators, |operator| {
+        pulse.beat()?;
         operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &known));
-        substitute(&mut operator.condition, &known)
-    });
+        Ok(substitute(&mut operator.condition, &known))
+    })?;
     if task.goal.as_mut().is_some_and(|goal| !substitute(goal, &known)) {
         task.goal = None;
     }
+    Ok(())
 }
 
 /// Removes decided literals from a conjunction; false if one of them fails.
@@ -162,15 +195,20 @@ fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) 
 }
 
 /// The body of each atom that has exactly one rule and does not depend on itself, free of such atoms.
-fn single_bodies(axioms: &[GroundAxiom]) -> FxHashMap<AtomId, GroundCondition> {
+fn single_bodies(
+    axioms: &[GroundAxiom],
+    limits: &Limits,
+) -> Result<FxHashMap<AtomId, GroundCondition>, Interrupted> {
     let mut count: FxHashMap<AtomId, usize> = FxHashMap::default();
     for axiom in axioms {
         *count.entry(axiom.head).or_default() += 1;
     }
     let mut bodies: FxHashMap<AtomId, GroundCondition> = FxHashMap::default();
-    for component in components(axioms) {
-        let [only] = component[..] else { continue };
-        for axiom in axioms.iter().filter(|axiom| axiom.head == only && count[&only] == 1) {
+    let rules: FxHashMap<AtomId, &GroundAxiom> =
+        axioms.iter().filter(|axiom| count[&axiom.head] == 1).map(|axiom| (axiom.head, axiom)).collect();
+    for component in limits.watch(components(axioms)) {
+        let [only] = component?[..] else { continue };
+        if let Some(axiom) = rules.get(&only) {
             let mut body = axiom.body.clone();
             let depends_on_itself = body.atoms().any(|atom| atom == only);
             if !depends_on_itself && inline(&mut body, &bodies) {
@@ -178,7 +216,7 @@ fn single_bodies(axioms: &[GroundAxiom]) -> FxHashMap<AtomId, GroundCondition> {
             }
         }
     }
-    bodies
+    Ok(bodies)
 }
 
 /// Derived atoms in components of mutual dependence, what a component depends on before it.

@@ -74,7 +74,7 @@ impl Build<'_, '_> {
             self.world.each_binding(&effect.bound, &guards, &mut self.binding, &mut |_, binding| {
                 bindings.push(binding.clone());
                 true
-            });
+            })?;
             let own = std::mem::take(&mut self.binding);
             for binding in bindings {
                 self.binding = binding;

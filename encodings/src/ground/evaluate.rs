@@ -1,6 +1,7 @@
 //! The world that grounding looks at, and expressions under a binding of their parameters.
 
 use std::hash::Hash;
+use std::num::Wrapping;
 
 use indexmap::{Equivalent, IndexMap, IndexSet};
 use rustc_hash::FxBuildHasher;
@@ -62,6 +63,8 @@ pub(crate) struct World<'a> {
     /// Whether the condition of an effect is evaluated, which must be defined.
     pub(crate) in_effect: bool,
     pub(crate) limits: Limits,
+    /// How many bindings were visited that nothing guards, modulo 2^32.
+    pub(crate) visited: Wrapping<u32>,
 }
 
 /// Why an expression has no value here.
@@ -112,6 +115,7 @@ impl<'a> World<'a> {
             definitions: Definitions::default(),
             in_effect: false,
             limits: Limits::none(),
+            visited: Wrapping(0),
         }
     }
 
@@ -377,9 +381,11 @@ pub(super) fn satisfying(
     comparison: &Formula,
     variables: &[u32],
     candidates: &Candidates,
-) -> Vec<Arguments> {
+    limits: &Limits,
+) -> Result<Vec<Arguments>, Interrupted> {
     let reached = Reached::default();
     let mut world = World::new(lifted, &reached);
+    world.limits = limits.clone();
     let bound: Vec<_> = variables
         .iter()
         .filter_map(|v| Some(Bound { variable: *v, candidates: candidates.get(v)?.clone() }))
@@ -391,6 +397,8 @@ pub(super) fn satisfying(
             rows.push(variables.iter().filter_map(|v| binding[*v as usize]).collect());
         }
         true
-    });
-    rows
+    })?;
+    // What was cut short above counts as not satisfied.
+    limits.check()?;
+    Ok(rows)
 }

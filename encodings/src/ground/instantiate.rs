@@ -156,7 +156,7 @@ pub(crate) fn instantiate<'a>(
         timeline.settle(&mut operators);
     }
     let mut task = GroundTask { world, operators, goal, objectives: Vec::new() };
-    derived::simplify(&mut task);
+    derived::simplify(&mut task, limits).map_err(|interrupted| vec![interrupted.into()])?;
     Ok(task)
 }
 

@@ -7,6 +7,7 @@ use rustc_hash::FxHashMap;
 
 use crate::ground::evaluate::{Binding, World};
 use crate::lifted::{Arguments, Bound, Formula, ObjectId, PredicateId, Term};
+use crate::limits::Interrupted;
 
 /// Rows of relations by the values of some of their columns.
 #[derive(Default)]
@@ -42,16 +43,19 @@ pub(crate) fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
     guards
 }
 
+/// The limits are looked at after so many bindings that nothing guards.
+const BETWEEN_LOOKS: u32 = 256;
+
 impl World<'_> {
     /// Calls `visit` with every binding of the variables under which all guards can hold, until it returns
-    /// false; the variables are unbound again afterwards. Returns whether `visit` never returned false.
+    /// false; the variables are unbound again afterwards, unless a limit ends it all. Returns whether `visit` never returned false.
     pub(crate) fn each_binding(
         &mut self,
         bound: &[Bound],
         guards: &[Guard<'_>],
         binding: &mut Binding,
         visit: &mut dyn FnMut(&mut Self, &mut Binding) -> bool,
-    ) -> bool {
+    ) -> Result<bool, Interrupted> {
         let open = |term: &&Term, binding: &Binding| match term {
             Term::Parameter(variable) if binding[*variable as usize].is_none() => Some(*variable),
             _ => None,
@@ -83,15 +87,15 @@ impl World<'_> {
                     bound.iter().any(ranges)
                 }
             });
-            let go_on = !fits || self.each_binding(bound, &rest, binding, visit);
+            let go_on = !fits || self.each_binding(bound, &rest, binding, visit)?;
             for variable in fresh {
                 binding[variable as usize] = None;
             }
             if !go_on {
-                return false;
+                return Ok(false);
             }
         }
-        true
+        Ok(true)
     }
 
     /// Every object for every variable that is still open.
@@ -100,19 +104,23 @@ impl World<'_> {
         bound: &[Bound],
         binding: &mut Binding,
         visit: &mut dyn FnMut(&mut Self, &mut Binding) -> bool,
-    ) -> bool {
+    ) -> Result<bool, Interrupted> {
         let Some(first) = bound.iter().find(|b| binding[b.variable as usize].is_none()) else {
-            return visit(self, binding);
+            self.visited += 1;
+            if self.visited.0.is_multiple_of(BETWEEN_LOOKS) {
+                self.limits.check()?;
+            }
+            return Ok(visit(self, binding));
         };
         for object in first.candidates.iter() {
             binding[first.variable as usize] = Some(*object);
-            let go_on = self.each_candidate(bound, binding, visit);
+            let go_on = self.each_candidate(bound, binding, visit)?;
             binding[first.variable as usize] = None;
             if !go_on {
-                return false;
+                return Ok(false);
             }
         }
-        true
+        Ok(true)
     }
 
     /// The rows of a relation that agree with the bound terms, in ascending order.

@@ -14,6 +14,7 @@ use crate::ground::evaluate::{Failure, World};
 use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::integers::TableMap;
 use crate::lifted::{Expression, Lifted, Metric, Rational};
+use crate::limits::Limits;
 use crate::pddl::ast::Direction;
 use crate::quantity::{Linear, NumericId, Quantity};
 
@@ -29,7 +30,11 @@ pub(crate) struct GroundObjective {
 ///
 /// # Errors
 /// A metric that is not linear, or over a fluent whose change depends on the state.
-pub(crate) fn attach_costs(lifted: &Lifted, task: &mut GroundTask<'_>) -> Result<(), Vec<Error>> {
+pub(crate) fn attach_costs(
+    lifted: &Lifted,
+    task: &mut GroundTask<'_>,
+    limits: &Limits,
+) -> Result<(), Vec<Error>> {
     if lifted.metrics.is_empty() {
         let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
         for operator in &mut task.operators {
@@ -42,13 +47,13 @@ pub(crate) fn attach_costs(lifted: &Lifted, task: &mut GroundTask<'_>) -> Result
     }
     let mut errors = Vec::new();
     for metric in &lifted.metrics {
-        attach(lifted, task, metric).unwrap_or_else(|error| errors.push(error));
+        attach(lifted, task, metric, limits).unwrap_or_else(|error| errors.push(error));
     }
     if errors.is_empty() { Ok(()) } else { Err(errors) }
 }
 
 /// Gives every operator its cost by one metric.
-fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric) -> Result<(), Error> {
+fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric, limits: &Limits) -> Result<(), Error> {
     let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
     let maximize = metric.direction == Direction::Maximize;
     if maximize {
@@ -63,7 +68,8 @@ fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric) -> Result
     let offset = initial.into_iter().fold(linear.quantity.constant.clone(), |sum, value| sum + value);
     task.objectives.push(GroundObjective { offset, maximize });
     let mut scaled = Scaled::default();
-    for operator in &mut task.operators {
+    for operator in limits.watch(&mut task.operators) {
+        let operator = operator?;
         let cost = cost(operator, &linear, &time, &mut scaled).ok_or_else(|| Error::Unsupported {
             construct: format!(
                 "a metric over a fluent that `{}` changes depending on the state",

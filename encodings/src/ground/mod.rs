@@ -109,7 +109,7 @@ pub(crate) fn ground_lifted<N: TaskNumber>(
 ) -> Result<(Task<N>, Reached), Vec<Error>> {
     let reached = reach::reach(lifted, slots, limits).map_err(|error| vec![error])?;
     let mut ground = instantiate::instantiate(lifted, designs, slots, &reached, limits)?;
-    metric::attach_costs(lifted, &mut ground)?;
+    metric::attach_costs(lifted, &mut ground, limits)?;
     if limits.reached() {
         return Err(vec![Error::Interrupted]);
     }

@@ -32,7 +32,7 @@ pub(crate) fn prune(
         .collect();
     let mut reached = forward(task, &initially, limits)?;
     while generality.numbers.is_none() && prune_by_numbers(task, limits)? {
-        simplify(task);
+        simplify(task, limits)?;
         reached = forward(task, &initially, limits)?;
     }
     let goal_atoms: Vec<AtomId> = match &task.goal {

@@ -9,7 +9,7 @@
 //!
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
-use rules::{Atom, Engine, Program, Symbol};
+use rules::{Atom, Engine, Interrupt, Program, Symbol};
 use rustc_hash::FxHashMap;
 
 use crate::configuration::{SlotParameter, atoms, conjuncts, formula_terms};
@@ -19,7 +19,7 @@ use crate::ground::relaxed::{Builder, Candidates};
 use crate::lifted::{
     Arguments, Axiom, Bound, Change, Effect, Formula, Lifted, ObjectId, PredicateId, Schema, Term,
 };
-use crate::limits::Limits;
+use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
 /// What relaxed reachability finds.
@@ -36,7 +36,7 @@ pub(crate) struct Reached {
 /// Runs the relaxed task to its fixpoint.
 ///
 /// # Errors
-/// `Error::Rules` if the rule engine refuses the program, `Error::Interrupted` at a limit, which the engine itself does not look at.
+/// `Error::Rules` if the rule engine refuses the program, `Error::Interrupted` at a limit.
 pub(crate) fn reach(
     lifted: &Lifted,
     slots: &[Vec<SlotParameter>],
@@ -48,19 +48,19 @@ pub(crate) fn reach(
     if variables.any(|count| u16::try_from(count).is_err()) {
         return Err(Error::Rules("an action or axiom with more than 65,535 variables".into()));
     }
-    let mut builder = Builder::new(lifted);
+    let mut builder = Builder::new(lifted, limits);
     for axiom in &lifted.axioms {
-        builder.axiom(axiom);
+        builder.axiom(axiom)?;
     }
-    let applicable: Vec<_> =
-        lifted.schemas.iter().zip(slots).map(|(schema, slots)| builder.schema(schema, slots)).collect();
+    let schemas = lifted.schemas.iter().zip(slots).map(|(schema, slots)| builder.schema(schema, slots));
+    let applicable: Vec<_> = schemas.collect::<Result<_, Interrupted>>()?;
     let (symbols, rules, facts) = builder.finish();
     let objects: FxHashMap<Symbol, ObjectId> =
         symbols.objects.iter().copied().zip((0..).map(ObjectId)).collect();
+    let within = rules::Limits { steps: u64::MAX, interrupt: Some(interrupt(limits)) };
+    let program = Program { rules, ..Program::default() };
     let engine =
-        Engine::new(symbols.table, Program { rules, ..Program::default() }, facts).map_err(|errors| {
-            Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-        })?;
+        Engine::with_limits(symbols.table, program, facts, within).map_err(|errors| refusal(&errors))?;
     limits.check()?;
     let read = |row: &[Symbol]| -> Arguments {
         row.iter().filter_map(|symbol| objects.get(symbol)).copied().collect()
@@ -97,22 +97,41 @@ pub(crate) fn reach(
     Ok(Reached { instances, atoms, derived })
 }
 
+/// What stops the rule engine.
+fn interrupt(limits: &Limits) -> Interrupt {
+    let limits = limits.clone();
+    Interrupt::new(move || limits.reached())
+}
+
+/// Why the rule engine has no result.
+fn refusal(errors: &[rules::Error]) -> Error {
+    if errors.iter().any(|error| matches!(error, rules::Error::Interrupted { .. })) {
+        return Error::Interrupted;
+    }
+    Error::Rules(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+}
+
 impl Builder<'_> {
     /// Adds the rules of a derived predicate: exact if it is static, else relaxed.
-    fn axiom(&mut self, axiom: &Axiom) {
+    fn axiom(&mut self, axiom: &Axiom) -> Result<(), Interrupted> {
         let parameters: Vec<u32> = (0..dense(axiom.parameters.len())).collect();
         let candidates: Candidates =
             parameters.iter().copied().zip(axiom.parameters.iter().map(|p| p.candidates.clone())).collect();
         let is_static = !self.lifted.predicates[axiom.predicate.index()].fluent;
         let mut body = self.types(&parameters, &candidates);
-        self.body(&axiom.condition, &candidates, is_static, &mut body);
+        self.body(&axiom.condition, &candidates, is_static, &mut body)?;
         let head =
             self.atom(axiom.predicate, &parameters.iter().map(|p| Term::Parameter(*p)).collect::<Vec<_>>());
         self.rule(vec![head], body);
+        Ok(())
     }
 
     /// Adds the rules of a schema; returns the relation of its instances and the parameters that it ranges over.
-    fn schema(&mut self, schema: &Schema, slots: &[SlotParameter]) -> (Symbol, Vec<u32>) {
+    fn schema(
+        &mut self,
+        schema: &Schema,
+        slots: &[SlotParameter],
+    ) -> Result<(Symbol, Vec<u32>), Interrupted> {
         let number = self.fresh("applicable");
         let is_slot = |parameter: &u32| slots.iter().any(|slot| slot.parameter == *parameter);
         let all: Vec<u32> = (0..dense(schema.parameters.len())).collect();
@@ -133,22 +152,27 @@ impl Builder<'_> {
             ranging.push(slot.parameter);
             let mut fits = self.types(&ranging, &candidates);
             for formula in own {
-                self.body(formula, &candidates, false, &mut fits);
+                self.body(formula, &candidates, false, &mut fits)?;
             }
             let relation = self.fresh("slot");
             body.push(Self::relation(relation, &others));
             self.rule(vec![Self::relation(relation, &others)], fits);
         }
         for formula in needs.iter().filter(|formula| slots_in(formula, slots).is_empty()) {
-            self.body(formula, &candidates, false, &mut body);
+            self.body(formula, &candidates, false, &mut body)?;
         }
         self.rule(vec![Self::relation(number, &core)], body);
-        self.effects(schema, Self::relation(number, &core), &candidates);
-        (number, core)
+        self.effects(schema, Self::relation(number, &core), &candidates)?;
+        Ok((number, core))
     }
 
     /// What instances add; all that they add without a condition in one rule.
-    fn effects(&mut self, schema: &Schema, applicable: Atom, candidates: &Candidates) {
+    fn effects(
+        &mut self,
+        schema: &Schema,
+        applicable: Atom,
+        candidates: &Candidates,
+    ) -> Result<(), Interrupted> {
         let mut plain = Vec::new();
         for Effect { bound, condition, change } in schema.start_effects.iter().chain(&schema.end_effects) {
             let Change::Add(predicate, terms) = change else { continue };
@@ -160,12 +184,13 @@ impl Builder<'_> {
             let (variables, candidates) = with_bound(candidates, bound);
             let mut body = vec![applicable.clone()];
             body.extend(self.types(&variables, &candidates));
-            self.body(condition, &candidates, false, &mut body);
+            self.body(condition, &candidates, false, &mut body)?;
             self.rule(vec![head], body);
         }
         if !plain.is_empty() {
             self.rule(plain, vec![applicable]);
         }
+        Ok(())
     }
 }
 

@@ -12,6 +12,7 @@ use rustc_hash::FxHashMap;
 use crate::configuration::{has_numbers, is_static};
 use crate::ground::reach::{free, with_bound};
 use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Term};
+use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
 /// What variables range over.
@@ -27,6 +28,7 @@ pub(super) struct Names {
 /// A program under construction.
 pub(super) struct Builder<'a> {
     pub(super) lifted: &'a Lifted,
+    limits: &'a Limits,
     names: Names,
     types: FxHashMap<Arc<[ObjectId]>, Symbol>,
     facts: Vec<Fact>,
@@ -35,7 +37,7 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(super) fn new(lifted: &'a Lifted) -> Self {
+    pub(super) fn new(lifted: &'a Lifted, limits: &'a Limits) -> Self {
         let mut table = Symbols::new();
         let objects: Vec<_> = (0..lifted.objects.len()).map(|i| table.name(&format!("object {i}"))).collect();
         let predicates: Vec<_> =
@@ -52,7 +54,7 @@ impl<'a> Builder<'a> {
             })
             .collect();
         let names = Names { table, objects, predicates };
-        Self { lifted, names, types: FxHashMap::default(), facts, rules: Vec::new(), relations: 0 }
+        Self { lifted, limits, names, types: FxHashMap::default(), facts, rules: Vec::new(), relations: 0 }
     }
 
     pub(super) fn finish(self) -> (Names, Vec<Rule>, Vec<Fact>) {
@@ -120,9 +122,11 @@ impl<'a> Builder<'a> {
         candidates: &Candidates,
         exact: bool,
         out: &mut Vec<Atom>,
-    ) {
+    ) -> Result<(), Interrupted> {
         match formula {
-            Formula::And(parts) => parts.iter().for_each(|part| self.body(part, candidates, exact, out)),
+            Formula::And(parts) => {
+                return parts.iter().try_for_each(|part| self.body(part, candidates, exact, out));
+            }
             Formula::Literal { positive, predicate, terms } => match self.atom(*predicate, terms) {
                 atom if *positive => out.push(atom),
                 Atom::Relation { predicate: symbol, arguments }
@@ -139,28 +143,29 @@ impl<'a> Builder<'a> {
             Formula::Exists(bound, body) => {
                 let (variables, candidates) = with_bound(candidates, bound);
                 out.extend(self.types(&variables, &candidates));
-                self.body(body, &candidates, exact, out);
+                self.body(body, &candidates, exact, out)?;
             }
             Formula::Or(parts) => {
                 if exact || !parts.iter().any(|part| self.may_be_free(part)) {
-                    let relation = self.auxiliary(formula, parts, candidates, exact);
+                    let relation = self.auxiliary(formula, parts, candidates, exact)?;
                     out.push(Self::relation(relation, &free(formula)));
                 }
             }
             Formula::ForAll(..) => {
                 if exact || (is_static(self.lifted, formula) && !has_numbers(formula)) {
-                    let relation = self.auxiliary(formula, &[formula.negated()], candidates, true);
+                    let relation = self.auxiliary(formula, &[formula.negated()], candidates, true)?;
                     let arguments = free(formula).into_iter().map(variable);
                     out.push(Atom::Not { predicate: relation, arguments: arguments.collect() });
                 }
             }
             Formula::Compare(..) => {
                 if exact {
-                    let relation = self.comparison(formula, candidates);
+                    let relation = self.comparison(formula, candidates)?;
                     out.push(Self::relation(relation, &free(formula)));
                 }
             }
         }
+        Ok(())
     }
 
     /// A relation over the free variables of a condition that holds where one of the parts does.
@@ -170,15 +175,15 @@ impl<'a> Builder<'a> {
         parts: &[Formula],
         candidates: &Candidates,
         exact: bool,
-    ) -> Symbol {
+    ) -> Result<Symbol, Interrupted> {
         let relation = self.fresh("auxiliary");
         let variables = free(formula);
         for part in parts {
             let mut body = self.types(&variables, candidates);
-            self.body(part, candidates, exact, &mut body);
+            self.body(part, candidates, exact, &mut body)?;
             self.rule(vec![Self::relation(relation, &variables)], body);
         }
-        relation
+        Ok(relation)
     }
 
     /// Whether a relaxed condition holds without asking for anything.
@@ -197,15 +202,16 @@ impl<'a> Builder<'a> {
     }
 
     /// The relation of a static comparison: the objects for which it holds.
-    fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Symbol {
+    fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Result<Symbol, Interrupted> {
         let relation = self.fresh("comparison");
         let variables = free(formula);
-        let rows = crate::ground::evaluate::satisfying(self.lifted, formula, &variables, candidates);
+        let rows =
+            crate::ground::evaluate::satisfying(self.lifted, formula, &variables, candidates, self.limits)?;
         for row in rows {
             let arguments = row.iter().map(|object| self.names.objects[object.index()]).collect();
             self.facts.push(Fact { predicate: relation, arguments });
         }
-        relation
+        Ok(relation)
     }
 }
 

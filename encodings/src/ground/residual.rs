@@ -153,7 +153,7 @@ impl World<'_> {
                 failure = Some(error);
                 false
             }
-        });
+        })?;
         match failure {
             Some(failure) => Err(failure),
             None if complete => Ok(Residual::junction(kept, universal)),

@@ -56,7 +56,8 @@ impl Run<'_> {
             }
             Err(Interrupted) => Tightened::Interrupted,
         };
-        let proof = matches!(tightened, Tightened::Exhausted).then_some(Proof::Sat { step_bound: steps });
+        let is_proved = matches!(tightened, Tightened::Exhausted) && run.statistics.unchecked.is_none();
+        let proof = is_proved.then_some(Proof::Sat { step_bound: steps });
         let mut plan = best.plan;
         let statistics = run.statistics;
         plan.cost += lowest * steps as Int;
@@ -67,7 +68,7 @@ impl Run<'_> {
         };
         Solution {
             status: Status::Feasible,
-            plan: Some(decode(self.task, &plan)),
+            plan: Some(decode(self.task, &plan, &self.config.limits)),
             ground: Some(plan),
             lower_bound: None,
             horizon: steps,

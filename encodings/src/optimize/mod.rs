@@ -167,15 +167,19 @@ impl<'a> Run<'a> {
             other => other,
         };
         let (lower, proof) = if doubtful { (None, None) } else { (lower, proof) };
+        let mut statistics = self.statistics;
+        if matches!(proof, Some(Proof::Bound | Proof::Search | Proof::Relaxation(_))) {
+            statistics.unchecked = None;
+        }
         Solution {
             status,
-            plan: plan.map(|plan| decode(self.task, plan)),
+            plan: plan.map(|plan| decode(self.task, plan, &self.config.limits)),
             ground: plan.cloned(),
             lower_bound: lower.map(|lower| metric(self.task, lower)),
             horizon,
             proof,
             unbounded: None,
-            statistics: self.statistics,
+            statistics,
         }
     }
 
@@ -251,7 +255,10 @@ impl<'a> Run<'a> {
                 (Tightened::Exhausted, Some(step_bound)) => {
                     best.lower = best.plan.cost.min(limit + 1);
                     if best.lower == best.plan.cost {
-                        return self.conclude(&best, horizon, Some(Proof::Sat { step_bound }));
+                        // What the search has proved does not come to rest on the word of a program.
+                        let proof = unproved.filter(|_| self.statistics.unchecked.is_some());
+                        let proof = proof.unwrap_or(Proof::Sat { step_bound });
+                        return self.conclude(&best, horizon, Some(proof));
                     }
                     self.announce(&best, horizon);
                     stage = stage.saturating_mul(2).max(1);
@@ -325,7 +332,8 @@ impl<'a> Run<'a> {
         if answer == Answer::Satisfiable {
             self.contradicted("a formula has a plan that is cheaper than the lower bound");
         }
-        (answer == Answer::Unsatisfiable).then_some(Proof::Sat { step_bound: steps })
+        let is_confirmed = answer == Answer::Unsatisfiable && self.statistics.unchecked.is_none();
+        is_confirmed.then_some(Proof::Sat { step_bound: steps })
     }
 
     fn conclude(self, best: &Best, horizon: usize, proof: Option<Proof>) -> Solution {

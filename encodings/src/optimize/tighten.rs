@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::encode::Encoding;
 use crate::optimize::{Best, Run, Tightened};
 use crate::plan::{GroundPlan, GroundStep, replay};
-use crate::sat::{Answer, Lit, Solver};
+use crate::sat::{Answer, Backend, Lit, Solver};
 
 /// A solver that has the clauses of a formula, up to some position.
 pub(super) struct Live {
@@ -46,6 +46,12 @@ impl Run<'_> {
         live.conflicts = live.solver.conflicts();
         if let Some(reason) = live.solver.failure() {
             self.statistics.failure = Some(reason.to_owned());
+        }
+        if let (Answer::Unsatisfiable, Backend::Program { command, arguments }) =
+            (answer, &self.config.backend)
+        {
+            let words: Vec<&str> = std::iter::once(command).chain(arguments).map(String::as_str).collect();
+            self.statistics.unchecked = Some(words.join(" "));
         }
         self.statistics.solve += started.elapsed();
         let plan = if answer == Answer::Satisfiable {

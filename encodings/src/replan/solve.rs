@@ -8,6 +8,7 @@ use num_rational::BigRational;
 use rustc_hash::FxHashSet;
 
 use crate::lifted::ObjectId;
+use crate::limits::Limits;
 use crate::number::{Int, dense};
 use crate::plan::{GroundPlan, GroundStep, decode, replay_from, resolve};
 use crate::replan::layout::Situation;
@@ -69,7 +70,7 @@ pub(super) fn solve(
                 let ended = winners.into_iter().map(|(start, plan)| Candidate::new(&set.task, &start, plan));
                 let all = known.into_iter().chain(cut_short).chain(ended);
                 let least = all.min_by(|left, right| left.value.cmp(&right.value));
-                return least.map_or(Replanned::Unknown, |least| least.feasible(&set.task));
+                return least.map_or(Replanned::Unknown, |least| least.feasible(&set.task, query.limits));
             }
             Found::Unknown(_) => return Replanned::Unknown,
         };
@@ -88,7 +89,7 @@ pub(super) fn solve(
     let metric = if set.task.objective.maximize { -value } else { value };
     let close_to = if query.stay_close { old.into_iter().flatten().collect() } else { FxHashSet::default() };
     let (first, plan) = choose(set, query, &close_to, winners);
-    Replanned::Optimal { first, steps: decode(&set.task, &plan).steps, metric }
+    Replanned::Optimal { first, steps: decode(&set.task, &plan, query.limits).steps, metric }
 }
 
 /// The old plan, where it still is one: all that can be said without time to search.
@@ -100,7 +101,7 @@ pub(super) fn keep_old(base: &Base, task: &Task, situation: &Situation, query: &
         old_plan(task, &start.state, query, &old).map(|plan| Candidate::new(task, start, plan))
     });
     let least = known.min_by(|left, right| left.value.cmp(&right.value));
-    least.map_or(Replanned::Unknown, |least| least.feasible(task))
+    least.map_or(Replanned::Unknown, |least| least.feasible(task, query.limits))
 }
 
 /// The old plan, if it is one from a state on.
@@ -126,9 +127,9 @@ impl Candidate {
         Self { first: start.first, value: (&start.own + cost, plan.steps.len()), plan }
     }
 
-    fn feasible(self, task: &Task) -> Replanned {
+    fn feasible(self, task: &Task, limits: &Limits) -> Replanned {
         let metric = if task.objective.maximize { -self.value.0 } else { self.value.0 };
-        Replanned::Feasible { first: self.first, steps: decode(task, &self.plan).steps, metric }
+        Replanned::Feasible { first: self.first, steps: decode(task, &self.plan, limits).steps, metric }
     }
 }
 

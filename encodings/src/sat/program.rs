@@ -120,7 +120,11 @@ impl Program {
         }
         loop {
             match receiver.recv_timeout(INTERVAL) {
-                Ok(Ok(text)) => return Ok(Some(String::from_utf8_lossy(&text).into_owned())),
+                Ok(Ok(text)) => {
+                    let is_over = || self.limits.reached();
+                    return Ok(has_ended(&mut child.0, &is_over)?
+                        .then(|| String::from_utf8_lossy(&text).into_owned()));
+                }
                 Ok(Err(error)) => return Err(format!("its output cannot be read: {error}")),
                 Err(mpsc::RecvTimeoutError::Disconnected) => return Err("its output is closed".to_owned()),
                 Err(mpsc::RecvTimeoutError::Timeout) => {
@@ -132,6 +136,19 @@ impl Program {
             }
         }
     }
+}
+
+/// Waits for the end of a program that writes nothing more; `false` if a limit comes first. A program ends with 10 or 20 as
+/// solvers do, or with 0; otherwise what it wrote may be half of it.
+fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, String> {
+    while !is_over() {
+        match child.try_wait().map_err(|error| format!("how it ended is not known: {error}"))? {
+            Some(status) if matches!(status.code(), Some(0 | 10 | 20)) => return Ok(true),
+            Some(status) => return Err(format!("it failed: {status}")),
+            None => thread::sleep(INTERVAL),
+        }
+    }
+    Ok(false)
 }
 
 /// A process that does not outlive this value.

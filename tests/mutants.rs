@@ -1,0 +1,179 @@
+//! Whether the oracles notice when the planner is wrong.
+//!
+//! `tests/oracle/mutants.toml` names faults. They are put into a copy of the workspace, all into one program, which is asked once for each
+//! fault with that one switched on. A fault that no oracle notices is a hole in the oracles, or no fault at all.
+
+#![expect(
+    clippy::print_stdout,
+    reason = "what noticed each fault, and after how long, is what this is run for"
+)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde::Deserialize;
+
+/// What is copied of the workspace.
+const PARTS: [&str; 13] = [
+    "Cargo.toml",
+    "Cargo.lock",
+    "README.md",
+    "src",
+    "ontology",
+    "rules",
+    "encodings",
+    "probabilistic",
+    "tests",
+    "benches",
+    "missions",
+    "clippy.toml",
+    "GLOSSARY.md",
+];
+
+/// The variable that switches a fault on; counted from 1.
+const SWITCH: &str = "METAPLAN_MUTANT";
+
+/// What is asked of each fault, in order: tests of `tests/oracle`, and how many tasks they judge.
+const ORACLES: [(&str, u32); 5] = [
+    ("field::", 0),
+    ("numbers::special::hundreds_of_designs", 0),
+    ("temporal::actions_one_after_another", 4_000),
+    ("temporal::overlapping_actions", 1_500),
+    ("numbers::random_tasks_with_numbers", 1_500),
+];
+
+/// A planner that does not come to an end is wrong, too.
+const PATIENCE: Duration = Duration::from_secs(900);
+
+#[derive(Deserialize)]
+struct Mutants {
+    mutant: Vec<Mutant>,
+}
+
+#[derive(Deserialize)]
+struct Mutant {
+    name: String,
+    file: String,
+    before: String,
+    after: String,
+}
+
+fn copy(from: &Path, to: &Path) {
+    if from.is_dir() {
+        std::fs::create_dir_all(to).expect("a directory");
+        for entry in std::fs::read_dir(from).expect("a directory") {
+            let name = entry.expect("an entry").file_name();
+            if name != "target" {
+                copy(&from.join(&name), &to.join(&name));
+            }
+        }
+    } else if std::fs::read(to).ok() != std::fs::read(from).ok() {
+        // What is as it was is not compiled again.
+        std::fs::copy(from, to).expect("a file");
+    }
+}
+
+/// A copy of the workspace with all faults, each behind its switch.
+fn mutated(mutants: &[Mutant]) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mutants");
+    std::fs::create_dir_all(&home).expect("a directory");
+    for part in PARTS {
+        copy(&root.join(part), &home.join(part));
+    }
+    for (mutant, number) in mutants.iter().zip(1..) {
+        let path = home.join(&mutant.file);
+        let text = std::fs::read_to_string(&path).expect("a file");
+        assert_eq!(
+            text.matches(&mutant.before).count(),
+            1,
+            "`{}`: the place in {}",
+            mutant.name,
+            mutant.file
+        );
+        let after = mutant.after.replace("IS_ON", &format!("crate::is_mutant({number})"));
+        // A later fault may be at the same place.
+        let text = text.replace(&mutant.before, &format!("/*{number}*/{after}"));
+        std::fs::write(path, text).expect("a file");
+    }
+    let library = home.join("encodings/src/lib.rs");
+    let text = std::fs::read_to_string(&library).expect("a file");
+    let question = format!(
+        "pub(crate) fn is_mutant(number: u32) -> bool {{ \
+         static ON: std::sync::OnceLock<u32> = std::sync::OnceLock::new(); \
+         let on = || std::env::var(\"{SWITCH}\").ok().and_then(|text| text.parse().ok()).unwrap_or(0); \
+         *ON.get_or_init(on) == number }}"
+    );
+    std::fs::write(library, text + &question).expect("a file");
+    home
+}
+
+/// Compiles the oracles of a workspace.
+fn compiled(home: &Path) -> PathBuf {
+    let output = Command::new(env!("CARGO"))
+        .args(["test", "--release", "--offline", "--test", "oracle", "--no-run", "--message-format", "json"])
+        .current_dir(home)
+        .env("CARGO_TARGET_DIR", home.with_file_name("mutants-target"))
+        .env("RUSTFLAGS", "--cap-lints allow")
+        .stderr(Stdio::inherit())
+        .output()
+        .expect("cargo");
+    assert!(output.status.success(), "the faults do not compile");
+    let text = String::from_utf8_lossy(&output.stdout);
+    let last = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+    let programs = last.filter(|line| line["target"]["name"] == "oracle");
+    let program = programs.filter_map(|line| line["executable"].as_str().map(PathBuf::from)).last();
+    program.expect("a program")
+}
+
+/// Whether an oracle is content with the planner when a fault is on.
+fn is_content(program: &Path, home: &Path, fault: usize, (test, tasks): (&str, u32)) -> bool {
+    let mut command = Command::new(program);
+    command.arg(test).current_dir(home).env(SWITCH, fault.to_string()).env("ORACLE_STOP", "1");
+    if tasks > 0 {
+        command.env("ORACLE_TASKS", tasks.to_string());
+    }
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the oracles");
+    let started = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().expect("a process") {
+            return status.success();
+        }
+        if started.elapsed() > PATIENCE {
+            child.kill().expect("a process");
+            child.wait().expect("a process");
+            return false;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+#[ignore = "takes an hour: compiles the planner again, and judges thousands of tasks for each fault"]
+fn every_fault_is_noticed() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracle/mutants.toml");
+    let text = std::fs::read_to_string(path).expect("the faults");
+    let Mutants { mutant: mutants } = toml::from_str(&text).expect("faults");
+    let home = mutated(&mutants);
+    let program = compiled(&home);
+    for oracle in ORACLES {
+        assert!(is_content(&program, &home, 0, oracle), "{} fails without a fault", oracle.0);
+    }
+    let mut missed = Vec::new();
+    for (mutant, number) in mutants.iter().zip(1..) {
+        let started = Instant::now();
+        let noticed = ORACLES.iter().find(|oracle| !is_content(&program, &home, number, **oracle));
+        let by = noticed.map_or("NOBODY", |(test, _)| test);
+        println!("{number:>3}. {}: noticed by {by} after {:.0?}", mutant.name, started.elapsed());
+        if noticed.is_none() {
+            missed.push(mutant.name.as_str());
+        }
+    }
+    assert!(
+        missed.is_empty(),
+        "{} of {} faults are noticed by nobody: {missed:#?}",
+        missed.len(),
+        mutants.len()
+    );
+}
