@@ -112,7 +112,16 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
 /// Compiles the oracles of a workspace.
 fn compiled(home: &Path) -> PathBuf {
     let output = Command::new(env!("CARGO"))
-        .args(["test", "--release", "--offline", "--test", "oracle", "--no-run", "--message-format", "json"])
+        .args([
+            "test",
+            "--release",
+            "--offline",
+            "--test",
+            "oracle",
+            "--no-run",
+            "--message-format",
+            "json-render-diagnostics",
+        ])
         .current_dir(home)
         .env("CARGO_TARGET_DIR", home.with_file_name("mutants-target"))
         .env("RUSTFLAGS", "--cap-lints allow")
