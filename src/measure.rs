@@ -1,8 +1,8 @@
 //! What a plan is measured by, as the validator has it: its metric, or else its time or its length.
 
-use encodings::pddl::ast::Problem;
-use encodings::validate::Verdict;
 use num_rational::BigRational;
+use pddl::ast::Problem;
+use pddl::validate::Verdict;
 
 /// The value of a valid plan of so many steps (waits are none). Without a metric it is the time where the task is
 /// `timed` ([`encodings::Task::is_timed`]), and the number of steps otherwise. None if the metric has no value after the plan.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use encodings::pddl::{self, Diagnostic, Severity, Source};
+use pddl::{self, Diagnostic, Severity, Source};
 use serde::Serialize;
 
 /// A message about an input.

@@ -7,12 +7,12 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use encodings::pddl::Source;
 use encodings::{Config, Limits, Status, lexicographic};
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission};
 use ontology::ReadOptions;
+use pddl::Source;
 use random::Random;
 use rules::Limits as StepLimits;
 

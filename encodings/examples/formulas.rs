@@ -6,8 +6,8 @@
 
 use std::time::{Duration, Instant};
 
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{Backend, Config, GroundConfig, Limits, Strategy, ground, optimize};
+use pddl::{Source, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

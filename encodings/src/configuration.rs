@@ -9,8 +9,8 @@ use smallvec::SmallVec;
 
 use crate::lifted::{Change, Expression, Formula, Lifted, PredicateId, Schema, Term};
 use crate::number::dense;
-use crate::pddl::ast::Name;
 use crate::quantity::SlotSet;
+use pddl::ast::Name;
 
 /// A parameter that stands for a function design, and the function that the design solves.
 #[derive(Debug, Clone, Copy)]

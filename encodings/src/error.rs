@@ -1,7 +1,7 @@
 //! What can go wrong between a checked PDDL task and its ground task, each cause with a stable code.
 
 use crate::limits::Interrupted;
-use crate::pddl::ast::Span;
+use pddl::ast::Span;
 
 /// Which of the two PDDL files a place lies in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

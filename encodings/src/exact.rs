@@ -17,12 +17,12 @@ use crate::ground::{Config as GroundConfig, Generality, ground_for};
 use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, Rational, dense};
 use crate::optimize::Config;
-use crate::pddl::ast::{Domain, Problem};
 use crate::plan::{GroundPlan, Plan, decode, metric};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::search::{Estimate, Found, search_states};
 use crate::solution::{Proof, Solution, Statistics, Status, Unbounded};
 use crate::task::{Condition, NumericEffect, Objective, Operator, State, Task};
+use pddl::ast::{Domain, Problem};
 
 /// How many states are stored at most.
 const STATE_LIMIT: usize = 2_000_000;

@@ -1,8 +1,7 @@
 //! What to do about it: PDDL to a ground task, to CNF, to a plan that is proved optimal.
 //!
 //! Modules in the order of the pipeline; each turns one thing into the next:
-//! `pddl` text → syntax tree → `normalize` → lifted task → `ground` → ground task → `bounds`, `search` → `encode` → formula → `optimize` → plan.
-//! `validate` checks a plan against the syntax tree and shares nothing with the rest.
+//! Syntax tree (crate `pddl`) → `normalize` → lifted task → `ground` → ground task → `bounds`, `search` → `encode` → formula → `optimize` → plan.
 //!
 //! What is absent: OWL. Availability of designs arrives as facts of the problem.
 
@@ -11,15 +10,6 @@
     test,
     allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)
 )]
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    reason = "positions in texts below 4 GiB"
-)]
-pub mod pddl;
-#[expect(clippy::cast_possible_truncation, reason = "positions in lists that are held in memory")]
-pub mod validate;
 
 mod error;
 mod exact;

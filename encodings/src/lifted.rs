@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::error::Place;
 pub(crate) use crate::number::Rational;
-use crate::pddl::ast::{Assignment, Comparison, Direction, Name};
+use pddl::ast::{Assignment, Comparison, Direction, Name};
 
 /// An object or constant, by order of declaration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -8,8 +8,8 @@ use crate::earliest::{earliest, starts};
 use crate::lifted::ObjectId;
 use crate::limits::Limits;
 use crate::number::{Int, Rational, TaskNumber};
-use crate::pddl::number::to_decimal;
 use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
+use pddl::to_decimal;
 
 /// One step of a plan over operators.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

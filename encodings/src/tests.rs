@@ -17,11 +17,11 @@ use crate::encode::{CostLimit, Counting, Encoding, Semantics};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
 use crate::number::Int;
-use crate::pddl::{Source, read};
 use crate::plan::replay;
 use crate::sat::{Answer, Backend};
 use crate::task::{State, Task};
 use missions::Mission;
+use pddl::{Source, read};
 use random::Random;
 
 /// Plans of so many steps are looked for at least.
@@ -274,7 +274,7 @@ pub(crate) fn depot(seed: u64) -> (String, String) {
 
 pub(crate) fn ground_text((domain, problem): (String, String)) -> Task {
     let (domain, problem, _) = read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
-    let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")], ..Config::default() };
+    let config = Config { solves: vec![pddl::ast::Name::new("solves")], ..Config::default() };
     ground(&domain, &problem, &config).expect("a task")
 }
 

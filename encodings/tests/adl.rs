@@ -6,8 +6,8 @@ mod random;
 
 use std::fmt::Write as _;
 
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, ground, optimize};
+use pddl::{Source, read};
 use random::Random;
 
 /// Solves a task with the quick search, or with the SAT solver alone.

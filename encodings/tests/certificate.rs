@@ -4,14 +4,14 @@
 mod missions;
 mod random;
 
-use metaplan_encodings::pddl::ast::{Domain, Problem};
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{
     Certificate, Config, Faithful, GroundConfig, Limits, Status, certify, check_certificate, faithful,
     ground, optimize, verification_conditions, witness,
 };
 use missions::Mission;
 use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
+use pddl::{Source, read};
 use random::Random;
 use serde_json::{Value, json};
 

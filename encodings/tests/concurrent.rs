@@ -5,14 +5,14 @@ mod random;
 
 use std::fmt::Write as _;
 
-use metaplan_encodings::pddl::ast::{Domain, Problem};
-use metaplan_encodings::pddl::{Source, read};
-use metaplan_encodings::validate::{Options, PlanText, validate};
 use metaplan_encodings::{
     GroundConfig, Limits, Plan, Solution, Status, ground_concurrent, optimize_concurrent,
 };
 use num_bigint::BigInt;
 use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, read};
 use random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {

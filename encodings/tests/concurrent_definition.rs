@@ -4,11 +4,11 @@
 use std::fs::read_to_string;
 use std::path::Path;
 
-use metaplan_encodings::pddl::{Source, read};
-use metaplan_encodings::validate::{Options, PlanText, validate};
 use metaplan_encodings::{GroundConfig, Limits, Status, ground_concurrent, optimize_concurrent};
 use num_bigint::BigInt;
 use num_rational::BigRational;
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, read};
 
 const NONE: &str = "none";
 

@@ -3,8 +3,8 @@
 
 use std::fmt::Write as _;
 
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{Config, GroundConfig, Solution, Status, ground, optimize};
+use pddl::{Source, read};
 
 fn solve(domain: &str, problem: &str) -> Solution {
     let (domain, problem, _) =

@@ -8,15 +8,15 @@ mod random;
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
-use metaplan_encodings::pddl::ast::{Domain, Name, Problem};
-use metaplan_encodings::pddl::{Source, read};
-use metaplan_encodings::validate::{Options, PlanStep, PlanText, validate};
 use metaplan_encodings::{
     Config, GroundConfig, Plan, Proof, Solution, Status, ground, ground_exact, optimize, optimize_exact,
 };
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
+use pddl::ast::{Domain, Name, Problem};
+use pddl::validate::{Options, PlanStep, PlanText, validate};
+use pddl::{Source, read};
 use random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {

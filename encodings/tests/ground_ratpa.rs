@@ -11,12 +11,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use metaplan_encodings::pddl::ast::{
+use metaplan_encodings::{GroundConfig, Task, ground};
+use pddl::ast::{
     ActionBody, Arithmetic, Assignment, Atom, Comparison, Condition, Domain, Effect, Expression,
     InitialElement, Name, Problem, Term,
 };
-use metaplan_encodings::pddl::{Source, read, render};
-use metaplan_encodings::{GroundConfig, Task, ground};
+use pddl::{Source, read, render};
 
 const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
 

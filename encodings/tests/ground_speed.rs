@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{GroundConfig, Task, ground};
+use pddl::{Source, read};
 
 const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
 
@@ -128,7 +128,7 @@ const LARGE_DOMAIN: &str = "(define (domain d) (:types place) (:predicates (link
 fn ten_megabytes_are_read_in_less_than_a_second() {
     let problem = Source::new("problem", large_problem(10_000_000));
     let domain = Source::new("domain", LARGE_DOMAIN);
-    let (parsed, seconds) = timed(|| metaplan_encodings::pddl::parse_problem(&problem));
+    let (parsed, seconds) = timed(|| pddl::parse_problem(&problem));
     assert!(parsed.1.is_empty(), "{:?}", parsed.1.first());
     let (found, with_check) = timed(|| read(&domain, &problem));
     assert!(found.is_ok_and(|(_, _, found)| found.is_empty()));

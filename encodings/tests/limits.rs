@@ -4,9 +4,9 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
-use metaplan_encodings::pddl::ast::{Domain, Problem};
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{Config, Error, GroundConfig, Limits, Status, alternatives, ground, optimize};
+use pddl::ast::{Domain, Problem};
+use pddl::{Source, read};
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let (domain, problem, _) =

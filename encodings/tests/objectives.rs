@@ -5,9 +5,9 @@ mod random;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use metaplan_encodings::pddl::ast::{Direction, Metric};
-use metaplan_encodings::pddl::{Source, read, read_objective};
 use metaplan_encodings::{Config, GroundConfig, Plan, Status, Task, ground, lexicographic, optimize, pareto};
+use pddl::ast::{Direction, Metric};
+use pddl::{Source, read, read_objective};
 use random::Random;
 
 /// Waypoints with corridors, and two functions with designs; every move costs time and energy by its designs.

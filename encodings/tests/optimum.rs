@@ -4,9 +4,9 @@
 mod missions;
 mod random;
 
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{Backend, Config, GroundConfig, Proof, Status, Strategy, ground, optimize};
 use missions::Mission;
+use pddl::{Source, read};
 
 /// How a mission without a plan, and one with a free metric, is answered: the SAT solver alone cannot tell.
 fn check(seed: u64, quick_search: bool, backend: &Backend, strategy: Strategy) {

@@ -9,13 +9,13 @@ use std::cell::RefCell;
 use std::io::Write;
 use std::rc::Rc;
 
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{
     Certificate, Config, GroundConfig, Limits, RefutationInputs, RefutationOutputs, StepBound, certify,
     check_refutation, ground, optimize, refute,
 };
 use missions::Mission;
 use num_rational::BigRational;
+use pddl::{Source, read};
 use random::Random;
 
 /// The certificate of a mission and its least cost; none if there is no plan.

@@ -10,15 +10,15 @@ mod random;
 use std::path::Path;
 use std::process::Command;
 
-use metaplan_encodings::pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
-use metaplan_encodings::pddl::{Source, read};
-use metaplan_encodings::validate::metric_after;
 use metaplan_encodings::{
     Config, GroundConfig, Limits, Query, Replanned, Replanner, Solution, Status, alternatives, ground,
     optimize,
 };
 use missions::Mission;
 use num_rational::BigRational;
+use pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
+use pddl::validate::metric_after;
+use pddl::{Source, read};
 use random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {

@@ -1,9 +1,9 @@
 //! What is claimed of tasks at the edges: nothing to do, nothing that helps, free cycles, metrics without a best value.
 
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{
     Backend, Config, GroundConfig, Proof, Semantics, Status, Unbounded, ground, optimize,
 };
+use pddl::{Source, read};
 
 const DOMAIN: &str = "(define (domain d)
   (:types place)

@@ -5,11 +5,11 @@ mod random;
 
 use std::fmt::Write as _;
 
-use metaplan_encodings::pddl::ast::{Domain, Problem};
-use metaplan_encodings::pddl::{Source, read};
-use metaplan_encodings::validate::{Options, PlanText, validate};
 use metaplan_encodings::{Config, GroundConfig, Limits, Plan, Status, ground, optimize};
 use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, read};
 use random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {

@@ -8,9 +8,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use metaplan_encodings::pddl::{Source, read};
-use metaplan_encodings::validate::{Options, PlanText, validate};
 use metaplan_encodings::{Config, GroundConfig, ground, optimize};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, read};
 
 const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools/gen_ratpa.py");
 

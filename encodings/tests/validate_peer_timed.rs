@@ -14,12 +14,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use metaplan_encodings::pddl::ast::{ActionBody, Domain, Problem};
-use metaplan_encodings::pddl::{Source, print_domain, print_problem, read};
-use metaplan_encodings::validate::{Options, PlanText, ViolationKind, validate};
 use metaplan_encodings::{Config, Exact, GroundConfig, Limits, ground, optimize};
 use num_bigint::BigInt;
 use num_traits::ToPrimitive;
+use pddl::ast::{ActionBody, Domain, Problem};
+use pddl::validate::{Options, PlanText, ViolationKind, validate};
+use pddl::{Source, print_domain, print_problem, read};
 
 const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/pddl");
 

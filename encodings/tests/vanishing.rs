@@ -3,9 +3,9 @@
 //! Each of these was answered with a false "no plan exists" or a false optimum once. What is right follows from the definition in
 //! `validate`, which also executes the expected plan.
 
-use metaplan_encodings::pddl::{Source, read};
-use metaplan_encodings::validate::{Options, PlanText, validate};
 use metaplan_encodings::{Config, GroundConfig, Status, ground, optimize};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, read};
 
 /// What is expected: the metric and a plan that has it, no plan, or a refusal with a code.
 enum Expected {

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use encodings::pddl::ast::{Domain, Problem};
-use encodings::pddl::{Source, print_domain, print_problem};
 use ontology::{Equality, OutputSyntax, ReadOptions};
+use pddl::ast::{Domain, Problem};
+use pddl::{Source, print_domain, print_problem};
 use rules::Engine;
 use rules::replay::{Replayed, replay};
 use serde::{Deserialize, Serialize};

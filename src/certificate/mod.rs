@@ -21,13 +21,13 @@ use std::fs;
 use std::io::{BufRead, BufReader, BufWriter};
 use std::path::Path;
 
-use encodings::pddl::ast::Problem;
-use encodings::pddl::{print_domain, print_problem};
 use encodings::{
     Faithful, Limits, RefutationOutputs, Solution, Status, StepBound, Task, certify, check_certificate,
     refute, witness,
 };
 use num_rational::BigRational;
+use pddl::ast::Problem;
+use pddl::{print_domain, print_problem};
 use serde::{Deserialize, Serialize};
 
 pub use verify::{conditions, verify};

@@ -4,15 +4,15 @@ use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 
-use encodings::pddl::ast::{Domain, Problem};
-use encodings::pddl::{self, Source};
-use encodings::validate::{Options, PlanText, validate};
 use encodings::{
     Checked, Faithful, Limits, RefutationInputs, check_certificate, check_refutation, faithful,
     verification_conditions,
 };
 use num_rational::BigRational;
 use num_traits::Zero;
+use pddl::ast::{Domain, Problem};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{self, Source};
 
 use super::files::{read, text};
 use super::{

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use encodings::pddl::ast::Problem;
 use encodings::{Alternatives, Config, Forced, Solution, Task};
 use metaplan::mission::Mission;
+use pddl::ast::Problem;
 use serde_json::{Value, json};
 
 use crate::cli::Failure;

@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use encodings::Limits;
-use encodings::pddl::ast::Problem;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
@@ -14,6 +13,7 @@ use metaplan::probabilistic::{
     Action, Coadaptation, Comparison, Config, Failure as Unfinished, Planned, Risk, Roles, Situation, Stages,
     Tasked, compare,
 };
+use pddl::ast::Problem;
 use serde_json::{Value, json};
 
 use crate::cli::check::failure as process_failure;

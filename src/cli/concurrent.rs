@@ -1,11 +1,11 @@
 //! `metaplan plan --concurrent`: plans whose actions overlap.
 
 use clap::Args;
-use encodings::pddl::ast::Problem;
-use encodings::validate::Options;
 use encodings::{Improvement, Limits, Plan, Point, optimize_concurrent};
 use metaplan::mission::Mission;
 use num_rational::BigRational;
+use pddl::ast::Problem;
+use pddl::validate::Options;
 
 use crate::cli::objectives::Objectives;
 use crate::cli::validate::time;

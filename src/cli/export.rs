@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use encodings::pddl::ast::Problem;
-use encodings::pddl::{portable, print_domain, print_problem};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use metaplan::probabilistic::{Coadaptation, Risk, Tasked, program, published_program};
+use pddl::ast::Problem;
+use pddl::{portable, print_domain, print_problem};
 use serde_json::json;
 
 use crate::cli::{Common, Exit, Failure, Format, Situation, output};

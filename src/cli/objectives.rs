@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use encodings::pddl::ast::{Metric, Problem};
 use encodings::{Front, Point, Status};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use pddl::ast::{Metric, Problem};
 use serde_json::{Value, json};
 
 use crate::cli::concurrent::Reading;

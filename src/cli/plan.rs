@@ -5,8 +5,6 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use encodings::pddl::ast::{Name, Problem};
-use encodings::validate::{PlanStep, PlanText, validate};
 use encodings::{
     Alternatives, Backend, BackendError, Config, Front, Improvement, Limits, Plan, Point, Semantics,
     Solution, Status, Task,
@@ -16,6 +14,8 @@ use metaplan::certificate;
 use metaplan::measure::measure;
 use metaplan::message::Message;
 use metaplan::mission::{Blocking, Mission};
+use pddl::ast::{Name, Problem};
+use pddl::validate::{PlanStep, PlanText, validate};
 use serde_json::json;
 
 use crate::cli::concurrent::{self, Overlap, Reading};

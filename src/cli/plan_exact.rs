@@ -1,9 +1,9 @@
 //! `metaplan plan` where numbers are too large for the integers of formulas: by search alone, in exact rationals.
 
-use encodings::pddl::ast::Problem;
 use encodings::{Config, Point, optimize_exact};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use pddl::ast::Problem;
 
 use crate::cli::concurrent::Reading;
 use crate::cli::objectives::Objectives;

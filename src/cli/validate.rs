@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use encodings::pddl::Source;
-use encodings::pddl::ast::Name;
-use encodings::validate::{Options, PlanStep, PlanText, Verdict, validate};
 use metaplan::message::Message;
 use metaplan::mission::source;
 use num_rational::BigRational;
 use num_traits::Num as _;
+use pddl::Source;
+use pddl::ast::Name;
+use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
 use serde_json::{Value, json};
 
 use crate::cli::{Common, Exit, Failure, Format, Situation, output};

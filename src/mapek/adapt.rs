@@ -5,7 +5,7 @@
 //! design of the action under way is lost, that action and the rest of the plan are configured anew together, see
 //! [`super::resume`]; if that is impossible or bad, the action is suspended or cancelled, see [`super::interrupt`].
 
-use encodings::validate::{Options, Verdict, Violation, advance, validate};
+use pddl::validate::{Options, Verdict, Violation, advance, validate};
 
 use super::Loop;
 use super::analyze::Findings;

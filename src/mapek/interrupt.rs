@@ -7,8 +7,8 @@
 //! suspended, and goes on when its designs, or others, are back. Robots that cannot suspend an action say that it was
 //! cancelled.
 
-use encodings::pddl::ast::Direction;
 use num_rational::BigRational;
+use pddl::ast::Direction;
 
 use super::Loop;
 use super::answer::{Answer, Command};

@@ -3,9 +3,9 @@
 //! The live planner knows the mission's own domain only. What is left of an action under way is a step that comes first: its
 //! configurations are tried one by one on the domain in which that action is shortened, see [`super::resume`].
 
-use encodings::validate::advance_each;
 use encodings::{First, Limits, Query, Replanned, Replanner};
 use num_rational::BigRational;
+use pddl::validate::advance_each;
 
 use super::plan::{Ask, Outcome};
 use super::resume::{GATE, resume};
@@ -101,7 +101,7 @@ impl Ask<'_> {
         if self.problem.metric.is_none() {
             return Some(zero);
         }
-        encodings::validate::metric_after(self.mission.domain(), self.problem, &zero)
+        pddl::validate::metric_after(self.mission.domain(), self.problem, &zero)
     }
 }
 

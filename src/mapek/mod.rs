@@ -36,8 +36,8 @@ use std::borrow::Cow;
 use std::collections::{BTreeSet, HashSet};
 use std::time::Duration;
 
-use encodings::pddl::ast::{Domain, Problem};
 use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
 use sha2::{Digest as _, Sha256};
 
 use crate::message::Message;
@@ -250,8 +250,8 @@ fn digest(mission: &Mission, settings: &Settings) -> String {
         mission.name.clone(),
         format!("{settings:?}"),
         format!("{:?}", mission.bindings()),
-        encodings::pddl::print_domain(mission.domain()),
-        encodings::pddl::print_problem(&problem),
+        pddl::print_domain(mission.domain()),
+        pddl::print_problem(&problem),
     ];
     if let Some(knowledge) = mission.knowledge() {
         let engine = knowledge.engine();

@@ -1,9 +1,9 @@
 //! Monitor: events to changes of what is believed.
 
-use encodings::pddl::ast::{InitialElement, Problem};
-use encodings::validate::{Advance, advance};
 use num_rational::BigRational;
 use ontology::vocab::local_name;
+use pddl::ast::{InitialElement, Problem};
+use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
 use super::Loop;
@@ -299,8 +299,8 @@ pub(crate) fn value_of(problem: &Problem, name: &str) -> Option<BigRational> {
     })
 }
 
-fn is_named(atom: &encodings::pddl::ast::Atom, words: &[&str]) -> bool {
-    use encodings::pddl::ast::{Name, Term};
+fn is_named(atom: &pddl::ast::Atom, words: &[&str]) -> bool {
+    use pddl::ast::{Name, Term};
     let same = |(term, word): (&Term, &&str)| match term {
         Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(word),
     };

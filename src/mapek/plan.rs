@@ -7,9 +7,9 @@ use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use encodings::pddl::ast::Problem;
 use encodings::{Config, Limits, Status, optimize};
 use num_rational::BigRational;
+use pddl::ast::Problem;
 use serde_json::{Value, json};
 
 use super::knowledge::Running;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use encodings::pddl::ast::{Atom, Identifier, InitialElement, Name, Span, Term};
+use pddl::ast::{Atom, Identifier, InitialElement, Name, Span, Term};
 use serde_json::{Value, json};
 
 use super::answer::{Answer, Command, Effect};

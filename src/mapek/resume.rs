@@ -7,11 +7,11 @@
 //! action changes, what has been changed so far with the designs at hand counts as not yet changed: the condition asks
 //! whether what is left can be done.
 
-use encodings::pddl::ast::{
+use num_rational::BigRational;
+use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Atom, Comparison, Condition, ConditionTime, Declaration,
     Domain, DurationConstraint, Effect, EffectTime, Expression, Identifier, Name, Span, Term,
 };
-use num_rational::BigRational;
 
 use super::step::PlannedStep;
 

@@ -1,8 +1,8 @@
 //! Steps of a plan as the loop keeps them: with exact numbers, and so that they can be written to the journal.
 
-use encodings::pddl::ast::Name;
-use encodings::validate::{PlanStep, PlanText};
 use num_rational::BigRational;
+use pddl::ast::Name;
+use pddl::validate::{PlanStep, PlanText};
 use serde_json::{Map, Value, json};
 
 use super::number;

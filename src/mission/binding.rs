@@ -6,12 +6,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use encodings::GroundConfig;
-use encodings::pddl::ast::{
+use num_rational::BigRational;
+use ontology::tomasys::{FunctionDesign, Individual, View};
+use pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
     TypedName,
 };
-use num_rational::BigRational;
-use ontology::tomasys::{FunctionDesign, Individual, View};
 
 use crate::message::Message;
 

@@ -7,8 +7,8 @@
 //!
 //! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
 
-use encodings::pddl::ast::{InitialElement, Name, Problem};
 use encodings::{Config, Status, optimize};
+use pddl::ast::{InitialElement, Name, Problem};
 
 use crate::mission::Mission;
 use crate::mission::binding::atom;

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeSet;
 
-use encodings::pddl::ast::{ActionBody, Assignment, Effect, InitialElement, Name};
-use encodings::pddl::{Diagnostic, Severity, print_domain};
 use ontology::vocab::local_name;
+use pddl::ast::{ActionBody, Assignment, Effect, InitialElement, Name};
+use pddl::{Diagnostic, Severity, print_domain};
 use rules::{Engine, Fact};
 
 use super::Mission;
@@ -82,7 +82,7 @@ impl Mission {
                 && !stands(name)
                 && !effects.iter().any(|effect| assigns(effect, name))
         });
-        let warning = |identifier: &encodings::pddl::ast::Identifier| {
+        let warning = |identifier: &pddl::ast::Identifier| {
             let text = format!(
                 "nothing gives `{}` a value: neither the problem nor the knowledge base, by its name or a binding",
                 identifier.name

@@ -1,10 +1,10 @@
 //! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
 
-use encodings::pddl::ast::{Condition, Declaration, Domain, InitialElement, Metric, Name, Problem, Term};
-use encodings::pddl::{self, Severity, Source};
 use encodings::{GroundConfig, Limits, Replanner, Task};
 use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
+use pddl::ast::{Condition, Declaration, Domain, InitialElement, Metric, Name, Problem, Term};
+use pddl::{self, Severity, Source};
 
 use super::{Mission, binding};
 use crate::knowledge::Knowledge;

@@ -14,10 +14,10 @@ mod settings;
 
 use std::path::Path;
 
-use encodings::pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
-use encodings::pddl::{self, Severity, Source};
 use encodings::{Concurrent, ExactTask, Limits, Plan, Task};
 use num_rational::BigRational;
+use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
+use pddl::{self, Severity, Source};
 
 use crate::knowledge::Knowledge;
 use crate::mapek::Settings;

@@ -1,7 +1,7 @@
 //! `--set NAME=VALUE`: measured attributes of the knowledge base, and fluents and facts of the problem.
 
-use encodings::pddl::ast::{InitialElement, Name, Span, Term};
 use num_rational::BigRational;
+use pddl::ast::{InitialElement, Name, Span, Term};
 
 use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean};
@@ -49,7 +49,7 @@ impl Mission {
             let text = format!("the knowledge base decides on `{symbol}`; let components fail with `--fail`");
             return Err(Message::error("M106", text));
         }
-        let arity = |declared: &[encodings::pddl::ast::Declaration]| {
+        let arity = |declared: &[pddl::ast::Declaration]| {
             declared.iter().find(|d| d.identifier.name == symbol).map(|d| d.parameters.len())
         };
         if arity(&self.domain.functions) == Some(arguments.len()) {
@@ -109,8 +109,8 @@ impl Mission {
     fn unknown_setting(&self, name: &str) -> Message {
         let attributes = self.knowledge.iter().flat_map(|knowledge| knowledge.view().attribute_types());
         let attributes: Vec<_> = attributes.map(|attribute| attribute.name).collect();
-        let declared = |all: &[encodings::pddl::ast::Declaration]| {
-            let each = |d: &encodings::pddl::ast::Declaration| d.identifier.name.to_string();
+        let declared = |all: &[pddl::ast::Declaration]| {
+            let each = |d: &pddl::ast::Declaration| d.identifier.name.to_string();
             all.iter().map(each).collect::<Vec<_>>().join(", ")
         };
         let text = format!(
@@ -128,7 +128,7 @@ impl Mission {
     }
 }
 
-fn same_atom(atom: &encodings::pddl::ast::Atom, predicate: &Name, arguments: &[&str]) -> bool {
+fn same_atom(atom: &pddl::ast::Atom, predicate: &Name, arguments: &[&str]) -> bool {
     atom.predicate.name == *predicate && same_terms(&atom.arguments, arguments)
 }
 

@@ -4,11 +4,11 @@
 
 use std::collections::BTreeMap;
 
-use encodings::pddl::ast::{Atom, Condition, InitialElement, Problem, Term};
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 use ontology::tomasys::View;
+use pddl::ast::{Atom, Condition, InitialElement, Problem, Term};
 use serde::Deserialize;
 
 use crate::message::Message;

@@ -7,11 +7,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use encodings::pddl::ast::{InitialElement, Name, Problem};
-use encodings::validate::{PlanStep, advance};
 use encodings::{Limits, Situation as TaskState, Step, Task, Transition};
 use num_rational::BigRational;
 use num_traits::{One, Zero};
+use pddl::ast::{InitialElement, Name, Problem};
+use pddl::validate::{PlanStep, advance};
 
 use crate::message::Message;
 use crate::mission::Mission;

@@ -15,9 +15,9 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
-use encodings::pddl::ast::Direction;
-use encodings::validate::{advance, metric_after};
 use num_rational::BigRational;
+use pddl::ast::Direction;
+use pddl::validate::{advance, metric_after};
 
 use crate::mapek::{Answer, Event, Loop, Observation, PlannedStep};
 

@@ -7,10 +7,10 @@
 
 use std::cell::OnceCell;
 
-use encodings::pddl::ast::Problem;
-use encodings::validate::{advance, metric_after};
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
+use pddl::ast::Problem;
+use pddl::validate::{advance, metric_after};
 
 use super::settings::{Disturbance, Simulation};
 use crate::mapek::{Command, Effect, Event, PlannedStep, number};
@@ -342,14 +342,9 @@ impl World {
     /// Whether the goal holds.
     pub fn reached(&self) -> bool {
         let problem = self.filled();
-        let empty = encodings::validate::PlanText::default();
-        encodings::validate::validate(
-            self.truth.domain(),
-            problem,
-            &empty,
-            &encodings::validate::Options::default(),
-        )
-        .valid
+        let empty = pddl::validate::PlanText::default();
+        pddl::validate::validate(self.truth.domain(), problem, &empty, &pddl::validate::Options::default())
+            .valid
     }
 
     /// The mission's metric so far; the time without one.

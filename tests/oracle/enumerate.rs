@@ -10,10 +10,10 @@
 
 use std::time::Duration;
 
-use encodings::pddl::ast::Problem;
-use encodings::validate::ViolationKind;
 use metaplan::mission::Mission;
 use num_rational::BigRational;
+use pddl::ast::Problem;
+use pddl::validate::ViolationKind;
 
 use crate::judge::{Case, Mode, Tally, Truth, judge, plan_lines, project_verdict, read, setting};
 use crate::temporal::best::{Schedule, written};

@@ -8,9 +8,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use encodings::pddl::Source;
-use encodings::pddl::ast::{Name, Problem};
-use encodings::validate::{Options, PlanStep, PlanText, Verdict, validate};
 use encodings::{Config, Exact, Limits, Plan, Solution, Status, Task, Unbounded};
 use metaplan::certificate::{self, Contents};
 use metaplan::measure::measure;
@@ -18,6 +15,9 @@ use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission};
 use num_rational::BigRational;
 use num_traits::Zero as _;
+use pddl::Source;
+use pddl::ast::{Name, Problem};
+use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
 
 /// One action of a plan, with its exact times.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -358,7 +358,7 @@ fn a_mission_without_places_is_compared() {
 /// Values that no process can have, and more configurations than the number of a state has room for.
 #[test]
 fn what_is_no_process_is_refused() {
-    use encodings::pddl::ast::{InitialElement, Name, Problem as Pddl, Term};
+    use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};
     let (mission, _) = Mission::read(&root().join("missions/camara_like.toml")).expect("a mission");
     let (problem, _) = mission.filled().expect("filled");
     let codes = |problem: &Pddl| match Coadaptation::new(&mission, problem, mission.roles()) {

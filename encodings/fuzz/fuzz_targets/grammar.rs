@@ -16,7 +16,7 @@ mod model;
 mod text;
 
 use libfuzzer_sys::fuzz_target;
-use metaplan_encodings::pddl::{Source, read, render};
+use pddl::{Source, read, render};
 use metaplan_encodings::{GroundConfig, ground};
 
 /// Words that mean something somewhere.

@@ -4,10 +4,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use metaplan_encodings::pddl::{
+use pddl::{
     Source, check_domain, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render,
 };
-use metaplan_encodings::validate::PlanText;
+use pddl::validate::PlanText;
 
 /// What a tree says, without the places of its parts.
 fn bare(tree: &impl std::fmt::Debug) -> String {

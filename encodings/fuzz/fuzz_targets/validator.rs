@@ -16,8 +16,8 @@ mod model;
 mod text;
 
 use libfuzzer_sys::fuzz_target;
-use metaplan_encodings::pddl::Source;
-use metaplan_encodings::validate::{Options, PlanText, validate};
+use pddl::Source;
+use pddl::validate::{Options, PlanText, validate};
 
 fuzz_target!(|bytes: &[u8]| {
     let mut draw = generate::Draw::new(bytes, generate::ALL);

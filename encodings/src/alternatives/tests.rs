@@ -7,11 +7,11 @@ use crate::ground::{Config as GroundConfig, ground};
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::optimize::{Config, optimize};
-use crate::pddl::{Source, read};
 use crate::plan::{GroundPlan, GroundStep, Plan, decode};
 use crate::solution::Status;
 use crate::task::{State, Task};
 use crate::tests::missions::Mission;
+use pddl::{Source, read};
 
 /// All plans that cost exactly so much, from a state on.
 fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found: &mut Vec<Vec<GroundStep>>) {

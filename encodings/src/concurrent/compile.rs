@@ -12,8 +12,8 @@ use crate::ground::reach::Reached;
 use crate::lifted::Rational;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, checked_lcm};
-use crate::pddl::ast::Span;
 use crate::task::{OperatorId, Task};
+use pddl::ast::Span;
 
 /// Times and durations stay below this.
 const LIMIT: Int = 1 << 90;

@@ -12,8 +12,8 @@ use crate::ground::evaluate::{AtomId, Binding, Failure, World};
 use crate::ground::reads::{Reads, Slot, fits};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId, Schema};
-use crate::pddl::ast::Assignment;
 use crate::quantity::NumericId;
+use pddl::ast::Assignment;
 
 /// How a number changes: two changes of one way commute, unless both assign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -4,9 +4,9 @@ use crate::error::Error;
 use crate::lifted::{Expression, Metric, Rational};
 use crate::normalize::duration::time_factor;
 use crate::number::{Int, LIMIT, checked_lcm};
-use crate::pddl::ast::Direction;
 use crate::plan::Exact;
 use crate::task::Objective;
+use pddl::ast::Direction;
 
 /// The metric in integers: `time` for each unit of time and `cost` for each unit of cost.
 #[derive(Debug, Clone)]

@@ -31,10 +31,10 @@ use crate::lifted::{Expression, Metric, Rational};
 use crate::limits::Limits;
 use crate::normalize::normalize;
 use crate::number::Int;
-use crate::pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
 use crate::plan::{Plan, Step};
 use crate::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::task::OperatorId;
+use pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
 
 pub use compile::Concurrent;
 
@@ -91,7 +91,7 @@ pub fn ground_concurrent(
 
 /// Durations that the planner would have to choose.
 fn open_durations(domain: &Domain) -> Vec<Error> {
-    let open = |action: &crate::pddl::ast::Action| match &action.body {
+    let open = |action: &pddl::ast::Action| match &action.body {
         ActionBody::Durative { duration, .. } => match &duration[..] {
             [only] if only.operator == Comparison::Equal => None,
             _ => Some(Error::Unsupported {

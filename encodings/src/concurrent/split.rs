@@ -13,7 +13,7 @@ use crate::lifted::{
     Bound, Change, Effect, Event, Expression, Formula, Lifted, ObjectId, Predicate, PredicateId, Rational,
     Schema, Term,
 };
-use crate::pddl::ast::{Comparison, Name, Span};
+use pddl::ast::{Comparison, Name, Span};
 
 /// Which happening of a schema another schema stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,9 +10,9 @@ use crate::encode::formula::{Family, Meaning};
 use crate::encode::{CostLimit, Counting, Encoding, Semantics};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
-use crate::pddl::{Source, read};
 use crate::sat::Lit;
 use crate::task::{Argument, Task};
+use pddl::{Source, read};
 
 const DOMAIN: &str = "(define (domain d)
   (:types place function design)
@@ -31,7 +31,7 @@ const PROBLEM: &str = "(define (problem p) (:domain d)
 fn task() -> Task {
     let (domain, problem, _) =
         read(&Source::new("domain", DOMAIN), &Source::new("problem", PROBLEM)).expect("PDDL");
-    let config = Config { solves: vec![crate::pddl::ast::Name::new("solves")], ..Config::default() };
+    let config = Config { solves: vec![pddl::ast::Name::new("solves")], ..Config::default() };
     ground(&domain, &problem, &config).expect("a task")
 }
 

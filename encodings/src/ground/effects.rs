@@ -16,9 +16,9 @@ use crate::ground::reads::{Reads, matches};
 use crate::ground::residual::{Residual, constant_comparison};
 use crate::lifted::{Change, Effect, Rational, Schema};
 use crate::limits::Limits;
-use crate::pddl::ast::Assignment;
 use crate::quantity::{Linear, NumericId};
 use crate::task::Forbidden;
+use pddl::ast::Assignment;
 
 /// An instance becomes at most this many operators.
 const CASE_LIMIT: usize = 64;

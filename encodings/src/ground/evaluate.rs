@@ -19,8 +19,8 @@ use crate::lifted::{
 };
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::dense;
-use crate::pddl::ast::Name;
 use crate::quantity::{Linear, NumericId, Quantity, SlotSet, Table};
+use pddl::ast::Name;
 
 /// A ground atom over a fluent predicate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

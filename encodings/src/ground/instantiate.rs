@@ -30,9 +30,9 @@ use crate::ground::residual::{Residual, compare};
 use crate::lifted::{Effect, Expression, Formula, Lifted, ObjectId, Rational, Schema, Term};
 use crate::limits::Limits;
 use crate::number::dense;
-use crate::pddl::ast::Span;
 use crate::quantity::{Linear, Quantity, SlotSet};
 use crate::task::{Argument, Forbidden};
+use pddl::ast::Span;
 
 /// The function and the designs that suit an operator, for each slot.
 pub(crate) type GroundSlots = [(ObjectId, Vec<ObjectId>)];

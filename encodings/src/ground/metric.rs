@@ -15,8 +15,8 @@ use crate::ground::instantiate::{GroundOperator, GroundTask};
 use crate::ground::integers::TableMap;
 use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::limits::Limits;
-use crate::pddl::ast::Direction;
 use crate::quantity::{Linear, NumericId, Quantity};
+use pddl::ast::Direction;
 
 /// How operator costs relate to the metric.
 #[derive(Debug, Clone, Default)]

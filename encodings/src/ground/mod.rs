@@ -34,8 +34,8 @@ use crate::lifted::Lifted;
 use crate::limits::Limits;
 use crate::normalize::{normalize, zero};
 use crate::number::{Int, TaskNumber};
-use crate::pddl::ast::{Domain, Metric, Name, Problem};
 use crate::task::Task;
+use pddl::ast::{Domain, Metric, Name, Problem};
 
 /// How the domain's symbols are to be read.
 #[derive(Debug, Clone)]

@@ -4,8 +4,8 @@ use crate::error::{Error, Place};
 use crate::ground::effects::GroundChange;
 use crate::ground::evaluate::Failure;
 use crate::lifted::Rational;
-use crate::pddl::ast::Assignment;
 use crate::quantity::{Linear, NumericId};
+use pddl::ast::Assignment;
 
 /// What numeric variables become; a list, because an operator changes few.
 #[derive(Debug, Clone, Default)]

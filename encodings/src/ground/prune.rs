@@ -14,8 +14,8 @@ use crate::ground::intervals::{goal_can_hold, prune_by_numbers};
 use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Rational};
 use crate::limits::{Interrupted, Limits};
-use crate::pddl::ast::Name;
 use crate::quantity::{NumericId, Quantity};
+use pddl::ast::Name;
 
 /// Prunes the task in place; returns a reason if the goal cannot be reached even if nothing is ever deleted.
 pub(crate) fn prune(

@@ -4,8 +4,8 @@ use crate::error::Error;
 use crate::ground::evaluate::{AtomId, Binding, Failure, World};
 use crate::ground::join::{guards_of_exists, guards_of_forall};
 use crate::lifted::{Bound, Formula, Rational};
-use crate::pddl::ast::Comparison;
 use crate::quantity::Linear;
+use pddl::ast::Comparison;
 
 /// What is left of a condition once everything static is decided.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

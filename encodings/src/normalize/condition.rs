@@ -3,7 +3,7 @@
 use crate::lifted::{Bound, Change, Effect, Expression, Formula, Term};
 use crate::normalize::duration::Duration;
 use crate::normalize::{Normalizer, Rational, Scope};
-use crate::pddl::ast::{self, TypedName};
+use pddl::ast::{self, TypedName};
 
 impl Normalizer {
     /// A condition, or its negation, in negation normal form.

@@ -6,7 +6,7 @@
 use crate::error::File;
 use crate::lifted::{Expression, Formula, Metric, Rational};
 use crate::normalize::{Normalizer, Scope};
-use crate::pddl::ast::{self, Comparison, Direction};
+use pddl::ast::{self, Comparison, Direction};
 
 /// What `?duration` stands for.
 pub(super) enum Duration {

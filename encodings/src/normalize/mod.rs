@@ -19,7 +19,7 @@ use crate::lifted::{
 };
 use crate::normalize::duration::Duration;
 use crate::number::dense;
-use crate::pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypedName};
+use pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypedName};
 
 /// Resolves and simplifies a domain and a problem, to be measured by `objectives` (the most important first) or, if
 /// there are none, by the metric of the problem.

@@ -7,7 +7,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::lifted::ObjectId;
 use crate::normalize::Normalizer;
 use crate::number::dense;
-use crate::pddl::ast::{self, Identifier, Name, Span, TypeExpression};
+use pddl::ast::{self, Identifier, Name, Span, TypeExpression};
 
 impl Normalizer {
     pub(super) fn declare_objects(&mut self, domain: &ast::Domain, problem: &ast::Problem) {

@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::lifted::{Expression, Formula, FunctionId, Joint, Lifted, Rational, Schema};
-use crate::pddl::ast::Comparison;
+use pddl::ast::Comparison;
 
 /// The least and the greatest value that an expression can have; none where that is not known.
 type Range = Option<(Rational, Rational)>;

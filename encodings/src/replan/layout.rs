@@ -11,10 +11,10 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::lifted::ObjectId;
 use crate::number::{Int, dense};
-use crate::pddl::ast::{Atom, InitialElement, Name, Problem};
 use crate::replan::usage::{Usage, key};
 use crate::task::{Fact, State, Task};
-use crate::validate::Advance;
+use pddl::ast::{Atom, InitialElement, Name, Problem};
+use pddl::validate::Advance;
 
 /// What facts and values of problems are in a task.
 #[derive(Debug)]

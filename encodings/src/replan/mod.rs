@@ -30,14 +30,14 @@ use crate::ground::{Config, Generality, ground_for};
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
-use crate::pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
-use crate::pddl::types::TypeHierarchy;
 use crate::plan::Step;
 use crate::search::{Prepared, STATE_LIMIT};
 use crate::task::Task;
 use crate::ties;
-use crate::validate::Advance;
 use layout::{Layout, Situation};
+use pddl::TypeHierarchy;
+use pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
+use pddl::validate::Advance;
 use usage::Usage;
 
 /// Numbers of the initial state have at most so many decimals, as a power of ten.

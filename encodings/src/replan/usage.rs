@@ -5,9 +5,7 @@
 
 use rustc_hash::FxHashSet;
 
-use crate::pddl::ast::{
-    Action, ActionBody, Atom, Condition, Domain, Effect, Expression, Name, Problem, Term,
-};
+use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Expression, Name, Problem, Term};
 
 /// What symbols are used for.
 #[derive(Debug, Default)]
@@ -166,7 +164,7 @@ pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<V
                 continue;
             };
             let [Term::Variable(variable)] = atom.arguments.as_slice() else { return None };
-            let is_own = |parameter: &crate::pddl::ast::TypedName| parameter.identifier.name == variable.name;
+            let is_own = |parameter: &pddl::ast::TypedName| parameter.identifier.name == variable.name;
             own.push((action.parameters.iter().position(is_own)?, predicate));
             mentions += 1;
         }

@@ -3,8 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use metaplan_encodings::pddl::ast::{Domain, Problem};
 use metaplan_encodings::{GroundConfig, Situation, ground};
+use pddl::ast::{Domain, Problem};
 
 use crate::interpret::{State, choices};
 use crate::model::{Action, Expression, Number, OBJECTS, Sign, Task, fact_text};

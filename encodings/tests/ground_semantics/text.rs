@@ -1,11 +1,9 @@
 //! What is generated reads without errors, and printing and reading it gives the same tree; a plan is judged by the
 //! validator as the interpreter judges it.
 
-use metaplan_encodings::pddl::ast::{Domain, Problem};
-use metaplan_encodings::pddl::{
-    Source, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render,
-};
-use metaplan_encodings::validate::{Options, PlanText, validate};
+use pddl::ast::{Domain, Problem};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render};
 
 use crate::interpret::{State, Step};
 use crate::model::{Number, OBJECTS, Task, function_text};

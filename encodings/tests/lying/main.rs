@@ -7,13 +7,13 @@
 mod search;
 mod tasks;
 
-use metaplan_encodings::pddl::ast::{Domain, Problem};
-use metaplan_encodings::pddl::{Source, read};
 use metaplan_encodings::{
     Certificate, ComparisonCause, Config, Difference, Faithful, GroundConfig, Limits, certify,
     check_certificate, faithful, ground, optimize, witness,
 };
 use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
+use pddl::{Source, read};
 use serde_json::{Value, json};
 
 use search::{Best, optimum};

@@ -13,13 +13,13 @@ mod walk;
 use std::collections::{BTreeMap, BTreeSet};
 
 use encodings::Step;
-use encodings::pddl::ast::{
-    Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
-    EffectTime, Expression, Identifier, Name, Problem, Span, Term, TypeExpression, TypedName,
-};
 use num_rational::BigRational;
 use num_traits::Zero as _;
 use ontology::tomasys::{FunctionDesign, Quality, View};
+use pddl::ast::{
+    Action, ActionBody, Arithmetic, Assignment, Condition, ConditionTime, Declaration, Domain, Effect,
+    EffectTime, Expression, Identifier, Name, Problem, Span, Term, TypeExpression, TypedName,
+};
 
 use crate::message::Message;
 use crate::mission::binding::{Bindings, atom, identifier, is_pddl_name};
@@ -200,7 +200,7 @@ impl CoAdaptation {
                 });
                 if (kept || !concerned) && is_pddl_name(&design.individual.name) {
                     let fact = atom(&meets(quality), &[&design.individual.name]);
-                    problem.init.push(encodings::pddl::ast::InitialElement::Fact(fact));
+                    problem.init.push(pddl::ast::InitialElement::Fact(fact));
                 }
             }
         }
@@ -407,7 +407,7 @@ fn attributes(
     let measured: BTreeSet<String> = view.measurements().into_iter().map(|m| m.attribute).collect();
     let valued = |name: &Name| {
         problem.init.iter().any(|element| {
-            matches!(element, encodings::pddl::ast::InitialElement::Value(atom, _, _) if atom.predicate.name == *name)
+            matches!(element, pddl::ast::InitialElement::Value(atom, _, _) if atom.predicate.name == *name)
         })
     };
     let (mut chosen, mut changed) = (BTreeMap::new(), BTreeMap::new());
@@ -457,7 +457,7 @@ fn declaration(name: &str, parameters: &[(&str, &str)]) -> Declaration {
 }
 
 /// An atom of a design variable, and of a function if one is given.
-fn of_design(symbol: &str, design: &Identifier, function: Option<&str>) -> encodings::pddl::ast::Atom {
+fn of_design(symbol: &str, design: &Identifier, function: Option<&str>) -> pddl::ast::Atom {
     let mut atom = atom(&Name::new(symbol), function.as_slice());
     atom.arguments.insert(0, Term::Variable(design.clone()));
     atom

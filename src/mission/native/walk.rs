@@ -1,6 +1,6 @@
 //! Changes to the expressions of conditions and effects, in place.
 
-use encodings::pddl::ast::{Condition, Effect, Expression, Name};
+use pddl::ast::{Condition, Effect, Expression, Name};
 
 /// Whether a numeric function is mentioned whose name is wanted.
 pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool, found: &mut bool) {

@@ -7,7 +7,7 @@ use crate::certificate::faithful::invariant::Invariant;
 use crate::certificate::faithful::reader::Reader;
 use crate::certificate::faithful::verdict::Cause;
 use crate::certificate::faithful::world::{Key, World};
-use crate::pddl::ast::{Condition, Expression};
+use pddl::ast::{Condition, Expression};
 
 /// With more derived atoms, nothing is checked.
 const ATOM_LIMIT: usize = 50_000;

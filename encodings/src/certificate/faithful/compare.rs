@@ -16,7 +16,7 @@ use crate::certificate::faithful::translation::{Translation, integer};
 use crate::certificate::faithful::verdict::{Cause, Difference, Obstacle};
 use crate::certificate::faithful::world::Key;
 use crate::certificate::model::{Argument, Operator};
-use crate::pddl::ast::{Action, Direction};
+use pddl::ast::{Action, Direction};
 
 type Result<T> = std::result::Result<T, Obstacle>;
 

@@ -8,7 +8,7 @@ use crate::certificate::faithful::formula::Formula;
 use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::meaning::Moment;
 use crate::certificate::faithful::world::Key;
-use crate::pddl::ast::Assignment;
+use pddl::ast::Assignment;
 
 /// What an end of an action reads for certain: what is left of its conditions once everything static is decided.
 #[derive(Default)]

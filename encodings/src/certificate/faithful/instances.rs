@@ -7,7 +7,7 @@ use crate::certificate::faithful::INSTANCE_LIMIT;
 use crate::certificate::faithful::verdict::Cause;
 use crate::certificate::faithful::world::World;
 use crate::limits::Limits;
-use crate::pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
+use pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
 
 /// Values of parameters so far.
 type Binding<'b> = FxHashMap<&'b Name, u32>;

@@ -13,7 +13,7 @@ use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::reader::{Applied, Reader};
 use crate::certificate::faithful::verdict::Cause;
 use crate::certificate::faithful::world::Key;
-use crate::pddl::ast::{
+use pddl::ast::{
     Action, ActionBody, Assignment, Comparison, Condition, ConditionTime, DurationConstraint, Effect,
     EffectTime,
 };

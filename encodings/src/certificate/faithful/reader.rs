@@ -13,7 +13,7 @@ use crate::certificate::faithful::invariant::Invariant;
 use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::verdict::Cause;
 use crate::certificate::faithful::world::{Key, World};
-use crate::pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
+use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
 
 /// The conditions of one instance have at most so many parts.
 const SIZE_LIMIT: usize = 200_000;

@@ -4,10 +4,10 @@ use num_rational::BigRational;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::certificate::faithful::verdict::Cause;
-use crate::pddl::ast::{
+use pddl::TypeHierarchy;
+use pddl::ast::{
     ActionBody, Atom, Derived, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
 };
-use crate::pddl::types::TypeHierarchy;
 
 /// A predicate or function with objects, both by number.
 pub(super) type Key = (u32, Vec<u32>);

@@ -1,0 +1,242 @@
+//! Conditions, expressions and atoms.
+
+use crate::ast::{Atom, Condition, Declaration, Expression, Identifier, Term, TypeExpression, TypedName};
+
+use crate::print::{signature, type_text};
+
+use super::{Checker, Scope, did_you_mean};
+
+/// Which space of names an atom belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Predicate,
+    Function,
+}
+
+impl Kind {
+    fn noun(self) -> &'static str {
+        match self {
+            Self::Predicate => "predicate",
+            Self::Function => "function",
+        }
+    }
+}
+
+impl<'a> Checker<'a> {
+    pub(super) fn condition(&mut self, condition: &'a Condition, scope: &mut Scope<'a>) {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                for part in parts {
+                    self.condition(part, scope);
+                }
+            }
+            Condition::Not(inner) => self.condition(inner, scope),
+            Condition::Imply(premise, conclusion) => {
+                self.condition(premise, scope);
+                self.condition(conclusion, scope);
+            }
+            Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
+                self.quantified(variables, scope, |checker, scope| checker.condition(body, scope));
+            }
+            Condition::Atom(atom) => self.atom(atom, Kind::Predicate, scope),
+            Condition::Equal(left, right, _) => {
+                self.term(left, scope);
+                self.term(right, scope);
+            }
+            Condition::Compare(_, left, right, _) => {
+                self.expression(left, scope);
+                self.expression(right, scope);
+            }
+        }
+    }
+
+    /// Checks what stands below a quantifier, with its variables in scope.
+    pub(super) fn quantified(
+        &mut self,
+        variables: &'a [TypedName],
+        scope: &mut Scope<'a>,
+        body: impl FnOnce(&mut Self, &mut Scope<'a>),
+    ) {
+        self.parameters(variables);
+        let outer = scope.len();
+        scope.extend(variables);
+        body(self, scope);
+        scope.truncate(outer);
+    }
+
+    pub(super) fn expression(&mut self, expression: &'a Expression, scope: &Scope<'a>) {
+        match expression {
+            Expression::Number(..) => {}
+            Expression::Fluent(atom) => self.atom(atom, Kind::Function, scope),
+            Expression::Duration(span) => {
+                if !self.in_durative_action {
+                    self.sink.error("P137", *span, "`?duration` has a value in durative actions only");
+                }
+            }
+            Expression::TotalTime(span) => {
+                self.sink.error("P137", *span, "`total-time` has a value in the metric only");
+            }
+            Expression::Operation(_, operands, _) => {
+                for operand in operands {
+                    self.expression(operand, scope);
+                }
+            }
+        }
+    }
+
+    pub(super) fn atom(&mut self, atom: &'a Atom, kind: Kind, scope: &Scope<'a>) {
+        let Identifier { name, span } = &atom.predicate;
+        let symbols = self.symbols;
+        let known = match kind {
+            Kind::Predicate => &symbols.predicates,
+            Kind::Function => &symbols.functions,
+        };
+        if let Some(declaration) = known.get(name) {
+            self.arguments(atom, declaration, kind, scope);
+        } else {
+            self.unknown_symbol(&atom.predicate, kind);
+            for term in &atom.arguments {
+                self.term(term, scope);
+            }
+        }
+        if kind == Kind::Function
+            && name.as_str().eq_ignore_ascii_case("total-cost")
+            && !atom.arguments.is_empty()
+        {
+            self.sink.error("P125", *span, "`total-cost` takes no arguments");
+        }
+    }
+
+    fn unknown_symbol(&mut self, identifier: &'a Identifier, kind: Kind) {
+        let Identifier { name, span } = identifier;
+        let symbols = self.symbols;
+        let (own, other, other_noun) = match kind {
+            Kind::Predicate => (&symbols.predicates, &symbols.functions, "function"),
+            Kind::Function => (&symbols.functions, &symbols.predicates, "predicate"),
+        };
+        if kind == Kind::Function && name.as_str().eq_ignore_ascii_case("total-cost") {
+            self.sink
+                .warning("P135", *span, "`total-cost` is used without being declared")
+                .help("write `(:functions (total-cost) - number)` in the domain");
+            return;
+        }
+        if name.as_str().to_ascii_lowercase().starts_with("inferred-") {
+            self.undeclared_inferred.insert(name);
+        }
+        let is_other = other.contains_key(name);
+        let diagnostic = match kind {
+            Kind::Predicate => self.undeclared("P121", *span, kind.noun(), name, own.keys().copied()),
+            Kind::Function => self.undeclared("P122", *span, kind.noun(), name, own.keys().copied()),
+        };
+        if is_other {
+            diagnostic.help(format!("`{name}` is a {other_noun}"));
+        }
+    }
+
+    fn arguments(&mut self, atom: &'a Atom, declaration: &'a Declaration, kind: Kind, scope: &Scope<'a>) {
+        let (wanted, found) = (declaration.parameters.len(), atom.arguments.len());
+        if wanted != found {
+            let plural = if wanted == 1 { "" } else { "s" };
+            let name = &atom.predicate.name;
+            let message =
+                format!("the {} `{name}` takes {wanted} argument{plural}, found {found}", kind.noun());
+            let form = signature(declaration);
+            self.sink.error("P125", atom.span, message).help(format!("it is declared as `{form}`"));
+        }
+        for (index, term) in atom.arguments.iter().enumerate() {
+            let fits = self.term(term, scope);
+            let (Some(given), Some(parameter)) = (fits, declaration.parameters.get(index)) else { continue };
+            if wanted == found && !self.argument_fits(&given, &parameter.r#type) {
+                self.argument_type(atom, index, &given, parameter);
+            }
+        }
+    }
+
+    fn argument_fits(&self, given: &Given<'a>, wanted: &TypeExpression) -> bool {
+        // A variable of a wider type is only narrowed; an object has exactly its types.
+        match given {
+            Given::Variable(r#type) => self.symbols.types.overlap(r#type, wanted),
+            Given::Object(types) => types.iter().any(|r#type| {
+                self.symbols.types.fits(r#type, wanted)
+                    || r#type.alternatives.iter().any(|r#type| !self.symbols.types.contains(&r#type.name))
+            }),
+        }
+    }
+
+    fn argument_type(&mut self, atom: &Atom, index: usize, given: &Given<'_>, wanted: &TypedName) {
+        let (span, shown) = match &atom.arguments[index] {
+            Term::Variable(identifier) => (identifier.span, format!("?{}", identifier.name)),
+            Term::Constant(identifier) => (identifier.span, identifier.name.to_string()),
+        };
+        // Files without types, generated ones above all, use such objects everywhere.
+        let is_untyped = match given {
+            Given::Variable(_) => false,
+            Given::Object(types) => types.iter().all(|r#type| is_object(r#type)),
+        };
+        let given = match given {
+            Given::Variable(r#type) => describe(r#type),
+            Given::Object(types) => types.first().map_or_else(String::new, |r#type| describe(r#type)),
+        };
+        let (name, wanted) = (&atom.predicate.name, describe(&wanted.r#type));
+        let message = format!("argument {} of `{name}` is {wanted}, but `{shown}` is {given}", index + 1);
+        if is_untyped {
+            self.sink.warning("P126", span, message).help("give it a type in `:objects` or `:constants`");
+        } else {
+            self.sink.error("P126", span, message);
+        }
+    }
+
+    /// The type of a term, if it is declared.
+    pub(super) fn term(&mut self, term: &'a Term, scope: &Scope<'a>) -> Option<Given<'a>> {
+        match term {
+            Term::Variable(Identifier { name, span }) => {
+                if let Some(variable) = scope.iter().rev().find(|entry| entry.identifier.name == *name) {
+                    return Some(Given::Variable(&variable.r#type));
+                }
+                let known = scope.iter().map(|entry| &entry.identifier.name);
+                let help = did_you_mean(name.as_str(), known).map(|help| help.replacen('`', "`?", 1));
+                self.sink.error("P124", *span, format!("unknown variable `?{name}`")).help = help;
+                None
+            }
+            Term::Constant(identifier) => self.constant(identifier, scope),
+        }
+    }
+
+    fn constant(&mut self, identifier: &'a Identifier, scope: &Scope<'a>) -> Option<Given<'a>> {
+        let Identifier { name, span } = identifier;
+        let symbols = self.symbols;
+        if let Some(object) = symbols.objects.get(name) {
+            if self.in_domain && !object.is_constant {
+                self.sink
+                    .warning("P138", *span, format!("the domain uses the object `{name}` of the problem"))
+                    .help("declare it in `:constants`; other planners reject the domain");
+            }
+            return Some(Given::Object(&object.types));
+        }
+        let is_variable = scope.iter().any(|entry| entry.identifier.name == *name);
+        let diagnostic = self.undeclared("P123", *span, "object", name, symbols.objects.keys().copied());
+        if is_variable {
+            diagnostic.help(format!("did you mean the variable `?{name}`?"));
+        }
+        None
+    }
+}
+
+/// What is known of an argument.
+#[derive(Debug)]
+pub(super) enum Given<'a> {
+    /// A variable of a type.
+    Variable(&'a TypeExpression),
+    /// An object with the types of all its declarations.
+    Object(&'a [&'a TypeExpression]),
+}
+
+/// Whether a type leaves everything open.
+fn is_object(r#type: &TypeExpression) -> bool {
+    r#type.alternatives.iter().all(|one| one.name.as_str().eq_ignore_ascii_case("object"))
+}
+
+/// A type for people.
+fn describe(r#type: &TypeExpression) -> String {
+    format!("of type `{}`", type_text(r#type))
+}

@@ -1,0 +1,62 @@
+//! What is declared, by name; each kind of name is a space of its own.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::ast::{Declaration, Domain, Name, Problem, TypeExpression, TypedName};
+use crate::types::TypeHierarchy;
+
+/// An object or constant.
+#[derive(Debug, Default)]
+pub(super) struct Object<'a> {
+    /// The types of all its declarations.
+    pub(super) types: Vec<&'a TypeExpression>,
+    /// Whether it is a constant of the domain.
+    pub(super) is_constant: bool,
+}
+
+/// All declarations; of repeated ones the first.
+#[derive(Debug)]
+pub(super) struct Symbols<'a> {
+    pub(super) types: TypeHierarchy,
+    pub(super) predicates: FxHashMap<&'a Name, &'a Declaration>,
+    pub(super) functions: FxHashMap<&'a Name, &'a Declaration>,
+    pub(super) derived: FxHashSet<&'a Name>,
+    pub(super) objects: FxHashMap<&'a Name, Object<'a>>,
+}
+
+impl<'a> Symbols<'a> {
+    pub(super) fn of(domain: &'a Domain, problem: Option<&'a Problem>) -> Self {
+        let mut objects = FxHashMap::default();
+        insert_objects(&mut objects, &domain.constants, true);
+        if let Some(problem) = problem {
+            insert_objects(&mut objects, &problem.objects, false);
+        }
+        Self {
+            types: TypeHierarchy::of(domain),
+            predicates: by_name(&domain.predicates),
+            functions: by_name(&domain.functions),
+            derived: domain.derived.iter().map(|axiom| &axiom.head.identifier.name).collect(),
+            objects,
+        }
+    }
+}
+
+fn insert_objects<'a>(
+    objects: &mut FxHashMap<&'a Name, Object<'a>>,
+    entries: &'a [TypedName],
+    is_constant: bool,
+) {
+    for entry in entries {
+        let object = objects.entry(&entry.identifier.name).or_default();
+        object.types.push(&entry.r#type);
+        object.is_constant |= is_constant;
+    }
+}
+
+fn by_name(declarations: &[Declaration]) -> FxHashMap<&Name, &Declaration> {
+    let mut map = FxHashMap::default();
+    for declaration in declarations {
+        map.entry(&declaration.identifier.name).or_insert(declaration);
+    }
+    map
+}

@@ -1,0 +1,91 @@
+//! The language: PDDL text to syntax tree and back, and what a plan does by its definition.
+//!
+//! Everything that real files contain is read, with a warning where they leave the standard; whatever is
+//! wrong is reported at its place, all of it at once. [`validate`] executes plans on the syntax tree, with exact numbers.
+//! No grounding, no solver and no file system here.
+//!
+#![doc = include_str!("../README.md")]
+
+pub mod ast;
+pub mod check;
+pub mod diagnostic;
+mod names;
+mod number;
+pub mod parse;
+mod portable;
+pub mod print;
+mod sexp;
+pub mod source;
+mod strata;
+mod types;
+pub mod validate;
+
+pub use check::{check, check_domain};
+pub use diagnostic::{Diagnostic, Severity, has_errors, render};
+pub use number::to_decimal;
+pub use parse::{parse_domain, parse_problem};
+pub use portable::portable;
+pub use print::{print_domain, print_problem};
+pub use source::{Position, Source};
+pub use types::TypeHierarchy;
+
+use ast::{Direction, Domain, Metric, Problem};
+
+/// An objective from the text of its expression, checked against a domain and a problem.
+///
+/// # Errors
+///
+/// All that is wrong with it.
+pub fn read_objective(
+    direction: Direction,
+    expression: &Source,
+    domain: &Domain,
+    problem: &Problem,
+) -> Result<Metric, Vec<Diagnostic>> {
+    let mut parsed = parse::expression(expression);
+    if let Some(tree) = parsed.tree {
+        let end = expression.text().len() as u32;
+        let metric = Metric { direction, expression: tree, span: ast::Span { start: 0, end } };
+        parsed.diagnostics.extend(check::objective(domain, problem, &metric, expression));
+        if !has_errors(&parsed.diagnostics) {
+            return Ok(metric);
+        }
+    }
+    Err(parsed.diagnostics)
+}
+
+/// A domain and a problem from their texts, with the warnings about both.
+///
+/// # Errors
+///
+/// All that is wrong, together with the warnings: the domain's messages first, each file's in its order.
+pub fn read(
+    domain: &Source,
+    problem: &Source,
+) -> Result<(Domain, Problem, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let parsed_domain = parse::domain(domain);
+    let parsed_problem = parse::problem(problem);
+    let mut found = Vec::new();
+    // Names are checked where what declares them was read; otherwise each error would be followed by many.
+    if parsed_domain.declarations_intact {
+        found = match (&parsed_domain.tree, &parsed_problem.tree) {
+            (Some(tree), Some(other)) if parsed_problem.declarations_intact => {
+                check(tree, domain, other, problem)
+            }
+            (Some(tree), _) => check_domain(tree, domain),
+            (None, _) => Vec::new(),
+        };
+    }
+    let (mut of_domain, mut of_problem) = (parsed_domain.diagnostics, parsed_problem.diagnostics);
+    for diagnostic in found {
+        let same_file = diagnostic.file == domain.name();
+        (if same_file { &mut of_domain } else { &mut of_problem }).push(diagnostic);
+    }
+    of_domain.sort_by_key(|diagnostic| diagnostic.span.start);
+    of_problem.sort_by_key(|diagnostic| diagnostic.span.start);
+    of_domain.append(&mut of_problem);
+    match (parsed_domain.tree, parsed_problem.tree) {
+        (Some(tree), Some(other)) if !has_errors(&of_domain) => Ok((tree, other, of_domain)),
+        _ => Err(of_domain),
+    }
+}

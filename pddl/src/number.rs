@@ -1,0 +1,141 @@
+//! Decimal literals to exact rationals and back.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Pow, Signed, Zero};
+
+/// The most digits of a number when it is written without exponent: nobody measures finer, and a short
+/// text cannot ask for a number that fills the memory.
+const DIGITS_LIMIT: usize = 400;
+
+/// What a symbol is, read as a number.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Literal {
+    /// Not of the form of a number.
+    Name,
+    /// A number.
+    Number(BigRational),
+    /// A number beyond the limits.
+    TooLong,
+}
+
+/// Reads `5`, `-0.5`, `100.`, `.5`, `1e-3`; anything else, for example `0.8_decimal`, is a name.
+pub(crate) fn literal(text: &str) -> Literal {
+    let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
+    let (mantissa, exponent) = match unsigned.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, Some(exponent)),
+        None => (unsigned, None),
+    };
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let exponent_digits = exponent.map(|exponent| exponent.strip_prefix(['-', '+']).unwrap_or(exponent));
+    let is_number = all_digits(whole)
+        && all_digits(fraction)
+        && whole.len() + fraction.len() > 0
+        && exponent_digits.is_none_or(|digits| !digits.is_empty() && all_digits(digits));
+    if !is_number {
+        return Literal::Name;
+    }
+    let digits = whole.len() + fraction.len();
+    let exponent = exponent.map_or(Some(0), |exponent| exponent.parse::<i32>().ok());
+    let exponent = exponent.filter(|exponent| written_out(digits, fraction.len(), *exponent) <= DIGITS_LIMIT);
+    let Some(exponent) = exponent else { return Literal::TooLong };
+    let value = decimal(whole, fraction, exponent);
+    Literal::Number(if text.starts_with('-') { -value } else { value })
+}
+
+/// How many digits a number has without its exponent.
+fn written_out(digits: usize, fraction: usize, exponent: i32) -> usize {
+    let shift = i64::from(exponent) - fraction as i64;
+    let shift_length = shift.unsigned_abs() as usize;
+    if shift >= 0 { digits + shift_length } else { digits.max(shift_length + 1) }
+}
+
+fn all_digits(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// The value of `whole.fraction` times ten to `exponent`.
+fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
+    let digits = || whole.bytes().chain(fraction.bytes());
+    let integer = if whole.len() + fraction.len() <= 18 {
+        let append = |value: i64, digit: u8| value * 10 + i64::from(digit - b'0');
+        BigInt::from(digits().fold(0, append))
+    } else {
+        let digits: Vec<u8> = digits().map(|digit| digit - b'0').collect();
+        BigInt::from_radix_be(num_bigint::Sign::Plus, &digits, 10).unwrap_or_default()
+    };
+    let shift = exponent - fraction.len() as i32;
+    let power = BigInt::from(10).pow(shift.unsigned_abs());
+    match shift {
+        0 => BigRational::from_integer(integer),
+        1.. => BigRational::from_integer(integer * power),
+        _ => BigRational::new(integer, power),
+    }
+}
+
+/// The shortest decimal that is exactly `value`; nothing where there is none.
+pub fn to_decimal(value: &BigRational) -> Option<String> {
+    let mut rest = value.denom().clone();
+    let mut count = [0_u32; 2];
+    for (prime, count) in [2, 5].into_iter().zip(&mut count) {
+        let prime = BigInt::from(prime);
+        while (&rest % &prime).is_zero() {
+            rest /= &prime;
+            *count += 1;
+        }
+    }
+    if !rest.is_one() {
+        return None;
+    }
+    let places = count[0].max(count[1]);
+    let scaled = (value * BigRational::from_integer(BigInt::from(10).pow(places))).to_integer();
+    let digits = format!("{:0>width$}", scaled.abs().to_string(), width = places as usize + 1);
+    let (whole, fraction) = digits.split_at(digits.len() - places as usize);
+    let sign = if scaled.is_negative() { "-" } else { "" };
+    let point = if fraction.is_empty() { "" } else { "." };
+    Some(format!("{sign}{whole}{point}{fraction}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn literals_are_read_exactly() {
+        let cases = [
+            ("5", "5"),
+            ("-0.50", "-0.5"),
+            ("+7", "7"),
+            ("100.", "100"),
+            (".25", "0.25"),
+            ("1e3", "1000"),
+            ("12.5E-2", "0.125"),
+            ("2499.9999972941", "2499.9999972941"),
+            ("123456789012345678901234567890.5", "123456789012345678901234567890.5"),
+            ("-0", "0"),
+        ];
+        for (text, expected) in cases {
+            let Literal::Number(value) = literal(text) else { panic!("{text} is a number") };
+            assert_eq!(to_decimal(&value).as_deref(), Some(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn other_symbols_are_names() {
+        for text in ["0.8_decimal", "", "-", ".", "e", "1e", "e5", "1.2.3", "?x", "1-2", "--1", "5m", "1e+"] {
+            assert_eq!(literal(text), Literal::Name, "{text}");
+        }
+    }
+
+    #[test]
+    fn short_texts_cannot_ask_for_huge_numbers() {
+        for text in ["1e999999999", "1e-400", "11e399", "1e99999999999999999999", &"9".repeat(401)] {
+            assert_eq!(literal(text), Literal::TooLong, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_third_has_no_decimal() {
+        assert_eq!(to_decimal(&BigRational::new(1.into(), 3.into())), None);
+    }
+}

@@ -1,0 +1,222 @@
+//! Domains and their actions.
+
+use crate::ast::{Action, ActionBody, Condition, Derived, Domain, Effect, Identifier};
+use crate::names::nearest;
+use crate::sexp::{Item, SECTIONS};
+
+use super::typed::Entries;
+use super::{Parser, at_start, list_start};
+
+const ACTION_KEYS: [&str; 3] = [":parameters", ":precondition", ":effect"];
+const DURATIVE_KEYS: [&str; 4] = [":parameters", ":duration", ":condition", ":effect"];
+
+impl Parser<'_> {
+    /// `(define (domain NAME) SECTION…)`.
+    pub(super) fn domain(&mut self, define: Item<'_>) -> Option<Domain> {
+        let (name, sections) = self.header(define, "domain")?;
+        let mut domain = Domain {
+            name,
+            requirements: Vec::new(),
+            types: Vec::new(),
+            constants: Vec::new(),
+            predicates: Vec::new(),
+            functions: Vec::new(),
+            derived: Vec::new(),
+            actions: Vec::new(),
+        };
+        for section in sections {
+            self.domain_section(section, &mut domain);
+        }
+        Some(domain)
+    }
+
+    /// The name behind `(define (KIND NAME)` and the sections that follow.
+    pub(super) fn header<'t>(
+        &mut self,
+        define: Item<'t>,
+        kind: &str,
+    ) -> Option<(Identifier, impl Iterator<Item = Item<'t>> + use<'t>)> {
+        let mut items = define.rest();
+        let Some(header) = items.next().filter(|header| header.is_headed(kind)) else {
+            let place = define.rest().next().unwrap_or(define);
+            let other = if kind == "domain" { "problem" } else { "domain" };
+            let help = if place.is_headed(other) {
+                format!("this is a {other} file; were the two files exchanged?")
+            } else {
+                format!("write `(define ({kind} name) …)`")
+            };
+            self.sink.error("P104", at_start(place), format!("expected `({kind} name)`")).help(help);
+            return None;
+        };
+        let name = if let Some(item) = header.rest().next() {
+            self.name_item(item, &format!("a name of a {kind}"))
+        } else {
+            self.sink.error("P106", header.span(), format!("the {kind} has no name"));
+            None
+        };
+        // A definition without a name can still be checked.
+        let name = name.unwrap_or_else(|| self.identifier("unnamed", header.span()));
+        Some((name, items))
+    }
+
+    fn domain_section(&mut self, section: Item<'_>, domain: &mut Domain) {
+        let before = self.sink.len();
+        let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
+        match keyword.as_str() {
+            ":requirements" => self.requirements(section, &mut domain.requirements),
+            ":types" => domain.types.extend(self.typed_list(section.rest(), Entries::Names)),
+            ":constants" => domain.constants.extend(self.typed_list(section.rest(), Entries::Names)),
+            ":predicates" => {
+                let declarations = section.rest().filter_map(|item| self.declaration(item, "a predicate"));
+                domain.predicates.extend(declarations);
+            }
+            ":functions" => domain.functions.extend(self.function_list(section.rest())),
+            ":derived" => return domain.derived.extend(self.derived(section)),
+            ":action" => return domain.actions.extend(self.action(section)),
+            ":durative-action" => return domain.actions.extend(self.durative_action(section)),
+            _ => return self.other_section(section, "domain"),
+        }
+        // Warnings count, too: a false alarm here costs only later messages of a file with errors.
+        if self.sink.len() > before && self.sink.has_errors() {
+            self.declarations_intact = false;
+        }
+    }
+
+    pub(super) fn requirements(&mut self, section: Item<'_>, found: &mut Vec<Identifier>) {
+        for item in section.rest() {
+            match item.symbol().and_then(|symbol| symbol.strip_prefix(':')) {
+                Some(flag) => found.push(self.identifier(flag, item.span())),
+                None => {
+                    self.expected(item, "a requirement such as `:typing`");
+                }
+            }
+        }
+    }
+
+    /// A section that is refused or not known.
+    pub(super) fn other_section(&mut self, section: Item<'_>, kind: &str) {
+        let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
+        let refused = match keyword.as_str() {
+            ":constraints" => Some("constraints on trajectories (PDDL 3, `:constraints`)"),
+            ":process" | ":event" => Some("processes and events (PDDL+)"),
+            ":task" | ":method" | ":htn" => Some("hierarchical tasks and methods (HDDL)"),
+            ":axiom" => Some("axioms of PDDL 1.2 (`:axiom`; use `:derived`)"),
+            _ => None,
+        };
+        if let Some(what) = refused {
+            self.refuse(section, what);
+            return;
+        }
+        if keyword == ":length" {
+            self.sink.warning("P109", at_start(section), "`:length` is ignored");
+            return;
+        }
+        if !section.is_headed(&keyword) || !keyword.starts_with(':') {
+            self.expected(section, "a section such as `(:init …)`");
+            return;
+        }
+        self.declarations_intact = false;
+        self.has_unknown_section = true;
+        let help = match nearest(&keyword, SECTIONS) {
+            Some(known) => format!("did you mean `{known}`?"),
+            None => "known sections are those of PDDL 2.1".to_owned(),
+        };
+        let message = format!("a {kind} has no section `{keyword}`");
+        self.sink.error("P109", list_start(section), message).help(help);
+    }
+
+    fn derived(&mut self, section: Item<'_>) -> Option<Derived> {
+        let [head, condition] = self.operands(section, "(:derived (predicate ?x) (condition))")?;
+        let (head, condition) = (self.declaration(head, "a predicate"), self.condition(condition));
+        Some(Derived { head: head?, condition: condition?, span: section.span() })
+    }
+
+    fn action(&mut self, section: Item<'_>) -> Option<Action> {
+        let (identifier, fields) = self.action_fields(section, &ACTION_KEYS)?;
+        let (mut parameters, mut precondition, mut effect) = (Vec::new(), None, None);
+        for (keyword, value) in fields {
+            match keyword {
+                ":parameters" => parameters = self.parameters(value),
+                ":precondition" => precondition = self.condition(value),
+                _ => effect = self.effect(value),
+            }
+        }
+        let body = ActionBody::Instantaneous {
+            precondition: precondition.unwrap_or(Condition::And(Vec::new())),
+            effect: effect.unwrap_or(Effect::And(Vec::new())),
+        };
+        Some(Action { identifier, parameters, body, span: section.span() })
+    }
+
+    fn durative_action(&mut self, section: Item<'_>) -> Option<Action> {
+        let (identifier, fields) = self.action_fields(section, &DURATIVE_KEYS)?;
+        if !fields.iter().any(|(keyword, _)| *keyword == ":duration") {
+            self.sink
+                .error(
+                    "P110",
+                    identifier.span,
+                    format!("the durative action `{}` has no `:duration`", identifier.name),
+                )
+                .help("write `:duration (= ?duration 5)`");
+        }
+        let mut parameters = Vec::new();
+        let (mut duration, mut conditions, mut effects) = (Vec::new(), Vec::new(), Vec::new());
+        for (keyword, value) in fields {
+            match keyword {
+                ":parameters" => parameters = self.parameters(value),
+                ":duration" => self.duration(value, &mut duration),
+                ":condition" => self.timed_conditions(value, &mut conditions),
+                _ => self.timed_effects(value, &mut effects),
+            }
+        }
+        let body = ActionBody::Durative { duration, conditions, effects };
+        Some(Action { identifier, parameters, body, span: section.span() })
+    }
+
+    /// The name of an action and its keywords with their values, each keyword one of `keys`.
+    fn action_fields<'t>(
+        &mut self,
+        section: Item<'t>,
+        keys: &[&'static str],
+    ) -> Option<(Identifier, Vec<(&'static str, Item<'t>)>)> {
+        let mut items = section.rest().peekable();
+        let Some(name) = items.next() else {
+            self.sink.error("P106", section.span(), "the action has no name");
+            return None;
+        };
+        let identifier = self.name_item(name, "a name of an action")?;
+        let mut fields: Vec<(&'static str, Item<'t>)> = Vec::new();
+        while let Some(item) = items.next() {
+            let Some(symbol) = item.symbol().filter(|symbol| symbol.starts_with(':')) else {
+                self.expected(item, "a keyword such as `:effect`").help(
+                    "each keyword of an action has one value; several conditions or effects need `(and …)`",
+                );
+                continue;
+            };
+            let is_value = |item: &Item<'_>| !item.symbol().is_some_and(|symbol| symbol.starts_with(':'));
+            let Some(value) = items.next_if(is_value) else {
+                self.sink.error("P106", item.span(), format!("`{symbol}` has no value"));
+                continue;
+            };
+            match keys.iter().find(|key| key.eq_ignore_ascii_case(symbol)) {
+                Some(key) if fields.iter().any(|(known, _)| known == key) => {
+                    self.sink.error("P111", item.span(), format!("`{symbol}` is repeated"));
+                }
+                Some(key) => fields.push((*key, value)),
+                None => self.unknown_keyword(item, symbol, keys),
+            }
+        }
+        Some((identifier, fields))
+    }
+
+    fn unknown_keyword(&mut self, item: Item<'_>, symbol: &str, keys: &[&'static str]) {
+        let help = match (symbol.to_ascii_lowercase().as_str(), nearest(symbol, keys.iter().copied())) {
+            (":condition", _) => "instantaneous actions have a `:precondition`".to_owned(),
+            (":precondition", _) => "durative actions have a `:condition`".to_owned(),
+            (":duration", _) => "actions with a duration are `:durative-action`".to_owned(),
+            (_, Some(key)) => format!("did you mean `{key}`?"),
+            _ => format!("known keywords are {}", keys.join(", ")),
+        };
+        self.sink.error("P109", item.span(), format!("this action cannot have `{symbol}`")).help(help);
+    }
+}

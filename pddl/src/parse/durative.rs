@@ -1,0 +1,200 @@
+//! Durative actions: time specifiers are moved outwards until each condition and effect stands at one time.
+
+use crate::ast::{Comparison, Condition, ConditionTime, DurationConstraint, Effect, EffectTime, Expression};
+use crate::sexp::Item;
+
+use super::condition::is_timed;
+use super::expression::comparison;
+use super::{Parser, list_start};
+
+type TimedConditions = Vec<(ConditionTime, Condition)>;
+type TimedEffects = Vec<(EffectTime, Effect)>;
+
+/// The time and the content of `(at start (…))`, `(over all (…))` or `(at end (…))`.
+fn timed(item: Item<'_>) -> Option<(ConditionTime, Item<'_>)> {
+    if !is_timed(item) {
+        return None;
+    }
+    let mut operands = item.rest();
+    let time = match operands.next()?.symbol()? {
+        word if word.eq_ignore_ascii_case("start") => ConditionTime::AtStart,
+        word if word.eq_ignore_ascii_case("end") => ConditionTime::AtEnd,
+        _ => ConditionTime::OverAll,
+    };
+    Some((time, operands.next()?))
+}
+
+fn effect_time(time: ConditionTime) -> Option<EffectTime> {
+    match time {
+        ConditionTime::AtStart => Some(EffectTime::AtStart),
+        ConditionTime::AtEnd => Some(EffectTime::AtEnd),
+        ConditionTime::OverAll => None,
+    }
+}
+
+fn is_conjunction(item: Item<'_>) -> bool {
+    item.is_headed("and") || (item.is_list() && item.items().next().is_none())
+}
+
+/// Gives each conjunct its time.
+fn spread_condition(time: ConditionTime, condition: Condition, found: &mut TimedConditions) {
+    match condition {
+        Condition::And(parts) => parts.into_iter().for_each(|part| spread_condition(time, part, found)),
+        condition => found.push((time, condition)),
+    }
+}
+
+/// Gives each conjunct its time.
+fn spread_effect(time: EffectTime, effect: Effect, found: &mut TimedEffects) {
+    match effect {
+        Effect::And(parts) => parts.into_iter().for_each(|part| spread_effect(time, part, found)),
+        effect => found.push((time, effect)),
+    }
+}
+
+impl Parser<'_> {
+    /// `:condition` of a durative action.
+    pub(super) fn timed_conditions(&mut self, item: Item<'_>, found: &mut TimedConditions) {
+        if is_conjunction(item) {
+            for item in item.rest() {
+                self.timed_conditions(item, found);
+            }
+        } else if let Some((time, inner)) = timed(item) {
+            if let Some(condition) = self.condition(inner) {
+                spread_condition(time, condition, found);
+            }
+        } else if item.is_headed("forall") {
+            let Some([variables, body]) = self.operands(item, "(forall (?x - type) (at start (p ?x)))")
+            else {
+                return;
+            };
+            let variables = self.parameters(variables);
+            let mut inner = Vec::new();
+            self.timed_conditions(body, &mut inner);
+            let quantify = |(time, part)| (time, Condition::ForAll(variables.clone(), Box::new(part)));
+            found.extend(inner.into_iter().map(quantify));
+        } else if item.is_headed("preference") {
+            self.refuse(item, "preferences");
+        } else {
+            self.without_time(item, "condition", "`(at start (…))`, `(over all (…))` or `(at end (…))`");
+        }
+    }
+
+    fn without_time(&mut self, item: Item<'_>, what: &str, forms: &str) {
+        if !item.is_list() {
+            self.expected(item, &format!("a {what} with a time specifier"));
+            return;
+        }
+        self.sink
+            .error(
+                "P115",
+                list_start(item),
+                format!("this {what} of a durative action has no time specifier"),
+            )
+            .help(format!("write {forms}"));
+    }
+
+    /// `:effect` of a durative action.
+    pub(super) fn timed_effects(&mut self, item: Item<'_>, found: &mut TimedEffects) {
+        if is_conjunction(item) {
+            for item in item.rest() {
+                self.timed_effects(item, found);
+            }
+        } else if let Some((time, inner)) = timed(item) {
+            self.effect_at(item, time, inner, found);
+        } else if item.is_headed("forall") {
+            let Some([variables, body]) = self.operands(item, "(forall (?x - type) (at end (p ?x)))") else {
+                return;
+            };
+            let variables = self.parameters(variables);
+            let mut inner = Vec::new();
+            self.timed_effects(body, &mut inner);
+            let quantify = |(time, part)| (time, Effect::ForAll(variables.clone(), Box::new(part)));
+            found.extend(inner.into_iter().map(quantify));
+        } else if item.is_headed("when") {
+            self.timed_when(item, found);
+        } else if item.items().any(mentions_continuous_time) {
+            self.refuse(item, "continuous effects (`#t`)");
+        } else {
+            self.without_time(item, "effect", "`(at start (…))` or `(at end (…))`");
+        }
+    }
+
+    fn effect_at(&mut self, item: Item<'_>, time: ConditionTime, inner: Item<'_>, found: &mut TimedEffects) {
+        let Some(time) = effect_time(time) else {
+            self.sink
+                .error("P115", list_start(item), "effects cannot take place over all")
+                .help("write `(at start (…))` or `(at end (…))`");
+            return;
+        };
+        if let Some(effect) = self.effect(inner) {
+            spread_effect(time, effect, found);
+        }
+    }
+
+    /// `(when (at T (p)) (at T (q)))`, both at the same time.
+    fn timed_when(&mut self, item: Item<'_>, found: &mut TimedEffects) {
+        let Some([condition, effect]) = self.operands(item, "(when (at end (p)) (at end (q)))") else {
+            return;
+        };
+        let (mut conditions, mut effects) = (Vec::new(), Vec::new());
+        self.timed_conditions(condition, &mut conditions);
+        self.timed_effects(effect, &mut effects);
+        for (time, effect) in effects {
+            if conditions.iter().any(|(condition_time, _)| effect_time(*condition_time) != Some(time)) {
+                self.refuse(item, "conditional effects that take place at another time than their condition");
+                return;
+            }
+            let condition = Condition::And(conditions.iter().map(|(_, part)| part.clone()).collect());
+            found.push((time, Effect::When(condition, Box::new(effect))));
+        }
+    }
+
+    /// `:duration`.
+    pub(super) fn duration(&mut self, item: Item<'_>, found: &mut Vec<DurationConstraint>) {
+        if is_conjunction(item) {
+            for item in item.rest() {
+                self.duration(item, found);
+            }
+            return;
+        }
+        let (time, constraint) = match timed(item) {
+            Some((time, inner)) => (effect_time(time), inner),
+            None => (Some(EffectTime::AtStart), item),
+        };
+        let operator = constraint.head().and_then(comparison);
+        let (Some(time), Some(operator)) = (time, operator) else {
+            self.expected(item, "a duration constraint").help("write `(= ?duration 5)`");
+            return;
+        };
+        let Some([left, right]) = self.operands(constraint, "(= ?duration 5)") else { return };
+        let (left, right) = (self.expression(left), self.expression(right));
+        let (operator, expression) = match (left, right) {
+            (Some(Expression::Duration(_)), Some(bound)) => (operator, bound),
+            (Some(bound), Some(Expression::Duration(_))) => (mirrored(operator), bound),
+            (Some(_), Some(_)) => {
+                self.sink.error("P106", list_start(constraint), "this does not constrain `?duration`");
+                return;
+            }
+            _ => return,
+        };
+        found.push(DurationConstraint { time, operator, expression, span: constraint.span() });
+    }
+}
+
+/// The comparison with its sides exchanged.
+fn mirrored(operator: Comparison) -> Comparison {
+    match operator {
+        Comparison::Less => Comparison::Greater,
+        Comparison::LessOrEqual => Comparison::GreaterOrEqual,
+        Comparison::Equal => Comparison::Equal,
+        Comparison::GreaterOrEqual => Comparison::LessOrEqual,
+        Comparison::Greater => Comparison::Less,
+    }
+}
+
+/// Whether `#t` occurs in an item.
+fn mentions_continuous_time(item: Item<'_>) -> bool {
+    item.symbol().is_some_and(|symbol| symbol.eq_ignore_ascii_case("#t"))
+        || item.items().any(mentions_continuous_time)
+}

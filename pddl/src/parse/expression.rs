@@ -1,0 +1,177 @@
+//! Numeric expressions, atoms and terms.
+
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use crate::ast::{Arithmetic, Atom, Comparison, Expression, Term};
+use crate::number::{Literal, literal};
+use crate::sexp::Item;
+
+use super::{Parser, at_start, list_start};
+
+/// The comparison that a symbol stands for.
+pub(super) fn comparison(symbol: &str) -> Option<Comparison> {
+    Some(match symbol {
+        "<" => Comparison::Less,
+        "<=" => Comparison::LessOrEqual,
+        "=" => Comparison::Equal,
+        ">=" => Comparison::GreaterOrEqual,
+        ">" => Comparison::Greater,
+        _ => return None,
+    })
+}
+
+fn arithmetic(symbol: &str) -> Option<Arithmetic> {
+    Some(match symbol {
+        "+" => Arithmetic::Add,
+        "-" => Arithmetic::Subtract,
+        "*" => Arithmetic::Multiply,
+        "/" => Arithmetic::Divide,
+        _ => return None,
+    })
+}
+
+impl Parser<'_> {
+    /// `?x` or `name`.
+    pub(super) fn term(&mut self, item: Item<'_>) -> Option<Term> {
+        let Some(symbol) = item.symbol() else {
+            self.expected(item, "a variable or an object")
+                .help("functions as arguments (object fluents) are not supported");
+            return None;
+        };
+        match symbol.strip_prefix('?') {
+            Some("") => {
+                self.sink.error("P106", item.span(), "a variable has a name behind its question mark");
+                None
+            }
+            Some(name) => Some(Term::Variable(self.identifier(name, item.span()))),
+            None => self.name_item(item, "a term").map(Term::Constant),
+        }
+    }
+
+    /// `(predicate terms)`.
+    pub(super) fn atom(&mut self, item: Item<'_>, what: &str) -> Option<Atom> {
+        let Some(first) = item.items().next() else {
+            self.expected(item, what);
+            return None;
+        };
+        let predicate = self.name_item(first, what)?;
+        let before = self.sink.len();
+        let arguments = item.rest().filter_map(|item| self.term(item)).collect();
+        // A term that cannot be read is not to be reported again as a wrong number of arguments.
+        (self.sink.len() == before).then_some(Atom { predicate, arguments, span: item.span() })
+    }
+
+    /// A function as `(f ?x)`, or bare where it has no arguments.
+    pub(super) fn fluent(&mut self, item: Item<'_>) -> Option<Atom> {
+        if item.is_list() {
+            return self.atom(item, "a function");
+        }
+        let is_sign = |symbol: &str| {
+            comparison(symbol).is_some()
+                || arithmetic(symbol).is_some()
+                || symbol.eq_ignore_ascii_case("is-violated")
+        };
+        if item.symbol().is_some_and(is_sign) {
+            self.expected(item, "a function");
+            return None;
+        }
+        let predicate = self.name_item(item, "a function")?;
+        Some(Atom { predicate, arguments: Vec::new(), span: item.span() })
+    }
+
+    /// A numeric expression.
+    pub(super) fn expression(&mut self, item: Item<'_>) -> Option<Expression> {
+        let Some(symbol) = item.symbol() else { return self.compound_expression(item) };
+        if symbol.eq_ignore_ascii_case("?duration") {
+            return Some(Expression::Duration(item.span()));
+        }
+        if symbol.eq_ignore_ascii_case("#t") {
+            self.refuse(item, "continuous effects (`#t`)");
+            return None;
+        }
+        if symbol.eq_ignore_ascii_case("total-time") {
+            return Some(Expression::TotalTime(item.span()));
+        }
+        if literal(symbol) == Literal::Name {
+            return self.fluent(item).map(Expression::Fluent);
+        }
+        self.number(item).map(|value| Expression::Number(value, item.span()))
+    }
+
+    fn compound_expression(&mut self, item: Item<'_>) -> Option<Expression> {
+        let head = item.head().unwrap_or_default();
+        if let Some(operation) = arithmetic(head) {
+            return self.operation(item, operation);
+        }
+        if head.eq_ignore_ascii_case("total-time") && item.rest().next().is_none() {
+            return Some(Expression::TotalTime(item.span()));
+        }
+        if head.eq_ignore_ascii_case("is-violated") {
+            self.refuse(item, "preferences (`is-violated`)");
+            return None;
+        }
+        if comparison(head).is_some() {
+            self.expected(item, "a number");
+            return None;
+        }
+        self.fluent(item).map(Expression::Fluent)
+    }
+
+    fn operation(&mut self, item: Item<'_>, operation: Arithmetic) -> Option<Expression> {
+        let found = item.rest().count();
+        let (allowed, form) = match operation {
+            Arithmetic::Add => (found >= 1, "(+ a b)"),
+            Arithmetic::Multiply => (found >= 1, "(* a b)"),
+            Arithmetic::Subtract => (found == 1 || found == 2, "(- a b)"),
+            Arithmetic::Divide => (found == 2, "(/ a b)"),
+        };
+        if !allowed {
+            let message = format!("`{}` cannot have {found} operands", item.head().unwrap_or_default());
+            self.sink.error("P108", list_start(item), message).help(format!("write `{form}`"));
+            return None;
+        }
+        let operands: Vec<_> = item.rest().filter_map(|item| self.expression(item)).collect();
+        (operands.len() == found).then_some(Expression::Operation(operation, operands, item.span()))
+    }
+
+    /// An expression without functions, as `:init` wants it.
+    pub(super) fn constant(&mut self, item: Item<'_>) -> Option<BigRational> {
+        let expression = self.expression(item)?;
+        let value = evaluate(&expression);
+        if value.is_none() {
+            self.sink.error("P106", at_start(item), "the initial value is not a number, or too long a one");
+        }
+        value
+    }
+}
+
+/// The value of an expression without functions.
+fn evaluate(expression: &Expression) -> Option<BigRational> {
+    match expression {
+        Expression::Number(value, _) => Some(value.clone()),
+        Expression::Fluent(_) | Expression::Duration(_) | Expression::TotalTime(_) => None,
+        Expression::Operation(operation, operands, _) => {
+            let mut values = operands.iter().map(evaluate);
+            let first = values.next()??;
+            if *operation == Arithmetic::Subtract && operands.len() == 1 {
+                return Some(-first);
+            }
+            values.try_fold(first, |left, right| apply(*operation, &left, &right?))
+        }
+    }
+}
+
+/// The most bits of a number that is computed while reading: it can still be written as a literal.
+const BITS_LIMIT: u64 = 300;
+
+fn apply(operation: Arithmetic, left: &BigRational, right: &BigRational) -> Option<BigRational> {
+    let value = match operation {
+        Arithmetic::Add => left + right,
+        Arithmetic::Subtract => left - right,
+        Arithmetic::Multiply => left * right,
+        Arithmetic::Divide if right.is_zero() => return None,
+        Arithmetic::Divide => left / right,
+    };
+    (value.numer().bits().max(value.denom().bits()) <= BITS_LIMIT).then_some(value)
+}

@@ -1,0 +1,101 @@
+//! The initial state and the metric.
+
+use crate::ast::{Direction, InitialElement, Metric};
+use crate::number::{Literal, literal};
+use crate::sexp::Item;
+
+use super::{Parser, at_start, list_start};
+
+impl Parser<'_> {
+    /// One entry of `:init`; a conjunction adds several.
+    pub(super) fn initial(&mut self, item: Item<'_>, found: &mut Vec<InitialElement>) {
+        if !item.is_list() {
+            self.expected(item, "a fact").help("a fact is in parentheses: `(predicate object)`");
+            return;
+        }
+        let Some(head) = item.head() else {
+            self.expected(item, "a fact");
+            return;
+        };
+        match head {
+            "=" => found.extend(self.initial_value(item)),
+            _ if head.eq_ignore_ascii_case("not") => {
+                let Some([inner]) = self.operands(item, "(not (predicate object))") else { return };
+                found.extend(self.fact(inner).map(InitialElement::NegatedFact));
+            }
+            _ if head.eq_ignore_ascii_case("and") => {
+                for item in item.rest() {
+                    self.initial(item, found);
+                }
+            }
+            _ if head.eq_ignore_ascii_case("at") && is_timed_literal(item) => {
+                found.extend(self.timed_literal(item));
+            }
+            _ => found.extend(self.fact(item).map(InitialElement::Fact)),
+        }
+    }
+
+    fn fact(&mut self, item: Item<'_>) -> Option<crate::ast::Atom> {
+        let head = item.head().unwrap_or_default();
+        if ["or", "not", "forall", "exists", "imply", "when", "oneof", "<", ">", "<=", ">=", "="]
+            .contains(&head)
+        {
+            self.sink.error("P106", list_start(item), format!("`{head}` cannot stand in the initial state"));
+            return None;
+        }
+        self.atom(item, "a predicate")
+    }
+
+    fn initial_value(&mut self, item: Item<'_>) -> Option<InitialElement> {
+        let [left, right] = self.operands(item, "(= (function object) 1)")?;
+        let is_number = |item: Item<'_>| item.symbol().is_some_and(|symbol| literal(symbol) != Literal::Name);
+        let (function, value) = if is_number(left) { (right, left) } else { (left, right) };
+        if value.symbol().is_some_and(|symbol| literal(symbol) == Literal::Name) {
+            self.expected(value, "a number").help("functions with objects as values are not supported");
+            return None;
+        }
+        let (function, value) = (self.fluent(function), self.constant(value));
+        Some(InitialElement::Value(function?, value?, item.span()))
+    }
+
+    /// `(at 5 (p))`, `(at 5 (not (p)))`.
+    fn timed_literal(&mut self, item: Item<'_>) -> Option<InitialElement> {
+        let [time, literal] = self.operands(item, "(at 5 (predicate object))")?;
+        let time = self.number(time)?;
+        if literal.is_headed("=") {
+            self.refuse(literal, "timed initial values");
+            return None;
+        }
+        let (atom, holds) = if literal.is_headed("not") {
+            let [inner] = self.operands(literal, "(not (predicate object))")?;
+            (inner, false)
+        } else {
+            (literal, true)
+        };
+        let atom = self.fact(atom)?;
+        Some(InitialElement::Timed(time, atom, holds, item.span()))
+    }
+
+    /// `(:metric minimize (f))`.
+    pub(super) fn metric(&mut self, section: Item<'_>) -> Option<Metric> {
+        let [direction, expression] = self.operands(section, "(:metric minimize (total-cost))")?;
+        let word = direction.symbol().unwrap_or_default();
+        let direction = if word.eq_ignore_ascii_case("minimize") {
+            Direction::Minimize
+        } else if word.eq_ignore_ascii_case("maximize") {
+            Direction::Maximize
+        } else {
+            self.sink.error("P106", at_start(direction), "expected `minimize` or `maximize`");
+            return None;
+        };
+        let expression = self.expression(expression)?;
+        Some(Metric { direction, expression, span: section.span() })
+    }
+}
+
+/// Whether `(at a b)` is a timed initial literal and not a fact of a predicate `at`.
+fn is_timed_literal(item: Item<'_>) -> bool {
+    let mut operands = item.rest();
+    let time = operands.next().and_then(Item::symbol);
+    time.is_some_and(|symbol| literal(symbol) != Literal::Name) && operands.next().is_some_and(Item::is_list)
+}

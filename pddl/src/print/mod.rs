@@ -1,0 +1,140 @@
+//! Syntax tree to text that other planners read, too; printing what was parsed from it changes nothing.
+//!
+//! Empty sections and empty preconditions are left out, because several planners reject them.
+
+mod layout;
+mod tree;
+
+use crate::ast::{
+    Action, ActionBody, Condition, Declaration, Direction, Domain, Identifier, InitialElement, Problem,
+    TypeExpression, TypedName,
+};
+use layout::{Doc, layout, list, text};
+
+/// A domain as text.
+pub fn print_domain(domain: &Domain) -> String {
+    let mut sections = vec![text(format!("(domain {})", domain.name.name))];
+    sections.extend(requirements(&domain.requirements));
+    sections.extend(entries(":types", &domain.types));
+    sections.extend(entries(":constants", &domain.constants));
+    sections.extend(declarations(":predicates", &domain.predicates));
+    sections.extend(declarations(":functions", &domain.functions));
+    sections.extend(
+        domain.derived.iter().map(|axiom| {
+            list(":derived", 2, [text(signature(&axiom.head)), tree::condition(&axiom.condition)])
+        }),
+    );
+    sections.extend(domain.actions.iter().map(action));
+    layout(&list("define", 2, sections).broken())
+}
+
+/// A problem as text.
+pub fn print_problem(problem: &Problem) -> String {
+    let mut sections = vec![
+        text(format!("(problem {})", problem.name.name)),
+        text(format!("(:domain {})", problem.domain.name)),
+    ];
+    sections.extend(requirements(&problem.requirements));
+    sections.extend(entries(":objects", &problem.objects));
+    sections.push(list(":init", 1, problem.init.iter().map(initial)).broken());
+    sections.push(list(":goal", 1, [tree::condition(&problem.goal)]));
+    sections.extend(problem.metric.as_ref().map(|metric| {
+        let direction = match metric.direction {
+            Direction::Minimize => "minimize",
+            Direction::Maximize => "maximize",
+        };
+        list(":metric", 2, [text(direction), tree::expression(&metric.expression)])
+    }));
+    layout(&list("define", 2, sections).broken())
+}
+
+/// A condition on one line, for messages.
+pub(crate) fn condition_text(condition: &Condition) -> String {
+    tree::condition(condition).on_one_line()
+}
+
+/// A declaration as written: `(at ?x - robot)`.
+pub(crate) fn signature(declaration: &Declaration) -> String {
+    let parameters = typed("?", &declaration.parameters);
+    let space = if parameters.is_empty() { "" } else { " " };
+    format!("({}{space}{})", declaration.identifier.name, parameters.join(" "))
+}
+
+/// The type of a typed list, without its dash.
+pub(crate) fn type_text(r#type: &TypeExpression) -> String {
+    let names: Vec<_> = r#type.alternatives.iter().map(|name| name.name.as_str()).collect();
+    match names.as_slice() {
+        [] => "object".to_owned(),
+        [one] => (*one).to_owned(),
+        several => format!("(either {})", several.join(" ")),
+    }
+}
+
+/// A typed list in groups of one type, each name with `prefix`. Untyped names can stand bare only at the end.
+fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
+    let bare_from =
+        entries.iter().rposition(|entry| !entry.r#type.alternatives.is_empty()).map_or(0, |last| last + 1);
+    let group_of = |entry: &TypedName| type_text(&entry.r#type);
+    let (typed, bare) = entries.split_at(bare_from);
+    let names = |group: &[TypedName]| -> String {
+        let names: Vec<_> = group.iter().map(|entry| format!("{prefix}{}", entry.identifier.name)).collect();
+        names.join(" ")
+    };
+    let groups = typed.chunk_by(|left, right| group_of(left) == group_of(right));
+    let mut lines: Vec<_> =
+        groups.map(|group| format!("{} - {}", names(group), group_of(&group[0]))).collect();
+    if !bare.is_empty() {
+        lines.push(names(bare));
+    }
+    lines
+}
+
+fn requirements(flags: &[Identifier]) -> Option<Doc> {
+    let flags: Vec<_> = flags.iter().map(|flag| text(format!(":{}", flag.name))).collect();
+    (!flags.is_empty()).then(|| list(":requirements", 1, flags))
+}
+
+fn entries(keyword: &str, entries: &[TypedName]) -> Option<Doc> {
+    let lines = typed("", entries).into_iter().map(text);
+    (!entries.is_empty()).then(|| list(keyword, 1, lines).broken())
+}
+
+fn declarations(keyword: &str, declarations: &[Declaration]) -> Option<Doc> {
+    let lines = declarations.iter().map(|declaration| text(signature(declaration)));
+    (!declarations.is_empty()).then(|| list(keyword, 1, lines).broken())
+}
+
+fn action(action: &Action) -> Doc {
+    let field = |keyword: &str, value: Doc| value.after(keyword);
+    let parameters = text(format!("({})", typed("?", &action.parameters).join(" ")));
+    let name = text(action.identifier.name.as_str());
+    let mut parts = vec![name, field(":parameters", parameters)];
+    match &action.body {
+        ActionBody::Instantaneous { precondition, effect } => {
+            if !matches!(precondition, Condition::And(parts) if parts.is_empty()) {
+                parts.push(field(":precondition", tree::condition(precondition)));
+            }
+            parts.push(field(":effect", tree::effect(effect)));
+            list(":action", 2, parts).broken()
+        }
+        ActionBody::Durative { duration, conditions, effects } => {
+            parts.push(field(":duration", tree::duration(duration)));
+            parts.push(field(":condition", list("and", 1, conditions.iter().map(tree::timed_condition))));
+            parts.push(field(":effect", list("and", 1, effects.iter().map(tree::timed_effect))));
+            list(":durative-action", 2, parts).broken()
+        }
+    }
+}
+
+fn initial(element: &InitialElement) -> Doc {
+    match element {
+        InitialElement::Fact(atom) => tree::atom(atom),
+        InitialElement::NegatedFact(atom) => list("not", 1, [tree::atom(atom)]),
+        InitialElement::Value(atom, value, _) => list("=", 1, [tree::atom(atom), tree::number(value)]),
+        InitialElement::Timed(time, atom, holds, _) => {
+            let atom = tree::atom(atom);
+            let literal = if *holds { atom } else { list("not", 1, [atom]) };
+            list("at", 1, [tree::number(time), literal])
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Conditions, effects and expressions to lists.
+
+use num_rational::BigRational;
+
+use crate::ast::{
+    Arithmetic, Assignment, Atom, Comparison, Condition, ConditionTime, DurationConstraint, Effect,
+    EffectTime, Expression, Term, TypedName,
+};
+use crate::number::to_decimal;
+
+use super::layout::{Doc, list, text};
+use super::typed;
+
+pub(super) fn term(term: &Term) -> Doc {
+    match term {
+        Term::Variable(identifier) => text(format!("?{}", identifier.name)),
+        Term::Constant(identifier) => text(identifier.name.as_str()),
+    }
+}
+
+pub(super) fn atom(atom: &Atom) -> Doc {
+    list(atom.predicate.name.as_str(), 1, atom.arguments.iter().map(term))
+}
+
+/// A decimal, or a quotient where there is none.
+pub(super) fn number(value: &BigRational) -> Doc {
+    match to_decimal(value) {
+        Some(decimal) => text(decimal),
+        None => text(format!("(/ {} {})", value.numer(), value.denom())),
+    }
+}
+
+pub(super) fn expression(value: &Expression) -> Doc {
+    match value {
+        Expression::Number(value, _) => number(value),
+        Expression::Fluent(fluent) => atom(fluent),
+        Expression::Duration(_) => text("?duration"),
+        Expression::TotalTime(_) => text("(total-time)"),
+        Expression::Operation(operation, operands, _) => {
+            let symbol = match operation {
+                Arithmetic::Add => "+",
+                Arithmetic::Subtract => "-",
+                Arithmetic::Multiply => "*",
+                Arithmetic::Divide => "/",
+            };
+            list(symbol, 1, operands.iter().map(expression))
+        }
+    }
+}
+
+fn comparison(operator: Comparison) -> &'static str {
+    match operator {
+        Comparison::Less => "<",
+        Comparison::LessOrEqual => "<=",
+        Comparison::Equal => "=",
+        Comparison::GreaterOrEqual => ">=",
+        Comparison::Greater => ">",
+    }
+}
+
+fn variables(entries: &[TypedName]) -> Doc {
+    text(format!("({})", typed("?", entries).join(" ")))
+}
+
+pub(super) fn condition(tree: &Condition) -> Doc {
+    match tree {
+        Condition::And(parts) => list("and", 1, parts.iter().map(condition)),
+        Condition::Or(parts) => list("or", 1, parts.iter().map(condition)),
+        Condition::Not(inner) => list("not", 1, [condition(inner)]),
+        Condition::Imply(premise, conclusion) => {
+            list("imply", 1, [condition(premise), condition(conclusion)])
+        }
+        Condition::Exists(entries, body) => list("exists", 2, [variables(entries), condition(body)]),
+        Condition::ForAll(entries, body) => list("forall", 2, [variables(entries), condition(body)]),
+        Condition::Atom(fact) => atom(fact),
+        Condition::Equal(left, right, _) => list("=", 1, [term(left), term(right)]),
+        Condition::Compare(operator, left, right, _) => {
+            list(comparison(*operator), 1, [expression(left), expression(right)])
+        }
+    }
+}
+
+pub(super) fn effect(tree: &Effect) -> Doc {
+    match tree {
+        Effect::And(parts) => list("and", 1, parts.iter().map(effect)),
+        Effect::Add(fact) => atom(fact),
+        Effect::Delete(fact) => list("not", 1, [atom(fact)]),
+        Effect::ForAll(entries, body) => list("forall", 2, [variables(entries), effect(body)]),
+        Effect::When(premise, body) => list("when", 1, [condition(premise), effect(body)]),
+        Effect::Assign(kind, target, value, _) => {
+            let head = match kind {
+                Assignment::Assign => "assign",
+                Assignment::Increase => "increase",
+                Assignment::Decrease => "decrease",
+                Assignment::ScaleUp => "scale-up",
+                Assignment::ScaleDown => "scale-down",
+            };
+            list(head, 1, [atom(target), expression(value)])
+        }
+    }
+}
+
+pub(super) fn timed_condition((time, tree): &(ConditionTime, Condition)) -> Doc {
+    let (head, when) = match time {
+        ConditionTime::AtStart => ("at", "start"),
+        ConditionTime::OverAll => ("over", "all"),
+        ConditionTime::AtEnd => ("at", "end"),
+    };
+    list(head, 2, [text(when), condition(tree)])
+}
+
+pub(super) fn timed_effect((time, tree): &(EffectTime, Effect)) -> Doc {
+    list("at", 2, [text(when(*time)), effect(tree)])
+}
+
+fn when(time: EffectTime) -> &'static str {
+    match time {
+        EffectTime::AtStart => "start",
+        EffectTime::AtEnd => "end",
+    }
+}
+
+/// `:duration`; only constraints that are evaluated at the end say so.
+pub(super) fn duration(constraints: &[DurationConstraint]) -> Doc {
+    let constraint = |constraint: &DurationConstraint| {
+        let bound = [text("?duration"), expression(&constraint.expression)];
+        let bound = list(comparison(constraint.operator), 1, bound);
+        match constraint.time {
+            EffectTime::AtStart => bound,
+            EffectTime::AtEnd => list("at", 2, [text(when(EffectTime::AtEnd)), bound]),
+        }
+    };
+    match constraints {
+        [] => text("()"),
+        [one] => constraint(one),
+        several => list("and", 1, several.iter().map(constraint)),
+    }
+}

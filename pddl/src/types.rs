@@ -1,0 +1,100 @@
+//! Which type is a subtype of which.
+
+use rustc_hash::FxHashMap;
+
+use super::ast::{Domain, Name, TypeExpression};
+
+/// The types of a domain. A supertype that is not declared itself counts as declared; `object` is above all.
+#[derive(Debug)]
+pub struct TypeHierarchy {
+    index: FxHashMap<Name, usize>,
+    parents: Vec<Vec<usize>>,
+}
+
+impl TypeHierarchy {
+    /// The types that a domain declares.
+    pub fn of(domain: &Domain) -> Self {
+        let mut hierarchy = Self { index: FxHashMap::default(), parents: Vec::new() };
+        hierarchy.insert(&Name::new("object"));
+        for entry in &domain.types {
+            let child = hierarchy.insert(&entry.identifier.name);
+            for parent in &entry.r#type.alternatives {
+                let parent = hierarchy.insert(&parent.name);
+                hierarchy.parents[child].push(parent);
+            }
+        }
+        hierarchy
+    }
+
+    fn insert(&mut self, name: &Name) -> usize {
+        if let Some(index) = self.index.get(name) {
+            return *index;
+        }
+        self.index.insert(name.clone(), self.parents.len());
+        self.parents.push(Vec::new());
+        self.parents.len() - 1
+    }
+
+    pub(crate) fn contains(&self, name: &Name) -> bool {
+        self.index.contains_key(name)
+    }
+
+    /// The names of all types, in no order.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &Name> {
+        self.index.keys()
+    }
+
+    /// Whether everything of type `lower` is of type `upper`. An undeclared upper type counts as `object`.
+    pub(crate) fn is_a(&self, lower: &Name, upper: &Name) -> bool {
+        let Some(upper) = self.index.get(upper) else { return true };
+        if *upper == 0 {
+            return true;
+        }
+        self.index.get(lower).is_some_and(|lower| self.reaches(*lower, *upper))
+    }
+
+    fn reaches(&self, lower: usize, upper: usize) -> bool {
+        let mut seen = vec![lower];
+        let mut next = 0;
+        while let Some(at) = seen.get(next).copied() {
+            if at == upper {
+                return true;
+            }
+            for parent in &self.parents[at] {
+                if !seen.contains(parent) {
+                    seen.push(*parent);
+                }
+            }
+            next += 1;
+        }
+        false
+    }
+
+    /// Whether an object of type `given` is one of type `wanted`.
+    pub fn fits(&self, given: &TypeExpression, wanted: &TypeExpression) -> bool {
+        let any_wanted = |lower: &Name| wanted.alternatives.iter().any(|upper| self.is_a(lower, &upper.name));
+        wanted.alternatives.is_empty() || given.alternatives.iter().any(|lower| any_wanted(&lower.name))
+    }
+
+    /// Whether something can be of both types.
+    pub(crate) fn overlap(&self, left: &TypeExpression, right: &TypeExpression) -> bool {
+        let common = |left: &Name, right: &Name| {
+            self.is_a(left, right)
+                || self.is_a(right, left)
+                || self.index.keys().any(|name| self.is_a(name, left) && self.is_a(name, right))
+        };
+        left.alternatives.is_empty()
+            || right.alternatives.is_empty()
+            || left
+                .alternatives
+                .iter()
+                .any(|left| right.alternatives.iter().any(|right| common(&left.name, &right.name)))
+    }
+
+    /// Whether a type is above itself.
+    pub(crate) fn is_cyclic(&self, name: &Name) -> bool {
+        let Some(index) = self.index.get(name) else { return false };
+        *index != 0
+            && self.parents[*index].iter().any(|parent| *parent != *index && self.reaches(*parent, *index))
+    }
+}

@@ -1,0 +1,194 @@
+//! One step to the problem that is left: what executing an action changes, by the same rules as [`validate`](super::validate()).
+//!
+//! For those who execute a plan and not only check it: the state after each action is the initial state of what remains.
+
+use num_rational::BigRational;
+use rustc_hash::FxHashMap;
+
+use crate::ast::{
+    Atom, ConditionTime, Domain, EffectTime, Identifier, InitialElement, Name, Problem, Span, Term,
+};
+
+use super::Options;
+use super::effects::{Change, Changes, Ground};
+use super::evaluate::Evaluator;
+use super::execute::{Execution, is_durative};
+use super::happening::Part;
+use super::plan::PlanStep;
+use super::verdict::Violation;
+use super::world::{Arguments, State, Symbol, World};
+use super::{Bindings, step};
+
+/// What one step changes.
+#[derive(Debug, Clone)]
+pub struct Advance {
+    /// Facts that begin to hold, sorted.
+    pub added: Vec<Atom>,
+    /// Facts that cease to hold, sorted.
+    pub deleted: Vec<Atom>,
+    /// The functions that it changes, sorted.
+    pub values: Vec<ValueChange>,
+    /// How long it takes, in the domain's time unit.
+    pub duration: BigRational,
+    /// The value of the problem's metric if the plan ended with it; none without a metric, or where it is undefined.
+    pub metric: Option<BigRational>,
+}
+
+/// A function whose value a step changes.
+#[derive(Debug, Clone)]
+pub struct ValueChange {
+    /// The function with its arguments.
+    pub function: Atom,
+    /// As text: `(battery)`.
+    pub text: String,
+    /// Its value before, where it has one.
+    pub before: Option<BigRational>,
+    /// Its value afterwards.
+    pub after: BigRational,
+    /// Whether it gets a value whatever it had before, as by `assign`, and is not increased or decreased.
+    pub assigned: bool,
+}
+
+/// Executes one step from the initial state of a problem. Timed initial literals do not take place.
+///
+/// # Errors
+/// What forbids it; with `forced`, only effects that are undefined, and actions that there are not.
+pub fn advance(
+    domain: &Domain,
+    problem: &Problem,
+    step: &PlanStep,
+    forced: bool,
+) -> Result<Advance, Box<Violation>> {
+    advance_in(&World::new(domain, problem), step, forced)
+}
+
+/// Executes each of some steps from the initial state of a problem, as [`advance`] does for one of them that is not forced.
+pub fn advance_each(
+    domain: &Domain,
+    problem: &Problem,
+    steps: &[PlanStep],
+) -> Vec<Result<Advance, Box<Violation>>> {
+    let world = World::new(domain, problem);
+    steps.iter().map(|step| advance_in(&world, step, false)).collect()
+}
+
+fn advance_in(world: &World<'_>, step: &PlanStep, forced: bool) -> Result<Advance, Box<Violation>> {
+    let step = step::resolve(world, 1, step);
+    let options = Options::default();
+    let mut execution = Execution::new(world, &options);
+    let before = execution.state.clone();
+    let start = BigRational::default();
+    let running =
+        if forced { execution.begin_anyway(&step, &start) } else { execution.begin(&step, &start) }?;
+    let mut assigned = FxHashMap::default();
+    // Nothing interferes with what has been done: an end that is enforced comes after its start, however short the action is.
+    let has_two = running.first_part() == Part::Start || (forced && is_durative(&running.instance));
+    let parts: &[Part] = if has_two { &[Part::Start, Part::End] } else { &[Part::Whole] };
+    for part in parts {
+        let time = if *part == Part::End { &running.end } else { &start };
+        if *part == Part::End && !forced {
+            execution.check(&running, ConditionTime::OverAll, &start)?;
+        }
+        let changes = if forced {
+            let when = if *part == Part::End { EffectTime::AtEnd } else { EffectTime::AtStart };
+            execution.changes(&running, when, time)?
+        } else {
+            execution.happening(&running, *part, time)?.changes
+        };
+        note(&changes, &mut assigned);
+        execution.apply(&step, time, changes)?;
+    }
+    let after = &execution.state;
+    let values = assigned.into_iter().filter_map(|(target, assigned)| {
+        let after = after.values.get(&target)?.clone();
+        let (function, text) = (atom(world, &target), world.show(target.0, &target.1));
+        Some(ValueChange { function, text, before: before.values.get(&target).cloned(), after, assigned })
+    });
+    let mut values: Vec<ValueChange> = values.collect();
+    values.sort_by(|left, right| left.text.cmp(&right.text));
+    let (added, deleted) = (missing(world, after, &before), missing(world, &before, after));
+    let metric = metric(world, after, &running.duration);
+    Ok(Advance { added, deleted, values, duration: running.duration, metric })
+}
+
+impl Advance {
+    /// Changes the initial state of a problem, so that it is the state after the step.
+    pub fn apply(&self, init: &mut Vec<InitialElement>) {
+        init.retain(|element| match element {
+            InitialElement::Fact(atom) => !self.deleted.iter().any(|deleted| is_same(deleted, atom)),
+            InitialElement::NegatedFact(atom) => !self.added.iter().any(|added| is_same(added, atom)),
+            _ => true,
+        });
+        init.extend(self.added.iter().cloned().map(InitialElement::Fact));
+        for change in &self.values {
+            let stated = init.iter_mut().find_map(|element| match element {
+                InitialElement::Value(function, value, _) if is_same(function, &change.function) => {
+                    Some(value)
+                }
+                _ => None,
+            });
+            match stated {
+                Some(value) => value.clone_from(&change.after),
+                None => init.push(InitialElement::Value(
+                    change.function.clone(),
+                    change.after.clone(),
+                    Span::default(),
+                )),
+            }
+        }
+    }
+}
+
+fn is_same(left: &Atom, right: &Atom) -> bool {
+    let name = |term: &Term| match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.clone(),
+    };
+    left.predicate.name == right.predicate.name
+        && left.arguments.len() == right.arguments.len()
+        && left.arguments.iter().zip(&right.arguments).all(|(left, right)| name(left) == name(right))
+}
+
+/// The value of the problem's metric if the plan ended in its initial state after `total_time`, in the domain's time
+/// unit; none without a metric, or where it is undefined.
+pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational) -> Option<BigRational> {
+    let world = World::new(domain, problem);
+    let options = Options::default();
+    let execution = Execution::new(&world, &options);
+    metric(&world, &execution.state, total_time)
+}
+
+fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
+    let metric = world.problem.metric.as_ref()?;
+    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
+    evaluator.value(&metric.expression, &Bindings::default()).ok()
+}
+
+fn note(changes: &Changes, assigned: &mut FxHashMap<Ground, bool>) {
+    for (target, change) in &changes.numeric {
+        let is_assignment = matches!(change, Change::Assign(_));
+        *assigned.entry(target.clone()).or_default() |= is_assignment;
+    }
+}
+
+/// Facts that hold in one state and not in another, sorted.
+fn missing(world: &World<'_>, there: &State, here: &State) -> Vec<Atom> {
+    let is_new = |predicate: Symbol, arguments: &Arguments| {
+        !here.facts.get(&predicate).is_some_and(|tuples| tuples.contains(arguments))
+    };
+    let mut facts: Vec<Ground> = Vec::new();
+    for (predicate, tuples) in &there.facts {
+        let new = tuples.iter().filter(|arguments| is_new(*predicate, arguments));
+        facts.extend(new.map(|arguments| (*predicate, arguments.clone())));
+    }
+    facts.sort_by_cached_key(|(predicate, arguments)| world.show(*predicate, arguments));
+    facts.iter().map(|ground| atom(world, ground)).collect()
+}
+
+fn atom(world: &World<'_>, (symbol, arguments): &Ground) -> Atom {
+    let identifier = |symbol| Identifier { name: Name::new(world.name(symbol)), span: Span::default() };
+    Atom {
+        predicate: identifier(*symbol),
+        arguments: arguments.iter().map(|argument| Term::Constant(identifier(*argument))).collect(),
+        span: Span::default(),
+    }
+}

@@ -1,0 +1,187 @@
+//! Effects: all read the state before, then all change it at once; of an atom both added and deleted, the
+//! addition counts.
+
+use num_rational::BigRational;
+use num_traits::{One, Zero};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::ast::{Arithmetic, Assignment, Effect, TypedName};
+
+use super::evaluate::{Bindings, Evaluator, Undefined, apply};
+use super::world::{Arguments, State, Symbol, World};
+
+/// A fact or a function with its arguments.
+pub(super) type Ground = (Symbol, Arguments);
+
+/// What a happening changes.
+#[derive(Debug, Default)]
+pub(super) struct Changes {
+    pub(super) added: FxHashSet<Ground>,
+    pub(super) deleted: FxHashSet<Ground>,
+    pub(super) numeric: FxHashMap<Ground, Change>,
+}
+
+/// How one number changes.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Change {
+    /// It gets this value.
+    Assign(BigRational),
+    /// This is added.
+    Add(BigRational),
+    /// It is multiplied by this.
+    Scale(BigRational),
+}
+
+/// Why effects cannot be applied.
+#[derive(Debug)]
+pub(super) enum EffectError {
+    /// A value that they need is undefined.
+    Undefined(Undefined),
+    /// They change one number in two ways that do not commute.
+    Conflict(Ground),
+}
+
+impl From<Undefined> for EffectError {
+    fn from(undefined: Undefined) -> Self {
+        Self::Undefined(undefined)
+    }
+}
+
+impl<'p> Evaluator<'_, 'p> {
+    /// Collects what an effect changes.
+    pub(super) fn collect(
+        &self,
+        effect: &'p Effect,
+        bindings: &mut Bindings<'p>,
+        changes: &mut Changes,
+    ) -> Result<(), EffectError> {
+        match effect {
+            Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, bindings, changes)),
+            Effect::Add(atom) | Effect::Delete(atom) => {
+                let predicate = self.world.symbol(&atom.predicate.name);
+                if let Some(arguments) = self.arguments(atom, bindings) {
+                    let is_add = matches!(effect, Effect::Add(_));
+                    let set = if is_add { &mut changes.added } else { &mut changes.deleted };
+                    set.insert((predicate, arguments));
+                }
+                Ok(())
+            }
+            Effect::ForAll(variables, body) => self.collect_for_all(variables, body, bindings, changes),
+            Effect::When(condition, body) => {
+                if self.holds(condition, bindings)? {
+                    self.collect(body, bindings, changes)
+                } else {
+                    Ok(())
+                }
+            }
+            Effect::Assign(kind, target, value, _) => {
+                let symbol = self.world.symbol(&target.predicate.name);
+                let arguments = self.arguments(target, bindings).unwrap_or_default();
+                let value = self.value(value, bindings)?;
+                changes.record((symbol, arguments), change(*kind, value)?)
+            }
+        }
+    }
+
+    fn collect_for_all(
+        &self,
+        variables: &'p [TypedName],
+        body: &'p Effect,
+        bindings: &mut Bindings<'p>,
+        changes: &mut Changes,
+    ) -> Result<(), EffectError> {
+        let Some((first, rest)) = variables.split_first() else {
+            return self.collect(body, bindings, changes);
+        };
+        let place = bindings.0.len();
+        bindings.declare(std::slice::from_ref(first));
+        let mut result = Ok(());
+        for object in self.world.objects_of(&first.r#type) {
+            bindings.0[place].object = Some(object);
+            result = result.and_then(|()| self.collect_for_all(rest, body, bindings, changes));
+        }
+        bindings.0.truncate(place);
+        result
+    }
+}
+
+fn change(kind: Assignment, value: BigRational) -> Result<Change, Undefined> {
+    Ok(match kind {
+        Assignment::Assign => Change::Assign(value),
+        Assignment::Increase => Change::Add(value),
+        Assignment::Decrease => Change::Add(-value),
+        Assignment::ScaleUp => Change::Scale(value),
+        Assignment::ScaleDown => Change::Scale(apply(Arithmetic::Divide, &BigRational::one(), &value)?),
+    })
+}
+
+impl Changes {
+    /// Adds a change to those of the same number.
+    fn record(&mut self, target: Ground, change: Change) -> Result<(), EffectError> {
+        let combined = match (self.numeric.get(&target), change) {
+            (None, change) => change,
+            (Some(Change::Add(earlier)), Change::Add(value)) => {
+                Change::Add(apply(Arithmetic::Add, earlier, &value)?)
+            }
+            (Some(Change::Scale(earlier)), Change::Scale(value)) => {
+                Change::Scale(apply(Arithmetic::Multiply, earlier, &value)?)
+            }
+            (Some(Change::Assign(earlier)), Change::Assign(value)) if *earlier == value => {
+                Change::Assign(value)
+            }
+            _ => return Err(EffectError::Conflict(target)),
+        };
+        self.numeric.insert(target, combined);
+        Ok(())
+    }
+
+    /// Takes over the changes of another action that happens at the same time.
+    pub(super) fn merge(&mut self, other: Self) -> Result<(), EffectError> {
+        self.added.extend(other.added);
+        self.deleted.extend(other.deleted);
+        other.numeric.into_iter().try_for_each(|(target, change)| self.record(target, change))
+    }
+
+    /// Changes the state; on an error it stays as it is.
+    pub(super) fn apply(self, world: &World<'_>, state: &mut State) -> Result<(), EffectError> {
+        let mut values = Vec::new();
+        for (target, change) in self.numeric {
+            let before = || {
+                let show = || Undefined::Function(world.show(target.0, &target.1));
+                state.values.get(&target).ok_or_else(show)
+            };
+            let after = match &change {
+                Change::Assign(value) => value.clone(),
+                Change::Add(value) => apply(Arithmetic::Add, before()?, value)?,
+                Change::Scale(value) => apply(Arithmetic::Multiply, before()?, value)?,
+            };
+            values.push((target, after));
+        }
+        state.values.extend(values);
+        change_facts(self.added, self.deleted, state);
+        Ok(())
+    }
+
+    /// Changes the facts of the state, and no numbers.
+    pub(super) fn apply_facts(self, state: &mut State) {
+        change_facts(self.added, self.deleted, state);
+    }
+
+    /// Whether the state stays as it is, if the changes can be applied at all.
+    pub(super) fn is_neutral(&self) -> bool {
+        let is_zero = |change: &Change| matches!(change, Change::Add(value) if value.is_zero());
+        self.added.is_empty() && self.deleted.is_empty() && self.numeric.values().all(is_zero)
+    }
+}
+
+/// Deletes, then adds.
+fn change_facts(added: FxHashSet<Ground>, deleted: FxHashSet<Ground>, state: &mut State) {
+    for (predicate, arguments) in deleted {
+        if let Some(tuples) = state.facts.get_mut(&predicate) {
+            tuples.remove(&arguments);
+        }
+    }
+    for (predicate, arguments) in added {
+        state.facts.entry(predicate).or_default().insert(arguments);
+    }
+}

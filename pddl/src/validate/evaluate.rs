@@ -1,0 +1,250 @@
+//! Conditions and expressions in a state, by their definition.
+//!
+//! A function without a value makes a comparison neither true nor false (Kleene's logic): the whole is
+//! undefined only where its truth depends on it.
+
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use crate::ast::{
+    Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypeExpression, TypedName,
+};
+
+use super::world::{Arguments, State, Symbol, World};
+
+/// Why a condition or an expression has no value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Undefined {
+    /// A function that was never set.
+    Function(String),
+    /// A division by zero.
+    Division,
+    /// A number that has grown beyond all measure.
+    Size,
+    /// `?duration` or `total-time` where it has no meaning.
+    Place,
+}
+
+/// The variables of the surrounding action, axiom or quantifiers, innermost last.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Bindings<'p>(pub(super) Vec<Binding<'p>>);
+
+/// One variable with its type, and its object once it has one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Binding<'p> {
+    pub(super) variable: &'p Name,
+    pub(super) r#type: &'p TypeExpression,
+    pub(super) object: Option<Symbol>,
+}
+
+impl<'p> Bindings<'p> {
+    pub(super) fn place(&self, variable: &Name) -> Option<usize> {
+        self.0.iter().rposition(|binding| binding.variable == variable)
+    }
+
+    pub(super) fn get(&self, variable: &Name) -> Option<Symbol> {
+        self.place(variable).and_then(|place| self.0[place].object)
+    }
+
+    pub(super) fn declare(&mut self, variables: &'p [TypedName]) {
+        self.0.extend(variables.iter().map(|entry| Binding {
+            variable: &entry.identifier.name,
+            r#type: &entry.r#type,
+            object: None,
+        }));
+    }
+}
+
+/// The most bits of a number: a plan that multiplies a value with itself a hundred times is no plan.
+const BITS_LIMIT: u64 = 100_000;
+
+/// Evaluates in one state.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Evaluator<'e, 'p> {
+    pub(super) world: &'e World<'p>,
+    pub(super) state: &'e State,
+    /// `?duration` of the action in question.
+    pub(super) duration: Option<&'e BigRational>,
+    /// `total-time`, in the metric.
+    pub(super) total_time: Option<&'e BigRational>,
+}
+
+impl<'e, 'p> Evaluator<'e, 'p> {
+    /// Evaluates conditions outside of actions.
+    pub(super) fn new(world: &'e World<'p>, state: &'e State) -> Self {
+        Self { world, state, duration: None, total_time: None }
+    }
+
+    pub(super) fn holds(
+        &self,
+        condition: &'p Condition,
+        bindings: &mut Bindings<'p>,
+    ) -> Result<bool, Undefined> {
+        match condition {
+            Condition::And(parts) => self.all(parts.iter(), bindings),
+            Condition::Or(parts) => self.any(parts.iter(), bindings),
+            Condition::Not(inner) => self.holds(inner, bindings).map(|holds| !holds),
+            Condition::Imply(premise, conclusion) => match self.holds(premise, bindings) {
+                Ok(false) => Ok(true),
+                Ok(true) => self.holds(conclusion, bindings),
+                Err(undefined) => match self.holds(conclusion, bindings) {
+                    Ok(true) => Ok(true),
+                    _ => Err(undefined),
+                },
+            },
+            Condition::Exists(variables, body) => self.exists(variables, body, bindings),
+            Condition::ForAll(variables, body) => {
+                let outer = bindings.0.len();
+                bindings.declare(variables);
+                let result = self.for_all(outer, body, bindings);
+                bindings.0.truncate(outer);
+                result
+            }
+            Condition::Atom(atom) => Ok(self.arguments(atom, bindings).is_some_and(|arguments| {
+                self.state.holds(self.world.symbol(&atom.predicate.name), &arguments)
+            })),
+            Condition::Equal(left, right, _) => Ok(self.term(left, bindings).is_some()
+                && self.term(left, bindings) == self.term(right, bindings)),
+            Condition::Compare(operator, left, right, _) => {
+                Ok(compare(*operator, &self.value(left, bindings)?, &self.value(right, bindings)?))
+            }
+        }
+    }
+
+    fn all(
+        &self,
+        parts: impl Iterator<Item = &'p Condition>,
+        bindings: &mut Bindings<'p>,
+    ) -> Result<bool, Undefined> {
+        let mut result = Ok(true);
+        for part in parts {
+            match self.holds(part, bindings) {
+                Ok(true) => {}
+                Ok(false) => return Ok(false),
+                Err(undefined) => result = result.and(Err(undefined)),
+            }
+        }
+        result
+    }
+
+    fn any(
+        &self,
+        parts: impl Iterator<Item = &'p Condition>,
+        bindings: &mut Bindings<'p>,
+    ) -> Result<bool, Undefined> {
+        let mut result = Ok(false);
+        for part in parts {
+            match self.holds(part, bindings) {
+                Ok(true) => return Ok(true),
+                Ok(false) => {}
+                Err(undefined) => result = result.and(Err(undefined)),
+            }
+        }
+        result
+    }
+
+    /// Whether the body holds for all objects of the variables from `place` on.
+    fn for_all(
+        &self,
+        place: usize,
+        body: &'p Condition,
+        bindings: &mut Bindings<'p>,
+    ) -> Result<bool, Undefined> {
+        let Some(Binding { r#type, .. }) = bindings.0.get(place).copied() else {
+            return self.holds(body, bindings);
+        };
+        let mut result = Ok(true);
+        for object in self.world.objects_of(r#type) {
+            bindings.0[place].object = Some(object);
+            match self.for_all(place + 1, body, bindings) {
+                Ok(true) => {}
+                Ok(false) => return Ok(false),
+                Err(undefined) => result = result.and(Err(undefined)),
+            }
+        }
+        result
+    }
+
+    fn exists(
+        &self,
+        variables: &'p [TypedName],
+        body: &'p Condition,
+        bindings: &mut Bindings<'p>,
+    ) -> Result<bool, Undefined> {
+        let outer = bindings.0.len();
+        bindings.declare(variables);
+        let mut result = Ok(false);
+        self.solve(vec![body], bindings, None, &mut |_, undefined| {
+            result = undefined.map_or(Ok(true), |undefined| Err(undefined.clone()));
+            result != Ok(true)
+        });
+        bindings.0.truncate(outer);
+        result
+    }
+
+    pub(super) fn term(&self, term: &Term, bindings: &Bindings<'p>) -> Option<Symbol> {
+        match term {
+            Term::Variable(identifier) => bindings.get(&identifier.name),
+            Term::Constant(identifier) => Some(self.world.symbol(&identifier.name)),
+        }
+    }
+
+    pub(super) fn arguments(&self, atom: &Atom, bindings: &Bindings<'p>) -> Option<Arguments> {
+        atom.arguments.iter().map(|term| self.term(term, bindings)).collect()
+    }
+
+    pub(super) fn value(
+        &self,
+        expression: &Expression,
+        bindings: &Bindings<'p>,
+    ) -> Result<BigRational, Undefined> {
+        match expression {
+            Expression::Number(value, _) => Ok(value.clone()),
+            Expression::Fluent(atom) => self.fluent(atom, bindings),
+            Expression::Duration(_) => self.duration.cloned().ok_or(Undefined::Place),
+            Expression::TotalTime(_) => self.total_time.cloned().ok_or(Undefined::Place),
+            Expression::Operation(operation, operands, _) => {
+                let mut operands = operands.iter().map(|operand| self.value(operand, bindings));
+                let first = operands.next().unwrap_or_else(|| Ok(BigRational::zero()))?;
+                let mut rest = operands.peekable();
+                if *operation == Arithmetic::Subtract && rest.peek().is_none() {
+                    return Ok(-first);
+                }
+                rest.try_fold(first, |left, right| apply(*operation, &left, &right?))
+            }
+        }
+    }
+
+    fn fluent(&self, atom: &Atom, bindings: &Bindings<'p>) -> Result<BigRational, Undefined> {
+        let symbol = self.world.symbol(&atom.predicate.name);
+        let arguments = self.arguments(atom, bindings).unwrap_or_default();
+        let undefined = || Undefined::Function(self.world.show(symbol, &arguments));
+        self.state.values.get(&(symbol, arguments.clone())).cloned().ok_or_else(undefined)
+    }
+}
+
+fn compare(operator: Comparison, left: &BigRational, right: &BigRational) -> bool {
+    match operator {
+        Comparison::Less => left < right,
+        Comparison::LessOrEqual => left <= right,
+        Comparison::Equal => left == right,
+        Comparison::GreaterOrEqual => left >= right,
+        Comparison::Greater => left > right,
+    }
+}
+
+pub(super) fn apply(
+    operation: Arithmetic,
+    left: &BigRational,
+    right: &BigRational,
+) -> Result<BigRational, Undefined> {
+    let value = match operation {
+        Arithmetic::Add => left + right,
+        Arithmetic::Subtract => left - right,
+        Arithmetic::Multiply => left * right,
+        Arithmetic::Divide if right.is_zero() => return Err(Undefined::Division),
+        Arithmetic::Divide => left / right,
+    };
+    let bits = value.numer().bits().max(value.denom().bits());
+    if bits > BITS_LIMIT { Err(Undefined::Size) } else { Ok(value) }
+}

@@ -1,0 +1,329 @@
+//! The parts of which an execution consists: starts, ends, and what must hold between them.
+
+use num_rational::BigRational;
+use num_traits::{Signed, Zero};
+
+use crate::ast::{ActionBody, Comparison, Condition, ConditionTime, Effect, EffectTime, InitialElement};
+
+use super::Options;
+use super::derive::close;
+use super::effects::{Changes, EffectError, Ground};
+use super::evaluate::{Evaluator, Undefined};
+use super::explain::{undefined_text, unmet};
+use super::interference::Footprint;
+use super::step::{Instance, Step, unresolved};
+use super::verdict::{Violation, ViolationKind};
+use super::world::{State, World};
+
+/// An execution as far as it has come.
+#[derive(Debug)]
+pub(super) struct Execution<'e, 'p> {
+    pub(super) world: &'e World<'p>,
+    pub(super) options: &'e Options,
+    pub(super) state: State,
+    /// The timed initial literals that are still to come, the last one first.
+    pub(super) pending: Vec<(BigRational, Ground, bool)>,
+    /// The last events that took place, with their time.
+    pub(super) last_event: Option<(BigRational, Footprint)>,
+}
+
+/// An action that has started.
+#[derive(Debug)]
+pub(super) struct Running<'e, 'p> {
+    pub(super) step: &'e Step<'p>,
+    pub(super) instance: Instance<'p>,
+    pub(super) start: BigRational,
+    /// The exact duration, in the domain's time unit.
+    pub(super) duration: BigRational,
+    /// When it ends on the plan's clock, where durations may be rounded.
+    pub(super) end: BigRational,
+}
+
+impl<'e, 'p> Execution<'e, 'p> {
+    pub(super) fn new(world: &'e World<'p>, options: &'e Options) -> Self {
+        let mut state = world.initial_state();
+        close(world, &mut state);
+        let mut pending: Vec<_> = world
+            .problem
+            .init
+            .iter()
+            .filter_map(|element| match element {
+                InitialElement::Timed(time, atom, holds, _) => {
+                    Some((time.clone(), world.ground(atom), *holds))
+                }
+                _ => None,
+            })
+            .collect();
+        // Of two literals of one time about one atom, the later one in the file prevails.
+        pending.reverse();
+        pending.sort_by(|left, right| right.0.cmp(&left.0));
+        Self { world, options, state, pending, last_event: None }
+    }
+
+    pub(super) fn evaluator<'s>(&'s self, duration: Option<&'s BigRational>) -> Evaluator<'s, 'p> {
+        Evaluator { duration, ..Evaluator::new(self.world, &self.state) }
+    }
+
+    /// When the next timed initial literal takes place.
+    pub(super) fn next_timed(&self) -> Option<&BigRational> {
+        self.pending.last().map(|(time, ..)| time)
+    }
+
+    /// Chooses the schema of a step, checks what must hold at its start, and finds its duration.
+    pub(super) fn begin(
+        &self,
+        step: &'e Step<'p>,
+        time: &BigRational,
+    ) -> Result<Running<'e, 'p>, Box<Violation>> {
+        if step.instances.is_empty() {
+            return Err(unresolved(self.world, step, time));
+        }
+        let mut first_violation = None;
+        for instance in &step.instances {
+            match self.begin_as(step, instance, time) {
+                Ok(running) => return Ok(running),
+                Err(violation) => first_violation = first_violation.or(Some(violation)),
+            }
+        }
+        Err(first_violation.unwrap_or_else(|| unresolved(self.world, step, time)))
+    }
+
+    /// As [`Execution::begin`], whether or not its conditions hold.
+    pub(super) fn begin_anyway(
+        &self,
+        step: &'e Step<'p>,
+        time: &BigRational,
+    ) -> Result<Running<'e, 'p>, Box<Violation>> {
+        let Some(instance) = step.instances.first() else {
+            return Err(unresolved(self.world, step, time));
+        };
+        let duration = self.duration(step, instance, time)?;
+        let end = time + &duration;
+        Ok(Running { step, instance: instance.clone(), start: time.clone(), duration, end })
+    }
+
+    fn begin_as(
+        &self,
+        step: &'e Step<'p>,
+        instance: &Instance<'p>,
+        time: &BigRational,
+    ) -> Result<Running<'e, 'p>, Box<Violation>> {
+        let duration = self.duration(step, instance, time)?;
+        // An action that takes time does not lose it by rounding, nor does another one gain it.
+        let is_rounded =
+            |stated: &&BigRational| is_durative(instance) && stated.is_zero() == duration.is_zero();
+        let rounded = step.text.duration.as_ref().filter(is_rounded).unwrap_or(&duration);
+        let end = time + rounded;
+        let running = Running { step, instance: instance.clone(), start: time.clone(), duration, end };
+        self.check(&running, ConditionTime::AtStart, time)?;
+        Ok(running)
+    }
+
+    /// The duration of a step: what the plan says, within the tolerance of what the domain demands.
+    fn duration(
+        &self,
+        step: &Step<'p>,
+        instance: &Instance<'p>,
+        time: &BigRational,
+    ) -> Result<BigRational, Box<Violation>> {
+        let ActionBody::Durative { duration: constraints, .. } = &instance.action.body else {
+            return Ok(BigRational::zero());
+        };
+        let evaluator = self.evaluator(None);
+        let mut exact = None;
+        for constraint in constraints.iter().filter(|constraint| constraint.time == EffectTime::AtStart) {
+            let bound = evaluator
+                .value(&constraint.expression, &instance.bindings)
+                .map_err(|undefined| undefined_violation(step, time, &undefined))?;
+            if constraint.operator == Comparison::Equal && exact.is_none() {
+                exact = Some(bound.clone());
+            }
+            if let Some(stated) = &step.text.duration {
+                self.duration_is(step, time, constraint.operator, stated, &bound)?;
+            }
+        }
+        let duration = exact.or_else(|| step.text.duration.clone());
+        let Some(duration) = duration else {
+            return Err(step.violation(
+                time,
+                ViolationKind::Duration,
+                "the plan does not say how long this takes",
+            ));
+        };
+        if duration.is_negative() {
+            let message = format!("the duration {} is negative", super::show_number(&duration));
+            return Err(step.violation(time, ViolationKind::Duration, message));
+        }
+        Ok(duration)
+    }
+
+    /// Checks a duration against one bound, within the tolerance.
+    fn duration_is(
+        &self,
+        step: &Step<'p>,
+        time: &BigRational,
+        operator: Comparison,
+        stated: &BigRational,
+        bound: &BigRational,
+    ) -> Result<(), Box<Violation>> {
+        let slack = &self.options.slack();
+        let (holds, sign) = match operator {
+            Comparison::Equal => ((stated - bound).abs() <= *slack, "="),
+            Comparison::LessOrEqual => (*stated <= bound + slack, "<="),
+            Comparison::Less => (*stated < bound + slack, "<"),
+            Comparison::GreaterOrEqual => (stated + slack >= *bound, ">="),
+            Comparison::Greater => (stated + slack > *bound, ">"),
+        };
+        if holds {
+            return Ok(());
+        }
+        let (stated, bound) = (super::show_number(stated), super::show_number(bound));
+        let message = format!("the plan says {stated}, but the domain wants ?duration {sign} {bound}");
+        Err(step.violation(time, ViolationKind::Duration, message))
+    }
+
+    /// Checks the conditions that an action has at a time.
+    pub(super) fn check(
+        &self,
+        running: &Running<'e, 'p>,
+        when: ConditionTime,
+        time: &BigRational,
+    ) -> Result<(), Box<Violation>> {
+        let Running { step, instance, duration, .. } = running;
+        let evaluator = self.evaluator(Some(duration));
+        let mut bindings = instance.bindings.clone();
+        let mut missing = Vec::new();
+        let mut undefined = None;
+        for condition in conditions(instance, when) {
+            match evaluator.holds(condition, &mut bindings) {
+                Ok(true) => continue,
+                Ok(false) => {}
+                Err(reason) => undefined = undefined.or(Some(reason)),
+            }
+            missing.extend(unmet(evaluator, condition, &mut bindings));
+        }
+        if when == ConditionTime::AtEnd {
+            self.check_duration_at_end(running, time)?;
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let (kind, place) = match when {
+            ConditionTime::AtStart if !is_durative(instance) => (ViolationKind::AtStart, "precondition"),
+            ConditionTime::AtStart => (ViolationKind::AtStart, "condition at start"),
+            ConditionTime::OverAll => (ViolationKind::OverAll, "condition over all"),
+            ConditionTime::AtEnd => (ViolationKind::AtEnd, "condition at end"),
+        };
+        let reason =
+            undefined.as_ref().map(|reason| format!(": {}", undefined_text(reason))).unwrap_or_default();
+        let message = format!("a {place} of {} does not hold{reason}", step.show());
+        let kind = if undefined.is_some() { ViolationKind::Undefined } else { kind };
+        Err(Box::new(Violation { unmet: missing, ..*step.violation(time, kind, message) }))
+    }
+
+    fn check_duration_at_end(
+        &self,
+        running: &Running<'e, 'p>,
+        time: &BigRational,
+    ) -> Result<(), Box<Violation>> {
+        let ActionBody::Durative { duration: constraints, .. } = &running.instance.action.body else {
+            return Ok(());
+        };
+        for constraint in constraints.iter().filter(|constraint| constraint.time == EffectTime::AtEnd) {
+            let bound = self
+                .evaluator(Some(&running.duration))
+                .value(&constraint.expression, &running.instance.bindings)
+                .map_err(|undefined| undefined_violation(running.step, time, &undefined))?;
+            self.duration_is(running.step, time, constraint.operator, &running.duration, &bound)?;
+        }
+        Ok(())
+    }
+
+    /// What an action changes at its start or its end.
+    pub(super) fn changes(
+        &self,
+        running: &Running<'e, 'p>,
+        when: EffectTime,
+        time: &BigRational,
+    ) -> Result<Changes, Box<Violation>> {
+        let mut changes = Changes::default();
+        let evaluator = self.evaluator(Some(&running.duration));
+        let mut bindings = running.instance.bindings.clone();
+        for effect in effects(&running.instance, when) {
+            evaluator
+                .collect(effect, &mut bindings, &mut changes)
+                .map_err(|error| self.effect_violation(running.step, time, &error))?;
+        }
+        Ok(changes)
+    }
+
+    /// Changes the state, and draws the conclusions.
+    pub(super) fn apply(
+        &mut self,
+        step: &Step<'p>,
+        time: &BigRational,
+        changes: Changes,
+    ) -> Result<(), Box<Violation>> {
+        let is_neutral = changes.is_neutral();
+        let applied = changes.apply(self.world, &mut self.state);
+        applied.map_err(|error| self.effect_violation(step, time, &error))?;
+        if !is_neutral {
+            close(self.world, &mut self.state);
+        }
+        Ok(())
+    }
+
+    pub(super) fn effect_violation(
+        &self,
+        step: &Step<'p>,
+        time: &BigRational,
+        error: &EffectError,
+    ) -> Box<Violation> {
+        match error {
+            EffectError::Undefined(undefined) => undefined_violation(step, time, undefined),
+            EffectError::Conflict((symbol, arguments)) => {
+                let function = self.world.show(*symbol, arguments);
+                let message = format!("{function} is changed in two ways at once");
+                step.violation(time, ViolationKind::Conflict, message)
+            }
+        }
+    }
+}
+
+fn undefined_violation(step: &Step<'_>, time: &BigRational, undefined: &Undefined) -> Box<Violation> {
+    step.violation(time, ViolationKind::Undefined, undefined_text(undefined))
+}
+
+pub(super) fn is_durative(instance: &Instance<'_>) -> bool {
+    matches!(instance.action.body, ActionBody::Durative { .. })
+}
+
+/// The conditions of an action at a time; a precondition counts as one at the start.
+pub(super) fn conditions<'p>(
+    instance: &Instance<'p>,
+    when: ConditionTime,
+) -> impl Iterator<Item = &'p Condition> + use<'p> {
+    let (single, several) = match &instance.action.body {
+        ActionBody::Instantaneous { precondition, .. } => {
+            ((when == ConditionTime::AtStart).then_some(precondition), [].as_slice())
+        }
+        ActionBody::Durative { conditions, .. } => (None, conditions.as_slice()),
+    };
+    let several = several.iter().filter(move |(time, _)| *time == when).map(|(_, condition)| condition);
+    single.into_iter().chain(several)
+}
+
+/// The effects of an action at a time; those of an instantaneous one count as effects at the start.
+pub(super) fn effects<'p>(
+    instance: &Instance<'p>,
+    when: EffectTime,
+) -> impl Iterator<Item = &'p Effect> + use<'p> {
+    let (single, several) = match &instance.action.body {
+        ActionBody::Instantaneous { effect, .. } => {
+            ((when == EffectTime::AtStart).then_some(effect), [].as_slice())
+        }
+        ActionBody::Durative { effects, .. } => (None, effects.as_slice()),
+    };
+    let several = several.iter().filter(move |(time, _)| *time == when).map(|(_, effect)| effect);
+    single.into_iter().chain(several)
+}

@@ -1,0 +1,147 @@
+//! Which parts of a condition do not hold, with their objects and values.
+
+use num_rational::BigRational;
+
+use crate::ast::{Atom, Condition, Expression, Identifier, Term, TypedName};
+use crate::print::condition_text;
+
+use super::evaluate::{Bindings, Evaluator, Undefined};
+use super::verdict::Unmet;
+use super::world::World;
+
+/// The conjuncts of a condition that do not hold.
+pub(super) fn unmet<'p>(
+    evaluator: Evaluator<'_, 'p>,
+    condition: &'p Condition,
+    bindings: &mut Bindings<'p>,
+) -> Vec<Unmet> {
+    if let Condition::And(parts) = condition {
+        return parts.iter().flat_map(|part| unmet(evaluator, part, bindings)).collect();
+    }
+    if evaluator.holds(condition, bindings) == Ok(true) {
+        return Vec::new();
+    }
+    let mut functions = Vec::new();
+    functions_in(condition, &mut functions);
+    let mut values: Vec<(String, Option<BigRational>)> = Vec::new();
+    for function in functions {
+        let Some(arguments) = evaluator.arguments(function, bindings) else { continue };
+        let symbol = evaluator.world.symbol(&function.predicate.name);
+        let shown = evaluator.world.show(symbol, &arguments);
+        if values.iter().all(|(known, _)| *known != shown) {
+            values.push((shown, evaluator.state.values.get(&(symbol, arguments)).cloned()));
+        }
+    }
+    let mut ground = condition.clone();
+    substitute(&mut ground, evaluator.world, bindings, &mut Vec::new());
+    vec![Unmet { condition: condition_text(&ground), values }]
+}
+
+/// Why something is undefined, for people.
+pub(super) fn undefined_text(undefined: &Undefined) -> String {
+    match undefined {
+        Undefined::Function(function) => format!("the value of {function} is needed, but it was never set"),
+        Undefined::Division => "division by zero".to_owned(),
+        Undefined::Size => "a number grows too large".to_owned(),
+        Undefined::Place => "`?duration` and `total-time` have no value here".to_owned(),
+    }
+}
+
+fn functions_in<'c>(condition: &'c Condition, found: &mut Vec<&'c Atom>) {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => {
+            for part in parts {
+                functions_in(part, found);
+            }
+        }
+        Condition::Not(inner) => functions_in(inner, found),
+        Condition::Imply(premise, conclusion) => {
+            functions_in(premise, found);
+            functions_in(conclusion, found);
+        }
+        Condition::Exists(_, body) | Condition::ForAll(_, body) => functions_in(body, found),
+        Condition::Atom(_) | Condition::Equal(..) => {}
+        Condition::Compare(_, left, right, _) => {
+            functions_of(left, found);
+            functions_of(right, found);
+        }
+    }
+}
+
+fn functions_of<'c>(expression: &'c Expression, found: &mut Vec<&'c Atom>) {
+    match expression {
+        Expression::Fluent(atom) => found.push(atom),
+        Expression::Operation(_, operands, _) => {
+            for operand in operands {
+                functions_of(operand, found);
+            }
+        }
+        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
+    }
+}
+
+/// Puts objects for the variables that have one; `hidden` are those of quantifiers within.
+fn substitute(
+    condition: &mut Condition,
+    world: &World<'_>,
+    bindings: &Bindings<'_>,
+    hidden: &mut Vec<Identifier>,
+) {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => {
+            for part in parts {
+                substitute(part, world, bindings, hidden);
+            }
+        }
+        Condition::Not(inner) => substitute(inner, world, bindings, hidden),
+        Condition::Imply(premise, conclusion) => {
+            substitute(premise, world, bindings, hidden);
+            substitute(conclusion, world, bindings, hidden);
+        }
+        Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
+            let outer = hidden.len();
+            hidden.extend(variables.iter().map(|entry: &TypedName| entry.identifier.clone()));
+            substitute(body, world, bindings, hidden);
+            hidden.truncate(outer);
+        }
+        Condition::Atom(atom) => substitute_terms(&mut atom.arguments, world, bindings, hidden),
+        Condition::Equal(left, right, _) => {
+            substitute_terms(std::slice::from_mut(left), world, bindings, hidden);
+            substitute_terms(std::slice::from_mut(right), world, bindings, hidden);
+        }
+        Condition::Compare(_, left, right, _) => {
+            substitute_expression(left, world, bindings, hidden);
+            substitute_expression(right, world, bindings, hidden);
+        }
+    }
+}
+
+fn substitute_expression(
+    expression: &mut Expression,
+    world: &World<'_>,
+    bindings: &Bindings<'_>,
+    hidden: &[Identifier],
+) {
+    match expression {
+        Expression::Fluent(atom) => substitute_terms(&mut atom.arguments, world, bindings, hidden),
+        Expression::Operation(_, operands, _) => {
+            for operand in operands {
+                substitute_expression(operand, world, bindings, hidden);
+            }
+        }
+        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
+    }
+}
+
+fn substitute_terms(terms: &mut [Term], world: &World<'_>, bindings: &Bindings<'_>, hidden: &[Identifier]) {
+    for term in terms {
+        let Term::Variable(Identifier { name, span }) = term else { continue };
+        if hidden.iter().any(|variable| variable.name == *name) {
+            continue;
+        }
+        if let Some(object) = bindings.get(name) {
+            let name = crate::ast::Name::new(world.name(object));
+            *term = Term::Constant(Identifier { name, span: *span });
+        }
+    }
+}

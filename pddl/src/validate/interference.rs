@@ -1,0 +1,259 @@
+//! When two happenings interfere: the mutex rule of PDDL 2.1 ("no moving targets").
+
+use std::rc::Rc;
+
+use rustc_hash::FxHashSet;
+use smallvec::SmallVec;
+
+use crate::ast::{
+    ActionBody, Atom, Condition, ConditionTime, Effect, EffectTime, Expression, Name, Term, TypedName,
+};
+
+use super::effects::{Change, Changes, Ground};
+use super::evaluate::Bindings;
+use super::execute::{Running, conditions, effects};
+use super::world::{Symbol, World};
+
+/// A fact or a function, with gaps where a quantifier runs through its objects.
+#[derive(Debug, Clone)]
+struct Pattern {
+    symbol: Symbol,
+    /// Nothing: whatever the arguments are.
+    arguments: Option<SmallVec<[Slot; 4]>>,
+}
+
+/// An argument of a pattern.
+#[derive(Debug, Clone)]
+enum Slot {
+    Object(Symbol),
+    /// One of the objects that a quantifier runs through, by its position among those around: the same wherever it stands.
+    Each(usize, Rc<FxHashSet<Symbol>>),
+}
+
+impl Pattern {
+    fn matches(&self, (symbol, arguments): &Ground) -> bool {
+        let Some(pattern) = &self.arguments else { return self.symbol == *symbol };
+        let mut bound: SmallVec<[(usize, Symbol); 4]> = SmallVec::new();
+        let mut fits = |(wanted, given): (&Slot, &Symbol)| match wanted {
+            Slot::Object(wanted) => wanted == given,
+            Slot::Each(variable, objects) => {
+                bound.push((*variable, *given));
+                let same = bound.iter().all(|(other, object)| other != variable || object == given);
+                same && objects.contains(given)
+            }
+        };
+        self.symbol == *symbol
+            && pattern.len() == arguments.len()
+            && pattern.iter().zip(arguments).all(&mut fits)
+    }
+}
+
+/// What a start or an end of an action reads and writes.
+#[derive(Debug, Default)]
+pub(super) struct Footprint {
+    facts_read: Vec<Pattern>,
+    values_read: Vec<Pattern>,
+    added: Vec<Ground>,
+    deleted: Vec<Ground>,
+    /// With the way in which it changes: two additions commute, two scalings as well.
+    values_written: Vec<(Ground, u8)>,
+}
+
+impl Footprint {
+    /// The footprint of the start or the end of an action that makes these changes.
+    pub(super) fn of<'p>(
+        world: &World<'p>,
+        running: &Running<'_, 'p>,
+        when: EffectTime,
+        changes: &Changes,
+    ) -> Self {
+        let mut footprint = Self::default();
+        let mut predicates = Vec::new();
+        let bindings = &running.instance.bindings;
+        let mut found = |found: Use<'p>, hidden: &[&'p TypedName]| match found {
+            Use::Fact(atom) => {
+                predicates.push(&atom.predicate.name);
+                footprint.facts_read.push(pattern(world, bindings, atom, hidden));
+            }
+            Use::Value(atom) => footprint.values_read.push(pattern(world, bindings, atom, hidden)),
+        };
+        let condition_time = match when {
+            EffectTime::AtStart => ConditionTime::AtStart,
+            EffectTime::AtEnd => ConditionTime::AtEnd,
+        };
+        let mut hidden = Vec::new();
+        for condition in conditions(&running.instance, condition_time) {
+            uses_of_condition(condition, &mut hidden, &mut found);
+        }
+        for effect in effects(&running.instance, when) {
+            uses_of_effect(effect, &mut hidden, &mut found);
+        }
+        if let ActionBody::Durative { duration, .. } = &running.instance.action.body {
+            for constraint in duration.iter().filter(|constraint| constraint.time == when) {
+                uses_of_expression(&constraint.expression, &[], &mut found);
+            }
+        }
+        read_through_axioms(world, predicates, &mut footprint);
+        footprint.added.extend(changes.added.iter().cloned());
+        footprint.deleted.extend(changes.deleted.iter().cloned());
+        footprint.values_written.extend(changes.numeric.iter().map(|(target, change)| {
+            let way = match change {
+                Change::Assign(_) => 0,
+                Change::Add(_) => 1,
+                Change::Scale(_) => 2,
+            };
+            (target.clone(), way)
+        }));
+        footprint
+    }
+
+    /// The footprint of timed initial literals, which read nothing.
+    pub(super) fn of_event(changes: &Changes) -> Self {
+        let (added, deleted) = (changes.added.iter().cloned(), changes.deleted.iter().cloned());
+        Self { added: added.collect(), deleted: deleted.collect(), ..Self::default() }
+    }
+
+    /// Adds what another happening of the same action reads and writes.
+    pub(super) fn join(&mut self, other: Self) {
+        self.facts_read.extend(other.facts_read);
+        self.values_read.extend(other.values_read);
+        self.added.extend(other.added);
+        self.deleted.extend(other.deleted);
+        self.values_written.extend(other.values_written);
+    }
+
+    /// Something that both touch, one of them writing, so that their order would matter.
+    pub(super) fn interferes(&self, other: &Self) -> Option<Ground> {
+        let one_way = self.disturbs(other).or_else(|| other.disturbs(self));
+        one_way.or_else(|| {
+            let clash = |(target, way): &&(Ground, u8)| {
+                other
+                    .values_written
+                    .iter()
+                    .any(|(written, other_way)| written == target && (way != other_way || *way == 0))
+            };
+            self.values_written.iter().find(clash).map(|(target, _)| target.clone())
+        })
+    }
+
+    /// Something that `self` writes and `other` reads, or `self` adds and `other` deletes.
+    fn disturbs(&self, other: &Self) -> Option<Ground> {
+        let is_read = |fact: &&Ground| other.facts_read.iter().any(|pattern| pattern.matches(fact));
+        let changed = self.added.iter().chain(&self.deleted).find(is_read);
+        let removed = || self.added.iter().find(|fact| other.deleted.contains(fact));
+        let value_is_read =
+            |target: &&Ground| other.values_read.iter().any(|pattern| pattern.matches(target));
+        let written = || self.values_written.iter().map(|(target, _)| target).find(value_is_read);
+        changed.or_else(removed).or_else(written).cloned()
+    }
+}
+
+/// A fact or a function that something reads.
+#[derive(Clone, Copy)]
+enum Use<'c> {
+    Fact(&'c Atom),
+    Value(&'c Atom),
+}
+
+/// Is told of each use, with the variables of the quantifiers around it.
+type Found<'f, 'c> = &'f mut dyn FnMut(Use<'c>, &[&'c TypedName]);
+
+fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c TypedName>, found: Found<'_, 'c>) {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => {
+            for part in parts {
+                uses_of_condition(part, hidden, found);
+            }
+        }
+        Condition::Not(inner) => uses_of_condition(inner, hidden, found),
+        Condition::Imply(premise, conclusion) => {
+            uses_of_condition(premise, hidden, found);
+            uses_of_condition(conclusion, hidden, found);
+        }
+        Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
+            let outer = hidden.len();
+            hidden.extend(variables);
+            uses_of_condition(body, hidden, found);
+            hidden.truncate(outer);
+        }
+        Condition::Atom(atom) => found(Use::Fact(atom), hidden),
+        Condition::Equal(..) => {}
+        Condition::Compare(_, left, right, _) => {
+            uses_of_expression(left, hidden, found);
+            uses_of_expression(right, hidden, found);
+        }
+    }
+}
+
+fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c TypedName>, found: Found<'_, 'c>) {
+    match effect {
+        Effect::And(parts) => {
+            for part in parts {
+                uses_of_effect(part, hidden, found);
+            }
+        }
+        Effect::ForAll(variables, body) => {
+            let outer = hidden.len();
+            hidden.extend(variables);
+            uses_of_effect(body, hidden, found);
+            hidden.truncate(outer);
+        }
+        Effect::When(condition, body) => {
+            uses_of_condition(condition, hidden, found);
+            uses_of_effect(body, hidden, found);
+        }
+        Effect::Assign(_, _, value, _) => uses_of_expression(value, hidden, found),
+        Effect::Add(_) | Effect::Delete(_) => {}
+    }
+}
+
+fn uses_of_expression<'c>(expression: &'c Expression, hidden: &[&'c TypedName], found: Found<'_, 'c>) {
+    match expression {
+        Expression::Fluent(atom) => found(Use::Value(atom), hidden),
+        Expression::Operation(_, operands, _) => {
+            for operand in operands {
+                uses_of_expression(operand, hidden, found);
+            }
+        }
+        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
+    }
+}
+
+fn pattern(world: &World<'_>, bindings: &Bindings<'_>, atom: &Atom, hidden: &[&TypedName]) -> Pattern {
+    let arguments = atom.arguments.iter().map(|term| match term {
+        Term::Variable(identifier) => {
+            match hidden.iter().rposition(|entry| entry.identifier.name == identifier.name) {
+                Some(place) => Slot::Each(place, Rc::new(world.objects_of(&hidden[place].r#type).collect())),
+                None => {
+                    Slot::Object(bindings.get(&identifier.name).unwrap_or(world.symbol(&identifier.name)))
+                }
+            }
+        }
+        Term::Constant(identifier) => Slot::Object(world.symbol(&identifier.name)),
+    });
+    Pattern { symbol: world.symbol(&atom.predicate.name), arguments: Some(arguments.collect()) }
+}
+
+/// Adds all that derived predicates depend on, whatever their arguments are.
+fn read_through_axioms(world: &World<'_>, read: Vec<&Name>, into: &mut Footprint) {
+    let mut seen: FxHashSet<&Name> = FxHashSet::default();
+    let mut todo = read;
+    while let Some(name) = todo.pop() {
+        if !seen.insert(name) {
+            continue;
+        }
+        for axiom in world.domain.derived.iter().filter(|axiom| axiom.head.identifier.name == *name) {
+            uses_of_condition(&axiom.condition, &mut Vec::new(), &mut |found, _| {
+                let (Use::Fact(atom) | Use::Value(atom)) = found;
+                let pattern = Pattern { symbol: world.symbol(&atom.predicate.name), arguments: None };
+                match found {
+                    Use::Fact(_) => {
+                        todo.push(&atom.predicate.name);
+                        into.facts_read.push(pattern);
+                    }
+                    Use::Value(_) => into.values_read.push(pattern),
+                }
+            });
+        }
+    }
+}

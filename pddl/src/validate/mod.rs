@@ -1,0 +1,187 @@
+//! A plan to a verdict: executes it by the definition below, with exact numbers.
+//!
+//! Nothing here is shared with grounding and encoding: conditions are evaluated on the syntax tree.
+//! Derived predicates are the least fixpoint of their axioms, layer by layer (S. Thiébaux, J. Hoffmann, B. Nebel: In
+//! defense of PDDL axioms, AIJ 168, 2005).
+//!
+#![doc = include_str!("definition.md")]
+
+mod advance;
+mod concurrent;
+mod derive;
+mod effects;
+mod evaluate;
+mod execute;
+mod explain;
+mod happening;
+mod interference;
+mod plan;
+mod sequential;
+mod solve;
+mod step;
+mod verdict;
+mod world;
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::Zero;
+use rustc_hash::FxHashSet;
+
+use crate::ast::{Action, ActionBody, Direction, Domain, Effect, Name, Problem};
+use crate::number::to_decimal;
+
+pub use advance::{Advance, ValueChange, advance, advance_each, metric_after};
+pub use plan::{PlanStep, PlanText};
+pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
+
+use evaluate::{Bindings, Evaluator};
+use execute::Execution;
+use explain::unmet;
+use step::Step;
+use world::{State, World};
+
+/// How a plan is to be read.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Whether actions may overlap, by the rules of PDDL 2.1; otherwise each begins when the one before
+    /// it has ended.
+    pub concurrent: bool,
+    /// In the domain's time unit, not negative. In sequence it is for plans that were rounded: how far a stated
+    /// duration may lie from the exact one, and how far a step may reach into the next. Concurrently it is the separation: how far
+    /// apart happenings that interfere must be; a stated duration may then lie as far from the exact one, but at most a
+    /// thousandth. Events are never forgiven for anything.
+    pub tolerance: BigRational,
+}
+
+impl Options {
+    /// How far a stated duration may lie from the exact one.
+    fn slack(&self) -> BigRational {
+        let own = self.tolerance.clone();
+        if self.concurrent { own.min(Self::default().tolerance) } else { own }
+    }
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { concurrent: false, tolerance: BigRational::new(BigInt::from(1), BigInt::from(1000)) }
+    }
+}
+
+/// How many ways to read a plan are tried where schemas share a name.
+const READINGS: usize = 4096;
+
+/// Executes a plan. Domain and problem must have passed [`check`](crate::check()); names that are declared
+/// nowhere hold for nothing.
+///
+/// A step whose name and objects fit several schemas stands for any of them: a plan is valid if some reading of it is, and
+/// the best one counts. Beyond 4,096 readings each such step is the first schema that can start.
+pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &Options) -> Verdict {
+    let world = World::new(domain, problem);
+    let steps: Vec<_> =
+        plan.steps.iter().enumerate().map(|(index, step)| step::resolve(&world, index + 1, step)).collect();
+    let first = judge(&world, &steps, options);
+    step::readings(&steps, READINGS).into_iter().map(|steps| judge(&world, &steps, options)).fold(
+        first,
+        |best, verdict| {
+            if is_better(problem, &verdict, &best) { verdict } else { best }
+        },
+    )
+}
+
+fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdict {
+    let mut execution = Execution::new(world, options);
+    let mut total_time = BigRational::zero();
+    let result = if options.concurrent {
+        concurrent::run(&mut execution, steps, &mut total_time)
+    } else {
+        sequential::run(&mut execution, steps, &mut total_time)
+    };
+    let violation = result.and_then(|()| goal_holds(world, &execution.state, &total_time)).err();
+    let metric = violation.is_none().then(|| metric_value(world, &execution.state, &total_time)).flatten();
+    let values = changeable_values(world, &execution.state);
+    Verdict { valid: violation.is_none(), total_time, metric, values, violation }
+}
+
+/// Whether one reading of a plan is better than another: valid, and by the metric, or by time without one.
+fn is_better(problem: &Problem, own: &Verdict, other: &Verdict) -> bool {
+    if !own.valid || !other.valid {
+        return own.valid && !other.valid;
+    }
+    match (&problem.metric, &own.metric, &other.metric) {
+        (Some(metric), Some(own), Some(other)) => match metric.direction {
+            Direction::Minimize => own < other,
+            Direction::Maximize => own > other,
+        },
+        (Some(_), own, other) => own.is_some() && other.is_none(),
+        (None, ..) => own.total_time < other.total_time,
+    }
+}
+
+fn goal_holds(world: &World<'_>, state: &State, time: &BigRational) -> Result<(), Box<Violation>> {
+    let evaluator = Evaluator::new(world, state);
+    let goal = &world.problem.goal;
+    let mut bindings = Bindings::default();
+    if evaluator.holds(goal, &mut bindings) == Ok(true) {
+        return Ok(());
+    }
+    Err(Box::new(Violation {
+        step: None,
+        action: None,
+        time: time.clone(),
+        kind: ViolationKind::Goal,
+        message: "the goal does not hold in the end".to_owned(),
+        unmet: unmet(evaluator, goal, &mut bindings),
+    }))
+}
+
+fn metric_value(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
+    let metric = world.problem.metric.as_ref()?;
+    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
+    evaluator.value(&metric.expression, &Bindings::default()).ok()
+}
+
+/// The values of the functions that some action can change, sorted by name.
+fn changeable_values(world: &World<'_>, state: &State) -> Vec<(String, BigRational)> {
+    let mut targets = FxHashSet::default();
+    for action in &world.domain.actions {
+        action_targets(action, &mut targets);
+    }
+    let symbols: FxHashSet<_> = targets.into_iter().map(|name| world.symbol(name)).collect();
+    let changeable = state.values.iter().filter(|((symbol, _), _)| symbols.contains(symbol));
+    let mut values: Vec<_> = changeable
+        .map(|((symbol, arguments), value)| (world.show(*symbol, arguments), value.clone()))
+        .collect();
+    values.sort();
+    values
+}
+
+fn action_targets<'p>(action: &'p Action, targets: &mut FxHashSet<&'p Name>) {
+    match &action.body {
+        ActionBody::Instantaneous { effect, .. } => effect_targets(effect, targets),
+        ActionBody::Durative { effects, .. } => {
+            for (_, effect) in effects {
+                effect_targets(effect, targets);
+            }
+        }
+    }
+}
+
+fn effect_targets<'p>(effect: &'p Effect, targets: &mut FxHashSet<&'p Name>) {
+    match effect {
+        Effect::And(parts) => {
+            for part in parts {
+                effect_targets(part, targets);
+            }
+        }
+        Effect::ForAll(_, body) | Effect::When(_, body) => effect_targets(body, targets),
+        Effect::Assign(_, target, ..) => {
+            targets.insert(&target.predicate.name);
+        }
+        Effect::Add(_) | Effect::Delete(_) => {}
+    }
+}
+
+/// A number for people: a decimal where there is one.
+fn show_number(value: &BigRational) -> String {
+    to_decimal(value).unwrap_or_else(|| value.to_string())
+}

@@ -1,0 +1,111 @@
+//! The text of a plan to its steps: IPC plans, temporal plans, and what POPF prints for `PlanSys2`.
+
+use num_rational::BigRational;
+
+use crate::ast::{Name, Span};
+use crate::diagnostic::Sink;
+use crate::number::{Literal, literal};
+use crate::{Diagnostic, Source};
+
+/// A plan as somebody wrote it: the steps in the order of the text.
+#[derive(Debug, Clone, Default)]
+pub struct PlanText {
+    /// The steps.
+    pub steps: Vec<PlanStep>,
+}
+
+/// One action of a plan.
+#[derive(Debug, Clone)]
+pub struct PlanStep {
+    /// The name of the schema; two schemas may share it.
+    pub action: Name,
+    /// The objects for its parameters.
+    pub arguments: Vec<Name>,
+    /// When it starts, in the domain's time unit, where the plan says so.
+    pub start: Option<BigRational>,
+    /// How long it takes, in the domain's time unit, where the plan says so.
+    pub duration: Option<BigRational>,
+    /// The line of the text, from 1; 0 for a step that was not read from a text.
+    pub line: usize,
+}
+
+impl PlanText {
+    /// Reads `(move a b)` and `0.000: (move a b) [5.000]`, one step a line, comments from `;` on. Where a
+    /// planner announces `Solution Found`, only what follows the last announcement counts, and lines
+    /// of another form are its remarks.
+    ///
+    /// # Errors
+    ///
+    /// Every line that is not a step.
+    pub fn parse(source: &Source) -> Result<Self, Vec<Diagnostic>> {
+        let text = source.text();
+        let announced = text.rfind("Solution Found");
+        let begin = announced.map_or(0, |at| text[at..].find('\n').map_or(text.len(), |end| at + end + 1));
+        let mut sink = Sink::new(source);
+        let mut steps = Vec::new();
+        let mut at = begin;
+        for line in text[begin..].split_inclusive('\n') {
+            let content = without_comment(line);
+            let trimmed = content.trim();
+            let start = (at + content.len() - content.trim_start().len()) as u32;
+            at += line.len();
+            if trimmed.is_empty() || (announced.is_some() && !looks_like_step(trimmed)) {
+                continue;
+            }
+            match step(trimmed) {
+                Ok(step) => steps.push(PlanStep { line: source.position(start).line, ..step }),
+                Err(message) => {
+                    let span = Span { start, end: start + trimmed.len() as u32 };
+                    sink.error("P150", span, message)
+                        .help("a step is `(action object …)` or `0.000: (action object …) [duration]`");
+                }
+            }
+        }
+        if sink.has_errors() { Err(sink.finish()) } else { Ok(Self { steps }) }
+    }
+}
+
+/// A line up to its comment; LPG writes a semicolon inside the brackets, `[D:5.00; C:0.10]`.
+fn without_comment(line: &str) -> &str {
+    let mut in_brackets = false;
+    let end = line.find(|character| {
+        in_brackets = (in_brackets || character == '[') && character != ']';
+        character == ';' && !in_brackets
+    });
+    &line[..end.unwrap_or(line.len())]
+}
+
+fn looks_like_step(line: &str) -> bool {
+    line.starts_with(|first: char| first == '(' || first.is_ascii_digit())
+}
+
+fn step(line: &str) -> Result<PlanStep, String> {
+    let (before, rest) = line.split_once('(').ok_or("this is not a step of a plan")?;
+    let (inside, after) = rest.split_once(')').ok_or("the `)` of this step is missing")?;
+    let start = match before.trim() {
+        "" => None,
+        time => Some(number(time.strip_suffix(':').ok_or("expected `:` behind the time")?.trim())?),
+    };
+    let duration = match after.trim() {
+        "" => None,
+        bracket => {
+            // LPG closes a parenthesis that it has not opened: `[5.0000])`.
+            let inner = bracket
+                .trim_end_matches([')', ' '])
+                .strip_prefix('[')
+                .and_then(|rest| rest.strip_suffix(']'));
+            let inner = inner.ok_or("expected a duration such as `[5.000]` behind the action")?;
+            Some(number(inner.trim().trim_start_matches("D:").split(';').next().unwrap_or_default().trim())?)
+        }
+    };
+    let mut words = inside.split_whitespace().map(Name::new);
+    let action = words.next().ok_or("the name of the action is missing")?;
+    Ok(PlanStep { action, arguments: words.collect(), start, duration, line: 0 })
+}
+
+fn number(text: &str) -> Result<BigRational, String> {
+    match literal(text) {
+        Literal::Number(value) => Ok(value),
+        _ => Err(format!("`{text}` is not a number")),
+    }
+}

@@ -1,0 +1,73 @@
+//! One action after another, in the order of their starts.
+
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use crate::ast::ConditionTime;
+
+use super::execute::{Execution, Running};
+use super::happening::Part;
+use super::step::Step;
+use super::verdict::{Violation, ViolationKind};
+
+/// Executes the steps; adds up their durations as long as nothing is wrong. In the end, all events up to the end of the last step
+/// have taken place.
+pub(super) fn run<'e, 'p>(
+    execution: &mut Execution<'e, 'p>,
+    steps: &'e [Step<'p>],
+    total_time: &mut BigRational,
+) -> Result<(), Box<Violation>> {
+    let is_timed = steps.iter().all(|step| step.text.start.is_some());
+    let mut order: Vec<_> = steps.iter().collect();
+    if is_timed {
+        order.sort_by(|left, right| left.text.start.cmp(&right.text.start));
+    }
+    let mut clock = BigRational::zero();
+    for step in order {
+        let stated = step.text.start.as_ref().filter(|_| is_timed).unwrap_or(&clock);
+        starts_late_enough(execution, step, stated, &clock)?;
+        // What the tolerance forgives is put off.
+        let time = stated.max(&clock).clone();
+        execution.pass(&time, false);
+        let running = execution.begin(step, &time)?;
+        let part = running.first_part();
+        execution.execute(&running, part, &time)?;
+        if part == Part::Start {
+            finish(execution, &running)?;
+        }
+        *total_time += &running.duration;
+        clock = running.end;
+    }
+    execution.pass(&clock, true);
+    Ok(())
+}
+
+/// What happens between the start and the end of an action, and at its end.
+fn finish<'e, 'p>(
+    execution: &mut Execution<'e, 'p>,
+    running: &Running<'e, 'p>,
+) -> Result<(), Box<Violation>> {
+    execution.check(running, ConditionTime::OverAll, &running.start)?;
+    while let Some(next) = execution.next_timed().filter(|next| **next < running.end).cloned() {
+        execution.apply_next_timed();
+        execution.check(running, ConditionTime::OverAll, &next)?;
+    }
+    execution.execute(running, Part::End, &running.end)
+}
+
+/// No step starts before the one before it has ended, up to the tolerance.
+fn starts_late_enough(
+    execution: &Execution<'_, '_>,
+    step: &Step<'_>,
+    time: &BigRational,
+    clock: &BigRational,
+) -> Result<(), Box<Violation>> {
+    if time + &execution.options.tolerance >= *clock {
+        return Ok(());
+    }
+    let (time_text, clock_text) = (super::show_number(time), super::show_number(clock));
+    let message = format!(
+        "it starts at {time_text}, before the step before it ends at {clock_text}; actions are executed one after another"
+    );
+    Err(step.violation(time, ViolationKind::Overlap, message))
+}

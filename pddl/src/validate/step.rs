@@ -1,0 +1,120 @@
+//! Steps of a plan to instances of action schemas.
+
+use num_rational::BigRational;
+
+use crate::ast::{Action, Name};
+use crate::names::nearest;
+
+use super::evaluate::{Binding, Bindings};
+use super::plan::PlanStep;
+use super::verdict::{Violation, ViolationKind};
+use super::world::{Symbol, World};
+
+/// A step with the schemas that it can be an instance of.
+#[derive(Debug, Clone)]
+pub(super) struct Step<'p> {
+    /// Its place in the plan's text, from 1.
+    pub(super) number: usize,
+    pub(super) text: &'p PlanStep,
+    /// More than one where schemas share a name, and its arguments fit several of them.
+    pub(super) instances: Vec<Instance<'p>>,
+}
+
+/// An action schema with objects for its parameters.
+#[derive(Debug, Clone)]
+pub(super) struct Instance<'p> {
+    pub(super) action: &'p Action,
+    pub(super) bindings: Bindings<'p>,
+}
+
+impl Instance<'_> {
+    /// Whether both are the same schema with the same objects.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let objects = |own: &Self| own.bindings.0.iter().map(|binding| binding.object).collect::<Vec<_>>();
+        std::ptr::eq(self.action, other.action) && objects(self) == objects(other)
+    }
+}
+
+impl Step<'_> {
+    /// The step as written, without its times.
+    pub(super) fn show(&self) -> String {
+        let words: Vec<_> =
+            std::iter::once(&self.text.action).chain(&self.text.arguments).map(Name::as_str).collect();
+        format!("({})", words.join(" "))
+    }
+
+    pub(super) fn violation(
+        &self,
+        time: &BigRational,
+        kind: ViolationKind,
+        message: impl Into<String>,
+    ) -> Box<Violation> {
+        Box::new(Violation {
+            step: Some(self.number),
+            action: Some(self.show()),
+            time: time.clone(),
+            kind,
+            message: message.into(),
+            unmet: Vec::new(),
+        })
+    }
+}
+
+/// Finds the schemas of a step; without any, `instances` is empty.
+pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) -> Step<'p> {
+    let objects: Option<Vec<Symbol>> = text.arguments.iter().map(|name| world.object(name)).collect();
+    let named = world.domain.actions.iter().filter(|action| action.identifier.name == text.action);
+    let instances = named.filter_map(|action| instantiate(world, action, objects.as_deref()?)).collect();
+    Step { number, text, instances }
+}
+
+/// All ways to choose one schema for each step that fits several; none if there is one way, or if there are more than `most`.
+pub(super) fn readings<'p>(steps: &[Step<'p>], most: usize) -> Vec<Vec<Step<'p>>> {
+    let ways = |step: &Step<'p>| step.instances.len().max(1);
+    let count = steps.iter().try_fold(1_usize, |count, step| count.checked_mul(ways(step)));
+    let Some(count) = count.filter(|count| (2..=most).contains(count)) else { return Vec::new() };
+    let reading = |mut number: usize| {
+        let chosen = steps.iter().map(|step| {
+            let own = number % ways(step);
+            number /= ways(step);
+            let instances = step.instances.get(own).cloned().into_iter().collect();
+            Step { number: step.number, text: step.text, instances }
+        });
+        chosen.collect()
+    };
+    (0..count).map(reading).collect()
+}
+
+fn instantiate<'p>(world: &World<'p>, action: &'p Action, objects: &[Symbol]) -> Option<Instance<'p>> {
+    let fits = action.parameters.len() == objects.len()
+        && action.parameters.iter().zip(objects).all(|(entry, object)| world.is_of(*object, &entry.r#type));
+    let bind = |(entry, object): (&'p crate::ast::TypedName, &Symbol)| Binding {
+        variable: &entry.identifier.name,
+        r#type: &entry.r#type,
+        object: Some(*object),
+    };
+    let bindings = Bindings(action.parameters.iter().zip(objects).map(bind).collect());
+    fits.then_some(Instance { action, bindings })
+}
+
+/// Why a step is not an instance of any schema.
+pub(super) fn unresolved(world: &World<'_>, step: &Step<'_>, time: &BigRational) -> Box<Violation> {
+    let name = &step.text.action;
+    let mut same_name = world.domain.actions.iter().filter(|action| action.identifier.name == *name);
+    let Some(action) = same_name.next() else {
+        let known = world.domain.actions.iter().map(|action| action.identifier.name.as_str());
+        let proposal = nearest(name.as_str(), known).map(|known| format!(", did you mean `{known}`?"));
+        let message = format!("unknown action `{name}`{}", proposal.unwrap_or_default());
+        return step.violation(time, ViolationKind::UnknownAction, message);
+    };
+    if let Some(unknown) = step.text.arguments.iter().find(|name| world.object(name).is_none()) {
+        return step.violation(time, ViolationKind::UnknownObject, format!("unknown object `{unknown}`"));
+    }
+    let (wanted, found) = (action.parameters.len(), step.text.arguments.len());
+    if same_name.next().is_none() && wanted != found {
+        let message = format!("`{name}` takes {wanted} arguments, found {found}");
+        return step.violation(time, ViolationKind::Arguments, message);
+    }
+    let message = format!("the types of these objects are not those of the parameters of `{name}`");
+    step.violation(time, ViolationKind::Arguments, message)
+}

@@ -1,0 +1,180 @@
+//! What does not change during a plan, and the states it goes through.
+
+use num_rational::BigRational;
+use num_traits::Zero;
+use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
+
+use crate::ast::{Atom, Domain, InitialElement, Name, Problem, Term, TypeExpression, TypedName};
+use crate::strata::Strata;
+use crate::types::TypeHierarchy;
+
+/// A name as a number: equal names, equal numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) struct Symbol(u32);
+
+/// The objects that a predicate or function is applied to.
+pub(super) type Arguments = SmallVec<[Symbol; 4]>;
+
+/// A domain with a problem, its names numbered.
+#[derive(Debug)]
+pub(super) struct World<'p> {
+    pub(super) domain: &'p Domain,
+    pub(super) problem: &'p Problem,
+    types: TypeHierarchy,
+    symbols: FxHashMap<Name, Symbol>,
+    names: Vec<Name>,
+    /// All objects with their types, constants first.
+    objects: Vec<(Symbol, Vec<&'p TypeExpression>)>,
+    place: FxHashMap<Symbol, usize>,
+    /// The axioms by layer, lowest first.
+    pub(super) layers: Vec<Vec<usize>>,
+}
+
+/// The facts and values at one time.
+#[derive(Debug, Clone, Default)]
+pub(super) struct State {
+    pub(super) facts: FxHashMap<Symbol, FxHashSet<Arguments>>,
+    /// What follows from the facts by the axioms.
+    pub(super) derived: FxHashMap<Symbol, FxHashSet<Arguments>>,
+    pub(super) values: FxHashMap<(Symbol, Arguments), BigRational>,
+}
+
+impl<'p> World<'p> {
+    pub(super) fn new(domain: &'p Domain, problem: &'p Problem) -> Self {
+        let mut world = Self {
+            domain,
+            problem,
+            types: TypeHierarchy::of(domain),
+            symbols: FxHashMap::default(),
+            names: Vec::new(),
+            objects: Vec::new(),
+            place: FxHashMap::default(),
+            layers: layers(domain),
+        };
+        world.intern(&Name::new("total-cost"));
+        for declaration in domain.predicates.iter().chain(&domain.functions) {
+            world.intern(&declaration.identifier.name);
+        }
+        for entry in domain.constants.iter().chain(&problem.objects) {
+            world.insert_object(entry);
+        }
+        world
+    }
+
+    fn intern(&mut self, name: &Name) -> Symbol {
+        if let Some(symbol) = self.symbols.get(name) {
+            return *symbol;
+        }
+        let symbol = Symbol(self.names.len() as u32);
+        self.symbols.insert(name.clone(), symbol);
+        self.names.push(name.clone());
+        symbol
+    }
+
+    fn insert_object(&mut self, entry: &'p TypedName) {
+        let symbol = self.intern(&entry.identifier.name);
+        if let Some(place) = self.place.get(&symbol) {
+            self.objects[*place].1.push(&entry.r#type);
+        } else {
+            self.place.insert(symbol, self.objects.len());
+            self.objects.push((symbol, vec![&entry.r#type]));
+        }
+    }
+
+    /// The number of a name; one that no fact has for a name that is declared nowhere.
+    pub(super) fn symbol(&self, name: &Name) -> Symbol {
+        self.symbols.get(name).copied().unwrap_or(Symbol(u32::MAX))
+    }
+
+    pub(super) fn name(&self, symbol: Symbol) -> &str {
+        self.names.get(symbol.0 as usize).map_or("?", Name::as_str)
+    }
+
+    /// The object with a name.
+    pub(super) fn object(&self, name: &Name) -> Option<Symbol> {
+        self.symbols.get(name).copied().filter(|symbol| self.place.contains_key(symbol))
+    }
+
+    /// Whether an object is of a type.
+    pub(super) fn is_of(&self, object: Symbol, wanted: &TypeExpression) -> bool {
+        let types = self.place.get(&object).map(|place| &self.objects[*place].1);
+        types.is_some_and(|types| types.iter().any(|given| self.types.fits(given, wanted)))
+    }
+
+    /// All objects of a type.
+    pub(super) fn objects_of<'w>(&'w self, wanted: &'w TypeExpression) -> impl Iterator<Item = Symbol> + 'w {
+        self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, wanted))
+    }
+
+    /// A fact or a function with its arguments as written.
+    pub(super) fn show(&self, symbol: Symbol, arguments: &[Symbol]) -> String {
+        let words: Vec<_> =
+            std::iter::once(&symbol).chain(arguments).map(|symbol| self.name(*symbol)).collect();
+        format!("({})", words.join(" "))
+    }
+
+    /// An atom of the initial state.
+    pub(super) fn ground(&self, atom: &Atom) -> (Symbol, Arguments) {
+        let arguments = atom.arguments.iter().map(|term| match term {
+            Term::Variable(identifier) | Term::Constant(identifier) => self.symbol(&identifier.name),
+        });
+        (self.symbol(&atom.predicate.name), arguments.collect())
+    }
+
+    /// The state before the plan, without what follows by axioms.
+    pub(super) fn initial_state(&self) -> State {
+        let mut state = State::default();
+        state.values.insert((self.symbol(&Name::new("total-cost")), Arguments::new()), BigRational::zero());
+        for element in &self.problem.init {
+            match element {
+                InitialElement::Fact(atom) => {
+                    let (predicate, arguments) = self.ground(atom);
+                    state.facts.entry(predicate).or_default().insert(arguments);
+                }
+                InitialElement::Value(atom, value, _) => {
+                    state.values.insert(self.ground(atom), value.clone());
+                }
+                InitialElement::NegatedFact(_) | InitialElement::Timed(..) => {}
+            }
+        }
+        state
+    }
+}
+
+impl State {
+    pub(super) fn holds(&self, predicate: Symbol, arguments: &Arguments) -> bool {
+        [&self.facts, &self.derived]
+            .iter()
+            .any(|facts| facts.get(&predicate).is_some_and(|tuples| tuples.contains(arguments)))
+    }
+
+    /// All arguments for which a predicate holds.
+    pub(super) fn tuples(&self, predicate: Symbol) -> impl Iterator<Item = &Arguments> {
+        let derived = self.derived.get(&predicate).into_iter().flatten();
+        self.facts.get(&predicate).into_iter().flatten().chain(derived)
+    }
+
+    /// For how many arguments a predicate holds.
+    pub(super) fn count(&self, predicate: Symbol) -> usize {
+        let count =
+            |facts: &FxHashMap<Symbol, FxHashSet<Arguments>>| facts.get(&predicate).map_or(0, FxHashSet::len);
+        count(&self.facts) + count(&self.derived)
+    }
+}
+
+/// The axioms by the layer of their head. Axioms through their own negation have no layers; the checker
+/// refuses them, and here they all come into one.
+fn layers(domain: &Domain) -> Vec<Vec<usize>> {
+    let strata = Strata::of(domain).ok();
+    let mut layers: Vec<Vec<usize>> = Vec::new();
+    for (index, axiom) in domain.derived.iter().enumerate() {
+        let name = &axiom.head.identifier.name;
+        let level = strata.as_ref().and_then(|strata| strata.level(name)).unwrap_or(0);
+        if layers.len() <= level {
+            layers.resize(level + 1, Vec::new());
+        }
+        layers[level].push(index);
+    }
+    layers
+}

@@ -1,0 +1,398 @@
+//! What a plan is, rule by rule: for each rule of the definition (the head of `validate`) plans on both sides of its border, in sequence
+//! and concurrently.
+
+use metaplan_pddl::validate::{Options, PlanStep, PlanText, advance, validate};
+use metaplan_pddl::{Source, read};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+
+const IN_SEQUENCE: bool = false;
+const CONCURRENTLY: bool = true;
+
+/// A task over the atoms `p`, `q`, `r`, `g` and the numbers `x` (2), `y` (0) and `z` (undefined).
+struct Task {
+    actions: String,
+    init: String,
+    goal: String,
+}
+
+/// A durative action.
+fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String {
+    format!(
+        "(:durative-action {name} :parameters () :duration (= ?duration {duration})
+           :condition (and {condition}) :effect (and {effect}))\n"
+    )
+}
+
+fn task(actions: &[String], init: &str, goal: &str) -> Task {
+    Task { actions: actions.concat(), init: init.to_owned(), goal: goal.to_owned() }
+}
+
+impl Task {
+    fn parse(&self) -> (metaplan_pddl::ast::Domain, metaplan_pddl::ast::Problem) {
+        let domain = format!(
+            "(define (domain d) (:predicates (p) (q) (r) (g) (derived)) (:functions (x) (y) (z))
+               (:derived (derived) (or (p) (q)))\n{})",
+            self.actions
+        );
+        let problem = format!(
+            "(define (problem n) (:domain d) (:init (= (x) 2) (= (y) 0) {}) (:goal (and {})))",
+            self.init, self.goal
+        );
+        let sources = (Source::new("domain", domain), Source::new("problem", problem));
+        let read = read(&sources.0, &sources.1);
+        let (domain, problem, _) = read.unwrap_or_else(|found| panic!("{found:?}\n{}", self.actions));
+        (domain, problem)
+    }
+
+    /// `valid`, or the kind of the violation. Times are exact; concurrently, the separation is 0.001.
+    fn verdict(&self, concurrent: bool, plan: &str) -> String {
+        let (domain, problem) = self.parse();
+        let plan = PlanText::parse(&Source::new("plan", plan)).expect("the plan can be read");
+        let thousandth = BigRational::new(BigInt::from(1), BigInt::from(1000));
+        let tolerance = if concurrent { thousandth } else { BigRational::default() };
+        let verdict = validate(&domain, &problem, &plan, &Options { concurrent, tolerance });
+        verdict.violation.map_or("valid".to_owned(), |violation| violation.kind.as_str().to_owned())
+    }
+
+    fn check(&self, mode: bool, cases: &[(&str, &str)]) {
+        for (plan, expected) in cases {
+            assert_eq!(self.verdict(mode, plan), *expected, "concurrent: {mode}\n{}{plan}", self.actions);
+        }
+    }
+
+    /// The same in both modes.
+    fn check_both(&self, cases: &[(&str, &str)]) {
+        self.check(IN_SEQUENCE, cases);
+        self.check(CONCURRENTLY, cases);
+    }
+}
+
+#[test]
+fn over_all_is_about_the_open_interval() {
+    let a = durative("a", "2", "(over all (p))", "(at end (g))");
+    // The event at the very end does not matter, one before does, and so does one at the start.
+    let ends = task(std::slice::from_ref(&a), "(p) (at 5 (not (p)))", "(g)");
+    ends.check_both(&[
+        ("3: (a) [2]", "valid"),
+        ("3.001: (a) [2]", "over_all"),
+        ("5: (a) [2]", "over_all"),
+        ("0: (a) [2]", "valid"),
+    ]);
+    let begins = task(&[a], "(at 5 (p))", "(g)");
+    begins.check_both(&[("5: (a) [2]", "valid"), ("4.999: (a) [2]", "over_all")]);
+    // What the action itself does at its start counts, what it does at its end does not.
+    let own = durative("a", "2", "(over all (p))", "(at start (p)) (at end (not (p))) (at end (g))");
+    task(&[own], "", "(g)").check_both(&[("0: (a) [2]", "valid")]);
+    let broken = durative("a", "2", "(over all (p))", "(at start (not (p))) (at end (g))");
+    task(&[broken], "(p)", "(g)").check_both(&[("0: (a) [2]", "over_all")]);
+    // It comes back in the midst: that is too late.
+    let gap = durative("a", "2", "(over all (p))", "(at end (g))");
+    task(&[gap], "(p) (at 1 (not (p))) (at 1.5 (p))", "(g)").check_both(&[("0: (a) [2]", "over_all")]);
+}
+
+#[test]
+fn over_all_and_the_happenings_of_other_actions() {
+    let a = durative("a", "2", "(over all (p))", "(at end (g))");
+    let b = durative("b", "1", "", "(at end (not (p)))");
+    let breaks = task(&[a.clone(), b], "(p)", "(g)");
+    breaks.check(
+        CONCURRENTLY,
+        &[
+            ("0: (a) [2]\n1: (b) [1]", "valid"),
+            ("0: (a) [2]\n0.999: (b) [1]", "over_all"),
+            // At the very start it is gone when the interval begins.
+            ("1: (a) [2]\n0: (b) [1]", "over_all"),
+        ],
+    );
+    let c = durative("c", "1", "", "(at end (p))");
+    task(&[a, c], "", "(g)").check(
+        CONCURRENTLY,
+        &[("1: (a) [2]\n0: (c) [1]", "valid"), ("0.999: (a) [2]\n0: (c) [1]", "over_all")],
+    );
+}
+
+#[test]
+fn an_event_that_interferes_is_at_another_time() {
+    // An event adds what the start reads.
+    let a = durative("a", "2", "(at start (p))", "(at end (g))");
+    let reads = task(&[a], "(at 5 (p))", "(g)");
+    reads.check(IN_SEQUENCE, &[("5: (a) [2]", "at_start"), ("5.000001: (a) [2]", "valid")]);
+    reads.check(CONCURRENTLY, &[("5.0009: (a) [2]", "interference"), ("5.001: (a) [2]", "valid")]);
+    // It was there before, and is all the same moved when it is read.
+    let a = durative("a", "2", "(at start (p))", "(at end (g))");
+    task(&[a], "(p) (at 5 (p))", "(g)")
+        .check_both(&[("5: (a) [2]", "interference"), ("4.999: (a) [2]", "valid")]);
+    // An event deletes what the end reads.
+    let a = durative("a", "2", "(at end (p))", "(at end (g))");
+    let reads = task(&[a], "(p) (at 5 (not (p)))", "(g)");
+    reads.check(
+        IN_SEQUENCE,
+        &[("2.999999: (a) [2]", "valid"), ("3: (a) [2]", "interference"), ("3.000001: (a) [2]", "at_end")],
+    );
+    reads.check(CONCURRENTLY, &[("2.999: (a) [2]", "valid"), ("2.9991: (a) [2]", "interference")]);
+    // One adds what the other deletes; both add; both delete.
+    for (effect, event, expected) in [
+        ("(at end (p))", "(not (p))", "interference"),
+        ("(at end (not (p)))", "(p)", "interference"),
+        ("(at end (p))", "(p)", "valid"),
+        ("(at end (not (p)))", "(not (p))", "valid"),
+        ("(at end (q))", "(p)", "valid"),
+    ] {
+        let a = durative("a", "2", "", &format!("{effect} (at end (g))"));
+        task(&[a], &format!("(at 5 {event})"), "(g)").check_both(&[("3: (a) [2]", expected)]);
+    }
+    // Instantaneous actions, which may both come at the time of an event, and the second one touches it.
+    let actions = "(:action a :parameters () :effect (q)) (:action b :parameters () :precondition (not (p)) :effect (g))";
+    let two = task(&[actions.to_owned()], "(at 5 (not (p)))", "(g)");
+    two.check(IN_SEQUENCE, &[("5: (a)\n5: (b)", "interference"), ("5: (a)\n5.1: (b)", "valid")]);
+    two.check(IN_SEQUENCE, &[("4: (a)\n4.9: (b)", "valid"), ("5: (a)", "goal")]);
+}
+
+#[test]
+fn what_counts_as_read() {
+    let event = "(at 5 (p))";
+    for (effect, expected) in [
+        // Conditions of effects, active or not; right-hand sides, also of inactive effects; through derived predicates.
+        ("(at end (when (p) (r)))", "interference"),
+        ("(at end (when (and (q) (p)) (r)))", "interference"),
+        ("(at end (when (derived) (r)))", "interference"),
+        ("(at end (when (q) (r)))", "valid"),
+        ("(at end (when (q) (not (p))))", "valid"),
+        ("(at end (when (not (q)) (not (p))))", "interference"),
+    ] {
+        let a = durative("a", "2", "", &format!("{effect} (at end (g))"));
+        task(&[a], event, "(g)").check_both(&[("3: (a) [2]", expected)]);
+    }
+    for (condition, expected) in [
+        // It makes no difference: one part is true anyway.
+        ("(at end (or (p) (g)))", "interference"),
+        ("(at end (or (q) (g)))", "valid"),
+        ("(at end (derived))", "interference"),
+        ("(over all (or (p) (g)))", "valid"),
+    ] {
+        let a = durative("a", "2", condition, "(at end (r))");
+        task(&[a], &format!("(g) (q) {event}"), "(r)").check_both(&[("3: (a) [2]", expected)]);
+    }
+}
+
+#[test]
+fn numbers_interfere() {
+    let pair = |left: &str, right: &str| {
+        let actions = [
+            durative("a", "2", "", &format!("(at end {left})")),
+            durative("b", "2", "", &format!("(at end {right})")),
+        ];
+        let task = task(&actions, "(q)", "");
+        let apart = task.verdict(CONCURRENTLY, "0: (a) [2]\n0.001: (b) [2]");
+        assert_eq!(apart, "valid", "{left} {right}");
+        task.verdict(CONCURRENTLY, "0: (a) [2]\n0: (b) [2]")
+    };
+    for (left, right, expected) in [
+        ("(increase (x) 1)", "(decrease (x) 1)", "valid"),
+        ("(scale-up (x) 2)", "(scale-down (x) 2)", "valid"),
+        ("(increase (x) 1)", "(scale-up (x) 2)", "interference"),
+        ("(assign (x) 1)", "(assign (x) 1)", "interference"),
+        ("(assign (x) 1)", "(increase (x) 1)", "interference"),
+        ("(increase (x) 1)", "(increase (y) (x))", "interference"),
+        ("(increase (x) 1)", "(when (p) (increase (y) (x)))", "interference"),
+        ("(increase (x) 1)", "(increase (y) 1)", "valid"),
+        ("(when (p) (increase (x) 1))", "(increase (y) (x))", "valid"),
+        ("(p)", "(not (p))", "interference"),
+        ("(p)", "(p)", "valid"),
+    ] {
+        assert_eq!(pair(left, right), expected, "{left} {right}");
+        assert_eq!(pair(right, left), expected, "{right} {left}");
+    }
+}
+
+#[test]
+fn an_action_that_takes_no_time_is_one_happening() {
+    for (condition, effect, expected) in [
+        // All conditions are evaluated before, so the start does not help the end.
+        ("(at end (q))", "(at start (p)) (at end (g))", "at_end"),
+        ("(at end (p))", "(at start (p)) (at end (g))", "at_end"),
+        ("(at end (r))", "(at start (p)) (at end (g))", "valid"),
+        // The end reads what the start writes, although it holds before as well.
+        ("(at end (r))", "(at start (r)) (at end (g))", "interference"),
+        ("(at start (r))", "(at end (not (r))) (at end (g))", "interference"),
+        // One adds what the other deletes; both add; both delete.
+        ("", "(at start (p)) (at end (not (p))) (at end (g))", "interference"),
+        ("", "(at start (not (p))) (at end (p)) (at end (g))", "interference"),
+        ("", "(at start (p)) (at end (p)) (at end (g))", "valid"),
+        ("", "(at start (not (r))) (at end (not (r))) (at end (g))", "valid"),
+        // Numbers.
+        ("", "(at start (increase (x) 1)) (at end (increase (x) 1)) (at end (g))", "valid"),
+        ("", "(at start (assign (x) 1)) (at end (assign (x) 1)) (at end (g))", "interference"),
+        ("", "(at start (increase (x) 1)) (at end (increase (y) (x))) (at end (g))", "interference"),
+        // Over all says nothing.
+        ("(over all (p))", "(at end (g))", "valid"),
+        ("(over all (p))", "(at start (p)) (at end (not (p))) (at end (g))", "interference"),
+    ] {
+        let a = durative("a", "0", condition, effect);
+        task(&[a], "(r)", "(g)").check_both(&[("0: (a) [0]", expected)]);
+    }
+    let sums = durative("a", "0", "", "(at start (increase (x) 1)) (at end (increase (x) 3))");
+    task(&[sums], "", "(= (x) 6)").check_both(&[("0: (a) [0]", "valid")]);
+    // With the least duration they are two.
+    let a = durative("a", "0.001", "(at end (p))", "(at start (p)) (at end (not (p))) (at end (g))");
+    task(&[a], "", "(g)").check_both(&[("0: (a) [0.001]", "valid")]);
+}
+
+#[test]
+fn effects_of_one_happening() {
+    for (effect, expected) in [
+        ("(at end (not (g))) (at end (g))", "valid"),
+        ("(at end (g)) (at end (assign (x) 1)) (at end (assign (x) 1))", "valid"),
+        ("(at end (g)) (at end (assign (x) 1)) (at end (assign (x) 2))", "conflict"),
+        ("(at end (g)) (at end (assign (x) 1)) (at end (increase (x) 2))", "conflict"),
+        ("(at end (g)) (at end (scale-up (x) 1)) (at end (increase (x) 2))", "conflict"),
+        ("(at end (g)) (at end (increase (x) 1)) (at end (decrease (x) 1))", "valid"),
+        // An effect whose condition does not hold is none.
+        ("(at end (g)) (at end (assign (x) 1)) (at end (when (p) (assign (x) 2)))", "valid"),
+        ("(at end (g)) (at end (assign (x) 1)) (at end (when (not (p)) (assign (x) 2)))", "conflict"),
+        ("(at end (g)) (at end (when (p) (increase (x) (z))))", "valid"),
+        ("(at end (g)) (at end (when (not (p)) (increase (x) (z))))", "undefined"),
+        ("(at end (g)) (at end (increase (z) 1))", "undefined"),
+        ("(at end (g)) (at end (assign (z) 1))", "valid"),
+        ("(at end (g)) (at end (assign (x) (/ 1 (y))))", "undefined"),
+    ] {
+        let a = durative("a", "2", "", effect);
+        task(&[a], "", "(g)").check_both(&[("0: (a) [2]", expected)]);
+        // The same at the start, where it contradicts itself as well.
+        let a = durative("a", "2", "", &effect.replace("at end", "at start"));
+        task(&[a], "", "(g)").check_both(&[("0: (a) [2]", expected)]);
+    }
+}
+
+#[test]
+fn the_goal_holds_when_the_last_action_ends() {
+    let a = durative("a", "2", "", "(at end (g))");
+    // An event at the end counts, a later one does not, and no plan waits for one.
+    let adds = task(std::slice::from_ref(&a), "(at 5 (p))", "(g) (p)");
+    adds.check_both(&[
+        ("3: (a) [2]", "valid"),
+        ("2.999: (a) [2]", "goal"),
+        ("4: (a) [2]", "valid"),
+        ("", "goal"),
+    ]);
+    let deletes = task(std::slice::from_ref(&a), "(p) (at 5 (not (p)))", "(g) (p)");
+    deletes.check_both(&[("3: (a) [2]", "goal"), ("2.999: (a) [2]", "valid")]);
+    task(std::slice::from_ref(&a), "(at 5 (p))", "(p)").check_both(&[("", "goal"), ("3: (a) [2]", "valid")]);
+    // A plan without actions ends at 0.
+    task(std::slice::from_ref(&a), "(at 0 (p))", "(p)").check_both(&[("", "valid"), ("0: (a) [2]", "valid")]);
+    task(std::slice::from_ref(&a), "(p) (at 0 (not (p)))", "(p)").check_both(&[("", "goal")]);
+    task(&[a], "(at 0.001 (p))", "(p)").check_both(&[("", "goal")]);
+    // An over-all condition that breaks at the end, as the goal wants.
+    let kept = durative("a", "2", "(over all (p))", "(at end (g))");
+    task(&[kept], "(p) (at 2 (not (p)))", "(g) (not (p))")
+        .check_both(&[("0: (a) [2]", "valid"), ("0.001: (a) [2]", "over_all")]);
+}
+
+#[test]
+fn in_sequence_an_end_and_a_start_may_touch() {
+    let a = durative("a", "2", "", "(at end (p))");
+    let b = durative("b", "2", "(at start (p))", "(at start (not (p))) (at end (g))");
+    let both = task(&[a, b], "", "(g)");
+    both.check(
+        IN_SEQUENCE,
+        &[("0: (a) [2]\n2: (b) [2]", "valid"), ("0: (a) [2]\n1.999: (b) [2]", "overlap")],
+    );
+    both.check(
+        CONCURRENTLY,
+        &[("0: (a) [2]\n2: (b) [2]", "at_start"), ("0: (a) [2]\n2.001: (b) [2]", "valid")],
+    );
+}
+
+#[test]
+fn an_instance_does_not_overlap_with_itself() {
+    let a = durative("a", "2", "", "(at end (increase (x) 1)) (at end (g))");
+    let free = task(std::slice::from_ref(&a), "", "(g)");
+    free.check(
+        CONCURRENTLY,
+        &[
+            ("0: (a) [2]\n2: (a) [2]", "valid"),
+            ("0: (a) [2]\n1.999: (a) [2]", "overlap"),
+            ("0: (a) [2]\n0: (a) [2]", "overlap"),
+        ],
+    );
+    // They touch, and interfere.
+    let a = durative("a", "2", "(at start (not (p)))", "(at start (p)) (at end (not (p)))");
+    task(&[a], "", "").check(
+        CONCURRENTLY,
+        &[
+            ("0: (a) [2]\n2: (a) [2]", "at_start"),
+            ("0: (a) [2]\n2.0009: (a) [2]", "interference"),
+            ("0: (a) [2]\n2.001: (a) [2]", "valid"),
+        ],
+    );
+}
+
+#[test]
+fn the_tolerance_is_for_rounded_plans() {
+    let a = durative("a", "5", "", "(at end (q))");
+    let b = durative("b", "1", "(at start (p)) (at start (q))", "(at end (g))");
+    let (domain, problem) = task(&[a, b], "(p) (at 5 (not (p)))", "(g)").parse();
+    let verdict = |options: &Options, text: &str| {
+        let plan = PlanText::parse(&Source::new("plan", text)).expect("the plan can be read");
+        validate(&domain, &problem, &plan, options).violation.map(|violation| violation.kind.as_str())
+    };
+    // What begins too early by a rounding begins when the step before has ended, and the event has taken place by then.
+    assert_eq!(verdict(&Options::default(), "0: (a) [5]\n4.9995: (b) [1]"), Some("at_start"));
+    // A separation is no tolerance of durations.
+    let separation = BigRational::from_integer(BigInt::from(1));
+    let wide = Options { concurrent: true, tolerance: separation };
+    assert_eq!(verdict(&wide, "0: (a) [4.5]"), Some("duration"));
+    assert_eq!(verdict(&wide, "0: (a) [4.9995]"), Some("goal"));
+}
+
+#[test]
+fn a_single_step_changes_what_it_changes_in_a_plan() {
+    let single = |duration: &str, condition: &str, effect: &str, forced: bool| {
+        let (domain, problem) = task(&[durative("a", duration, condition, effect)], "(r)", "").parse();
+        let plan = PlanText::parse(&Source::new("plan", "(a)")).expect("the plan can be read");
+        let step: &PlanStep = &plan.steps[0];
+        match advance(&domain, &problem, step, forced) {
+            Ok(after) => {
+                let names = |atoms: &[metaplan_pddl::ast::Atom]| {
+                    atoms.iter().map(|atom| atom.predicate.name.to_string()).collect::<Vec<_>>().join(" ")
+                };
+                format!("+{} -{}", names(&after.added), names(&after.deleted))
+            }
+            Err(violation) => violation.kind.as_str().to_owned(),
+        }
+    };
+    for (duration, condition, effect, forced, expected) in [
+        ("2", "(over all (p))", "(at end (g))", false, "over_all"),
+        ("0", "(over all (p))", "(at end (g))", false, "+g -"),
+        ("2", "(at end (p))", "(at start (p)) (at end (g))", false, "+g p -"),
+        ("0", "(at end (p))", "(at start (p)) (at end (g))", false, "at_end"),
+        ("0", "", "(at start (p)) (at end (not (p))) (at end (g))", false, "interference"),
+        ("0", "", "(at start (p)) (at end (not (p))) (at end (g))", true, "+g -"),
+        ("0", "", "(at start (p)) (at end (not (r)))", false, "+p -r"),
+    ] {
+        assert_eq!(single(duration, condition, effect, forced), expected, "{duration} {condition} {effect}");
+    }
+}
+
+#[test]
+fn a_step_that_fits_two_schemas_is_the_better_one() {
+    let domain = "(define (domain d) (:predicates (p) (g)) (:functions (total-cost))
+      (:action go :parameters () :effect (and (g) (increase (total-cost) 10)))
+      (:action go :parameters () :precondition (p) :effect (and (g) (increase (total-cost) 1)))
+      (:action go :parameters () :effect (and (not (g)))))";
+    let metric = |init: &str, plan: &str| {
+        let problem = format!(
+            "(define (problem n) (:domain d) (:init {init} (= (total-cost) 0)) (:goal (g)) (:metric minimize (total-cost)))"
+        );
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("a task");
+        let plan = PlanText::parse(&Source::new("plan", plan)).expect("the plan can be read");
+        validate(&domain, &problem, &plan, &Options::default()).metric.map(|value| value.to_string())
+    };
+    assert_eq!(metric("(p)", "(go)"), Some("1".to_owned()));
+    assert_eq!(metric("", "(go)"), Some("10".to_owned()));
+    // The first of them may be the one that undoes.
+    assert_eq!(metric("(p)", "(go)\n(go)"), Some("1".to_owned()));
+    assert_eq!(metric("", ""), None);
+}
