@@ -155,3 +155,23 @@ fn start_and_end_of_an_action_without_duration_are_one() {
         check(name, &domain(conditions, effects), &problem("1"), &with);
     }
 }
+
+#[test]
+fn a_negative_duration_is_no_duration() {
+    let domain = |duration: &str| {
+        format!(
+            "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (g)) (:functions (short) (long))
+              (:durative-action a :parameters () :duration (= ?duration {duration}) :condition (and) :effect (at end (g)))
+              (:durative-action dear :parameters () :duration (= ?duration 100) :condition (and) :effect (at end (g))))"
+        )
+    };
+    let problem = "(define (problem x) (:domain d) (:init (= (short) 1) (= (long) 3)) (:goal (g)) (:metric minimize (total-time)))";
+    for (duration, time, plan) in [
+        ("(- (short) (long))", "100", "0: (dear) [100]"),
+        ("-1", "100", "0: (dear) [100]"),
+        ("(- (short) 1)", "0", "0: (a) [0]"),
+        ("(- (long) (short))", "2", "0: (a) [2]"),
+    ] {
+        check(duration, &domain(duration), problem, &Optimal(time, plan));
+    }
+}

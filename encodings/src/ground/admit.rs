@@ -15,7 +15,8 @@ pub(super) fn admit_some(
     sizes: &[usize],
     limits: &Limits,
 ) -> Result<bool, Interrupted> {
-    if sizes.contains(&0) {
+    let is_never = |rule: &Forbidden| rule.slots.is_empty() && !rule.combinations.is_empty();
+    if sizes.contains(&0) || forbidden.iter().any(is_never) {
         return Ok(false);
     }
     let mut pulse = limits.pulse();
@@ -87,15 +88,18 @@ mod tests {
         #[test]
         fn what_is_left_is_what_the_product_has(
             sizes in proptest::collection::vec(1_usize..4, 1..5),
+            never in proptest::bool::weighted(0.1),
             rules in proptest::collection::vec((0_u32..4, 0_u32..4, proptest::collection::vec((0_u32..3, 0_u32..3), 0..9)), 0..5),
         ) {
             let fits = |slot: u32| (slot as usize) < sizes.len();
             let rules = rules.into_iter().filter(|(a, b, _)| a < b && fits(*a) && fits(*b));
+            let never = never.then(|| Forbidden { slots: [].into(), combinations: vec![[].into()] });
             let forbidden: Vec<Forbidden> = rules
                 .map(|(a, b, pairs)| Forbidden {
                     slots: [a, b].into(),
                     combinations: pairs.into_iter().map(|(x, y)| [x, y].into()).collect(),
                 })
+                .chain(never)
                 .collect();
             let mut all: Vec<Vec<u32>> = vec![Vec::new()];
             for size in &sizes {
