@@ -93,7 +93,7 @@ mod tests {
         ) {
             let fits = |slot: u32| (slot as usize) < sizes.len();
             let rules = rules.into_iter().filter(|(a, b, _)| a < b && fits(*a) && fits(*b));
-            let never = never.then(|| Forbidden { slots: [].into(), combinations: vec![[].into()] });
+            let never = never.then(|| Forbidden { slots: SlotSet::new(), combinations: vec![SlotSet::new()] });
             let forbidden: Vec<Forbidden> = rules
                 .map(|(a, b, pairs)| Forbidden {
                     slots: [a, b].into(),
