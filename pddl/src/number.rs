@@ -73,6 +73,11 @@ fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
     }
 }
 
+/// A number for people: a decimal where there is one.
+pub(crate) fn show_number(value: &BigRational) -> String {
+    to_decimal(value).unwrap_or_else(|| value.to_string())
+}
+
 /// The shortest decimal that is exactly `value`; nothing where there is none.
 pub fn to_decimal(value: &BigRational) -> Option<String> {
     let mut rest = value.denom().clone();

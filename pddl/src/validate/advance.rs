@@ -9,15 +9,16 @@ use crate::ast::{
     Atom, ConditionTime, Domain, EffectTime, Identifier, InitialElement, Name, Problem, Span, Term,
 };
 
-use super::Options;
 use super::effects::{Change, Changes, Ground};
-use super::evaluate::Evaluator;
-use super::execute::{Execution, is_durative};
+use super::evaluate::{Bindings, Evaluator};
+use super::execute::Execution;
 use super::happening::Part;
+use super::options::Options;
 use super::plan::PlanStep;
+use super::running::is_durative;
+use super::step;
 use super::verdict::Violation;
 use super::world::{Arguments, State, Symbol, World};
-use super::{Bindings, step};
 
 /// What one step changes.
 #[derive(Debug, Clone)]

@@ -6,11 +6,13 @@ use num_traits::Signed;
 use crate::ast::ConditionTime;
 
 use super::effects::Changes;
-use super::execute::{Execution, Running};
+use super::execute::Execution;
 use super::happening::{Happening, Part};
 use super::interference::Footprint;
+use super::running::Running;
 use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
+use crate::number::show_number;
 
 /// A happening that lies less than the separation back.
 struct Recent<'e, 'p> {
@@ -87,7 +89,7 @@ fn overlaps_not_with_itself(
     else {
         return Ok(());
     };
-    let (start, end) = (super::show_number(&started.start), super::show_number(&other.end));
+    let (start, end) = (show_number(&started.start), show_number(&other.end));
     let message = format!(
         "it starts at {start}, before the same action with the same objects, step {}, ends at {end}",
         other.step.number
@@ -170,7 +172,7 @@ fn apart<'p>(
     let Some(touched) = footprint.interferes(&earlier.footprint) else { return Ok(()) };
     match (step, earlier.step) {
         (Some(step), Some(other)) => {
-            let gap = super::show_number(&(time - &earlier.time));
+            let gap = show_number(&(time - &earlier.time));
             let (number, other) = (other.number, other.show());
             let touched = execution.world.show(touched.0, &touched.1);
             let message = format!("it interferes with step {number} {other} at {touched}, {gap} apart");

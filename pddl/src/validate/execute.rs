@@ -3,14 +3,16 @@
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
 
-use crate::ast::{ActionBody, Comparison, Condition, ConditionTime, Effect, EffectTime, InitialElement};
+use crate::ast::{ActionBody, Comparison, ConditionTime, EffectTime, InitialElement};
+use crate::number::show_number;
 
-use super::Options;
 use super::derive::close;
 use super::effects::{Changes, EffectError, Ground};
 use super::evaluate::{Evaluator, Undefined};
 use super::explain::{undefined_text, unmet};
 use super::interference::Footprint;
+use super::options::Options;
+use super::running::{Running, conditions, effects, is_durative};
 use super::step::{Instance, Step, unresolved};
 use super::verdict::{Violation, ViolationKind};
 use super::world::{State, World};
@@ -25,18 +27,6 @@ pub(super) struct Execution<'e, 'p> {
     pub(super) pending: Vec<(BigRational, Ground, bool)>,
     /// The last events that took place, with their time.
     pub(super) last_event: Option<(BigRational, Footprint)>,
-}
-
-/// An action that has started.
-#[derive(Debug)]
-pub(super) struct Running<'e, 'p> {
-    pub(super) step: &'e Step<'p>,
-    pub(super) instance: Instance<'p>,
-    pub(super) start: BigRational,
-    /// The exact duration, in the domain's time unit.
-    pub(super) duration: BigRational,
-    /// When it ends on the plan's clock, where durations may be rounded.
-    pub(super) end: BigRational,
 }
 
 impl<'e, 'p> Execution<'e, 'p> {
@@ -151,7 +141,7 @@ impl<'e, 'p> Execution<'e, 'p> {
             ));
         };
         if duration.is_negative() {
-            let message = format!("the duration {} is negative", super::show_number(&duration));
+            let message = format!("the duration {} is negative", show_number(&duration));
             return Err(step.violation(time, ViolationKind::Duration, message));
         }
         Ok(duration)
@@ -177,7 +167,7 @@ impl<'e, 'p> Execution<'e, 'p> {
         if holds {
             return Ok(());
         }
-        let (stated, bound) = (super::show_number(stated), super::show_number(bound));
+        let (stated, bound) = (show_number(stated), show_number(bound));
         let message = format!("the plan says {stated}, but the domain wants ?duration {sign} {bound}");
         Err(step.violation(time, ViolationKind::Duration, message))
     }
@@ -292,38 +282,4 @@ impl<'e, 'p> Execution<'e, 'p> {
 
 fn undefined_violation(step: &Step<'_>, time: &BigRational, undefined: &Undefined) -> Box<Violation> {
     step.violation(time, ViolationKind::Undefined, undefined_text(undefined))
-}
-
-pub(super) fn is_durative(instance: &Instance<'_>) -> bool {
-    matches!(instance.action.body, ActionBody::Durative { .. })
-}
-
-/// The conditions of an action at a time; a precondition counts as one at the start.
-pub(super) fn conditions<'p>(
-    instance: &Instance<'p>,
-    when: ConditionTime,
-) -> impl Iterator<Item = &'p Condition> + use<'p> {
-    let (single, several) = match &instance.action.body {
-        ActionBody::Instantaneous { precondition, .. } => {
-            ((when == ConditionTime::AtStart).then_some(precondition), [].as_slice())
-        }
-        ActionBody::Durative { conditions, .. } => (None, conditions.as_slice()),
-    };
-    let several = several.iter().filter(move |(time, _)| *time == when).map(|(_, condition)| condition);
-    single.into_iter().chain(several)
-}
-
-/// The effects of an action at a time; those of an instantaneous one count as effects at the start.
-pub(super) fn effects<'p>(
-    instance: &Instance<'p>,
-    when: EffectTime,
-) -> impl Iterator<Item = &'p Effect> + use<'p> {
-    let (single, several) = match &instance.action.body {
-        ActionBody::Instantaneous { effect, .. } => {
-            ((when == EffectTime::AtStart).then_some(effect), [].as_slice())
-        }
-        ActionBody::Durative { effects, .. } => (None, effects.as_slice()),
-    };
-    let several = several.iter().filter(move |(time, _)| *time == when).map(|(_, effect)| effect);
-    single.into_iter().chain(several)
 }

@@ -7,10 +7,12 @@ use crate::ast::{ConditionTime, EffectTime};
 
 use super::derive::close;
 use super::effects::{Changes, Ground};
-use super::execute::{Execution, Running, is_durative};
+use super::execute::Execution;
 use super::interference::Footprint;
+use super::running::{Running, is_durative};
 use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
+use crate::number::show_number;
 
 /// The part of an action that happens at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,7 +138,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     ) -> Box<Violation> {
         let touched = self.world.show(*symbol, arguments);
         let gap = if time < event { event - time } else { time - event };
-        let (event, gap) = (super::show_number(event), super::show_number(&gap));
+        let (event, gap) = (show_number(event), show_number(&gap));
         let message = format!(
             "it interferes with the timed initial literals of time {event} at {touched}, {gap} apart"
         );

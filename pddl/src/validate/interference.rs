@@ -11,7 +11,7 @@ use crate::ast::{
 
 use super::effects::{Change, Changes, Ground};
 use super::evaluate::Bindings;
-use super::execute::{Running, conditions, effects};
+use super::running::{Running, conditions, effects};
 use super::world::{Symbol, World};
 
 /// A fact or a function, with gaps where a quantifier runs through its objects.

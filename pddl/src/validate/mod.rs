@@ -15,22 +15,23 @@ mod execute;
 mod explain;
 mod happening;
 mod interference;
+mod options;
 mod plan;
+mod running;
 mod sequential;
 mod solve;
 mod step;
 mod verdict;
 mod world;
 
-use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::Zero;
 use rustc_hash::FxHashSet;
 
 use crate::ast::{Action, ActionBody, Direction, Domain, Effect, Name, Problem};
-use crate::number::to_decimal;
 
 pub use advance::{Advance, ValueChange, advance, advance_each, metric_after};
+pub use options::Options;
 pub use plan::{PlanStep, PlanText};
 pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
 
@@ -39,33 +40,6 @@ use execute::Execution;
 use explain::unmet;
 use step::Step;
 use world::{State, World};
-
-/// How a plan is to be read.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// Whether actions may overlap, by the rules of PDDL 2.1; otherwise each begins when the one before
-    /// it has ended.
-    pub concurrent: bool,
-    /// In the domain's time unit, not negative. In sequence it is for plans that were rounded: how far a stated
-    /// duration may lie from the exact one, and how far a step may reach into the next. Concurrently it is the separation: how far
-    /// apart happenings that interfere must be; a stated duration may then lie as far from the exact one, but at most a
-    /// thousandth. Events are never forgiven for anything.
-    pub tolerance: BigRational,
-}
-
-impl Options {
-    /// How far a stated duration may lie from the exact one.
-    fn slack(&self) -> BigRational {
-        let own = self.tolerance.clone();
-        if self.concurrent { own.min(Self::default().tolerance) } else { own }
-    }
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { concurrent: false, tolerance: BigRational::new(BigInt::from(1), BigInt::from(1000)) }
-    }
-}
 
 /// How many ways to read a plan are tried where schemas share a name.
 const READINGS: usize = 4096;
@@ -179,9 +153,4 @@ fn effect_targets<'p>(effect: &'p Effect, targets: &mut FxHashSet<&'p Name>) {
         }
         Effect::Add(_) | Effect::Delete(_) => {}
     }
-}
-
-/// A number for people: a decimal where there is one.
-fn show_number(value: &BigRational) -> String {
-    to_decimal(value).unwrap_or_else(|| value.to_string())
 }

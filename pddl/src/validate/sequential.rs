@@ -5,10 +5,12 @@ use num_traits::Zero;
 
 use crate::ast::ConditionTime;
 
-use super::execute::{Execution, Running};
+use super::execute::Execution;
 use super::happening::Part;
+use super::running::Running;
 use super::step::Step;
 use super::verdict::{Violation, ViolationKind};
+use crate::number::show_number;
 
 /// Executes the steps; adds up their durations as long as nothing is wrong. In the end, all events up to the end of the last step
 /// have taken place.
@@ -65,7 +67,7 @@ fn starts_late_enough(
     if time + &execution.options.tolerance >= *clock {
         return Ok(());
     }
-    let (time_text, clock_text) = (super::show_number(time), super::show_number(clock));
+    let (time_text, clock_text) = (show_number(time), show_number(clock));
     let message = format!(
         "it starts at {time_text}, before the step before it ends at {clock_text}; actions are executed one after another"
     );
