@@ -1,5 +1,7 @@
 //! The house rules that a machine can check.
 
+mod circles;
+
 use std::path::{Path, PathBuf};
 
 const FILE_LINES: usize = 500;
