@@ -298,6 +298,22 @@ fn n1_large_cost() {
     check("n1-cost", (domain, problem), vec![(sequential(), best("1", "0: (cheap) [0]"))]);
 }
 
+/// An action that has to lie exactly between two events, with which its start may interfere.
+#[test]
+fn exactly_between_events() {
+    let domain = "(define (domain d) (:requirements :adl :durative-actions :timed-initial-literals) (:predicates (e) (w) (q) (g))
+     (:durative-action a :parameters () :duration (= ?duration 5) :condition (over all (and (e) (w)))
+      :effect (and (when (at start (q)) (at start (not (e)))) (at end (g))))
+     (:action disturb :parameters () :precondition (and) :effect (q)))";
+    let problem = |more: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:init (w) {more} (at 5 (e)) (at 10 (not (w)))) (:goal (g)))"
+        )
+    };
+    check("between", (domain, &problem("")), vec![(sequential(), best("5", "5: (a) [5]"))]);
+    check("between-disturbed", (domain, &problem("(q)")), vec![(sequential(), Truth::NoPlan)]);
+}
+
 /// Large coefficients.
 #[test]
 fn n2_coefficients() {
