@@ -357,6 +357,25 @@ fn n3_doublings() {
     }
 }
 
+/// A number that outgrows all integers on the only way to the goal: what cannot be calculated is not "no plan".
+#[test]
+fn n3_more_doublings() {
+    let predicates: String = (0..141).map(|at| format!(" (c{at})")).collect();
+    let action = |at: usize| {
+        format!(
+            "(:action s{at} :parameters () :precondition (c{at}) :effect (and (not (c{at})) (c{}) (increase (x) (x))))\n",
+            at + 1
+        )
+    };
+    let actions: String = (0..140).map(action).collect();
+    let domain = format!(
+        "(define (domain d) (:requirements :fluents) (:predicates{predicates}) (:functions (x)) {actions})"
+    );
+    let problem = "(define (problem p) (:domain d) (:init (c0) (= (x) 1)) (:goal (and (c140) (>= (x) 1))))";
+    let plan: Vec<_> = (0..140).map(|at| format!("0: (s{at}) [0]")).collect();
+    check("n3-more", (&domain, problem), vec![(sequential(), best("140", &plan.join(", ")))]);
+}
+
 /// A measure beyond 64 bits.
 #[test]
 fn n5_large_measure() {
