@@ -6,19 +6,23 @@
 //!
 //! What is absent: OWL. Availability of designs arrives as facts of the problem.
 
-#![warn(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
-#![cfg_attr(
-    test,
-    allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)
-)]
-
-#[expect(
+#![warn(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
-    reason = "positions in texts below 4 GiB"
+    clippy::cast_sign_loss,
+    clippy::arithmetic_side_effects
 )]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        clippy::arithmetic_side_effects
+    )
+)]
+
 pub mod pddl;
-#[expect(clippy::cast_possible_truncation, reason = "positions in lists that are held in memory")]
 pub mod validate;
 
 mod error;
@@ -37,10 +41,10 @@ mod bounds;
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
+    clippy::arithmetic_side_effects,
     reason = "positions in lists that are held in memory, and DIMACS variables of formulas below a size limit"
 )]
 mod certificate;
-#[expect(clippy::cast_possible_truncation, reason = "positions in lists that are held in memory")]
 mod concurrent;
 mod earliest;
 mod encode;

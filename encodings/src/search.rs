@@ -168,6 +168,7 @@ pub(crate) type ClosedLabel = (Vec<u32>, Vec<Int>, Int);
 
 /// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
 /// nothing left; none if there is a cheaper plan, or if a limit comes first.
+#[expect(clippy::arithmetic_side_effects, reason = "what was paid, and estimates, are at most GROWTH_LIMIT")]
 pub(crate) fn closed_labels(
     task: &Task,
     bounds: &Bounds,
@@ -243,6 +244,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
 
     /// Adds all that can be reached from a node by one step. A node whose expansion is interrupted is not expanded, so that the
     /// search must end there.
+    #[expect(clippy::arithmetic_side_effects, reason = "steps are fewer than nodes")]
     fn expand(&mut self, id: u32, steps: u32, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
         let state = self.nodes[id as usize].state.clone();
         let cost = self.nodes[id as usize].cost.clone();

@@ -38,7 +38,7 @@ pub fn read_objective(
 ) -> Result<Metric, Vec<Diagnostic>> {
     let mut parsed = parse::expression(expression);
     if let Some(tree) = parsed.tree {
-        let end = expression.text().len() as u32;
+        let end = source::place(expression.text().len());
         let metric = Metric { direction, expression: tree, span: ast::Span { start: 0, end } };
         parsed.diagnostics.extend(check::objective(domain, problem, &metric, expression));
         if !has_errors(&parsed.diagnostics) {

@@ -247,6 +247,7 @@ impl Base {
     }
 
     /// For each predicate the objects that some operator needs to be available, sorted.
+    #[expect(clippy::arithmetic_side_effects, reason = "predicates are held in memory")]
     fn possible(&self) -> Vec<Vec<ObjectId>> {
         let count = self.requirements.iter().flatten().map(|(_, predicate)| predicate + 1).max().unwrap_or(0);
         let mut found = vec![Vec::new(); count];

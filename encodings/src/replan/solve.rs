@@ -184,6 +184,7 @@ fn choose(
 }
 
 /// The most changes that are fewer than these.
+#[expect(clippy::arithmetic_side_effects, reason = "those that are 0 are told apart")]
 fn fewer((departures, reconfigurations): ties::Changes) -> Option<ties::Changes> {
     match (departures, reconfigurations) {
         (0, 0) => None,
