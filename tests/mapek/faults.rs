@@ -236,6 +236,9 @@ fn what_is_no_journal_is_left_as_it_is() {
         refused(directory.path(), &pristine, "is no journal");
         assert_eq!(std::fs::read_to_string(&file).expect("a file"), text);
     }
+    let first = "{\"header\":[\"metaplan-journal/1\"]}\n";
+    std::fs::write(&file, first).expect("a file");
+    refused(directory.path(), &pristine, "or begin the mission anew with a journal in another directory");
     std::fs::remove_file(&file).expect("removed");
     std::fs::create_dir(&file).expect("a directory");
     refused(directory.path(), &pristine, "is no regular file");
