@@ -54,6 +54,22 @@ fn names_that_meet_nothing_are_warned_of_with_their_place() {
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
+/// A name that stands in an imported file is shown where it stands there.
+#[test]
+fn names_in_imported_files_have_a_place() {
+    let copy = copy_of_mission("ugv");
+    let path = copy.path().join("ontology/kb/ugv.ttl");
+    let text = std::fs::read_to_string(&path)
+        .expect("text")
+        .replace("t:requiresC :c_kinect ;", "t:requiresC :c_kinetc ;");
+    std::fs::write(copy.path().join("ontology/kb/own.ttl"), text).expect("written");
+    let importing = "@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
+        <http://example.org/main> a owl:Ontology ; owl:imports <own.ttl> .\n";
+    std::fs::write(&path, importing).expect("written");
+    let outcome = metaplan_in(copy.path(), &["plan", "missions/ugv.toml"], "");
+    assert!(outcome.stderr.contains("M207") && outcome.stderr.contains("own.ttl:"), "{outcome:#?}");
+}
+
 #[test]
 fn a_plain_domain_that_meets_nothing_is_warned_of() {
     let kb = "ontology/kb/ugv.ttl";
