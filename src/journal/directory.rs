@@ -104,7 +104,7 @@ impl Contents {
 
     /// The segments from a number on, which follow each other without a gap, or the first thing that is wrong.
     pub(super) fn chain(&self, from: u64) -> Result<Vec<&Segment>, String> {
-        let last = self.segments.keys().chain(self.snapshots.keys()).next_back().copied().unwrap_or(from);
+        let last = self.segments.keys().chain(self.snapshots.keys()).max().copied().unwrap_or(from);
         let mut chain: Vec<&Segment> = Vec::new();
         for number in from..=last.max(from) {
             let name = name("journal", number);
