@@ -91,7 +91,8 @@ impl Stated {
             Ok(ontology) if errors.is_empty() => ontology,
             Ok(_) => return Err(errors),
             Err(more) => {
-                errors.extend(more.iter().map(Message::from_ontology));
+                let more = more.iter().map(Message::from_ontology).collect();
+                errors.extend(crate::mission::discreet(more));
                 return Err(errors);
             }
         };
