@@ -124,13 +124,15 @@ pub(super) fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> 
 }
 
 /// The first words of a document of a knowledge base, whatever its syntax.
-const BEGINNINGS: [&str; 10] = ["@", "prefix", "base", "<", "_:", "[", "(", "ontology", "version", "\u{feff}"];
+const BEGINNINGS: [&str; 10] =
+    ["@", "prefix", "base", "<", "_:", "[", "(", "ontology", "version", "\u{feff}"];
 
 /// Messages about knowledge bases without what a document is quoted for that does not begin like one: it may be any file.
 pub(crate) fn discreet(messages: Vec<Message>) -> Vec<Message> {
     let mut kept: Vec<Message> = Vec::new();
     for message in messages {
-        let file = message.file.clone().filter(|file| message.code == "O102" && !is_knowledge(Path::new(file)));
+        let file =
+            message.file.clone().filter(|file| message.code == "O102" && !is_knowledge(Path::new(file)));
         let Some(file) = file else {
             kept.push(message);
             continue;

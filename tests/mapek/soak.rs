@@ -6,6 +6,7 @@ use std::io::Write as _;
 use std::time::{Duration, Instant};
 
 use metaplan::journal::{Journal, Policy, Sync};
+use metaplan::mapek::Answer;
 
 use crate::common::{control, feed};
 use crate::fuzz::{Fuzz, WORLDS, step};
@@ -132,21 +133,23 @@ fn lines_a_second() {
                 let policy = Policy { sync: Sync::Effects, snapshot_every: 1000 };
                 Journal::open(directory.path(), policy, &mut control).expect("it opens").0
             });
-            match &mut journal {
-                Some(journal) => drop(journal.begin(&mut control).expect("written")),
-                None => drop(control.start()),
-            }
+            let first = match &mut journal {
+                Some(journal) => journal.begin(&mut control).expect("written"),
+                None => control.start(),
+            };
+            assert!(!first.is_empty());
             let (begun, before) = (Instant::now(), processor_time());
             for number in 0..lines {
                 let line = reports[number % 2];
-                match &mut journal {
-                    Some(journal) => {
-                        drop(journal.handle(&mut control, line, begun.elapsed()).expect("written"))
-                    }
-                    None => drop(feed(&mut control, line)),
-                }
+                let answers = match &mut journal {
+                    Some(journal) => journal.handle(&mut control, line, begun.elapsed()).expect("written"),
+                    None => feed(&mut control, line),
+                };
+                assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })));
             }
-            let taken = before.zip(processor_time()).map_or(begun.elapsed(), |(before, now)| now - before);
+            let taken = before
+                .zip(processor_time())
+                .map_or(begun.elapsed(), |(before, now)| now.saturating_sub(before));
             let rate = (lines as f64 / taken.as_secs_f64()) as u64;
             println!("{what}, journal: {}: {rate} a second of one core", journal.is_some());
             assert!(rate >= if journal.is_some() { least / 2 } else { least }, "{what}: {rate}");
