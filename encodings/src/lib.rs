@@ -78,7 +78,7 @@ pub use limits::Limits;
 pub use objectives::{Front, Point, lexicographic, pareto};
 pub use optimize::{Config, Strategy, optimize};
 pub use plan::{Exact, Plan, Step};
-pub use replan::{First, Query, Replanned, Replanner};
+pub use replan::{First, Progress, Query, Replanned, Replanner};
 pub use sat::{Backend, BackendError};
 pub use solution::{Improvement, Proof, Solution, Statistics, Status, Unbounded};
 pub use task::Task;
