@@ -1,18 +1,25 @@
 //! A knowledge base at run time: OWL documents and rule files in an engine, kept in step with the robot.
 
+mod catalogue;
+mod reports;
+mod statement;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::Status;
 use ontology::{EntityKind, Equality, Iri, Ontology, ReadOptions};
-use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Symbols, Value};
-use serde::{Deserialize, Serialize};
+use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Symbols};
 
 use crate::message::Message;
+pub(crate) use catalogue::Catalogue;
+pub use reports::Fault;
+pub(crate) use reports::{Report, Waiting};
+pub use statement::{Part, Statement, Statements};
 
 /// The name under which the shipped co-adaptation rules are asked for.
 pub const COADAPTATION: &str = "coadaptation";
@@ -39,71 +46,18 @@ pub struct Sources {
 #[derive(Debug, Clone)]
 pub struct Knowledge {
     runtime: Runtime,
+    /// What was last read of `runtime`, in step with it.
+    catalogue: OnceLock<Arc<Catalogue>>,
+    /// What was told and nothing follows from yet.
+    waiting: Waiting,
     /// As it was read; shares with `runtime` what has not changed since.
     origin: Runtime,
     rule_count: usize,
     warnings: Vec<Message>,
     sources: Sources,
     entities: Arc<[(EntityKind, Iri)]>,
-}
-
-/// A stated fact, with names and values in place of symbols.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Statement {
-    /// The IRI of the class or property.
-    pub predicate: String,
-    /// Names as they are; literals as lexical form, datatype.
-    pub arguments: Vec<Part>,
-}
-
-/// An argument of a [`Statement`].
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Part {
-    /// An individual.
-    Name(String),
-    /// A literal: its lexical form and the IRI of its datatype.
-    Literal(String, String),
-}
-
-/// How statements differ from those of the documents.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Statements {
-    /// Stated now, and not in the documents.
-    pub added: Vec<Statement>,
-    /// Stated in the documents, and not now.
-    pub removed: Vec<Statement>,
-}
-
-impl Statement {
-    fn of(engine: &Engine, fact: &Fact) -> Self {
-        let symbols = engine.symbols();
-        let part = |symbol| match symbols.value(symbol) {
-            Value::Name(name) => Part::Name(name.to_string()),
-            Value::Literal(literal) => Part::Literal(literal.lexical(), literal.datatype().to_owned()),
-        };
-        Self {
-            predicate: symbols.value(fact.predicate).as_name().unwrap_or_default().to_owned(),
-            arguments: fact.arguments.iter().map(|argument| part(*argument)).collect(),
-        }
-    }
-
-    fn intern(&self, symbols: &mut Symbols) -> Fact {
-        let predicate = symbols.name(&self.predicate);
-        let arguments: Vec<_> = self
-            .arguments
-            .iter()
-            .map(|part| match part {
-                Part::Name(name) => symbols.name(name),
-                Part::Literal(lexical, datatype) => {
-                    symbols.literal(Literal::parse(lexical, Some(datatype), None))
-                }
-            })
-            .collect();
-        Fact::new(predicate, arguments)
-    }
+    /// The names of all documents, those that are imported among them.
+    documents: Arc<[String]>,
 }
 
 /// What documents and rule files say, before anything is concluded.
@@ -137,7 +91,8 @@ impl Stated {
             Ok(ontology) if errors.is_empty() => ontology,
             Ok(_) => return Err(errors),
             Err(more) => {
-                errors.extend(more.iter().map(Message::from_ontology));
+                let more = more.iter().map(Message::from_ontology).collect();
+                errors.extend(crate::mission::discreet(more));
                 return Err(errors);
             }
         };
@@ -188,7 +143,8 @@ impl Knowledge {
         warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
         let runtime = Runtime::new(engine, Mode::Retract);
         let (sources, entities) = (sources.clone(), ontology.entities.into());
-        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources, entities })
+        let documents = ontology.sources.into_iter().map(|source| source.name).collect();
+        Ok(Self { documents, ..Self::of(runtime, rule_count, warnings, sources, entities) })
     }
 
     /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
@@ -201,7 +157,19 @@ impl Knowledge {
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let runtime = Runtime::new(engine, Mode::Retract);
         let (sources, entities) = (Sources::default(), Arc::default());
-        Ok(Self { origin: runtime.clone(), runtime, rule_count: 0, warnings: Vec::new(), sources, entities })
+        Ok(Self::of(runtime, 0, Vec::new(), sources, entities))
+    }
+
+    fn of(
+        runtime: Runtime,
+        rule_count: usize,
+        warnings: Vec<Message>,
+        sources: Sources,
+        entities: Arc<[(EntityKind, Iri)]>,
+    ) -> Self {
+        let (catalogue, waiting, origin) = (OnceLock::new(), Waiting::default(), runtime.clone());
+        let documents = Arc::default();
+        Self { runtime, catalogue, waiting, origin, rule_count, warnings, sources, entities, documents }
     }
 
     /// What is questionable about the documents.
@@ -217,6 +185,11 @@ impl Knowledge {
     /// What it was read from.
     pub fn sources(&self) -> &Sources {
         &self.sources
+    }
+
+    /// The names of the documents that were read: paths of files, imported ones among them.
+    pub fn documents(&self) -> &[String] {
+        &self.documents
     }
 
     /// How many rules there are: those of each document, and those of rule files; axioms do not count.
@@ -241,7 +214,28 @@ impl Knowledge {
 
     /// As [`Knowledge::runtime`], to change it.
     pub fn runtime_mut(&mut self) -> &mut Runtime {
+        self.catalogue = OnceLock::new();
         &mut self.runtime
+    }
+
+    /// What planning asks for again and again.
+    pub(crate) fn catalogue(&self) -> &Catalogue {
+        self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
+    }
+
+    /// Keeps the catalogue in step with what holds.
+    fn follow(&mut self, delta: &Delta) {
+        let engine = self.runtime.engine();
+        if self.catalogue.get_mut().is_some_and(|own| !Arc::make_mut(own).follow(delta, engine)) {
+            self.catalogue = OnceLock::new();
+        }
+    }
+
+    /// The outcome of a change.
+    fn changed(&mut self, outcome: Result<Delta, ontology::Error>) -> Result<Delta, Message> {
+        let delta = outcome.map_err(|error| Message::from_ontology(&error))?;
+        self.follow(&delta);
+        Ok(delta)
     }
 
     /// Marks a component, named by IRI or local name, as failed.
@@ -258,7 +252,8 @@ impl Knowledge {
     /// # Errors
     /// There is no such component, or a rule runs away.
     pub fn report(&mut self, component: &str, status: Status) -> Result<Delta, Message> {
-        self.runtime.report_component(component, status).map_err(|error| Message::from_ontology(&error))
+        let outcome = self.runtime.report_component(component, status);
+        self.changed(outcome)
     }
 
     /// Sets the measured value of an attribute, named by the IRI or local name of its type; returns what holds since,
@@ -274,7 +269,8 @@ impl Knowledge {
                 format!("the value `{value}` of {attribute} is no decimal number"),
             ));
         }
-        self.runtime.measure(attribute, literal).map_err(|error| Message::from_ontology(&error))
+        let outcome = self.runtime.measure(attribute, literal);
+        self.changed(outcome)
     }
 
     /// An attribute has a measured value from now on; returns what holds since, and what no more. What was measured holds
@@ -284,7 +280,8 @@ impl Knowledge {
     /// There is no such attribute, or a rule runs away.
     pub fn observe(&mut self, attribute: &str, value: &BigRational) -> Result<Delta, Message> {
         let literal = Literal::Decimal(rules::Decimal::from_rational(value));
-        self.runtime.measure(attribute, literal).map_err(|error| Message::from_ontology(&error))
+        let outcome = self.runtime.measure(attribute, literal);
+        self.changed(outcome)
     }
 
     /// Makes functions, and no others, the objectives of the robot, each grounded with a design; both by local name.
@@ -293,7 +290,10 @@ impl Knowledge {
     /// # Errors
     /// There is no such function or design.
     pub fn pursue(&mut self, configuration: &[(String, String)]) -> Result<(), Message> {
-        let error = |error: ontology::Error| Message::from_ontology(&error);
+        self.pursue_now(configuration).map_err(|error| Message::from_ontology(&error))
+    }
+
+    fn pursue_now(&mut self, configuration: &[(String, String)]) -> Result<(), ontology::Error> {
         let name = |function: &str| format!("o_{function}");
         let objectives = self.runtime.objectives();
         for objective in &objectives {
@@ -301,7 +301,8 @@ impl Knowledge {
             let ours = function.is_some_and(|function| objective.individual.name == name(function));
             let wanted = configuration.iter().any(|(wanted, _)| Some(wanted.as_str()) == function);
             if ours && !wanted {
-                self.runtime.remove_objective(&objective.individual.iri).map_err(error)?;
+                let delta = self.runtime.remove_objective(&objective.individual.iri)?;
+                self.follow(&delta);
             }
         }
         for (function, design) in configuration {
@@ -317,10 +318,12 @@ impl Knowledge {
                     requirements: Vec::new(),
                     always_improve: false,
                 };
-                self.runtime.add_objective(&new).map_err(error)?;
+                let delta = self.runtime.add_objective(&new)?;
+                self.follow(&delta);
             }
             if !grounded {
-                self.runtime.assign(&objective, design).map_err(error)?;
+                let delta = self.runtime.assign(&objective, design)?;
+                self.follow(&delta);
             }
         }
         Ok(())
@@ -352,7 +355,10 @@ impl Knowledge {
         };
         let delta = Delta { insert: facts(&statements.added), delete: facts(&statements.removed) };
         runtime.apply(delta).map_err(|error| Message::from_ontology(&error))?;
+        let limits = self.runtime.engine().limits().clone();
+        runtime.engine_mut().set_limits(limits);
         self.runtime = runtime;
+        self.catalogue = OnceLock::new();
         Ok(())
     }
 
@@ -372,7 +378,8 @@ impl Knowledge {
     /// # Errors
     /// A rule runs away.
     pub fn apply(&mut self, delta: Delta) -> Result<(), Message> {
-        self.runtime.apply(delta).map(|_| ()).map_err(|error| Message::from_ontology(&error))
+        let outcome = self.runtime.apply(delta);
+        self.changed(outcome).map(|_| ())
     }
 
     /// The assertions of a document (without its imports and rules) as facts, to insert or delete.

@@ -1,13 +1,15 @@
 //! Whether the oracles notice when the planner is wrong.
 //!
 //! `tests/oracle/mutants.toml` names faults. They are put into a copy of the workspace, all into one program, which is asked once for each
-//! fault with that one switched on. A fault that no oracle notices is a hole in the oracles, or no fault at all.
+//! fault with that one switched on. A fault that no oracle notices is a hole in the oracles, or no fault at all. `MUTANTS_FROM` is the number
+//! of the first.
 
 #![expect(
     clippy::print_stdout,
     reason = "what noticed each fault, and after how long, is what this is run for"
 )]
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -34,11 +36,15 @@ const PARTS: [&str; 13] = [
 /// The variable that switches a fault on; counted from 1.
 const SWITCH: &str = "METAPLAN_MUTANT";
 
+/// Where the switch is.
+const LIBRARY: &str = "encodings/src/lib.rs";
+
 /// What is asked of each fault, in order: tests of `tests/oracle`, and how many tasks they judge.
-const ORACLES: [(&str, u32); 5] = [
+const ORACLES: [(&str, u32); 6] = [
     ("field::", 0),
     ("numbers::special::hundreds_of_designs", 0),
     ("temporal::actions_one_after_another", 4_000),
+    ("temporal::actions_with_designs", 3_000),
     ("temporal::overlapping_actions", 1_500),
     ("numbers::random_tasks_with_numbers", 1_500),
 ];
@@ -59,18 +65,25 @@ struct Mutant {
     after: String,
 }
 
-fn copy(from: &Path, to: &Path) {
+/// Writes a file; what is as it was is left alone, and not compiled again.
+fn write(path: &Path, bytes: &[u8]) {
+    if std::fs::read(path).ok().as_deref() != Some(bytes) {
+        std::fs::create_dir_all(path.parent().expect("a directory")).expect("a directory");
+        std::fs::write(path, bytes).expect("a file");
+    }
+}
+
+/// Copies what has no faults.
+fn copy(from: &Path, to: &Path, faulty: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
-        std::fs::create_dir_all(to).expect("a directory");
         for entry in std::fs::read_dir(from).expect("a directory") {
             let name = entry.expect("an entry").file_name();
             if name != "target" {
-                copy(&from.join(&name), &to.join(&name));
+                copy(&from.join(&name), &to.join(&name), faulty);
             }
         }
-    } else if std::fs::read(to).ok() != std::fs::read(from).ok() {
-        // What is as it was is not compiled again.
-        std::fs::copy(from, to).expect("a file");
+    } else if !faulty.contains_key(to) {
+        write(to, &std::fs::read(from).expect("a file"));
     }
 }
 
@@ -78,13 +91,10 @@ fn copy(from: &Path, to: &Path) {
 fn mutated(mutants: &[Mutant]) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mutants");
-    std::fs::create_dir_all(&home).expect("a directory");
-    for part in PARTS {
-        copy(&root.join(part), &home.join(part));
-    }
+    let original = |file: &str| std::fs::read_to_string(root.join(file)).expect("a file");
+    let mut faulty: BTreeMap<PathBuf, String> = BTreeMap::new();
     for (mutant, number) in mutants.iter().zip(1..) {
-        let path = home.join(&mutant.file);
-        let text = std::fs::read_to_string(&path).expect("a file");
+        let text = faulty.entry(home.join(&mutant.file)).or_insert_with(|| original(&mutant.file));
         assert_eq!(
             text.matches(&mutant.before).count(),
             1,
@@ -93,19 +103,21 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
             mutant.file
         );
         let after = mutant.after.replace("IS_ON", &format!("crate::is_mutant({number})"));
-        // A later fault may be at the same place.
-        let text = text.replace(&mutant.before, &format!("/*{number}*/{after}"));
-        std::fs::write(path, text).expect("a file");
+        *text = text.replace(&mutant.before, &after);
     }
-    let library = home.join("encodings/src/lib.rs");
-    let text = std::fs::read_to_string(&library).expect("a file");
     let question = format!(
         "pub(crate) fn is_mutant(number: u32) -> bool {{ \
          static ON: std::sync::OnceLock<u32> = std::sync::OnceLock::new(); \
          let on = || std::env::var(\"{SWITCH}\").ok().and_then(|text| text.parse().ok()).unwrap_or(0); \
          *ON.get_or_init(on) == number }}"
     );
-    std::fs::write(library, text + &question).expect("a file");
+    *faulty.entry(home.join(LIBRARY)).or_insert_with(|| original(LIBRARY)) += &question;
+    for part in PARTS {
+        copy(&root.join(part), &home.join(part), &faulty);
+    }
+    for (path, text) in faulty {
+        write(&path, text.as_bytes());
+    }
     home
 }
 
@@ -170,7 +182,8 @@ fn every_fault_is_noticed() {
         assert!(is_content(&program, &home, 0, oracle), "{} fails without a fault", oracle.0);
     }
     let mut missed = Vec::new();
-    for (mutant, number) in mutants.iter().zip(1..) {
+    let from = std::env::var("MUTANTS_FROM").ok().map_or(1, |text| text.parse().expect("a number"));
+    for (mutant, number) in mutants.iter().zip(1..).filter(|(_, number)| *number >= from) {
         let started = Instant::now();
         let noticed = ORACLES.iter().find(|oracle| !is_content(&program, &home, number, **oracle));
         let by = noticed.map_or("NOBODY", |(test, _)| test);

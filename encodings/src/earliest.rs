@@ -4,8 +4,10 @@
 //! do that. So each action in turn is tried at its earlier passages, with waits before the next one where that needs events;
 //! what still is a plan, and costs no more, is kept.
 
+use num_traits::Zero;
+
 use crate::limits::Limits;
-use crate::number::TaskNumber;
+use crate::number::{Rational, TaskNumber};
 use crate::plan::{GroundPlan, GroundStep, replay};
 use crate::task::{Operator, OperatorId, Task};
 
@@ -33,7 +35,7 @@ pub(crate) fn earliest<N: TaskNumber>(
                 continue;
             }
         }
-        position += 1;
+        position = position.saturating_add(1);
     }
     plan
 }
@@ -85,20 +87,21 @@ fn with<N: TaskNumber>(
 }
 
 /// When the actions start, in the task's time unit.
-pub(crate) fn starts<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Vec<N> {
-    let mut clock = N::zero();
+pub(crate) fn starts<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Vec<Rational> {
+    let mut clock = Rational::zero();
     let mut all = Vec::new();
     for step in steps {
         let operator = &task.operators[step.operator.index()];
         if let Some(time) = &operator.wait {
-            clock = clock.max(time.clone());
+            clock = clock.max(time.to_rational());
             continue;
         }
-        let duration = operator.duration.at(&step.choice, &operator.sizes());
-        let by_end = operator.timing.end.clone().map(|end| end + -duration.clone());
-        let start = operator.timing.start.clone().into_iter().chain(by_end).fold(clock, N::max);
+        let duration = operator.duration.at(&step.choice, &operator.sizes()).to_rational();
+        let by_end = operator.timing.end.as_ref().map(|end| end.to_rational() - &duration);
+        let by_start = operator.timing.start.as_ref().map(TaskNumber::to_rational);
+        let start = by_start.into_iter().chain(by_end).fold(clock, Rational::max);
         all.push(start.clone());
-        clock = start + duration;
+        clock = start + &duration;
     }
     all
 }

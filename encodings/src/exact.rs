@@ -81,7 +81,7 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     match (any, config.horizon) {
         (Explored::Known(solution), _) => *solution,
         (Explored::Optimal(plan), _) if !too_long(&plan) => {
-            let lower = Some(metric(task, plan.cost.clone()));
+            let lower = Some(metric(task, &plan.cost));
             let solution = answer(Status::Optimal, Some(show(&plan)), Some(Proof::Search));
             Solution { lower_bound: lower, ..solution }
         }
@@ -90,7 +90,7 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
         (Explored::Optimal(plan), None) => answer(Status::Feasible, Some(show(&plan)), None),
         (Explored::Unknown(plan, lower), None) => {
             let status = if plan.is_some() { Status::Feasible } else { Status::Unknown };
-            let lower = Some(metric(task, lower));
+            let lower = Some(metric(task, &lower));
             Solution { lower_bound: lower, ..answer(status, plan.as_ref().map(show), None) }
         }
     }
@@ -105,7 +105,7 @@ fn within(task: &Task<Rational>, horizon: usize, lower: &Rational, limits: &Limi
     };
     let show = |plan: &GroundPlan<Rational>| decode(task, plan, limits);
     let solution = answer(status, plan.as_ref().map(show), proof);
-    Solution { lower_bound: Some(metric(task, lower.clone())), horizon, ..solution }
+    Solution { lower_bound: Some(metric(task, lower)), horizon, ..solution }
 }
 
 /// For a metric that actions improve: fewest steps first, then the best metric among those plans.
@@ -257,6 +257,10 @@ impl Estimate<Rational> for RoundedBounds {
 
 /// A factor for costs: one that makes integers of them if these are short enough, else a power of two after which the largest
 /// one is as long as admitted.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers have fewer than 2^63 bits, and the greater length is what the smaller one is taken from"
+)]
 fn factor(costs: &[BigRational]) -> BigRational {
     let largest = costs.iter().max().cloned().unwrap_or_default();
     let most = BigInt::one() << COST_BITS;

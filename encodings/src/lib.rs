@@ -5,10 +5,20 @@
 //!
 //! What is absent: OWL. Availability of designs arrives as facts of the problem.
 
-#![warn(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
+#![warn(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::arithmetic_side_effects
+)]
 #![cfg_attr(
     test,
-    allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)
+    allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        clippy::arithmetic_side_effects
+    )
 )]
 
 mod error;
@@ -27,10 +37,10 @@ mod bounds;
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
+    clippy::arithmetic_side_effects,
     reason = "positions in lists that are held in memory, and DIMACS variables of formulas below a size limit"
 )]
 mod certificate;
-#[expect(clippy::cast_possible_truncation, reason = "positions in lists that are held in memory")]
 mod concurrent;
 mod earliest;
 mod encode;
@@ -64,7 +74,7 @@ pub use limits::Limits;
 pub use objectives::{Front, Point, lexicographic, pareto};
 pub use optimize::{Config, Strategy, optimize};
 pub use plan::{Exact, Plan, Step};
-pub use replan::{First, Query, Replanned, Replanner};
+pub use replan::{First, Progress, Query, Replanned, Replanner};
 pub use sat::{Backend, BackendError};
 pub use solution::{Improvement, Proof, Solution, Statistics, Status, Unbounded};
 pub use task::Task;

@@ -77,6 +77,10 @@ const BETWEEN: Duration = Duration::from_millis(2);
 
 impl Pulse<'_> {
     /// An error once a limit is reached.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "above 0 where it is taken from; a stride is at most twice the longest"
+    )]
     pub(crate) fn beat(&mut self) -> Result<(), Interrupted> {
         if self.left > 0 {
             self.left -= 1;

@@ -11,7 +11,7 @@ use num_bigint::BigInt;
 use num_rational::{BigRational, Ratio};
 use num_traits::{CheckedAdd, CheckedDiv, CheckedMul, CheckedSub, One, Signed, ToPrimitive, Zero};
 
-use crate::quantity::Number;
+use crate::quantity::{Number, Quantity, Table};
 
 /// A number of a ground task, scaled to an integer.
 ///
@@ -22,8 +22,14 @@ pub(crate) type Int = i128;
 /// Constants of a task stay below this once they are scaled.
 pub(crate) const LIMIT: Int = 1 << 118;
 
+/// What the numbers of a quantity come to together, whatever their signs.
+pub(crate) const QUANTITY_LIMIT: Int = 1 << 123;
+
 /// What fluents may grow to, and sums of costs: a state beyond is left out, and the search knows that it is not complete then.
 pub(crate) const GROWTH_LIMIT: Int = 1 << 124;
+
+/// Quantities with so many numbers are below [`QUANTITY_LIMIT`] by [`LIMIT`] alone.
+const FEW: usize = 32;
 
 /// An exact rational of any size.
 #[derive(Clone, PartialEq, Eq, Hash)]
@@ -138,12 +144,13 @@ pub(crate) fn dense(index: usize) -> u32 {
 /// A number in words, for keys.
 pub(crate) fn words(number: Int) -> [u32; 4] {
     let bytes = number.to_le_bytes();
-    std::array::from_fn(|word| u32::from_le_bytes(std::array::from_fn(|byte| bytes[4 * word + byte])))
+    let (words, _) = bytes.as_chunks::<4>();
+    std::array::from_fn(|word| u32::from_le_bytes(words[word]))
 }
 
 /// The least common multiple of two positive integers; none if it does not fit.
 pub(crate) fn checked_lcm(a: Int, b: Int) -> Option<Int> {
-    (a / num_integer::gcd(a, b)).checked_mul(b)
+    a.checked_div(num_integer::gcd(a, b))?.checked_mul(b)
 }
 
 impl Default for Rational {
@@ -192,6 +199,9 @@ pub(crate) trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Defaul
     /// Whether a fluent or a sum of costs may become as large as this.
     fn is_moderate(&self) -> bool;
 
+    /// Whether all sums over the numbers of a quantity fit: those of its tables' greatest magnitudes and its constant do.
+    fn fits(quantity: &Quantity<Self>) -> bool;
+
     /// Whether `start`, with products added, is at least 0 (more than 0 if `strict`), however large the numbers in between.
     fn compare<'n>(
         start: Self,
@@ -215,7 +225,7 @@ impl TaskNumber for Int {
 
     fn from_rational(number: &Rational, scale: Int) -> Option<Self> {
         let scaled = (number.clone() * &Rational::from_integer(scale)).to_int();
-        scaled.filter(|integer| integer.abs() < LIMIT)
+        scaled.filter(|integer| (-LIMIT..LIMIT).contains(integer))
     }
 
     fn to_rational(&self) -> Rational {
@@ -231,7 +241,14 @@ impl TaskNumber for Int {
     }
 
     fn is_moderate(&self) -> bool {
-        self.abs() <= GROWTH_LIMIT
+        (-GROWTH_LIMIT..=GROWTH_LIMIT).contains(self)
+    }
+
+    fn fits(quantity: &Quantity<Self>) -> bool {
+        let greatest = |table: &Table<Int>| table.values.iter().map(|value| value.unsigned_abs()).max();
+        let mut all = quantity.tables.iter().filter_map(greatest);
+        let mut sum = || all.try_fold(quantity.constant.unsigned_abs(), u128::checked_add);
+        quantity.tables.len() < FEW || sum().is_some_and(|sum| sum <= QUANTITY_LIMIT.unsigned_abs())
     }
 
     fn compare<'n>(
@@ -272,6 +289,10 @@ impl TaskNumber for Rational {
             Repr::Small(_) => true,
             Repr::Big(big) => big.numer().bits().max(big.denom().bits()) <= BIT_LIMIT,
         }
+    }
+
+    fn fits(_: &Quantity<Self>) -> bool {
+        true
     }
 
     fn compare<'n>(

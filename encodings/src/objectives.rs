@@ -8,7 +8,7 @@
 //! and system optimization, IEEE Trans. SMC 1(3), 1971.
 
 use crate::limits::Limits;
-use crate::number::Int;
+use crate::number::{Int, Rational};
 use crate::optimize::{Config, optimize};
 use crate::plan::{Exact, GroundPlan};
 use crate::quantity::{Linear, NumericId, Quantity};
@@ -49,9 +49,11 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
         let point = in_order(task, &[0, 1], &budgets, config, report);
         match (point.solution.status, &point.solution.ground) {
             (Status::Optimal, Some(plan)) => {
-                let by_second = task.cost_by(1, plan);
+                let by_second = task.cost_by(1, plan).and_then(|cost| cost.checked_sub(1));
                 points.push(point);
-                budgets = vec![(1, by_second - 1)];
+                // A sum that does not fit is no budget: there may be other points.
+                let Some(budget) = by_second else { return Front { points, status: Status::Feasible } };
+                budgets = vec![(1, budget)];
             }
             (Status::Unsolvable, _) if points.is_empty() => {
                 return Front { points: vec![point], status: Status::Unsolvable };
@@ -92,8 +94,10 @@ fn in_order(
             let known = best.map(|known| Solution { status: Status::Feasible, proof: None, ..known });
             return finish(task, known.unwrap_or(solution), &config.limits);
         };
-        budgets.push((*objective, task.cost_by(*objective, plan)));
-        let proved = solution.status == Status::Optimal;
+        let spent = task.cost_by(*objective, plan);
+        budgets.extend(spent.map(|spent| (*objective, spent)));
+        // A sum that does not fit is no budget for what comes next.
+        let proved = solution.status == Status::Optimal && spent.is_some();
         best = Some(match best {
             None => solution,
             Some(first) => Solution {
@@ -115,15 +119,17 @@ fn in_order(
 fn finish(task: &Task, mut solution: Solution, limits: &Limits) -> Point {
     let mut values = Vec::new();
     if let Some(plan) = &solution.ground {
-        let plan = GroundPlan { steps: plan.steps.clone(), cost: task.cost_by(0, plan) };
-        solution.plan = Some(crate::plan::decode(task, &plan, limits));
         let objectives = std::iter::once(&task.objective).chain(&task.others);
         values.extend(
             objectives
                 .enumerate()
-                .map(|(position, objective)| objective.metric(task.cost_by(position, &plan))),
+                .map(|(position, objective)| objective.metric(&task.exact_cost_by(position, plan))),
         );
-        solution.ground = Some(plan);
+        if let Some(cost) = task.cost_by(0, plan) {
+            let plan = GroundPlan { steps: plan.steps.clone(), cost };
+            solution.plan = Some(crate::plan::decode(task, &plan, limits));
+            solution.ground = Some(plan);
+        }
     }
     Point { solution, values }
 }
@@ -133,13 +139,22 @@ impl Task {
         objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
     }
 
-    /// What a plan costs by an objective, by its position.
-    fn cost_by(&self, objective: usize, plan: &GroundPlan) -> Int {
-        let costs = plan.steps.iter().map(|step| {
+    /// What the steps of a plan cost by an objective, by its position.
+    fn costs_by(&self, objective: usize, plan: &GroundPlan) -> impl Iterator<Item = Int> {
+        plan.steps.iter().map(move |step| {
             let operator = &self.operators[step.operator.index()];
             Self::cost(operator, objective).at(&step.choice, &operator.sizes())
-        });
-        costs.sum()
+        })
+    }
+
+    /// What a plan costs by an objective; none if that does not fit.
+    fn cost_by(&self, objective: usize, plan: &GroundPlan) -> Option<Int> {
+        self.costs_by(objective, plan).try_fold(0, Int::checked_add)
+    }
+
+    /// What a plan costs by an objective, however much that is.
+    fn exact_cost_by(&self, objective: usize, plan: &GroundPlan) -> Rational {
+        self.costs_by(objective, plan).map(Rational::from_integer).sum()
     }
 
     /// Admits only plans that cost at most so much by an objective.

@@ -26,6 +26,13 @@ pub(crate) struct GroundPlan<N = Int> {
     pub(crate) cost: N,
 }
 
+impl GroundPlan {
+    /// The limit on the cost of cheaper plans.
+    pub(crate) fn below(&self) -> Int {
+        self.cost.saturating_sub(1)
+    }
+}
+
 /// An exact number of any size, in the units of the PDDL files.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Exact(Rational);
@@ -114,13 +121,13 @@ pub(crate) fn decode<N: TaskNumber>(task: &Task<N>, plan: &GroundPlan<N>, limits
     for (step, start) in actions.zip(starts(task, &plan.steps)) {
         let operator = &task.operators[step.operator.index()];
         let sizes = operator.sizes();
-        let duration = operator.duration.at(&step.choice, &sizes);
-        let cost = task.objective.signed(operator.cost.at(&step.choice, &sizes));
+        let duration = operator.duration.at(&step.choice, &sizes).to_rational();
+        let cost = task.objective.signed(&operator.cost.at(&step.choice, &sizes));
         let mut step = Step::new(task, operator, &step.choice, (start, duration, cost));
         step.note_reconfigured(&mut current);
         steps.push(step);
     }
-    Plan { steps, cost: metric(task, plan.cost.clone()) }
+    Plan { steps, cost: metric(task, &plan.cost) }
 }
 
 impl Plan {
@@ -137,7 +144,7 @@ impl Step {
         task: &Task<N>,
         operator: &Operator<N>,
         choice: &[u32],
-        (start, duration, cost): (N, N, N),
+        (start, duration, cost): (Rational, Rational, Rational),
     ) -> Self {
         Self {
             action: task.schema_names[operator.schema as usize].clone(),
@@ -166,18 +173,19 @@ impl Step {
 }
 
 /// The metric of the problem file for a sum of operator costs.
-pub(crate) fn metric<N: TaskNumber>(task: &Task<N>, cost: N) -> Exact {
+pub(crate) fn metric<N: TaskNumber>(task: &Task<N>, cost: &impl TaskNumber) -> Exact {
     task.objective.metric(cost)
 }
 
 impl<N: TaskNumber> Objective<N> {
     /// The metric as the file writes it for a sum of operator costs.
-    pub(crate) fn metric(&self, cost: N) -> Exact {
-        Exact::scaled(&self.signed(cost + self.offset.clone()), self.scale)
+    pub(crate) fn metric(&self, cost: &impl TaskNumber) -> Exact {
+        Exact::scaled(&self.signed(&(cost.to_rational() + self.offset.to_rational())), self.scale)
     }
 
     /// A cost as the file counts it.
-    fn signed(&self, cost: N) -> N {
+    fn signed(&self, cost: &impl TaskNumber) -> Rational {
+        let cost = cost.to_rational();
         if self.maximize { -cost } else { cost }
     }
 }
@@ -213,8 +221,8 @@ fn configuration<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> V
     pairs.map(|(function, design)| (name(*function), argument(task, operator, choice, *design))).collect()
 }
 
-/// The states that a plan passes through, the initial one first; none if a step is not applicable or the last
-/// state is not a goal state.
+/// The states that a plan passes through, the initial one first, and its cost; none if a step is not applicable, the last
+/// state is not a goal state, or the cost does not fit.
 pub(crate) fn replay<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<(Vec<State<N>>, N)> {
     replay_from(task, &task.initial, plan)
 }
@@ -225,17 +233,34 @@ pub(crate) fn replay_from<N: TaskNumber>(
     initial: &State<N>,
     plan: &[GroundStep],
 ) -> Option<(Vec<State<N>>, N)> {
+    let states = pass(task, initial, plan)?;
+    Some((states, cost(task, plan)?))
+}
+
+/// The sum of the costs of steps; none if it does not fit.
+pub(crate) fn cost<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<N> {
+    plan.iter().try_fold(N::zero(), |sum, step| {
+        let operator = &task.operators[step.operator.index()];
+        sum.plus(&operator.cost.at(&step.choice, &operator.sizes())).filter(N::is_moderate)
+    })
+}
+
+/// The states that a plan passes through from a state on; none if a step is not applicable, or the last state is not a goal
+/// state.
+pub(crate) fn pass<N: TaskNumber>(
+    task: &Task<N>,
+    initial: &State<N>,
+    plan: &[GroundStep],
+) -> Option<Vec<State<N>>> {
     let mut states = vec![initial.clone()];
-    let mut cost = N::zero();
     for step in plan {
         let operator = &task.operators[step.operator.index()];
         let state = states.last()?;
         if !operator.admits(&step.choice) || !operator.applicable(state, &step.choice) {
             return None;
         }
-        cost = cost.plus(&operator.cost.at(&step.choice, &operator.sizes()))?;
         let next = task.successor(operator, state, &step.choice)?;
         states.push(next);
     }
-    task.is_goal(states.last()?).then_some((states, cost))
+    task.is_goal(states.last()?).then_some(states)
 }

@@ -94,6 +94,10 @@ impl<N: Number> Quantity<N> {
         self.constant.is_zero() && self.tables.is_empty()
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     pub(crate) fn add(&mut self, other: &Self) {
         self.constant = self.constant.clone() + other.constant.clone();
         for table in &other.tables {
@@ -102,6 +106,10 @@ impl<N: Number> Quantity<N> {
     }
 
     /// Adds a table; one that is constant joins the constant, one over the same slots is merged.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     pub(crate) fn add_table(&mut self, table: Table<N>) {
         match self.tables.iter_mut().find(|present| present.slots == table.slots) {
             Some(present) => {
@@ -114,6 +122,10 @@ impl<N: Number> Quantity<N> {
         self.fold_constant_tables();
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     fn fold_constant_tables(&mut self) {
         let constant = &mut self.constant;
         self.tables.retain(|table| {
@@ -126,6 +138,10 @@ impl<N: Number> Quantity<N> {
         });
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     pub(crate) fn scale(&mut self, factor: &N) {
         if factor.is_one() {
             return;
@@ -138,6 +154,10 @@ impl<N: Number> Quantity<N> {
     }
 
     /// What tables over no other slots than these contribute.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     pub(crate) fn part(&self, slots: &[u32], choice: &[u32], sizes: &[usize]) -> N {
         let own = self.tables.iter().filter(|table| table.slots.iter().all(|slot| slots.contains(slot)));
         own.map(|table| table.values[table.index(choice, sizes)].clone())
@@ -145,6 +165,10 @@ impl<N: Number> Quantity<N> {
     }
 
     /// The value when the slot at position `i` has its `choice[i]`-th admitted design; `sizes` counts those designs.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     pub(crate) fn at(&self, choice: &[u32], sizes: &[usize]) -> N {
         let chosen = self.tables.iter().map(|table| table.values[table.index(choice, sizes)].clone());
         chosen.fold(self.constant.clone(), |sum, value| sum + value)
@@ -153,6 +177,10 @@ impl<N: Number> Quantity<N> {
 
 impl<N: Number> Quantity<N> {
     /// A lower bound that ignores that tables share slots; exact if no two do.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     pub(crate) fn minimum(&self) -> N {
         let least = self.tables.iter().filter_map(|table| table.values.iter().min());
         least.fold(self.constant.clone(), |sum, value| sum + value.clone())
@@ -161,6 +189,10 @@ impl<N: Number> Quantity<N> {
 
 impl Quantity<Int> {
     /// An upper bound, as `minimum` is a lower one.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     pub(crate) fn maximum(&self) -> Int {
         self.constant
             + self.tables.iter().map(|table| table.values.iter().max().copied().unwrap_or(0)).sum::<Int>()
@@ -168,6 +200,7 @@ impl Quantity<Int> {
 }
 
 impl<N> Table<N> {
+    #[expect(clippy::arithmetic_side_effects, reason = "a position in the table, which is in memory")]
     fn index(&self, choice: &[u32], sizes: &[usize]) -> usize {
         self.slots
             .iter()
@@ -191,6 +224,10 @@ impl<N: Number> Linear<N> {
         self.quantity.add(&other.quantity);
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     fn add_coefficient(&mut self, variable: NumericId, factor: N) {
         match self.coefficients.binary_search_by_key(&variable, |(v, _)| *v) {
             Ok(position) => {
@@ -205,6 +242,10 @@ impl<N: Number> Linear<N> {
         }
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     pub(crate) fn scale(&mut self, factor: &N) {
         if factor.is_zero() {
             *self = Self::constant(N::zero());
@@ -216,6 +257,7 @@ impl<N: Number> Linear<N> {
         self.quantity.scale(factor);
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "the negation of 1")]
     pub(crate) fn negated(mut self) -> Self {
         self.scale(&-N::one());
         self

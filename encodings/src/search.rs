@@ -110,49 +110,52 @@ pub(crate) fn search_states<N: TaskNumber>(
     limits: &Limits,
 ) -> Found<N> {
     match Prepared::new(task, limits) {
-        Ok(Some(prepared)) => search_within(task, bounds, &prepared, &task.initial, None, most, limits),
+        Ok(Some(prepared)) => {
+            search_within((task, bounds, &prepared), &task.initial, None, most, limits, &mut |_, _| {})
+        }
         Ok(None) | Err(Interrupted) => Found::Unknown(None),
     }
 }
 
+/// Hears, while a search goes on, what the best plan so far costs, if there is one, and what none costs less than.
+pub(crate) type Hear<'a, N> = &'a mut dyn FnMut(Option<&N>, &N);
+
 /// Searches it from a state of its own, storing at most so many states, for a plan that costs at most `limit`: what a known one
 /// costs, or `Int::MAX`.
 pub(crate) fn search_from(
-    task: &Task,
-    bounds: &Bounds,
-    prepared: &Prepared,
+    (task, bounds, prepared): (&Task, &Bounds, &Prepared),
     initial: &State,
     limit: Int,
     most: usize,
     limits: &Limits,
+    hear: Hear<'_, Int>,
 ) -> Found {
     let limit = (limit < Int::MAX).then_some(limit);
-    search_within(task, bounds, prepared, initial, limit, most, limits)
+    search_within((task, bounds, prepared), initial, limit, most, limits, hear)
 }
 
 fn search_within<N: TaskNumber>(
-    task: &Task<N>,
-    bounds: &impl Estimate<N>,
-    prepared: &Prepared<N>,
+    (task, bounds, prepared): (&Task<N>, &impl Estimate<N>, &Prepared<N>),
     initial: &State<N>,
     limit: Option<N>,
     most: usize,
     limits: &Limits,
+    hear: Hear<'_, N>,
 ) -> Found<N> {
     let known = limit.is_some();
     let mut search = Search::new(task, bounds, prepared, initial, false);
     search.limit = limit;
-    if let Some(found) = search.run(limits, SOON.min(most)) {
+    if let Some(found) = search.run(limits, SOON.min(most), hear) {
         return found;
     }
     let mut some = None;
     if search.best.is_none() && !known {
         let mut greedy = Search::new(task, bounds, prepared, initial, true);
-        greedy.run(limits, SOON.min(most));
+        greedy.run(limits, SOON.min(most), &mut |_, _| {});
         some = greedy.best_plan();
         search.limit = some.as_ref().map(|plan| plan.cost.clone());
     }
-    match search.run(limits, most) {
+    match search.run(limits, most, hear) {
         Some(Found::Unknown(plan)) => Found::Unknown(cheaper(plan, some)),
         Some(found) => found,
         None => Found::Unknown(cheaper(search.best_plan(), some)),
@@ -168,6 +171,7 @@ pub(crate) type ClosedLabel = (Vec<u32>, Vec<Int>, Int);
 
 /// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
 /// nothing left; none if there is a cheaper plan, or if a limit comes first.
+#[expect(clippy::arithmetic_side_effects, reason = "what was paid, and estimates, are at most GROWTH_LIMIT")]
 pub(crate) fn closed_labels(
     task: &Task,
     bounds: &Bounds,
@@ -176,7 +180,7 @@ pub(crate) fn closed_labels(
 ) -> Option<Vec<ClosedLabel>> {
     let prepared = Prepared::new(task, limits).ok()??;
     let mut search = Search::new(task, bounds, &prepared, &task.initial, false);
-    match (search.run(limits, STATE_LIMIT)?, cost) {
+    match (search.run(limits, STATE_LIMIT, &mut |_, _| {})?, cost) {
         (Found::Optimal(plan), Some(cost)) if plan.cost >= cost => {}
         (Found::None, None) => {}
         _ => return None,
@@ -215,10 +219,11 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     }
 
     /// None if there are more states than `most` before anything is known; it may be called again.
-    fn run(&mut self, limits: &Limits, most: usize) -> Option<Found<N>> {
+    fn run(&mut self, limits: &Limits, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
         let mut pulse = limits.pulse();
+        let mut told: Option<(Option<N>, N)> = None;
         while self.nodes.len() <= most {
-            let Some(Reverse((_, steps, id))) = self.open.pop() else {
+            let Some(Reverse((total, steps, id))) = self.open.pop() else {
                 return Some(if self.incomplete { Found::Unknown(self.best_plan()) } else { Found::None });
             };
             if self.nodes[id as usize].dominated {
@@ -229,6 +234,11 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
                     return Some(Found::Unknown(self.best_plan()));
                 }
                 return Some(Found::Optimal(self.plan(id)));
+            }
+            let is_told = |(limit, bound): &(Option<N>, N)| *limit == self.limit && *bound == total;
+            if !self.incomplete && !told.as_ref().is_some_and(is_told) {
+                hear(self.limit.as_ref(), &total);
+                told = Some((self.limit.clone(), total));
             }
             if self.expand(id, steps, &mut pulse).is_err() {
                 return Some(Found::Unknown(self.best_plan()));
@@ -243,6 +253,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
 
     /// Adds all that can be reached from a node by one step. A node whose expansion is interrupted is not expanded, so that the
     /// search must end there.
+    #[expect(clippy::arithmetic_side_effects, reason = "steps are fewer than nodes")]
     fn expand(&mut self, id: u32, steps: u32, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
         let state = self.nodes[id as usize].state.clone();
         let cost = self.nodes[id as usize].cost.clone();

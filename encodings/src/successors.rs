@@ -142,6 +142,10 @@ fn own_front<N: TaskNumber>(
 }
 
 impl<N: TaskNumber> Partial<N> {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
     fn with(&self, other: &Self, slots: &[u32]) -> Self {
         let mut choice = self.choice.clone();
         for slot in slots {
@@ -236,6 +240,7 @@ impl<'a> Combinations<'a> {
 impl Iterator for Combinations<'_> {
     type Item = Vec<u32>;
 
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn next(&mut self) -> Option<Vec<u32>> {
         let current = self.next.take()?;
         let grows = |slot: &u32| (current[*slot as usize] as usize) + 1 < self.sizes[*slot as usize];

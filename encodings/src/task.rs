@@ -291,6 +291,7 @@ pub(crate) struct Choices<'a, N = Int> {
 impl<N> Iterator for Choices<'_, N> {
     type Item = Vec<u32>;
 
+    #[expect(clippy::arithmetic_side_effects, reason = "a design is below the number of them")]
     fn next(&mut self) -> Option<Vec<u32>> {
         loop {
             let current = self.next.take()?;
@@ -432,6 +433,7 @@ impl<N: TaskNumber> Task<N> {
     }
 
     /// Gives the derived variables their values: the least fixpoint of the rules, layer by layer.
+    #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
     pub(crate) fn close(&self, state: &mut State<N>) {
         if self.axioms.is_empty() {
             return;

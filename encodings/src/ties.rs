@@ -224,6 +224,10 @@ impl Ties<'_> {
     }
 
     /// The label after a step; none if it leads beyond the limits.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "costs are not negative and those of labels at most that of a known plan, so that sums with an operator and an estimate fit"
+    )]
     fn successor(&self, label: &Label, operator: OperatorId, choice: &Choice) -> Option<Label> {
         let operator = &self.task.operators[operator.index()];
         let (cost, steps) = (label.cost + choice.cost, label.steps + 1);
@@ -339,6 +343,7 @@ impl Ties<'_> {
     }
 
     /// Keeps a label; none if there are too many.
+    #[expect(clippy::arithmetic_side_effects, reason = "labels are counted up to their limit")]
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
         labels.fronts.entry(label.place(self.task)).or_default().push(labels.all.len());
         labels.all.push(label);

@@ -75,6 +75,7 @@ impl Task {
     }
 
     /// The atoms of [`Task::atoms`] that hold.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub fn holding(&self, situation: &Situation) -> Vec<&str> {
         let values = self.variables.iter().zip(&situation.state.values);
         values
@@ -96,7 +97,7 @@ impl Task {
 
     /// The metric of a plan that leads here.
     pub fn metric(&self, situation: &Situation) -> Exact {
-        metric(self, situation.cost)
+        metric(self, &situation.cost)
     }
 
     /// Everything that can be done; none if numbers grow too large for it.

@@ -120,14 +120,25 @@ fn live_with(
     let zero = BigRational::default();
     let metric = metric_after(domain, problem, &zero).expect("a metric");
     let limits = Limits::none();
-    replanner.plan(&Query {
+    let query = Query {
         problem,
         first: &[],
         metric,
         old: old.map(|old| &old[..]),
         stay_close: false,
         limits: &limits,
-    })
+    };
+    let mut told = Vec::new();
+    let found = replanner.plan_aloud(&query, &mut |progress| told.push(progress));
+    // What is told on the way is true in the end.
+    if let Replanned::Optimal { metric, .. } = &found {
+        for progress in told {
+            let dearest = progress.metric.as_ref();
+            assert!(progress.bound <= *metric, "{progress:?}, {metric}");
+            assert!(dearest.is_none_or(|dearest| metric <= dearest), "{progress:?}, {metric}");
+        }
+    }
+    found
 }
 
 fn new(domain: &Domain, problem: &Problem) -> Replanner {

@@ -139,6 +139,7 @@ impl<'s> Sink<'s> {
         self.push(Severity::Warning, code, span, message.into())
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     fn push(
         &mut self,
         severity: Severity,
@@ -161,6 +162,7 @@ impl<'s> Sink<'s> {
     }
 
     /// How many there were so far.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn len(&self) -> usize {
         self.diagnostics.len() + self.beyond_limit
     }
@@ -175,6 +177,7 @@ impl<'s> Sink<'s> {
     }
 
     /// All that was collected, in the order of the file.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         if let (Some(last), true) = (self.diagnostics.get_mut(LIMIT), self.beyond_limit > 0) {
             *last = Diagnostic::new(
@@ -225,6 +228,10 @@ struct Excerpts(Vec<Excerpt>);
 const CONTEXT: usize = 150;
 
 impl Excerpt {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions in a text in memory; the label starts in the part that is shown"
+    )]
     fn of(sources: &[&Source], file: &str, span: Span, message: &str) -> Option<Self> {
         let source = sources.iter().find(|source| source.name() == file)?;
         let line = source.line_span(span.start);
@@ -297,6 +304,7 @@ impl<'a> Files<'a> for Excerpts {
         self.0.get(id).map(|excerpt| excerpt.line).ok_or(FilesError::FileMissing)
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     fn column_number(&'a self, id: usize, _: usize, byte: usize) -> Result<usize, FilesError> {
         let excerpt = self.0.get(id).ok_or(FilesError::FileMissing)?;
         let before = excerpt.text.get(..byte).unwrap_or(&excerpt.text);

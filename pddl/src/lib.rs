@@ -5,6 +5,13 @@
 //! No grounding, no solver and no file system here.
 //!
 #![doc = include_str!("../README.md")]
+#![warn(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::arithmetic_side_effects
+)]
+#![cfg_attr(test, allow(clippy::arithmetic_side_effects))]
 
 pub mod ast;
 pub mod check;
@@ -44,7 +51,7 @@ pub fn read_objective(
 ) -> Result<Metric, Vec<Diagnostic>> {
     let mut parsed = parse::expression(expression);
     if let Some(tree) = parsed.tree {
-        let end = expression.text().len() as u32;
+        let end = source::place(expression.text().len());
         let metric = Metric { direction, expression: tree, span: ast::Span { start: 0, end } };
         parsed.diagnostics.extend(check::objective(domain, problem, &metric, expression));
         if !has_errors(&parsed.diagnostics) {

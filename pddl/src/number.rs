@@ -30,12 +30,12 @@ pub(crate) fn literal(text: &str) -> Literal {
     let exponent_digits = exponent.map(|exponent| exponent.strip_prefix(['-', '+']).unwrap_or(exponent));
     let is_number = all_digits(whole)
         && all_digits(fraction)
-        && whole.len() + fraction.len() > 0
+        && !(whole.is_empty() && fraction.is_empty())
         && exponent_digits.is_none_or(|digits| !digits.is_empty() && all_digits(digits));
     if !is_number {
         return Literal::Name;
     }
-    let digits = whole.len() + fraction.len();
+    let digits = whole.len().saturating_add(fraction.len());
     let exponent = exponent.map_or(Some(0), |exponent| exponent.parse::<i32>().ok());
     let exponent = exponent.filter(|exponent| written_out(digits, fraction.len(), *exponent) <= DIGITS_LIMIT);
     let Some(exponent) = exponent else { return Literal::TooLong };
@@ -45,9 +45,13 @@ pub(crate) fn literal(text: &str) -> Literal {
 
 /// How many digits a number has without its exponent.
 fn written_out(digits: usize, fraction: usize, exponent: i32) -> usize {
-    let shift = i64::from(exponent) - fraction as i64;
-    let shift_length = shift.unsigned_abs() as usize;
-    if shift >= 0 { digits + shift_length } else { digits.max(shift_length + 1) }
+    // What does not fit is beyond the limit, too.
+    let exponent_length = usize::try_from(exponent.unsigned_abs()).unwrap_or(usize::MAX);
+    match (exponent >= 0, exponent_length.checked_sub(fraction)) {
+        (true, Some(zeros)) => digits.saturating_add(zeros),
+        (true, None) => digits.max(fraction.saturating_sub(exponent_length).saturating_add(1)),
+        (false, _) => digits.max(fraction.saturating_add(exponent_length).saturating_add(1)),
+    }
 }
 
 fn all_digits(text: &str) -> bool {
@@ -55,21 +59,23 @@ fn all_digits(text: &str) -> bool {
 }
 
 /// The value of `whole.fraction` times ten to `exponent`.
+#[expect(clippy::arithmetic_side_effects, reason = "digits are from 0 to 9, and 18 of them fit")]
 fn decimal(whole: &str, fraction: &str, exponent: i32) -> BigRational {
     let digits = || whole.bytes().chain(fraction.bytes());
-    let integer = if whole.len() + fraction.len() <= 18 {
+    let integer = if digits().count() <= 18 {
         let append = |value: i64, digit: u8| value * 10 + i64::from(digit - b'0');
         BigInt::from(digits().fold(0, append))
     } else {
         let digits: Vec<u8> = digits().map(|digit| digit - b'0').collect();
         BigInt::from_radix_be(num_bigint::Sign::Plus, &digits, 10).unwrap_or_default()
     };
-    let shift = exponent - fraction.len() as i32;
-    let power = BigInt::from(10).pow(shift.unsigned_abs());
-    match shift {
-        0 => BigRational::from_integer(integer),
-        1.. => BigRational::from_integer(integer * power),
-        _ => BigRational::new(integer, power),
+    let power = |digits: u32| BigInt::from(10).pow(digits);
+    let fraction = dense(fraction.len());
+    match u32::try_from(exponent) {
+        Ok(shift) if shift == fraction => BigRational::from_integer(integer),
+        Ok(shift) if shift > fraction => BigRational::from_integer(integer * power(shift.abs_diff(fraction))),
+        Ok(shift) => BigRational::new(integer, power(fraction.abs_diff(shift))),
+        Err(_) => BigRational::new(integer, power(fraction.saturating_add(exponent.unsigned_abs()))),
     }
 }
 
@@ -86,7 +92,7 @@ pub fn to_decimal(value: &BigRational) -> Option<String> {
         let prime = BigInt::from(prime);
         while (&rest % &prime).is_zero() {
             rest /= &prime;
-            *count += 1;
+            *count = count.saturating_add(1);
         }
     }
     if !rest.is_one() {
@@ -94,8 +100,9 @@ pub fn to_decimal(value: &BigRational) -> Option<String> {
     }
     let places = count[0].max(count[1]);
     let scaled = (value * BigRational::from_integer(BigInt::from(10).pow(places))).to_integer();
-    let digits = format!("{:0>width$}", scaled.abs().to_string(), width = places as usize + 1);
-    let (whole, fraction) = digits.split_at(digits.len() - places as usize);
+    let places = places as usize;
+    let digits = format!("{:0>width$}", scaled.abs().to_string(), width = places.saturating_add(1));
+    let (whole, fraction) = digits.split_at(digits.len().saturating_sub(places));
     let sign = if scaled.is_negative() { "-" } else { "" };
     let point = if fraction.is_empty() { "" } else { "." };
     Some(format!("{sign}{whole}{point}{fraction}"))
@@ -143,4 +150,9 @@ mod tests {
     fn a_third_has_no_decimal() {
         assert_eq!(to_decimal(&BigRational::new(1.into(), 3.into())), None);
     }
+}
+
+/// An index as a number of 32 bits: of bytes, names or parameters, of which there are fewer than fit into memory.
+pub(crate) fn dense(index: usize) -> u32 {
+    u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }

@@ -5,6 +5,7 @@
 
 use super::ast::Span;
 use super::diagnostic::Sink;
+use crate::number::dense;
 
 /// The deepest nesting that is read. Everything behind the reader may recurse this far,
 /// also without optimisation in a thread of 2 MB; real files stay below 30.
@@ -78,6 +79,7 @@ impl<'t> Item<'t> {
     }
 
     /// The items of a list; none for a symbol.
+    #[expect(clippy::arithmetic_side_effects, reason = "an index in the list of nodes")]
     pub(super) fn items(self) -> Items<'t> {
         Items { tree: self.tree, next: self.index + 1, end: self.node().next }
     }
@@ -124,7 +126,7 @@ impl<'t> Iterator for Items<'t> {
 impl<'s> Tree<'s> {
     /// The lists and symbols that stand in no list.
     pub(super) fn top(&'s self) -> Items<'s> {
-        Items { tree: self, next: 0, end: self.nodes.len() as u32 }
+        Items { tree: self, next: 0, end: dense(self.nodes.len()) }
     }
 }
 
@@ -138,7 +140,7 @@ pub(super) fn read<'s>(text: &'s str, sink: &mut Sink<'_>) -> Option<Tree<'s>> {
         Reader { nodes: Vec::with_capacity(text.len() / 6), open: Vec::new(), sink, last_close: 0 };
     let mut at = 0;
     while let Some((start, end)) = next_token(text, at) {
-        let span = Span { start: start as u32, end: end as u32 };
+        let span = Span { start: dense(start), end: dense(end) };
         match text.as_bytes()[start] {
             b'(' => reader.open(span)?,
             b')' => reader.close(span),
@@ -146,12 +148,16 @@ pub(super) fn read<'s>(text: &'s str, sink: &mut Sink<'_>) -> Option<Tree<'s>> {
         }
         at = end;
     }
-    reader.end(text.len() as u32);
+    reader.end(dense(text.len()));
     let nodes = reader.nodes;
     Some(Tree { text, nodes })
 }
 
 /// The next parenthesis or symbol from byte `at` on.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "positions in a text in memory, which are at most its length"
+)]
 fn next_token(text: &str, mut at: usize) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     loop {
@@ -193,11 +199,12 @@ impl Reader<'_, '_> {
             self.sink.error("P103", span, message);
             return None;
         }
-        self.open.push(self.nodes.len() as u32);
+        self.open.push(dense(self.nodes.len()));
         self.nodes.push(Node { span, next: 0, is_list: true });
         Some(())
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn symbol(&mut self, span: Span, text: &str) {
         // Only the first item of a list opens a section, and only right below `(define`.
         let is_first = self.open.last().is_some_and(|list| *list as usize + 1 == self.nodes.len());
@@ -208,10 +215,11 @@ impl Reader<'_, '_> {
                 _ => self.close_section_before(span, text),
             }
         }
-        self.nodes.push(Node { span, next: self.nodes.len() as u32 + 1, is_list: false });
+        self.nodes.push(Node { span, next: dense(self.nodes.len()) + 1, is_list: false });
     }
 
     /// A section at top level: the `(define` before it was closed too early, so it goes on.
+    #[expect(clippy::arithmetic_side_effects, reason = "the definition was closed before, by a parenthesis")]
     fn reopen_define(&mut self, span: Span, text: &str) {
         // Only a definition that came first and is closed again can go on.
         if self.open[0] == 0 || !self.nodes[0].is_list {
@@ -249,11 +257,12 @@ impl Reader<'_, '_> {
             self.sink.error("P102", span, "this `)` closes nothing").help("remove it");
             return;
         };
-        let next = self.nodes.len() as u32;
+        let next = dense(self.nodes.len());
         let node = &mut self.nodes[list as usize];
         (node.next, node.span.end) = (next, span.end);
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "a parenthesis is a byte of the text")]
     fn end(&mut self, end: u32) {
         if let Some(innermost) = self.open.last() {
             let span = Span {
@@ -266,7 +275,7 @@ impl Reader<'_, '_> {
             };
             self.sink.error("P101", span, message).help("add the missing `)`");
         }
-        let next = self.nodes.len() as u32;
+        let next = dense(self.nodes.len());
         for list in self.open.drain(..) {
             let node = &mut self.nodes[list as usize];
             (node.next, node.span.end) = (next, end);

@@ -2,6 +2,11 @@
 
 use super::ast::Span;
 
+/// The place of a byte. Texts beyond 4 GB are not read; all that is said of them is where their first bytes are.
+pub(crate) fn place(at: usize) -> u32 {
+    u32::try_from(at).unwrap_or(u32::MAX)
+}
+
 /// A text to parse: a file, or what stands for one.
 #[derive(Debug, Clone)]
 pub struct Source {
@@ -24,7 +29,9 @@ impl Source {
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         let text = text.into();
         let newlines = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
-        let line_starts = std::iter::once(0).chain(newlines.map(|(at, _)| at as u32 + 1)).collect();
+        let line_starts = std::iter::once(0)
+            .chain(newlines.map_while(|(at, _)| u32::try_from(at).ok()?.checked_add(1)))
+            .collect();
         Self { name: name.into(), text, line_starts }
     }
 
@@ -50,6 +57,10 @@ impl Source {
     }
 
     /// Line and column of a byte; that of the end for one beyond the end.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions in a text in memory, which are at most its length"
+    )]
     pub fn position(&self, byte: u32) -> Position {
         let index = self.line_index(byte);
         let start = self.line_starts[index] as usize;
@@ -60,12 +71,16 @@ impl Source {
     }
 
     /// The line in which `byte` stands, without its end of line.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a line that is not the last one ends with a line feed"
+    )]
     pub(super) fn line_span(&self, byte: u32) -> Span {
         let index = self.line_index(byte);
         let start = self.line_starts[index] as usize;
         let end = self.line_starts.get(index + 1).map_or(self.text.len(), |next| *next as usize - 1);
         let end = start + self.text[start..end].trim_end_matches('\r').len();
-        Span { start: start as u32, end: end as u32 }
+        Span { start: place(start), end: place(end) }
     }
 
     fn line_index(&self, byte: u32) -> usize {

@@ -20,6 +20,7 @@ impl<'d> Strata<'d> {
     /// # Errors
     ///
     /// Where a derived predicate depends on its own negation there are none.
+    #[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
     pub(crate) fn of(domain: &'d Domain) -> Result<Self, NegativeCycle<'d>> {
         let mut level: FxHashMap<&Name, usize> = FxHashMap::default();
         for axiom in &domain.derived {

@@ -26,6 +26,7 @@ impl TypeHierarchy {
         hierarchy
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "a type was pushed before")]
     fn insert(&mut self, name: &Name) -> usize {
         if let Some(index) = self.index.get(name) {
             return *index;
@@ -53,6 +54,7 @@ impl TypeHierarchy {
         self.index.get(lower).is_some_and(|lower| self.reaches(*lower, *upper))
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn reaches(&self, lower: usize, upper: usize) -> bool {
         let mut seen = vec![lower];
         let mut next = 0;

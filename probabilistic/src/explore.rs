@@ -6,7 +6,7 @@
 use std::hash::Hash;
 
 use crate::error::Error;
-use crate::mdp::Mdp;
+use crate::mdp::{MOST, Mdp, dense};
 use crate::number::Number;
 use crate::states::States;
 
@@ -48,7 +48,7 @@ pub trait Generator<N: Number> {
 pub struct Choices<S, N> {
     transitions: Vec<(S, N)>,
     /// Action, and the end of its transitions.
-    ends: Vec<(u32, u32)>,
+    ends: Vec<(u32, usize)>,
     rewards: Vec<N>,
 }
 
@@ -65,10 +65,10 @@ impl<S: Clone, N: Number> Choices<S, N> {
     /// Where the first choice with an action leads, and its rewards.
     pub fn find(&self, action: u32) -> Option<Written<'_, S, N>> {
         let at = self.ends.iter().position(|(known, _)| *known == action)?;
-        let begin = if at == 0 { 0 } else { self.ends[at - 1].1 as usize };
-        let kinds = self.rewards.len() / self.ends.len();
-        let rewards = &self.rewards[at * kinds..(at + 1) * kinds];
-        Some((&self.transitions[begin..self.ends[at].1 as usize], rewards))
+        let begin = at.checked_sub(1).map_or(0, |before| self.ends[before].1);
+        let kinds = self.rewards.len().checked_div(self.ends.len())?;
+        let rewards = if kinds == 0 { &[] } else { self.rewards.chunks(kinds).nth(at)? };
+        Some((&self.transitions[begin..self.ends[at].1], rewards))
     }
 
     /// Adds a transition to the choice that is being written. Those of probability 0 are dropped.
@@ -81,7 +81,7 @@ impl<S: Clone, N: Number> Choices<S, N> {
     /// Ends the choice that is being written.
     pub fn end(&mut self, action: u32, rewards: impl IntoIterator<Item = N>) {
         self.rewards.extend(rewards);
-        self.ends.push((action, self.transitions.len() as u32));
+        self.ends.push((action, self.transitions.len()));
     }
 
     fn clear(&mut self) {
@@ -122,19 +122,28 @@ pub struct Explored<S, N> {
 ///
 /// # Errors
 /// What the model must not do, a limit, or that the caller wants to stop.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "no more deadlocks than states, which are counted by 32 bits"
+)]
 pub fn explore<N: Number, G: Generator<N>>(
     generator: &G,
     bounds: &Bounds<'_>,
 ) -> Result<Explored<G::State, N>, Error> {
     let mut states = States::new(generator.codes());
+    let most = bounds.states.min(MOST);
+    let too_many = |states: usize| Error::StateLimit { states, limit: most };
     let initial = generator.initial();
-    states.insert(generator.code(&initial), initial);
+    states.insert(generator.code(&initial), initial).ok_or_else(|| too_many(0))?;
     let mut mdp = Mdp::default();
     let kinds = generator.rewards();
     let mut rewards: Vec<Vec<N>> = vec![Vec::new(); kinds];
     let mut choices = Choices::default();
-    let (mut at, mut deadlocks) = (0, 0);
-    while at < states.len() {
+    let mut deadlocks = 0;
+    for at in 0..MOST {
+        if at == states.len() {
+            break;
+        }
         if at % 65_536 == 0 && !(bounds.progress)(states.len()) {
             return Err(Error::Interrupted { states: states.len() });
         }
@@ -148,7 +157,7 @@ pub fn explore<N: Number, G: Generator<N>>(
             for _ in begin..end {
                 if let Some((target, probability)) = transitions.next() {
                     let target = states.insert(generator.code(&target), target);
-                    mdp.push_transition(target, probability);
+                    mdp.push_transition(target.ok_or_else(|| too_many(states.len()))?, probability);
                 }
             }
             begin = end;
@@ -157,19 +166,18 @@ pub fn explore<N: Number, G: Generator<N>>(
                 values.push(reward.next().unwrap_or_else(N::zero));
             }
         }
-        if states.len() > bounds.states {
-            return Err(Error::StateLimit { states: states.len(), limit: bounds.states });
+        if states.len() > most {
+            return Err(too_many(states.len()));
         }
         if mdp.open_choices() == 0 {
             deadlocks += 1;
-            mdp.push_transition(at as u32, N::one());
+            mdp.push_transition(dense(at), N::one());
             mdp.end_choice(DEADLOCK)?;
             for values in &mut rewards {
                 values.push(N::zero());
             }
         }
         mdp.end_state();
-        at += 1;
     }
     Ok(Explored { mdp, states, rewards, deadlocks })
 }

@@ -4,6 +4,8 @@
 //! Components", IPL 116(1), 2016): nodes that are components by themselves, most of them in practice, never get on the
 //! stack, and each component is handed over as soon as it is complete.
 
+use crate::mdp::dense;
+
 /// A node that has not been visited.
 const UNSEEN: u32 = 0;
 /// A node whose component is complete.
@@ -22,6 +24,10 @@ struct Frame<'a> {
 ///
 /// # Errors
 /// What `take` says, at once.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "nodes are numbered from 1 to n, which is below the greatest number of 32 bits; begin is above 0"
+)]
 pub fn visit_components<'a, E>(
     n: usize,
     successors: impl Fn(u32) -> &'a [u32],
@@ -32,7 +38,7 @@ pub fn visit_components<'a, E>(
     let mut stack: Vec<u32> = Vec::new();
     let mut frames: Vec<Frame<'a>> = Vec::new();
     let mut next = 0_u32;
-    for root in 0..n as u32 {
+    for root in 0..dense(n) {
         if low[root as usize] != UNSEEN {
             continue;
         }
@@ -99,6 +105,10 @@ impl Components {
     }
 
     /// How many there are.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the end is listed, too, so that the list is never empty"
+    )]
     pub fn len(&self) -> usize {
         self.starts.len() - 1
     }
@@ -114,7 +124,7 @@ pub fn components<'a>(n: usize, successors: impl Fn(u32) -> &'a [u32]) -> Compon
     let mut found = Components { nodes: Vec::with_capacity(n), starts: vec![0] };
     let Ok(()) = visit_components(n, successors, |component| {
         found.nodes.extend_from_slice(component);
-        found.starts.push(found.nodes.len() as u32);
+        found.starts.push(dense(found.nodes.len()));
         Ok::<(), std::convert::Infallible>(())
     });
     found

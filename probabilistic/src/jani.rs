@@ -130,9 +130,8 @@ fn system(model: &Model, actions: &BTreeMap<&str, Vec<usize>>) -> Value {
 fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
     let mut used = Vec::new();
     formula.expression.names(&mut used);
-    let mut at = 0;
-    while at < used.len() {
-        let name = used[at].0;
+    for at in 0.. {
+        let Some((name, _)) = used.get(at).copied() else { break };
         if name == formula.name {
             let text = format!("`{name}` stands for something with itself in it");
             return Some(Diagnostic::new("Q204", formula.place, text));
@@ -142,7 +141,6 @@ fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
         {
             inner.expression.names(&mut used);
         }
-        at += 1;
     }
     None
 }

@@ -7,6 +7,24 @@
 //!
 //! The crate knows no OWL and no PDDL, opens no file and prints nothing.
 
+#![warn(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    clippy::arithmetic_side_effects
+)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        clippy::arithmetic_side_effects
+    )
+)]
+
 pub mod check;
 pub mod error;
 pub mod explore;

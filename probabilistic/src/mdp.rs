@@ -8,6 +8,15 @@ use num_rational::BigRational;
 use crate::error::Error;
 use crate::number::Number;
 
+/// A process has at most so many states and choices: two numbers of 32 bits are left for what is none of them.
+pub(crate) const MOST: usize = 0xFFFF_FFFE;
+
+/// A position as a number of 32 bits: of a state, a choice or a transition, of which a process has no more than 32 bits count,
+/// or of a part of a text, which is shorter than that in memory.
+pub(crate) fn dense(position: usize) -> u32 {
+    u32::try_from(position).expect("invariant: positions are below 2^32")
+}
+
 /// A Markov decision process; a Markov chain is one with a single choice in each state.
 ///
 /// States are numbers from 0, choices are numbered through over all states.
@@ -37,6 +46,10 @@ impl<N: Number> Default for Mdp<N> {
 
 impl<N: Number> Mdp<N> {
     /// How many states there are.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the end is listed, too, so that the list is never empty"
+    )]
     pub fn states(&self) -> usize {
         self.first_choice.len() - 1
     }
@@ -52,11 +65,19 @@ impl<N: Number> Mdp<N> {
     }
 
     /// The choices of a state.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the start of the next one is there, because the end is listed, too"
+    )]
     pub fn choices(&self, state: usize) -> std::ops::Range<usize> {
         self.first_choice[state] as usize..self.first_choice[state + 1] as usize
     }
 
     /// The state that a choice belongs to.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the first state starts with choice 0, so that there is one that starts before"
+    )]
     pub fn owner(&self, choice: usize) -> usize {
         self.first_choice.partition_point(|first| *first as usize <= choice) - 1
     }
@@ -66,6 +87,10 @@ impl<N: Number> Mdp<N> {
         self.actions[choice]
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the start of the next one is there, because the end is listed, too"
+    )]
     fn range(&self, choice: usize) -> std::ops::Range<usize> {
         self.first_transition[choice] as usize..self.first_transition[choice + 1] as usize
     }
@@ -89,6 +114,10 @@ impl<N: Number> Mdp<N> {
     }
 
     /// Adds a transition to the choice that is being written; transitions to one state are added up.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a position in the list behind the first transition of the choice"
+    )]
     pub fn push_transition(&mut self, target: u32, probability: N) {
         let first = self.first_transition[self.actions.len()] as usize;
         if let Some(at) = self.targets[first..].iter().position(|known| *known == target) {
@@ -102,9 +131,12 @@ impl<N: Number> Mdp<N> {
     /// Ends the choice that is being written.
     ///
     /// # Errors
-    /// There are more transitions than 32 bits can count.
+    /// There are more choices or transitions than 32 bits can count.
     pub fn end_choice(&mut self, action: u32) -> Result<(), Error> {
         let end = u32::try_from(self.targets.len()).map_err(|_| self.too_large())?;
+        if self.actions.len() >= MOST {
+            return Err(self.too_large());
+        }
         self.actions.push(action);
         self.first_transition.push(end);
         Ok(())
@@ -112,10 +144,14 @@ impl<N: Number> Mdp<N> {
 
     /// Ends the state that is being written.
     pub fn end_state(&mut self) {
-        self.first_choice.push(self.actions.len() as u32);
+        self.first_choice.push(dense(self.actions.len()));
     }
 
     /// How many choices the state that is being written has so far.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the state that is being written starts after the choices of those before"
+    )]
     pub fn open_choices(&self) -> usize {
         self.actions.len() - self.first_choice[self.states()] as usize
     }

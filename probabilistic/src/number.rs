@@ -19,6 +19,15 @@ pub(crate) fn is_whole(value: f64) -> bool {
     value.fract() == 0.0 && value < WHOLE
 }
 
+/// A count of things in memory as a double.
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "what is counted is in memory, so that there is less of it than 2^53"
+)]
+pub(crate) fn count(things: usize) -> f64 {
+    things as f64
+}
+
 /// A field with an order; probabilities, rewards and values.
 pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     /// Whether arithmetic is exact.
@@ -137,7 +146,7 @@ impl Number for BigRational {
         self < other
     }
     fn size(&self) -> u64 {
-        self.numer().bits() + self.denom().bits()
+        self.numer().bits().saturating_add(self.denom().bits())
     }
 }
 
@@ -152,7 +161,7 @@ pub fn parse_decimal(text: &str) -> Option<BigRational> {
         return None;
     }
     let digits: num_bigint::BigInt = format!("{whole}{fraction}").parse().ok()?;
-    let shift = exponent - fraction.len() as i32;
+    let shift = exponent.checked_sub(i32::try_from(fraction.len()).ok()?)?;
     let power = num_bigint::BigInt::from(10).pow(shift.unsigned_abs());
     Some(if shift >= 0 { BigRational::from(digits * power) } else { BigRational::new(digits, power) })
 }

@@ -6,6 +6,8 @@
 //! the search for vertices by normals is that of Forejt, Kwiatkowska and Parker, ATVA 2012). So the vertices are those of
 //! policies that remember which targets have been reached, and nothing else.
 
+use std::collections::VecDeque;
+
 use fixedbitset::FixedBitSet;
 
 use crate::mdp::Mdp;
@@ -187,7 +189,8 @@ impl<'a, N: Number> Pareto<'a, N> {
         if best.infinite.contains(0) {
             return Ok(None);
         }
-        let (second, _) = self.solve(&unit(1 - first), Some(&kept))?;
+        let other = usize::from(first == 0);
+        let (second, _) = self.solve(&unit(other), Some(&kept))?;
         let policy = second.policy.iter().zip(&best.policy).map(|(s, b)| if *s == NONE { *b } else { *s });
         self.point(policy.collect()).map(Some)
     }
@@ -205,7 +208,7 @@ impl<'a, N: Number> Pareto<'a, N> {
         while let Some(next) = open.last() {
             let weights = [at.losses[1].minus(&next.losses[1]), next.losses[0].minus(&at.losses[0])];
             let flat = weights.iter().any(|w| !clearly_positive(w));
-            let between = if flat || done.len() + open.len() > VERTICES {
+            let between = if flat || done.len().saturating_add(open.len()) > VERTICES {
                 None
             } else {
                 let (solution, _) = self.solve(&weights, allowed)?;
@@ -279,10 +282,9 @@ impl<'a, N: Number> Pareto<'a, N> {
         let mut all = FixedBitSet::with_capacity(self.mdp.choice_count());
         all.insert_range(..);
         let mut open = vec![all];
-        let mut tried = 0;
+        let mut left = 0..BRANCHES;
         while let Some(allowed) = open.pop() {
-            tried += 1;
-            if tried > BRANCHES {
+            if left.next().is_none() {
                 return Ok(best.map(|best| (Bounded { lower: 0.0, ..best }, false)));
             }
             let vertices = self.vertices(Some(&allowed))?;
@@ -316,12 +318,9 @@ impl<'a, N: Number> Pareto<'a, N> {
     /// The first state on the way of a policy at which another one does something else.
     fn difference(&self, policy: &[u32], other: &[u32]) -> Option<usize> {
         let mut seen = FixedBitSet::with_capacity(self.mdp.states());
-        let mut queue = vec![0];
+        let mut queue = VecDeque::from([0]);
         seen.insert(0);
-        let mut at = 0;
-        while at < queue.len() {
-            let state = queue[at];
-            at += 1;
+        while let Some(state) = queue.pop_front() {
             if policy[state] == NONE || self.terminal.contains(state) {
                 continue;
             }
@@ -330,7 +329,7 @@ impl<'a, N: Number> Pareto<'a, N> {
             }
             for target in self.mdp.targets(policy[state] as usize) {
                 if !seen.put(*target as usize) {
-                    queue.push(*target as usize);
+                    queue.push_back(*target as usize);
                 }
             }
         }
@@ -378,11 +377,11 @@ fn above<N: Number>(vertices: &[Point<N>], segment: Option<(usize, usize)>, limi
 fn lower_hull<N: Number>(vertices: &[Point<N>], limit: &N) -> Option<(N, Option<(usize, usize)>)> {
     // Vertices go from small first losses to small second ones.
     let right = vertices.iter().position(|vertex| keeps(&vertex.losses[1], limit))?;
-    if right == 0 {
-        return Some((vertices[0].losses[0].clone(), None));
-    }
-    let (a, b) = (&vertices[right - 1].losses, &vertices[right].losses);
+    let Some(left) = right.checked_sub(1) else {
+        return Some((vertices[right].losses[0].clone(), None));
+    };
+    let (a, b) = (&vertices[left].losses, &vertices[right].losses);
     let share = a[1].minus(limit).over(&a[1].minus(&b[1]));
     let value = a[0].plus(&share.times(&b[0].minus(&a[0])));
-    Some((value, Some((right - 1, right))))
+    Some((value, Some((left, right))))
 }

@@ -2,7 +2,7 @@
 
 use fixedbitset::FixedBitSet;
 
-use crate::mdp::Mdp;
+use crate::mdp::{Mdp, dense};
 use crate::number::Number;
 use crate::solve::{Direction, NONE, Problem, Solution, solve};
 
@@ -42,7 +42,7 @@ pub fn conserving<N: Number>(problem: &Problem<'_, N>, solution: &Solution<N>) -
             });
             let difference = (worth.to_f64() - value.to_f64()).abs();
             let keeps = if N::EXACT { worth == *value } else { difference <= 1e-9 * value.to_f64() };
-            if keeps || solution.policy[state] == choice as u32 {
+            if keeps || solution.policy[state] as usize == choice {
                 kept.insert(choice);
             }
         }
@@ -100,7 +100,7 @@ pub fn conditioned<N: Number>(
             for (target, probability) in mdp.transitions(choice as usize) {
                 let weighted = probability.times(&success[target]).over(&success[state]);
                 if !weighted.is_zero() {
-                    result.push_transition(target as u32, weighted);
+                    result.push_transition(dense(target), weighted);
                 }
             }
             if result.end_choice(mdp.action(choice as usize)).is_ok() {

@@ -37,15 +37,17 @@ impl<S: Eq + Hash> States<S> {
         Self { list: Vec::new(), numbers }
     }
 
-    /// The number of a state, which it gets if it has none. The code is ignored where there are none.
-    pub(crate) fn insert(&mut self, code: usize, state: S) -> u32 {
-        let next = self.list.len() as u32;
+    /// The number of a state, which it gets if it has none; none where there are too many states to number them. The code is
+    /// ignored where there are none.
+    pub(crate) fn insert(&mut self, code: usize, state: S) -> Option<u32> {
+        let next = u32::try_from(self.list.len()).ok()?;
+        let after = next.checked_add(1)?;
         match &mut self.numbers {
             Numbers::Table(table) => {
-                if table[code] != 0 {
-                    return table[code] - 1;
+                if let Some(known) = table[code].checked_sub(1) {
+                    return Some(known);
                 }
-                table[code] = next + 1;
+                table[code] = after;
             }
             Numbers::Hash(table) => {
                 let list = &self.list;
@@ -55,13 +57,13 @@ impl<S: Eq + Hash> States<S> {
                     |number| hash(&list[*number as usize]),
                 );
                 match entry {
-                    hashbrown::hash_table::Entry::Occupied(known) => return *known.get(),
+                    hashbrown::hash_table::Entry::Occupied(known) => return Some(*known.get()),
                     hashbrown::hash_table::Entry::Vacant(place) => place.insert(next),
                 };
             }
         }
         self.list.push(state);
-        next
+        Some(next)
     }
 
     /// The number of a state with its code, if it was found.

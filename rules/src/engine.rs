@@ -112,6 +112,11 @@ impl Engine {
         self.settle().map_err(|error| vec![error])
     }
 
+    /// The limits of later updates.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
     /// Sets the limits of later updates. Where there is an interrupt, an update keeps what was there before until it ends, which
     /// costs a copy of each relation that changes.
     pub fn set_limits(&mut self, limits: Limits) {
@@ -238,6 +243,13 @@ impl Engine {
         };
         facts.sort_unstable();
         facts.into_iter()
+    }
+
+    /// The predicates of all facts that hold, each with the number of its arguments, in no particular order; of some of them
+    /// no fact holds any more.
+    pub fn predicates(&self) -> impl Iterator<Item = (Symbol, usize)> {
+        let relations = self.store.relations.iter();
+        relations.filter_map(|relation| Some((relation.predicate?, relation.arity())))
     }
 
     /// The rows of the store with these state bits, those of constraints and aggregates left out.

@@ -2,7 +2,9 @@
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use encodings::Limits;
@@ -20,7 +22,8 @@ use crate::cli::check::failure as process_failure;
 use crate::cli::compare_table::{
     Pair, Row, as_json, as_text, csv, memory_since, published_rows, row_json, rows,
 };
-use crate::cli::{Common, Exit, Failure, Format, Situation as Given, output};
+use crate::cli::plan::seconds;
+use crate::cli::{Common, Exit, Failure, Format, Situation as Given, limits, output};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -48,6 +51,9 @@ pub struct Arguments {
     /// Stop beyond so many states.
     #[arg(long, value_name = "N", default_value_t = 20_000_000)]
     state_limit: usize,
+    /// Give up after this many seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    time_limit: Option<Duration>,
     /// Compare for pairs of start and goal in place of the mission's: so many, spread evenly over all pairs.
     #[arg(long, value_name = "N")]
     pairs: Option<usize>,
@@ -80,6 +86,9 @@ fn penalty(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    if let Some(time) = arguments.time_limit {
+        limits::end_after(time, "the time limit was reached before everything was compared", common);
+    }
     let mission = arguments.situation.mission(&arguments.inputs)?;
     let mut roles = mission.roles().clone();
     if let Some((component, rate)) = &arguments.loss {
@@ -113,12 +122,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let mut comparisons = Vec::new();
     let missions = missions(arguments, &mission, coadaptation, &roles)?;
-    let progress = bar(missions.len(), common);
+    let progress = Progress::new(missions.len(), common);
     for (pair, mission, coadaptation) in missions {
         comparisons.push((pair, one(arguments, &mission, &coadaptation, &roles, tasked.as_ref())?));
-        progress.set_position(comparisons.len() as u64);
+        progress.done(comparisons.len());
     }
-    progress.finish_and_clear();
+    progress.end();
     let mut rows: Vec<Row> =
         comparisons.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison)).collect();
     rows.append(&mut added);
@@ -138,10 +147,53 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn bar(missions: usize, common: &Common) -> ProgressBar {
-    let shown = !common.quiet && std::io::stderr().is_terminal();
-    let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-    ProgressBar::with_draw_target(Some(missions as u64), target)
+/// How far the comparison is: a bar on a terminal, and otherwise a line now and then.
+struct Progress {
+    bar: ProgressBar,
+    done: Arc<AtomicUsize>,
+}
+
+impl Progress {
+    fn new(missions: usize, common: &Common) -> Self {
+        let (shown, done) = (std::io::stderr().is_terminal(), Arc::new(AtomicUsize::new(0)));
+        let target =
+            if shown && !common.quiet { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        if !shown && !common.quiet {
+            tell(missions, Arc::clone(&done));
+        }
+        Self { bar: ProgressBar::with_draw_target(Some(missions as u64), target), done }
+    }
+
+    fn done(&self, count: usize) {
+        self.bar.set_position(count as u64);
+        self.done.store(count, Ordering::Relaxed);
+    }
+
+    fn end(self) {
+        self.bar.finish_and_clear();
+        self.done.store(usize::MAX, Ordering::Relaxed);
+    }
+}
+
+/// Between two lines that tell how far the comparison is.
+const TELLING: Duration = Duration::from_secs(5);
+
+/// Tells on standard error how many missions are compared until all are.
+fn tell(missions: usize, done: Arc<AtomicUsize>) {
+    let begun = Instant::now();
+    std::thread::spawn(move || {
+        loop {
+            std::thread::sleep(TELLING);
+            let count = done.load(Ordering::Relaxed);
+            if count >= missions {
+                return;
+            }
+            output::note(&format!(
+                "comparing: {count} of {missions} done, {} s\n",
+                begun.elapsed().as_secs()
+            ));
+        }
+    });
 }
 
 /// The mission itself, or the same mission between other places.

@@ -208,10 +208,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             if common.verbose {
                 plan_exact::explain(&refused);
             }
-            if arguments.certificate.is_some() {
-                output::warnings(common, &[plan_exact::no_certificate(&refused)]);
-            }
-            return finish(point, &Beside::default(), &mission, &objectives, &stages, (arguments, common));
+            let exit =
+                finish(point, &Beside::default(), &mission, &objectives, &stages, (arguments, common))?;
+            let asked = arguments.certificate.as_ref();
+            return Ok(certified(exit, asked.map_or(Ok(()), |_| Err(plan_exact::no_certificate(&refused)))));
         }
         Err(messages) => return Err(failed(messages)),
     };
@@ -226,7 +226,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return Err(fault(reason));
     }
     objectives.confirm(&mission, &problem, &point, &Reading::sequential(task.is_timed()))?;
-    let certified = match &arguments.certificate {
+    let certificate = match &arguments.certificate {
         Some(directory) => {
             certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
         }
@@ -246,12 +246,18 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let beside = Beside { others, blocking };
     let exit = finish(point, &beside, &mission, &objectives, &stages, (arguments, common))?;
-    // The plan is there, and what was asked for besides is not.
-    if let Err(message) = certified {
-        output::note(message.text());
-        return Ok(Exit::BadInput);
+    Ok(certified(exit, certificate))
+}
+
+/// The exit status where a certificate was asked for: the plan is there, and what was asked for besides may not be.
+fn certified(exit: Exit, certificate: Result<(), Message>) -> Exit {
+    match certificate {
+        Ok(()) => exit,
+        Err(message) => {
+            output::note(message.text());
+            Exit::BadInput
+        }
     }
-    Ok(exit)
 }
 
 /// Shows the answer, or writes it to a file.

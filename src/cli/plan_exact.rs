@@ -44,5 +44,5 @@ pub(super) fn explain(refused: &[Message]) {
 /// Why there is no certificate.
 pub(super) fn no_certificate(refused: &[Message]) -> Message {
     let reasons: Vec<&str> = refused.iter().map(|message| message.message.as_str()).collect();
-    Message::warning("M120", format!("no certificate: {}", reasons.join("; ")))
+    Message::error("M120", format!("no certificate: {}", reasons.join("; ")))
 }

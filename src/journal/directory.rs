@@ -104,7 +104,7 @@ impl Contents {
 
     /// The segments from a number on, which follow each other without a gap, or the first thing that is wrong.
     pub(super) fn chain(&self, from: u64) -> Result<Vec<&Segment>, String> {
-        let last = self.segments.keys().chain(self.snapshots.keys()).next_back().copied().unwrap_or(from);
+        let last = self.segments.keys().chain(self.snapshots.keys()).max().copied().unwrap_or(from);
         let mut chain: Vec<&Segment> = Vec::new();
         for number in from..=last.max(from) {
             let name = name("journal", number);
@@ -208,7 +208,9 @@ fn no_journal(first: &[u8]) -> String {
     let old = text.contains("metaplan-journal/1");
     let damaged = text.contains("metaplan-journal/");
     match (old, damaged) {
-        (true, _) => "was written by an older version, which has to bring its mission to an end".to_owned(),
+        (true, _) => "is of the format `metaplan-journal/1`, which this version does not read; let the version that wrote it \
+                      bring its mission to an end, or begin the mission anew with a journal in another directory"
+            .to_owned(),
         (false, true) => "is damaged in its first line".to_owned(),
         (false, false) => "is no journal; it was left as it is".to_owned(),
     }

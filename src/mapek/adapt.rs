@@ -8,7 +8,7 @@
 use pddl::validate::{Options, Verdict, Violation, advance, validate};
 
 use super::Loop;
-use super::analyze::Findings;
+use super::analyze::{Findings, unknown};
 use super::answer::Answer;
 use super::knowledge::Running;
 use super::monitor::{Base, Changes};
@@ -149,6 +149,8 @@ impl Loop {
         let has_plan = self.knowledge.plan.is_some() && !self.knowledge.reached;
         if !has_plan {
             self.knowledge.hopes.clear();
+        } else if self.knowledge.fault.is_some() {
+            // It is not known what there is to hope for.
         } else if !self.knowledge.hopes.is_empty()
             && self.knowledge.now >= self.knowledge.hoped + self.settings.settle
         {
@@ -181,6 +183,10 @@ impl Loop {
 
     /// The best plan, with what is left of the action under way as its first step or as though there was none.
     pub(super) fn plan(&mut self, goes_on: bool) -> Outcome {
+        if let Some(fault) = &self.knowledge.fault {
+            let (because, cost) = (unknown(fault), num_rational::BigRational::default());
+            return Outcome { steps: None, cost, proved: false, because, blocking: Vec::new() };
+        }
         let problem = self.filled();
         let running = self.knowledge.running.as_ref().filter(|_| goes_on);
         let steps = running.is_some() || self.knowledge.running.is_none();

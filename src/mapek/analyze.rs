@@ -6,7 +6,7 @@ use rules::{Fact, Literal, Reason};
 
 use super::Loop;
 use super::answer::{Answer, DesignChange, ObjectiveChange};
-use crate::knowledge::Knowledge;
+use crate::knowledge::{Fault, Knowledge};
 
 /// What the analysis has found.
 #[derive(Debug, Default)]
@@ -19,16 +19,23 @@ pub(super) struct Findings {
     pub(super) errors: Vec<String>,
 }
 
-/// The designs that are available, by local name.
+/// The designs that are available, by local name; none where it is not known what follows.
 pub(super) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
-    let designs = knowledge.runtime().available_designs(None).unwrap_or_default();
-    designs.into_iter().map(|design| design.name).collect()
+    if knowledge.fault().is_some() {
+        return BTreeSet::new();
+    }
+    let designs = knowledge.catalogue().designs().iter().filter(|design| design.available);
+    designs.map(|design| design.individual.name.clone()).collect()
 }
 
 impl Loop {
-    /// Reports what contradicts itself where that has changed; what was observed stays.
+    /// Reports what contradicts itself, and that it is not known what follows, where that has changed; what was observed stays.
     pub(super) fn contradict(&mut self, answers: &mut Vec<Answer>) {
         let Some(knowledge) = self.knowledge.mission.knowledge() else { return };
+        if knowledge.fault() != self.knowledge.fault.as_ref() {
+            self.knowledge.fault = knowledge.fault().cloned();
+            answers.push(Answer::Unconcluded { fault: self.knowledge.fault.clone() });
+        }
         let mut contradictions = knowledge.contradictions();
         for fact in contradictions.iter_mut().flat_map(|own| own.facts.iter_mut()) {
             *fact = local(fact);
@@ -50,7 +57,11 @@ impl Loop {
             .into_iter()
             .map(|design| {
                 let available = now.contains(&design);
-                let because = if available { Vec::new() } else { ruled_out(knowledge, &design) };
+                let because = match knowledge.fault() {
+                    _ if available => Vec::new(),
+                    Some(fault) => vec![unknown(fault)],
+                    None => ruled_out(knowledge, &design),
+                };
                 DesignChange { design, available, because }
             })
             .collect();
@@ -82,6 +93,11 @@ impl Loop {
     }
 }
 
+/// Why nothing counts as available, and no plan is looked for.
+pub(super) fn unknown(fault: &Fault) -> String {
+    format!("it is not known what follows: {}", fault.message)
+}
+
 /// Objectives that have a status which calls for another design.
 fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
     let objectives = knowledge.runtime().objectives().into_iter();
@@ -93,8 +109,8 @@ fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
 pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
     let engine = knowledge.engine();
     let symbols = engine.symbols();
-    let designs = knowledge.view().individuals_of_class_named("FunctionDesign");
-    let Some(individual) = designs.into_iter().find(|individual| individual.name == design) else {
+    let designs = knowledge.catalogue().members(&knowledge.view(), "FunctionDesign");
+    let Some(individual) = designs.iter().find(|individual| individual.name == design) else {
         return Vec::new();
     };
     let (Some(subject), Some(falsehood)) =

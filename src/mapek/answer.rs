@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::number;
 use super::step::PlannedStep;
-use crate::knowledge::Contradiction;
+use crate::knowledge::{Contradiction, Fault};
 
 /// One line of output.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +22,12 @@ pub enum Answer {
     Contradicted {
         /// All contradictions from now on; none where what is known is consistent again.
         contradictions: Vec<Contradiction>,
+    },
+    /// It is not known what follows from what was observed, or it is again. What was observed stays. No design counts as
+    /// available meanwhile, and nothing is begun.
+    Unconcluded {
+        /// Why; none where it is known again.
+        fault: Option<Fault>,
     },
     /// A plan is looked for.
     PlanRequested {
@@ -173,6 +179,15 @@ impl Answer {
                 "designs": designs.iter().map(DesignChange::to_json).collect::<Vec<_>>(),
                 "objectives": objectives.iter().map(ObjectiveChange::to_json).collect::<Vec<_>>(),
             }),
+            Self::Unconcluded { fault } => {
+                let part = |part: fn(&Fault) -> &String| fault.as_ref().map(part);
+                json!({
+                    "answer": "unconcluded",
+                    "code": part(|fault| &fault.code),
+                    "message": part(|fault| &fault.message),
+                    "rule": part(|fault| &fault.rule),
+                })
+            }
             Self::Contradicted { contradictions } => {
                 let object = |own: &Contradiction| json!({ "violated": own.violated, "facts": own.facts });
                 let contradictions: Vec<Value> = contradictions.iter().map(object).collect();

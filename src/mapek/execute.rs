@@ -13,7 +13,9 @@ impl Loop {
     pub(super) fn execute(&mut self, answers: &mut Vec<Answer>) {
         // A plan that does not fit is replaced once; one that still does not fit is none.
         for attempt in 0..2 {
-            if self.knowledge.running.is_some() || self.knowledge.stuck || self.knowledge.reached {
+            let is_known = self.knowledge.fault.is_none();
+            if self.knowledge.running.is_some() || self.knowledge.stuck || self.knowledge.reached || !is_known
+            {
                 return;
             }
             let is_planned = self.knowledge.plan.is_some();
@@ -88,7 +90,7 @@ impl Loop {
     fn objectives(&mut self, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
         let wanted = step.map_or(&[][..], |step| &step.configuration);
         let Some(knowledge) = self.knowledge.mission.knowledge_mut() else { return };
-        if let Err(error) = knowledge.pursue(wanted) {
+        if let Err(error) = knowledge.pursue_in_time(wanted) {
             answers.push(Answer::Error { code: error.code.clone(), message: error.message.clone() });
         }
         self.contradict(answers);

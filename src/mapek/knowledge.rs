@@ -11,6 +11,7 @@ use num_rational::BigRational;
 use super::answer::Effect;
 use super::sequence::Numbers;
 use super::step::PlannedStep;
+use crate::knowledge::Fault;
 use crate::mission::Mission;
 
 /// Everything that the loop knows.
@@ -26,6 +27,8 @@ pub struct Knowledge {
     pub(super) statuses: BTreeMap<String, Vec<String>>,
     /// The axioms and rules that what is known violates.
     pub(super) violated: BTreeSet<String>,
+    /// Why it is not known what follows, as was said last.
+    pub(super) fault: Option<Fault>,
     /// Function to the design that it has.
     pub(super) configuration: BTreeMap<String, String>,
     /// What is still to be requested, if there is a plan.
@@ -81,6 +84,7 @@ impl Knowledge {
             available: BTreeSet::new(),
             statuses: BTreeMap::new(),
             violated: BTreeSet::new(),
+            fault: None,
             configuration: BTreeMap::new(),
             plan: None,
             running: None,

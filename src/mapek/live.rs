@@ -3,13 +3,14 @@
 //! The live planner knows the mission's own domain only. What is left of an action under way is a step that comes first: its
 //! configurations are tried one by one on the domain in which that action is shortened, see [`super::resume`].
 
-use encodings::{First, Limits, Query, Replanned, Replanner};
+use encodings::{First, Limits, Progress, Query, Replanned, Replanner};
 use num_rational::BigRational;
 use pddl::validate::advance_each;
 
 use super::plan::{Ask, Outcome};
 use super::resume::{GATE, resume};
 use super::step::PlannedStep;
+use super::watch::Watch;
 
 /// So many configurations of the action under way are tried at most.
 const CONFIGURATIONS: usize = 256;
@@ -28,7 +29,7 @@ pub(super) enum Live {
 
 impl Live {
     /// A proved answer, or the best plan that was known when time was up; none if it has to be found without a live planner.
-    pub(super) fn plan(&mut self, ask: &Ask<'_>, limits: &Limits) -> Option<Outcome> {
+    pub(super) fn plan(&mut self, ask: &Ask<'_>, limits: &Limits, watch: &Watch) -> Option<Outcome> {
         let metric = ask.metric()?;
         let first = match ask.running {
             Some(_) => first_steps(ask)?,
@@ -49,9 +50,13 @@ impl Live {
             stay_close: ask.stay_close,
             limits,
         };
-        let mut answer = self.ask(ask, &query, false)?;
+        let mut report = |progress: Progress| {
+            let cost = progress.metric.map(|own| own - &metric);
+            watch.improve(cost, progress.bound - &metric);
+        };
+        let mut answer = self.ask(ask, &query, false, &mut report)?;
         if answer == Replanned::Misfit {
-            answer = self.ask(ask, &query, true)?;
+            answer = self.ask(ask, &query, true, &mut report)?;
         }
         let proved = matches!(answer, Replanned::Optimal { .. });
         match answer {
@@ -71,13 +76,19 @@ impl Live {
         }
     }
 
-    fn ask(&mut self, ask: &Ask<'_>, query: &Query<'_>, anew: bool) -> Option<Replanned> {
+    fn ask(
+        &mut self,
+        ask: &Ask<'_>,
+        query: &Query<'_>,
+        anew: bool,
+        report: &mut dyn FnMut(Progress),
+    ) -> Option<Replanned> {
         if anew || matches!(self, Self::Untried) {
             let made = ask.mission.replanner(ask.problem, query.limits);
             *self = made.map_or(Self::Unsuited, Self::Ready);
         }
         match self {
-            Self::Ready(replanner) => Some(replanner.plan(query)),
+            Self::Ready(replanner) => Some(replanner.plan_aloud(query, report)),
             _ => None,
         }
     }

@@ -22,6 +22,7 @@ mod execute;
 mod interrupt;
 mod knowledge;
 mod live;
+mod memo;
 mod monitor;
 pub(crate) mod number;
 mod parts;
@@ -90,6 +91,9 @@ impl Default for Settings {
 /// How long one plan may take unless said otherwise. A robot waits meanwhile.
 const TIME_LIMIT: Duration = Duration::from_secs(10);
 
+/// What follows from an observation is to be found in so many steps; see [`rules::Limits`]. A robot waits meanwhile.
+const STEPS: u64 = 100_000_000;
+
 /// So many names and values may be interned before the knowledge is made anew without what is not used any more.
 const GROWTH: usize = 1024;
 
@@ -127,6 +131,9 @@ impl Loop {
         let digest = digest(&mission, &settings);
         let planner = Planner { time_limit: settings.time_limit, ..Planner::default() };
         let mut knowledge = Knowledge::new(mission);
+        if let Some(base) = knowledge.mission.knowledge_mut() {
+            base.limit(STEPS);
+        }
         if let Some(base) = knowledge.mission.knowledge() {
             knowledge.available = analyze::available(base);
         }

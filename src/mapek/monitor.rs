@@ -11,6 +11,7 @@ use super::event::{Event, Fault};
 use super::knowledge::Running;
 use super::number;
 use super::step::PlannedStep;
+use crate::knowledge::Report;
 use crate::message::{Message, did_you_mean};
 
 /// What a line has changed, for the analysis.
@@ -76,8 +77,11 @@ impl Loop {
                     let text = format!("there is no knowledge base that has a component `{component}`");
                     return Err(Fault::new("M306", text));
                 };
-                let delta = knowledge.report(component, *status).map_err(|message| fault(&message))?;
-                self.note(&delta, changes);
+                let was_known = knowledge.fault().is_none();
+                let delta = knowledge
+                    .take(component, Report::Component(*status))
+                    .map_err(|message| fault(&message))?;
+                self.note(&delta, was_known, changes);
                 Ok(())
             }
             Event::Started { action } => self.running(*action).map(|_| ()),
@@ -101,6 +105,7 @@ impl Loop {
                 let condition = self.knowledge.mission.goal(goal).map_err(|messages| first(&messages))?;
                 self.knowledge.mission.set_goal(condition);
                 self.knowledge.goal = Some(goal.clone());
+                self.planner.memo.forget();
                 changes.must.push("the goal has changed".to_owned());
                 Ok(())
             }
@@ -117,8 +122,10 @@ impl Loop {
     fn measured(&mut self, attribute: &str, value: &BigRational, changes: &mut Changes) -> Result<(), Fault> {
         let is_known = self.attributes.contains(attribute);
         if let Some(knowledge) = self.knowledge.mission.knowledge_mut().filter(|_| is_known) {
-            let delta = knowledge.observe(attribute, value).map_err(|message| fault(&message))?;
-            self.note(&delta, changes);
+            let was_known = knowledge.fault().is_none();
+            let delta =
+                knowledge.take(attribute, Report::measured(value)).map_err(|message| fault(&message))?;
+            self.note(&delta, was_known, changes);
             if let Some(function) = self.knowledge.mission.fed_by(local_name(attribute)) {
                 changes.facts = true;
                 if self.value(&function).is_some() {
@@ -149,10 +156,11 @@ impl Loop {
         Err(Fault::new("M306", text))
     }
 
-    /// What a change of the knowledge base matters for.
-    fn note(&self, delta: &Delta, changes: &mut Changes) {
+    /// What a change of the knowledge base matters for; and whether it was known before what follows.
+    fn note(&self, delta: &Delta, was_known: bool, changes: &mut Changes) {
         let Some(knowledge) = self.knowledge.mission.knowledge() else { return };
-        changes.base = changes.base.max(Base::Stated);
+        let is_known = knowledge.fault().is_none();
+        changes.base = changes.base.max(if was_known && is_known { Base::Stated } else { Base::Watched });
         let engine = knowledge.engine();
         let name = |fact: &Fact| engine.symbols().value(fact.predicate).as_name().map_or("", local_name);
         for fact in delta.insert.iter().chain(&delta.delete) {

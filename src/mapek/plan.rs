@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::knowledge::Running;
 use super::live::Live;
+use super::memo::Memo;
 use super::number;
 use super::resume::{resume, resumed_goal};
 use super::step::PlannedStep;
@@ -60,6 +61,8 @@ pub(crate) struct Planner {
     pub made: Vec<Outcome>,
     /// What is kept from one plan to the next.
     pub live: Live,
+    /// Plans of situations that may come back.
+    pub memo: Memo,
     /// Who looks on.
     pub watch: Watch,
 }
@@ -68,7 +71,7 @@ impl Planner {
     /// The best plan for a situation.
     pub fn plan(&mut self, ask: &Ask<'_>) -> Outcome {
         let recorded = self.recorded.pop_front();
-        let outcome = recorded.unwrap_or_else(|| self.solve(ask));
+        let outcome = recorded.or_else(|| self.memo.recall(ask)).unwrap_or_else(|| self.solve(ask));
         self.made.push(outcome.clone());
         outcome
     }
@@ -76,8 +79,12 @@ impl Planner {
     fn solve(&mut self, ask: &Ask<'_>) -> Outcome {
         let limits = self.time_limit.map_or_else(Limits::none, |time| Limits::none().with_time(time));
         self.watch.begin();
-        let outcome = self.live.plan(ask, &limits).unwrap_or_else(|| from_scratch(ask, limits, &self.watch));
+        let outcome = self
+            .live
+            .plan(ask, &limits, &self.watch)
+            .unwrap_or_else(|| from_scratch(ask, limits, &self.watch));
         self.watch.end();
+        self.memo.note(ask, &outcome);
         outcome
     }
 }
@@ -106,7 +113,7 @@ pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits, watch: &Watch) -> Outc
     };
     let config = Config { limits, ..Config::default() };
     let mut report = |better: encodings::Improvement| {
-        watch.improve(number::of_plan(&better.cost), number::of_plan(&better.lower_bound));
+        watch.improve(Some(number::of_plan(&better.cost)), number::of_plan(&better.lower_bound));
     };
     let solution = optimize(&task, &config, &mut report);
     match (solution.status, solution.plan) {

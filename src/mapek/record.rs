@@ -12,7 +12,7 @@ use super::plan::Outcome;
 use super::sequence::Numbers;
 use super::step::PlannedStep;
 use super::{Loop, Observation, analyze};
-use crate::knowledge::{Part, Statement, Statements};
+use crate::knowledge::{Part, Statement, Statements, Waiting};
 use crate::message::Message;
 
 /// What one observation has led to.
@@ -78,6 +78,7 @@ impl Loop {
             "available": known.available,
             "statuses": known.statuses,
             "violated": known.violated,
+            "waiting": known.mission.knowledge().map(|base| base.waiting().to_record()),
             "configuration": known.configuration,
             "plan": known.plan.as_ref().map(steps),
             "running": running,
@@ -103,6 +104,7 @@ impl Loop {
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
         let wrong =
             |what: &str| Message::error("M320", format!("the snapshot does not fit the mission: {what}"));
+        self.planner.memo.forget();
         self.restore_mission(&snapshot.0).ok_or_else(|| wrong("facts or statements"))?;
         self.restore_work(&snapshot.0).ok_or_else(|| wrong("plan or effects"))?;
         if let Some(base) = self.knowledge.mission.knowledge()
@@ -121,6 +123,8 @@ impl Loop {
         let statements = Statements { added: statements("added")?, removed: statements("removed")? };
         if let Some(base) = known.mission.knowledge_mut() {
             base.restore(&statements).ok()?;
+            base.set_waiting(Waiting::from_record(data.get("waiting").unwrap_or(&Value::Null))?);
+            known.fault = base.fault().cloned();
         }
         let timed = known.mission.problem().init.iter().filter(|e| matches!(e, InitialElement::Timed(..)));
         let mut init: Vec<InitialElement> = timed.cloned().collect();

@@ -15,6 +15,10 @@ use pddl::ast::{
 
 use super::step::PlannedStep;
 
+/// Of the duration of an action that has done all it should and has not ended, so much is taken to be left: one part of so
+/// many. Progress comes in hundredths.
+const LEAST_LEFT: u32 = 1000;
+
 /// Holds once the action under way has ended; no file has such a predicate.
 pub(super) const GATE: &str = "metaplan_resumed";
 
@@ -55,6 +59,8 @@ pub(crate) fn resumed_goal(goal: &Condition) -> Condition {
 fn shorten(action: &mut Action, done: &BigRational) {
     let ActionBody::Durative { duration, conditions, effects } = &mut action.body else { return };
     let left = BigRational::from_integer(1.into()) - done;
+    // The start and the end of what takes no time are one happening, in which one spoils what the other needs.
+    let time_left = left.clone().max(BigRational::new(1.into(), LEAST_LEFT.into()));
     let whole = duration.iter().find(|constraint| constraint.operator == Comparison::Equal);
     let whole = whole.map(|constraint| constraint.expression.clone());
     let mut changes = Vec::new();
@@ -65,7 +71,7 @@ fn shorten(action: &mut Action, done: &BigRational) {
         restore_condition(condition, done, &changes);
     }
     for DurationConstraint { expression, .. } in duration {
-        *expression = product(&left, expression.clone());
+        *expression = product(&time_left, expression.clone());
     }
 }
 

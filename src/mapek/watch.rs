@@ -19,9 +19,9 @@ struct State {
 pub struct Planning {
     /// Which one, from 1: another number is another plan.
     pub number: u64,
-    /// The metric of the best plan so far, if the planner has said that it has one.
+    /// What the steps of the best plan so far add to the metric, if the planner has said that it has one.
     pub cost: Option<BigRational>,
-    /// No plan has a better metric, as far as the planner has said.
+    /// No plan adds less, as far as the planner has said.
     pub lower_bound: Option<BigRational>,
 }
 
@@ -38,10 +38,10 @@ impl Watch {
         });
     }
 
-    pub(super) fn improve(&self, cost: BigRational, lower_bound: BigRational) {
+    pub(super) fn improve(&self, cost: Option<BigRational>, lower_bound: BigRational) {
         self.state(|state| {
             if let Some(planning) = &mut state.planning {
-                (planning.cost, planning.lower_bound) = (Some(cost), Some(lower_bound));
+                (planning.cost, planning.lower_bound) = (cost, Some(lower_bound));
             }
         });
     }

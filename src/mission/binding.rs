@@ -7,12 +7,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use encodings::GroundConfig;
 use num_rational::BigRational;
-use ontology::tomasys::{FunctionDesign, Individual, View};
+
+use ontology::tomasys::{Individual, View};
 use pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
     TypedName,
 };
 
+use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 
 /// What a PDDL symbol stands for.
@@ -183,15 +185,17 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,
-    view: &View<'_>,
+    knowledge: &Knowledge,
     bindings: &Bindings,
 ) -> Vec<Message> {
-    let mut fill = Fill { problem, view, designs: view.function_designs(), warnings: Vec::new() };
+    let known = knowledge.catalogue();
+    let is_known = knowledge.fault().is_none();
+    let mut fill = Fill { problem, view: knowledge.view(), known, is_known, warnings: Vec::new() };
     let types = domain.types.iter().map(|declared| &declared.identifier.name);
     let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
     let actions = domain.actions.iter().map(|action| &action.identifier.name);
-    let known: BTreeSet<&Name> = types.chain(symbols).chain(actions).collect();
-    for name in bindings.own.keys().filter(|name| !known.contains(name)) {
+    let declared: BTreeSet<&Name> = types.chain(symbols).chain(actions).collect();
+    for name in bindings.own.keys().filter(|name| !declared.contains(name)) {
         let text =
             format!("`{name}` is bound, but the domain declares no such type, predicate, function or action");
         fill.warnings.push(Message::warning("M204", text));
@@ -220,23 +224,21 @@ pub(super) fn fill(
 
 struct Fill<'a> {
     problem: &'a mut Problem,
-    view: &'a View<'a>,
-    designs: Vec<FunctionDesign>,
+    view: View<'a>,
+    known: &'a Catalogue,
+    /// Whether it is known what follows.
+    is_known: bool,
     warnings: Vec<Message>,
 }
 
 impl Fill<'_> {
     fn objects(&mut self, domain: &Domain, r#type: &Name, class: &str) {
-        let members = if class.contains(':') {
-            self.view.individuals_of(class)
-        } else {
-            self.view.individuals_of_class_named(class)
-        };
+        let members = self.known.members(&self.view, class);
         let present = domain.constants.iter().chain(&self.problem.objects);
         let mut known: BTreeSet<Name> = present.map(|object| object.identifier.name.clone()).collect();
-        for Individual { iri, name } in members {
-            let spelled = Name::new(&name);
-            if !is_pddl_name(&name) {
+        for Individual { iri, name } in &*members {
+            let spelled = Name::new(name);
+            if !is_pddl_name(name) {
                 let text = format!("<{iri}> is left out: `{name}` is no PDDL name");
                 self.warnings.push(Message::warning("M201", text));
             } else if known.insert(spelled.clone()) {
@@ -252,7 +254,7 @@ impl Fill<'_> {
     }
 
     fn solves(&mut self, predicate: &Name) {
-        for design in self.designs.clone() {
+        for design in self.known.designs() {
             for function in &design.solves {
                 self.fact(predicate, &[&design.individual.name, &function.name]);
             }
@@ -267,14 +269,16 @@ impl Fill<'_> {
                 format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides");
             self.warnings.push(Message::warning("M202", text));
         }
-        for design in self.designs.clone().iter().filter(|design| design.available) {
+        // Where it is not known what follows, nothing counts as available.
+        let is_known = self.is_known;
+        for design in self.known.designs().iter().filter(|design| is_known && design.available) {
             self.fact(predicate, &[&design.individual.name]);
         }
     }
 
     /// One atom for each action: the action (where the predicate has a place for it) and all its functions.
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
-        for action in self.view.actions() {
+        for action in self.known.actions() {
             if only.is_some_and(|only| !only.eq_ignore_ascii_case(&action.individual.name)) {
                 continue;
             }
@@ -313,14 +317,14 @@ impl Fill<'_> {
         match query {
             Query::Estimation(attribute) if declared.parameters.len() == 1 => {
                 let plain = attribute.strip_prefix("fd_").unwrap_or(attribute);
-                for design in &self.designs {
+                for design in self.known.designs() {
                     let value = design.estimations.get(attribute).or_else(|| design.estimations.get(plain));
                     values.extend(value.map(|value| (vec![design.individual.name.clone()], value.clone())));
                 }
             }
             Query::Measured(attribute) if declared.parameters.is_empty() => {
-                let measured = self.view.measurements().into_iter().find(|m| m.attribute == *attribute);
-                values.extend(measured.and_then(|m| m.value).map(|value| (Vec::new(), value)));
+                let measured = self.known.measurements().iter().find(|m| m.attribute == *attribute);
+                values.extend(measured.and_then(|m| m.value.clone()).map(|value| (Vec::new(), value)));
             }
             _ => {}
         }

@@ -183,11 +183,11 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     doubts
 }
 
-/// A warning with the place where a document first has the name, if one of those that were named has it.
+/// A warning with the place where a document first has the name, if one of those that were read has it.
 fn warning(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Message {
     let name = local_name(iri);
     let is_part = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '-');
-    for file in &knowledge.sources().documents {
+    for file in knowledge.documents() {
         let Ok(document) = std::fs::read_to_string(file) else { continue };
         for (line, number) in document.lines().zip(1..) {
             let place = line.match_indices(name).find(|(at, _)| {
@@ -195,7 +195,7 @@ fn warning(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Messag
             });
             if let Some((at, _)) = place.filter(|_| !line.trim_start().starts_with('#')) {
                 let column = line[..at].chars().count() + 1;
-                return Message::warning_at(code, &file.display().to_string(), (number, column), text);
+                return Message::warning_at(code, file, (number, column), text);
             }
         }
     }

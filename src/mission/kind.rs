@@ -123,6 +123,42 @@ pub(super) fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> 
     Err(Message::at(CODE, file, None, text))
 }
 
+/// The first words of a document of a knowledge base, whatever its syntax.
+const BEGINNINGS: [&str; 10] =
+    ["@", "prefix", "base", "<", "_:", "[", "(", "ontology", "version", "\u{feff}"];
+
+/// Messages about knowledge bases without what a document is quoted for that does not begin like one: it may be any file.
+pub(crate) fn discreet(messages: Vec<Message>) -> Vec<Message> {
+    let mut kept: Vec<Message> = Vec::new();
+    for message in messages {
+        let file =
+            message.file.clone().filter(|file| message.code == "O102" && !is_knowledge(Path::new(file)));
+        let Some(file) = file else {
+            kept.push(message);
+            continue;
+        };
+        if !kept.iter().any(|known| known.code == CODE && known.file.as_ref() == Some(&file)) {
+            let text = format!("this should be {}, but is something else", Kind::Knowledge.name());
+            kept.push(Message::at(CODE, &file, None, text));
+        }
+    }
+    kept
+}
+
+/// Whether a file begins like a knowledge base. What is no file, or cannot be read, was given otherwise.
+fn is_knowledge(path: &Path) -> bool {
+    let Ok(file) = std::fs::File::open(path) else { return true };
+    let mut bytes = Vec::new();
+    if file.take(1 << 16).read_to_end(&mut bytes).is_err() {
+        return true;
+    }
+    // Text of two bytes a character has zeros between.
+    let text: String = String::from_utf8_lossy(&bytes).chars().filter(|c| *c != '\0').collect();
+    let first = text.lines().map(str::trim_start).find(|line| !line.is_empty() && !line.starts_with('#'));
+    let first = first.unwrap_or("@").to_ascii_lowercase();
+    BEGINNINGS.iter().any(|word| first.starts_with(word))
+}
+
 #[cfg(test)]
 mod tests {
     use super::{Kind, expect};

@@ -15,9 +15,9 @@ impl Mission {
     pub(crate) fn fill(&self, problem: &mut Problem) -> Vec<Message> {
         self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
             if let Some(adaptation) = &self.adaptation {
-                adaptation.fill(problem, &knowledge.view());
+                adaptation.fill(problem, knowledge.catalogue().designs());
             }
-            binding::fill(&self.domain, problem, &knowledge.view(), &self.bindings)
+            binding::fill(&self.domain, problem, knowledge, &self.bindings)
         })
     }
 
@@ -82,7 +82,7 @@ impl Mission {
         };
         let is_own = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate);
         problem.init.retain(|element| !is_own(element));
-        let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.view().function_designs());
+        let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
         for design in designs.filter(|design| allowed(&design.individual.name, design.available)) {
             problem.init.push(InitialElement::Fact(binding::atom(predicate, &[&design.individual.name])));
         }
@@ -138,9 +138,9 @@ impl Mission {
     /// The designs that solve a function, by local name, whether or not they are available.
     pub(crate) fn designs_of(&self, function: &str) -> Vec<String> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };
-        let solves = |design: &FunctionDesign| design.solves.iter().any(|solved| solved.name == function);
-        let designs = knowledge.view().function_designs().into_iter().filter(solves);
-        designs.map(|design| design.individual.name).collect()
+        let solves = |design: &&FunctionDesign| design.solves.iter().any(|solved| solved.name == function);
+        let designs = knowledge.catalogue().designs().iter().filter(solves);
+        designs.map(|design| design.individual.name.clone()).collect()
     }
 
     /// Grounds a filled problem with a variant of the domain.

@@ -27,7 +27,7 @@ use kind::Kind;
 
 pub use binding::Bindings;
 pub use blocking::Blocking;
-pub(crate) use kind::read;
+pub(crate) use kind::{discreet, read};
 pub use manifest::{Manifest, Scenario};
 pub use native::CoAdaptation;
 

@@ -180,6 +180,27 @@ fn the_battery_of_the_uuv_drops() {
     );
 }
 
+/// An action that has done all it should and has not ended yet goes on.
+#[test]
+fn an_action_that_is_all_done_is_not_cancelled() {
+    for (mission, change) in [
+        ("uuv", r#"{"event":"fact_changed","name":"battery","value":"50"}"#),
+        ("ugv", r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#),
+    ] {
+        let mut control = control(mission);
+        control.start();
+        feed(&mut control, r#"{"event":"action_progress","action":1,"fraction":1}"#);
+        assert_eq!(control.violation(), None, "{mission}");
+        let answers = feed(&mut control, change);
+        let commands = answers.iter().filter_map(Answer::effect).map(|effect| &effect.command);
+        for command in commands {
+            assert!(matches!(command, Command::Reconfigure { .. }), "{mission}: {answers:#?}");
+        }
+        let answers = feed(&mut control, r#"{"event":"action_succeeded","action":1}"#);
+        assert!(answers.iter().filter_map(Answer::effect).any(|effect| effect.action == 2), "{answers:#?}");
+    }
+}
+
 #[test]
 fn what_the_plan_does_not_use_may_fail() {
     let mut ugv = ugv_at_wp2();

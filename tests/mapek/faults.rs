@@ -219,6 +219,28 @@ fn every_bit_and_every_byte_of_a_journal() {
     println!("{:?}", suite.count);
 }
 
+/// A crash between two steps of a checkpoint, in any generation: the loop goes on from the snapshot before.
+#[test]
+fn a_snapshot_that_was_not_written_any_more_is_no_loss() {
+    let suite = Suite::new();
+    let newest = suite.files.keys().rfind(|name| name.starts_with("snapshot")).expect("a snapshot").clone();
+    assert!(!newest.ends_with("000001"), "{newest}: there is a generation before");
+    let number = newest.trim_start_matches("snapshot-");
+    for damaged in [None, Some(b"half a snap".to_vec())] {
+        let mut files = suite.files.clone();
+        files.remove(&newest);
+        files.extend(damaged.map(|bytes| (newest.clone(), bytes)));
+        assert!(open(&files, &suite.pristine) == suite.sound, "the newest snapshot");
+        // The new segment had only just been begun.
+        let segment = format!("journal-{number}");
+        let begun = files[&segment].split_inclusive(|byte| *byte == b'\n').next().expect("a line").to_vec();
+        files.insert(segment, begun);
+        files.remove("lock");
+        let outcome = open(&files, &suite.pristine);
+        assert!(matches!(outcome, Outcome::Sound(..)), "the newest segment: {outcome:?}");
+    }
+}
+
 /// Opening a journal must fail with these words, and leave the file as it is.
 fn refused(directory: &Path, control: &Loop, words: &str) {
     let refused = Journal::open(directory, POLICY, &mut control.clone());
@@ -236,6 +258,9 @@ fn what_is_no_journal_is_left_as_it_is() {
         refused(directory.path(), &pristine, "is no journal");
         assert_eq!(std::fs::read_to_string(&file).expect("a file"), text);
     }
+    let first = "{\"header\":[\"metaplan-journal/1\"]}\n";
+    std::fs::write(&file, first).expect("a file");
+    refused(directory.path(), &pristine, "or begin the mission anew with a journal in another directory");
     std::fs::remove_file(&file).expect("removed");
     std::fs::create_dir(&file).expect("a directory");
     refused(directory.path(), &pristine, "is no regular file");

@@ -102,7 +102,7 @@ impl Fuzz {
                 let status = *pick(random, &["FALSE", "RECOVERED", "TRUE", "ERROR", "OK"]);
                 json!({ "event": "component_status", "component": pick(random, self.world.components), "status": status })
             }
-            3..=7 => {
+            4..=7 => {
                 let (name, low, high) = *pick(random, self.world.measured);
                 json!({ "event": "measured", "attribute": name, "value": low + random.f64() * (high - low) })
             }
@@ -113,6 +113,7 @@ impl Fuzz {
             9 if random.u32(..4) == 0 || control.knowledge().reached() => {
                 json!({ "event": "goal_changed", "goal": pick(random, self.world.goals) })
             }
+            3 | 9 => self.burst(),
             10 => json!({ "event": "tick" }),
             kind => match (running, kind) {
                 (Some(action), 11..=12) => {
@@ -126,6 +127,26 @@ impl Fuzz {
             },
         };
         (event.to_string(), true)
+    }
+
+    /// Two to five reports at one instant.
+    fn burst(&mut self) -> Value {
+        let (random, world) = (&mut self.random, self.world);
+        let (mut components, mut measured) = (Vec::new(), Vec::new());
+        for _ in 0..random.usize(2..=5) {
+            if random.u32(..3) == 0 {
+                let (name, low, high) = *pick(random, world.measured);
+                let value = low + random.f64() * (high - low);
+                measured.push(json!({ "key": name, "value": value.to_string() }));
+            } else {
+                let status = *pick(random, &["FALSE", "FALSE", "RECOVERED", "TRUE"]);
+                components.push(json!({ "key": pick(random, world.components), "value": status }));
+            }
+        }
+        json!({ "status": [
+            { "message": "Component status", "values": components },
+            { "message": "QA status", "values": measured },
+        ] })
     }
 }
 

@@ -10,5 +10,6 @@ mod fuzz;
 mod journal;
 mod kill;
 mod numbers;
+mod runaway;
 mod soak;
 mod worlds;

@@ -5,7 +5,10 @@
 use std::io::Write as _;
 use std::time::{Duration, Instant};
 
-use crate::common::feed;
+use metaplan::journal::{Journal, Policy, Sync};
+use metaplan::mapek::Answer;
+
+use crate::common::{control, feed};
 use crate::fuzz::{Fuzz, WORLDS, step};
 
 /// How long the soak lasts, in seconds, unless `METAPLAN_SOAK_SECONDS` says otherwise.
@@ -98,6 +101,59 @@ fn reaction_times() {
         let limit = |share: usize| times[times.len() * share / 100];
         assert!(limit(50) < Duration::from_millis(5), "median");
         assert!(limit(99) < Duration::from_millis(20), "p99");
+    }
+}
+
+/// How many lines a second of one core takes, with what is reported again and again, and how many it should take.
+const RATES: [(&str, [&str; 2], u64); 4] = [
+    ("what the plan does without fails and recovers", [CAMERA_FAILS, CAMERA_WORKS], 5_000),
+    ("what the plan uses fails and recovers", [KINECT_FAILS, KINECT_WORKS], 1_000),
+    ("measurements that change nothing", [DIM, DIMMER], 20_000),
+    ("measurements across a bound of the plan", [DIM, BRIGHT], 1_000),
+];
+
+const CAMERA_FAILS: &str = r#"{"event":"component_status","component":"c_camera","status":"FALSE"}"#;
+const CAMERA_WORKS: &str = r#"{"event":"component_status","component":"c_camera","status":"TRUE"}"#;
+const KINECT_FAILS: &str = r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#;
+const KINECT_WORKS: &str = r#"{"event":"component_status","component":"c_kinect","status":"TRUE"}"#;
+const DIM: &str = r#"{"event":"measured","attribute":"ambient_light","value":0.5}"#;
+const DIMMER: &str = r#"{"event":"measured","attribute":"ambient_light","value":0.45}"#;
+const BRIGHT: &str = r#"{"event":"measured","attribute":"ambient_light","value":0.95}"#;
+
+#[test]
+#[ignore = "measures; only a release build is of interest"]
+fn lines_a_second() {
+    let lines = 10_000;
+    let pristine = control("ugv");
+    for (what, reports, least) in RATES {
+        for journal in [false, true] {
+            let mut control = pristine.clone();
+            let directory = tempfile::tempdir().expect("a directory");
+            let mut journal = journal.then(|| {
+                let policy = Policy { sync: Sync::Effects, snapshot_every: 1000 };
+                Journal::open(directory.path(), policy, &mut control).expect("it opens").0
+            });
+            let first = match &mut journal {
+                Some(journal) => journal.begin(&mut control).expect("written"),
+                None => control.start(),
+            };
+            assert!(!first.is_empty());
+            let (begun, before) = (Instant::now(), processor_time());
+            for number in 0..lines {
+                let line = reports[number % 2];
+                let answers = match &mut journal {
+                    Some(journal) => journal.handle(&mut control, line, begun.elapsed()).expect("written"),
+                    None => feed(&mut control, line),
+                };
+                assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })));
+            }
+            let taken = before
+                .zip(processor_time())
+                .map_or(begun.elapsed(), |(before, now)| now.saturating_sub(before));
+            let rate = (lines as f64 / taken.as_secs_f64()) as u64;
+            println!("{what}, journal: {}: {rate} a second of one core", journal.is_some());
+            assert!(rate >= if journal.is_some() { least / 2 } else { least }, "{what}: {rate}");
+        }
     }
 }
 

@@ -298,6 +298,22 @@ fn n1_large_cost() {
     check("n1-cost", (domain, problem), vec![(sequential(), best("1", "0: (cheap) [0]"))]);
 }
 
+/// An action that has to lie exactly between two events, with which its start may interfere.
+#[test]
+fn exactly_between_events() {
+    let domain = "(define (domain d) (:requirements :adl :durative-actions :timed-initial-literals) (:predicates (e) (w) (q) (g))
+     (:durative-action a :parameters () :duration (= ?duration 5) :condition (over all (and (e) (w)))
+      :effect (and (when (at start (q)) (at start (not (e)))) (at end (g))))
+     (:action disturb :parameters () :precondition (and) :effect (q)))";
+    let problem = |more: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:init (w) {more} (at 5 (e)) (at 10 (not (w)))) (:goal (g)))"
+        )
+    };
+    check("between", (domain, &problem("")), vec![(sequential(), best("5", "5: (a) [5]"))]);
+    check("between-disturbed", (domain, &problem("(q)")), vec![(sequential(), Truth::NoPlan)]);
+}
+
 /// Large coefficients.
 #[test]
 fn n2_coefficients() {
@@ -339,6 +355,25 @@ fn n3_doublings() {
         let solution = encodings::optimize(&task, &config, &mut |_| {});
         assert!(!matches!(solution.status, Status::UnsolvableWithinHorizon | Status::Unsolvable));
     }
+}
+
+/// A number that outgrows all integers on the only way to the goal: what cannot be calculated is not "no plan".
+#[test]
+fn n3_more_doublings() {
+    let predicates: String = (0..141).map(|at| format!(" (c{at})")).collect();
+    let action = |at: usize| {
+        format!(
+            "(:action s{at} :parameters () :precondition (c{at}) :effect (and (not (c{at})) (c{}) (increase (x) (x))))\n",
+            at + 1
+        )
+    };
+    let actions: String = (0..140).map(action).collect();
+    let domain = format!(
+        "(define (domain d) (:requirements :fluents) (:predicates{predicates}) (:functions (x)) {actions})"
+    );
+    let problem = "(define (problem p) (:domain d) (:init (c0) (= (x) 1)) (:goal (and (c140) (>= (x) 1))))";
+    let plan: Vec<_> = (0..140).map(|at| format!("0: (s{at}) [0]")).collect();
+    check("n3-more", (&domain, problem), vec![(sequential(), best("140", &plan.join(", ")))]);
 }
 
 /// A measure beyond 64 bits.

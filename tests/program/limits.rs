@@ -73,6 +73,13 @@ fn the_time_limit_covers_reading() {
 }
 
 #[test]
+fn a_comparison_is_given_up_in_time() {
+    let outcome = metaplan(&["compare", "missions/camara_like.toml", "--time-limit", "0.05"]);
+    assert_eq!(outcome.status, 12, "{outcome:#?}");
+    assert!(outcome.stderr.contains("M130") && outcome.stdout.is_empty(), "{outcome:#?}");
+}
+
+#[test]
 fn a_certificate_that_cannot_be_written_is_an_error() {
     let directory = tempfile::tempdir().expect("a directory");
     let full = directory.path().join("full");

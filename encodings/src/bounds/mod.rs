@@ -71,10 +71,9 @@ impl Bounds {
         others.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
         for other in &others {
             for goal in &goal_variables {
-                let size =
-                    task.variables[goal.index()].values.len() * task.variables[other.index()].values.len();
-                if goal != other && size <= STATE_LIMIT && patterns.len() < goal_variables.len() + PAIR_LIMIT
-                {
+                let [one, two] = [goal, other].map(|variable| task.variables[variable.index()].values.len());
+                let most = goal_variables.len().saturating_add(PAIR_LIMIT);
+                if goal != other && one.saturating_mul(two) <= STATE_LIMIT && patterns.len() < most {
                     patterns.push(vec![*goal.min(other), *goal.max(other)]);
                 }
             }

@@ -13,7 +13,7 @@ use num_bigint::BigInt;
 
 use crate::bounds::Projection;
 use crate::limits::{Interrupted, Limits};
-use crate::number::Int;
+use crate::number::{GROWTH_LIMIT, Int};
 use crate::task::Task;
 
 /// How many sums are kept.
@@ -31,8 +31,9 @@ impl Partition {
     /// The sum for a state, of which the abstract states are given by position.
     pub(super) fn estimate(&self, states: &[u32]) -> Int {
         let shares = self.parts.iter().map(|(position, to_go)| to_go[states[*position] as usize]);
-        // Dead ends are noticed by the projections themselves.
-        shares.map(|share| share.unwrap_or(0)).sum()
+        // Dead ends are noticed by the projections themselves. A sum that is cut off stays a lower bound, and consistent.
+        let sum = shares.fold(0, |sum: Int, share| sum.saturating_add(share.unwrap_or(0)));
+        sum.min(GROWTH_LIMIT)
     }
 
     fn new(
@@ -47,7 +48,7 @@ impl Partition {
             let to_go = projections[*position].costs_to_go(&left, limits)?;
             if to_go.iter().any(|cost| cost.is_some_and(|cost| cost > 0)) {
                 for (left, taken) in left.iter_mut().zip(projections[*position].saturated(&to_go)) {
-                    *left -= taken;
+                    *left = (*left).saturating_sub(taken);
                 }
                 parts.push((*position, to_go));
             }
@@ -71,13 +72,13 @@ pub(super) fn partitions(
     if useful.len() < 2 || transitions > EFFORT {
         return Ok(Vec::new());
     }
-    let mut budget = (EFFORT / transitions.max(1)).clamp(1, ORDERS);
+    let mut budget = EFFORT.checked_div(transitions).unwrap_or(EFFORT).clamp(1, ORDERS);
     let mut tried: Vec<(Int, Vec<usize>, Partition)> = Vec::new();
     let mut attempt = |order: Vec<usize>, tried: &mut Vec<(Int, Vec<usize>, Partition)>| {
         if budget == 0 || tried.iter().any(|(_, known, _)| *known == order) {
             return Ok(());
         }
-        budget -= 1;
+        budget = budget.saturating_sub(1);
         let partition = Partition::new(projections, &costs, &order, limits)?;
         tried.push((partition.estimate(&initial), order, partition));
         // Stable: of equal ones the earlier stays first.
@@ -91,9 +92,9 @@ pub(super) fn partitions(
         attempt(std::iter::once(first).chain(rest).copied().collect(), &mut tried)?;
     }
     // Then the best order, with two neighbours exchanged.
-    for place in 1..useful.len() {
+    for (before, place) in (1..useful.len()).enumerate() {
         let mut order = tried[0].1.clone();
-        order.swap(place - 1, place);
+        order.swap(before, place);
         attempt(order, &mut tried)?;
     }
     let best = useful.iter().map(|position| alone(*position)).max().unwrap_or(0);
@@ -108,7 +109,8 @@ pub(super) fn partitions(
 fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> Int) -> Vec<usize> {
     let taken = |position: usize| {
         let projection = &projections[position];
-        projection.saturated(projection.costs()).sum::<Int>().max(1)
+        // What is more is no less in the order below.
+        projection.saturated(projection.costs()).fold(0, Int::saturating_add).max(1)
     };
     let mut order: Vec<(usize, Int, Int)> =
         useful.iter().map(|position| (*position, alone(*position), taken(*position))).collect();

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::limits::{Interrupted, Limits};
-use crate::number::{Int, dense};
+use crate::number::{GROWTH_LIMIT, Int, dense};
 use crate::task::{ConditionalEffect, Literal, OperatorId, State, Task, VariableId};
 
 /// An operator leads from one abstract state to another.
@@ -27,6 +27,12 @@ pub(crate) struct Projection {
     idle_cost: Option<Int>,
     /// Cost to the nearest goal state.
     to_go: Vec<Option<Int>>,
+}
+
+/// The sum of two amounts from 0 to the limit of growth, at most that limit: what is known to cost so much may cost more. Sums that are
+/// cut off stay lower bounds, and consistent ones.
+fn sum(a: Int, b: Int) -> Int {
+    a.saturating_add(b).min(GROWTH_LIMIT)
 }
 
 impl Projection {
@@ -80,12 +86,17 @@ impl Projection {
     }
 
     /// The abstract state of a state.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "an abstract state is below the number of them, which are in memory"
+    )]
     pub(crate) fn state(&self, state: &State) -> u32 {
         let values = self.pattern.iter().map(|variable| state.values[variable.index()] as usize);
         dense(self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * size + value))
     }
 
     /// The value of each pattern variable in an abstract state.
+    #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value, so that no size is 0")]
     pub(crate) fn values(&self, state: u32) -> Vec<u32> {
         let mut rest = state as usize;
         let mut values: Vec<_> = self
@@ -107,6 +118,10 @@ impl Projection {
         self.pattern.iter().map(|variable| value(*variable)).collect()
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "abstract states are below the number of them, which are in memory"
+    )]
     fn matching(&self, required: &[Option<u32>]) -> Vec<u32> {
         let mut states = vec![0_u32];
         for (size, value) in self.sizes.iter().zip(required) {
@@ -121,6 +136,10 @@ impl Projection {
 
     /// Where an operator can lead: a conditional effect whose condition the abstract state leaves open may take
     /// place or not.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "abstract states are below the number of them, which are in memory"
+    )]
     fn targets(
         &self,
         source: u32,
@@ -166,6 +185,7 @@ impl Projection {
     }
 
     /// The least costs of operators with which the cost to go is as given.
+    #[expect(clippy::arithmetic_side_effects, reason = "costs to go are between 0 and GROWTH_LIMIT")]
     pub(crate) fn saturated(&self, to_go: &[Option<Int>]) -> impl Iterator<Item = Int> {
         self.operators.iter().map(|(_, transitions)| {
             let falls = transitions
@@ -176,6 +196,7 @@ impl Projection {
     }
 
     /// How much has to be looked at to compute costs to go.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn effort(&self) -> usize {
         self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
     }
@@ -229,7 +250,7 @@ impl Projection {
             to_go[state as usize] = Some(cost);
             for (source, step) in &incoming[state as usize] {
                 if to_go[*source as usize].is_none() {
-                    heap.push(Reverse((cost + step, *source)));
+                    heap.push(Reverse((sum(cost, *step), *source)));
                 }
             }
         }
@@ -263,14 +284,14 @@ impl Projection {
         if let Some(idle) = self.idle_cost {
             for (slot, cost) in next.iter_mut().zip(costs) {
                 if let Some(cost) = cost {
-                    improve(slot, cost + idle);
+                    improve(slot, sum(*cost, idle));
                 }
             }
         }
         for (step, transitions) in &self.operators {
             for transition in transitions {
                 if let Some(cost) = costs[transition.source as usize] {
-                    improve(&mut next[transition.target as usize], cost + step);
+                    improve(&mut next[transition.target as usize], sum(cost, *step));
                 }
             }
         }
@@ -291,7 +312,10 @@ impl Projection {
         limits: &Limits,
     ) -> Result<Option<usize>, Interrupted> {
         let fits = |costs: &[Option<Int>]| {
-            costs.iter().zip(&self.to_go).any(|(c, h)| matches!((c, h), (Some(c), Some(h)) if c + h <= limit))
+            costs
+                .iter()
+                .zip(&self.to_go)
+                .any(|(c, h)| matches!((c, h), (Some(c), Some(h)) if sum(*c, *h) <= limit))
         };
         let mut costs = self.start();
         let mut bound = 0;
@@ -321,17 +345,17 @@ impl Projection {
         let mut costs = self.start();
         for row in limits.watch(allowed) {
             let row = row?;
-            let through = |(c, h): (&Option<Int>, &Option<Int>)| Some((*c)? + (*h)?);
+            let through = |(c, h): (&Option<Int>, &Option<Int>)| Some(sum((*c)?, (*h)?));
             let cheapest = costs.iter().zip(&self.to_go).filter_map(through).min();
             for (flag, (cost, transitions)) in row.iter_mut().zip(&self.operators) {
                 *flag = *flag
                     && if transitions.is_empty() {
-                        cheapest.is_some_and(|known| within(known + cost))
+                        cheapest.is_some_and(|known| within(sum(known, *cost)))
                     } else {
                         transitions.iter().any(|transition| {
                             let through =
                                 (&costs[transition.source as usize], &self.to_go[transition.target as usize]);
-                            matches!(through, (Some(c), Some(h)) if within(c + cost + h))
+                            matches!(through, (Some(c), Some(h)) if within(sum(sum(*c, *cost), *h)))
                         })
                     };
             }

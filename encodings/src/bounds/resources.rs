@@ -32,6 +32,10 @@ impl Resource {
 }
 
 /// The resources of a task.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers of a task are above the least number of their type"
+)]
 pub(super) fn resources(
     task: &Task,
     projections: &[Projection],
@@ -59,6 +63,10 @@ pub(super) fn resources(
 
 /// What an operator uses at least (none if it may replenish); nothing if it may lower the variable below 0.
 #[allow(clippy::option_option)]
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "the numbers of a quantity fit together, so that their sum is above the least number of its type"
+)]
 fn used(operator: &Operator, variable: NumericId) -> Option<Option<Int>> {
     let Some(effect) = operator.numeric_effects.iter().find(|effect| effect.variable == variable) else {
         return Some(Some(0));

@@ -12,7 +12,7 @@ use crate::ground::reach::Reached;
 use crate::ground::reads::Reads;
 use crate::lifted::{Change, Effect, ObjectId};
 use crate::limits::Limits;
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::quantity::NumericId;
 use crate::task::{Argument, Operator, OperatorId, Task};
 
@@ -159,8 +159,8 @@ impl<'a> Builder<'a> {
                 let instead = "a smaller `--epsilon`".into();
                 return Err(Error::Unsupported { construct, instead, place: schema.place });
             }
-            roles[start.index()] = Role::Start(instances.len() as u32);
-            roles[end.index()] = Role::End(instances.len() as u32);
+            roles[start.index()] = Role::Start(dense(instances.len()));
+            roles[end.index()] = Role::End(dense(instances.len()));
             let designs = designs(task, start);
             instances.push(Instance { start, end, over_all, duration, designs, joint: Vec::new() });
         }
@@ -211,7 +211,7 @@ impl<'a> Builder<'a> {
         limits: &Limits,
     ) -> Result<(Vec<Happening>, usize), Error> {
         let whole = (0..roles.len()).filter(|id| roles[*id] == Role::Whole);
-        let whole = whole.flat_map(|id| designs(task, OperatorId(id as u32)));
+        let whole = whole.flat_map(|id| designs(task, OperatorId(dense(id))));
         let used = instances.iter().flat_map(|instance| instance.designs.iter().copied());
         let mut keys = Keys::new(self.separation, used.chain(whole).collect());
         let index = self.footprints.index();
@@ -303,6 +303,10 @@ fn writes(written: &Footprint) -> Vec<u32> {
     ids(&atoms, written.numbers.iter().map(|(number, _)| *number))
 }
 
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "atoms and numbers are held in memory with their names: there are fewer than 2^31"
+)]
 fn ids(atoms: &[AtomId], numbers: impl Iterator<Item = NumericId>) -> Vec<u32> {
     let atoms = atoms.iter().map(|atom| 2 * atom.0);
     let mut all: Vec<u32> = atoms.chain(numbers.map(|number| 2 * number.0 + 1)).collect();

@@ -6,11 +6,14 @@
 //! can be put off, and what came after them with them, so that an end meets what it has to meet. An end fixes its float as
 //! early as it can be. Times of happenings that do not interfere are not ordered by their place in the sequence [2].
 //!
+//! Times are sums over the happenings of a sequence: fewer than 2^32, as nodes are counted, and each less than 2^91 (a duration and the
+//! separation) after another. Upper bounds that are none (`Int::MAX`) are not reckoned with.
+//!
 //! [1] R. Dechter, I. Meiri, J. Pearl: Temporal constraint networks, Artificial Intelligence 49, 1991.
 //! [2] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
 
 use crate::concurrent::time::{Float, Time, place};
-use crate::number::{Int, words};
+use crate::number::{Int, dense, words};
 
 /// A kind of access to an atom or a number.
 pub(super) type Key = u32;
@@ -115,6 +118,7 @@ impl Clocks {
 
     /// Whether timed initial literals to come lie far enough after the accesses that they interfere with, if everything so far
     /// happens as early as it can.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn are_apart(&self, time: Int, after: &[(Key, Int)]) -> bool {
         after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
     }
@@ -138,6 +142,7 @@ impl Clocks {
     }
 
     /// The least time at which an action under way has started.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn start(&self, open: &Open) -> Int {
         self.floats[place(open.float)].lower.base + open.offset
     }
@@ -170,6 +175,7 @@ impl Clocks {
     }
 
     /// The clocks after a happening; none if no time is left for it.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn after(&self, happening: &Happening<'_>) -> Option<Self> {
         let mut next = self.clone();
         let mut lower = Time::constant(self.floor.max(0));
@@ -222,6 +228,7 @@ impl Clocks {
         Some((self.last_float(), 0))
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "a float was pushed before")]
     fn last_float(&self) -> Float {
         Float::try_from(self.floats.len() - 1).expect("invariant: fewer actions under way than operators")
     }
@@ -273,6 +280,7 @@ impl Clocks {
     }
 
     /// From now on, so much after a float is not before `lower`. None if that cannot be.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn raise(&mut self, float: Float, lower: &Time, offset: Int) -> Option<()> {
         let mut bound = lower.shifted(-offset);
         if bound.forget(float).is_some_and(|lag| lag > 0) {
@@ -297,7 +305,7 @@ impl Clocks {
             let other = &mut self.floats[index];
             if let Some(lag) = other.lower.lag(float) {
                 let mut further = own.shifted(lag);
-                if further.forget(index as Float).is_some_and(|lag| lag > 0) {
+                if further.forget(dense(index)).is_some_and(|lag| lag > 0) {
                     return None;
                 }
                 other.lower.put_off(&further, 0);
@@ -307,6 +315,7 @@ impl Clocks {
     }
 
     /// What is before something that has to be before some time has to be before it, too. None if that cannot be.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn spread(&mut self) -> Option<()> {
         for _ in 0..self.floats.len() {
             for index in 0..self.floats.len() {
@@ -321,6 +330,7 @@ impl Clocks {
     }
 
     /// One float is another one and so much more.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn unify(&mut self, float: Float, other: Float, by: Int) -> Option<()> {
         let Start { mut lower, upper } = self.floats[place(float)].clone();
         let target = &mut self.floats[place(other)];
@@ -342,7 +352,7 @@ impl Clocks {
             let start = &mut self.floats[index];
             if let Some(lag) = start.lower.forget(float) {
                 let mut further = at.shifted(lag);
-                if further.forget(index as Float).is_some_and(|lag| lag > 0) {
+                if further.forget(dense(index)).is_some_and(|lag| lag > 0) {
                     return None;
                 }
                 start.lower.put_off(&further, 0);
@@ -382,6 +392,7 @@ impl Clocks {
     }
 
     /// The clocks after timed initial literals: nothing so far was after them, and nothing from now on is before. None if that cannot be.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn timed(&self, event: &Event<'_>) -> Option<Self> {
         let mut next = self.clone();
         next.bound(&self.latest, event.time)?;
@@ -418,6 +429,7 @@ impl Clocks {
     }
 
     /// A time is not after some moment. None if that cannot be.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn bound(&mut self, time: &Time, moment: Int) -> Option<()> {
         for (float, lag) in &time.lags {
             let upper = &mut self.floats[place(*float)].upper;

@@ -91,14 +91,17 @@ impl Unit {
 
     fn of(self, time: &Rational) -> Result<Int, Error> {
         let units = (time.clone() * &Rational::from_integer(self.0)).to_int();
-        units.filter(|units| *units < LIMIT).ok_or_else(|| Error::Overflow { what: "a time".into() })
+        units
+            .filter(|units| (-LIMIT..LIMIT).contains(units))
+            .ok_or_else(|| Error::Overflow { what: "a time".into() })
     }
 
     /// A duration of the task, in this unit.
     pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<Int, Error> {
-        let factor = self.0 / task.time_scale;
-        let duration = task.operators[operator.index()].duration.constant.checked_mul(factor);
-        let duration = duration.filter(|duration| *duration < LIMIT);
+        let factor = self.0.checked_div(task.time_scale);
+        let own = task.operators[operator.index()].duration.constant;
+        let duration = factor.and_then(|factor| own.checked_mul(factor));
+        let duration = duration.filter(|duration| (-LIMIT..LIMIT).contains(duration));
         duration.ok_or_else(|| Error::Overflow { what: "a duration".into() })
     }
 }

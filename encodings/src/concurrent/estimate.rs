@@ -9,7 +9,7 @@ use std::collections::BinaryHeap;
 
 use crate::concurrent::clocks::Clocks;
 use crate::concurrent::compile::{Concurrent, Role};
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::task::{Fact, State, VariableId};
 
 /// The time to the goal for each value of a variable; none if there is no way.
@@ -45,6 +45,10 @@ impl Estimate {
     }
 
     /// None if the goal is out of reach.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "fewer than 2^32 happenings, less than 2^91 apart, and a variable has fewer than 2^32 values"
+    )]
     pub(super) fn left(&self, concurrent: &Concurrent, state: &State, clocks: &Clocks) -> Option<Left> {
         // No plan ends with waiting for what happens by itself.
         let mut left = Left { makespan: clocks.latest().max(clocks.floor()), sum: 0 };
@@ -55,7 +59,7 @@ impl Estimate {
         for path in &self.paths {
             let more = path.left[state.values[path.variable] as usize]?;
             if more > 0 {
-                let since = clocks.changed(path.variable as u32).unwrap_or(-self.separation);
+                let since = clocks.changed(dense(path.variable)).unwrap_or(-self.separation);
                 left.makespan = left.makespan.max(since + more);
                 left.sum += more;
             }
@@ -65,6 +69,10 @@ impl Estimate {
 }
 
 /// Dijkstra's algorithm from the value of the goal backwards.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "a path takes fewer steps than the variable has values, each less than 2^91"
+)]
 fn path(concurrent: &Concurrent, goal: Fact) -> Path {
     let variable = goal.variable;
     let values = concurrent.task.variables[variable.index()].values.len();
@@ -81,7 +89,7 @@ fn path(concurrent: &Concurrent, goal: Fact) -> Path {
         }
         left[value as usize] = Some(distance);
         for (from, _, weight) in into[value as usize].iter().map(|index| edges[*index]) {
-            let all = 0..values as u32;
+            let all = 0..dense(values);
             let sources = from.map_or(all, |from| from..from + 1);
             for source in sources.filter(|source| left[*source as usize].is_none()) {
                 open.push(Reverse((distance + weight, source)));
@@ -92,6 +100,10 @@ fn path(concurrent: &Concurrent, goal: Fact) -> Path {
 }
 
 /// All changes of a variable.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "durations and the separation are below 2^90; setters are counted in memory"
+)]
 fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
     let task = &concurrent.task;
     let operators = || task.operators.iter().zip(&concurrent.happenings);

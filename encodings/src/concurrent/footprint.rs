@@ -12,6 +12,7 @@ use crate::ground::evaluate::{AtomId, Binding, Failure, World};
 use crate::ground::reads::{Reads, Slot, fits};
 use crate::ground::residual::Residual;
 use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId, Schema};
+use crate::number::dense;
 use crate::quantity::NumericId;
 use pddl::ast::Assignment;
 
@@ -139,11 +140,11 @@ impl<'a> Footprints<'a> {
         let mut written = Written::default();
         for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {
             let entry = written.atoms.entry(*predicate).or_default();
-            entry.push((arguments.clone(), AtomId(index as u32)));
+            entry.push((arguments.clone(), AtomId(dense(index))));
         }
         for (index, (function, arguments)) in self.world.numerics.keys().enumerate() {
             let entry = written.numbers.entry(*function).or_default();
-            entry.push((arguments.clone(), NumericId(index as u32)));
+            entry.push((arguments.clone(), NumericId(dense(index))));
         }
         written.exact = written
             .atoms

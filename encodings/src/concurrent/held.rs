@@ -4,6 +4,7 @@ use crate::concurrent::compile::Instance;
 use crate::task::{Condition, Fact, Task, VariableId};
 
 /// Takes out the variables that only link a condition over all to an end.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(super) fn drop_held(task: &mut Task, instances: &[Instance]) {
     let mut held = vec![false; task.variables.len()];
     for id in instances.iter().filter_map(|instance| instance.over_all) {

@@ -7,7 +7,7 @@ use crate::concurrent::clocks::Key;
 use crate::concurrent::footprint::{Footprint, Way};
 use crate::ground::evaluate::AtomId;
 use crate::lifted::ObjectId;
-use crate::number::Int;
+use crate::number::{Int, dense};
 use crate::quantity::NumericId;
 
 /// A kind of access.
@@ -58,7 +58,7 @@ impl Keys {
     }
 
     fn key(&mut self, access: Access) -> Key {
-        self.known.insert_full(access, ()).0 as Key
+        dense(self.known.insert_full(access, ()).0)
     }
 
     /// The accesses of a happening by what it reads and writes.

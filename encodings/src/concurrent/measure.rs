@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::lifted::{Expression, Metric, Rational};
 use crate::normalize::duration::time_factor;
-use crate::number::{Int, LIMIT, checked_lcm};
+use crate::number::{Int, LIMIT, TaskNumber, checked_lcm};
 use crate::plan::Exact;
 use crate::task::Objective;
 use pddl::ast::Direction;
@@ -27,12 +27,13 @@ impl Measure {
         let common = by_time.denominator().and_then(|own| checked_lcm(own, objective.scale));
         let scale = common.filter(|scale| *scale < LIMIT).ok_or_else(overflow)?;
         let time = (by_time * Rational::from_integer(scale)).to_int();
-        let cost = scale / objective.scale;
+        let cost = scale.checked_div(objective.scale).ok_or_else(overflow)?;
+        let offset = objective.offset.checked_mul(cost).filter(Int::is_moderate).ok_or_else(overflow)?;
         Ok(Self {
             time: time.filter(|time| *time < LIMIT).ok_or_else(overflow)?,
             cost,
             scale,
-            offset: objective.offset.checked_mul(cost).ok_or_else(overflow)?,
+            offset,
             maximize: objective.maximize,
         })
     }
@@ -43,6 +44,7 @@ impl Measure {
     }
 
     /// The metric of the file.
+    #[expect(clippy::arithmetic_side_effects, reason = "offset and totals are at most GROWTH_LIMIT")]
     pub(super) fn metric(&self, total: Int) -> Exact {
         let sign = if self.maximize { -1 } else { 1 };
         Exact::scaled(&(sign * (total + self.offset)), self.scale)

@@ -182,9 +182,10 @@ impl Concurrent {
                 _ => continue,
             };
             let operator = &self.task.operators[id.index()];
-            let sign = if self.task.objective.maximize { -1 } else { 1 };
-            let cost = sign * (operator.cost.constant + end);
-            steps.push(((time, *id), Step::new(&self.task, operator, &[], (time, duration, cost))));
+            let cost = Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end);
+            let cost = if self.task.objective.maximize { -cost } else { cost };
+            let [start, duration] = [time, duration].map(Rational::from_integer);
+            steps.push(((time, *id), Step::new(&self.task, operator, &[], (start, duration, cost))));
         }
         steps.sort_by_key(|(place, _)| *place);
         let mut current = Vec::new();

@@ -12,6 +12,7 @@ type Bound = (usize, usize, Int);
 
 /// The earliest times of a sequence that the search has found. `together` says which happenings take place at the time of
 /// the one before.
+#[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
 pub(super) fn schedule(concurrent: &Concurrent, sequence: &[OperatorId], together: &[bool]) -> Vec<Int> {
     let mut times = vec![0; sequence.len()];
     let bounds = bounds(concurrent, sequence, together, &mut times);
@@ -32,6 +33,10 @@ pub(super) fn schedule(concurrent: &Concurrent, sequence: &[OperatorId], togethe
     times
 }
 
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "the first happening is together with none; durations are below 2^90"
+)]
 fn bounds(
     concurrent: &Concurrent,
     sequence: &[OperatorId],

@@ -19,7 +19,7 @@ use crate::concurrent::compile::{Concurrent, Role};
 use crate::concurrent::estimate::Estimate;
 use crate::concurrent::keys::Accesses;
 use crate::limits::Limits;
-use crate::number::{GROWTH_LIMIT, Int, words};
+use crate::number::{GROWTH_LIMIT, Int, dense, words};
 use crate::search::is_monotone;
 use crate::successors::OperatorIndex;
 use crate::task::{OperatorId, State};
@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
         let begins = |id: &OperatorId| {
             matches!(concurrent.happenings[id.index()].role, Role::Start(_) | Role::Whole | Role::Timed(_))
         };
-        let operators = (0..concurrent.task.operators.len() as u32).map(OperatorId).filter(begins);
+        let operators = (0..dense(concurrent.task.operators.len())).map(OperatorId).filter(begins);
         let mut search = Self {
             concurrent,
             estimate,
@@ -109,6 +109,7 @@ impl<'a> Search<'a> {
 
     /// Searches until nothing better is left, `most` nodes are expanded, or a limit is reached; greedily, until a plan is
     /// found. `report` hears of each better plan and of what none can get below.
+    #[expect(clippy::arithmetic_side_effects, reason = "nodes are counted by 32 bits")]
     pub(super) fn run(
         &mut self,
         limits: &Limits,
@@ -183,6 +184,7 @@ impl<'a> Search<'a> {
     }
 
     /// The node after a happening; none if it cannot happen here.
+    #[expect(clippy::arithmetic_side_effects, reason = "a node is no deeper than there are nodes")]
     fn successor(&self, id: u32, operator_id: OperatorId) -> Result<Option<Node>, Unfit> {
         let concurrent = self.concurrent;
         let Node { state, clocks, cost, depth, .. } = &self.nodes[id as usize];
@@ -270,7 +272,7 @@ impl<'a> Search<'a> {
         if !self.monotone {
             key.extend(node.state.numbers.iter().flat_map(|number| words(*number)));
         }
-        let id = self.nodes.len() as u32;
+        let id = dense(self.nodes.len());
         let (guards, separation) = (&concurrent.guards, concurrent.separation);
         let dominates = |own: &Node, other: &Node| {
             own.cost <= other.cost

@@ -13,6 +13,7 @@ use crate::lifted::{
     Bound, Change, Effect, Event, Expression, Formula, Lifted, ObjectId, Predicate, PredicateId, Rational,
     Schema, Term,
 };
+use crate::number::dense;
 use pddl::ast::{Comparison, Name, Span};
 
 /// Which happening of a schema another schema stands for.
@@ -67,14 +68,14 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
             if !events.is_empty() && matches!(half, Half::End | Half::Whole) {
                 part.end_effects.push(effect(Change::Delete(waited, Vec::new())));
             }
-            part.action = lifted.schemas.len() as u32;
+            part.action = dense(lifted.schemas.len());
             lifted.schemas.push(part);
             origins.push(Origin { schema: index, half });
             designs.push(own.clone());
         }
     }
     for (index, event) in events.iter().enumerate() {
-        let schema = timed(&lifted, index as u32, event);
+        let schema = timed(&lifted, dense(index), event);
         lifted.schemas.push(schema);
         origins.push(Origin { schema: usize::MAX, half: Half::Timed(index) });
         designs.push(Vec::new());
@@ -118,12 +119,12 @@ fn parts(lifted: &mut Lifted, schema: &Schema) -> Vec<(Half, Schema)> {
     if known == Some(zero) {
         return all;
     }
-    let parameters: Vec<Term> = (0..schema.parameters.len() as u32).map(Term::Parameter).collect();
+    let parameters: Vec<Term> = (0..dense(schema.parameters.len())).map(Term::Parameter).collect();
     let mut symbol = |text: &str, running| {
         let name = Name::new(&format!("{text} {}", schema.name));
         let arity = parameters.len();
         lifted.predicates.push(Predicate { name, arity, fluent: true, derived: false, running });
-        PredicateId(lifted.predicates.len() as u32 - 1)
+        last_predicate(lifted)
     };
     let running = symbol("running", true);
     let later = [&schema.over_all, &schema.at_end].into_iter().flat_map(conjuncts);
@@ -147,7 +148,7 @@ fn parts(lifted: &mut Lifted, schema: &Schema) -> Vec<(Half, Schema)> {
             let name = Name::new(&format!("{text} {}", schema.name));
             let arity = parameters.len();
             lifted.predicates.push(Predicate { name, arity, fluent: true, derived: false, running: false });
-            PredicateId(lifted.predicates.len() as u32 - 1)
+            last_predicate(lifted)
         };
         let held = symbol("held");
         let own = [literal(running, &parameters)].into_iter().chain(changing.into_iter().cloned()).collect();
@@ -162,6 +163,7 @@ fn parts(lifted: &mut Lifted, schema: &Schema) -> Vec<(Half, Schema)> {
 }
 
 /// What happens by itself at one time, after what happened before.
+#[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
 fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     let phase = |number: u32| vec![Term::Object(ObjectId(lifted.time.first_phase.0 + number))];
     let mut changes: Vec<(PredicateId, &[ObjectId], bool)> = Vec::new();
@@ -195,7 +197,12 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
         duration: None,
         is_chosen: false,
         joint: None,
-        action: lifted.schemas.len() as u32,
+        action: dense(lifted.schemas.len()),
         place: Place { file: File::Problem, span: Span::default() },
     }
+}
+
+/// The predicate that was declared last.
+fn last_predicate(lifted: &Lifted) -> PredicateId {
+    PredicateId(dense(lifted.predicates.len().saturating_sub(1)))
 }

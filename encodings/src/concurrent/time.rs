@@ -29,11 +29,13 @@ impl Time {
     }
 
     /// Later, or earlier, by so much.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn shifted(&self, by: Int) -> Self {
         Self { base: self.base + by, lags: self.lags.iter().map(|(float, lag)| (*float, lag + by)).collect() }
     }
 
     /// From now on not before `other` and so much more.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn put_off(&mut self, other: &Self, by: Int) {
         self.base = self.base.max(other.base + by);
         for (float, lag) in &other.lags {
@@ -55,6 +57,7 @@ impl Time {
     }
 
     /// Whether this is so much before `other`, whatever the floats come to.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn precedes(&self, other: &Self, by: Int) -> bool {
         self.base + by <= other.base
             && self.lags.iter().all(|(float, lag)| other.lag(*float).is_some_and(|later| lag + by <= later))

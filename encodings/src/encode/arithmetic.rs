@@ -8,6 +8,7 @@ use crate::sat::Lit;
 pub(crate) type Bits = Vec<Lit>;
 
 /// How many bits a number needs, sign included.
+#[expect(clippy::arithmetic_side_effects, reason = "a number has at most 128 leading zeros")]
 pub(crate) fn width(low: Int, high: Int) -> usize {
     let bits = |number: Int| {
         129 - if number < 0 { (!number).leading_zeros() } else { number.leading_zeros() } as usize
@@ -171,6 +172,7 @@ impl Arithmetic<'_> {
     }
 
     /// The number is at most a constant.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most(&mut self, bits: &Bits, limit: Int) {
         let width = bits.len().max(width(limit, limit));
         let bits = Self::extend(bits, width);

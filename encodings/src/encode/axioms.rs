@@ -54,6 +54,7 @@ impl Encoding<'_> {
     }
 
     /// Variables of a layer must not hold because of each other alone.
+    #[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
     fn levels(
         &mut self,
         step: usize,

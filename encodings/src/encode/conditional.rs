@@ -19,6 +19,10 @@ pub(super) struct Fires {
 
 impl Encoding<'_> {
     /// The variables of the conditional effects at a step, and what they set.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "steps are fewer than the horizon, whose formula is in memory"
+    )]
     pub(super) fn conditional(&mut self, step: usize) {
         let mut all = Vec::new();
         for index in 0..self.operators[step].len() {

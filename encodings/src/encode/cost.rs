@@ -50,14 +50,15 @@ impl Cost {
 
     /// Adds clauses that admit only plans with cost at most `limit`.
     pub(super) fn at_most(&self, formula: &mut Formula, limit: Int) {
-        let gap = limit - self.lower;
+        // Below 0 if it is cut off.
+        let gap = limit.saturating_sub(self.lower);
         if gap < 0 {
             formula.add(Family::Bound, []);
             return;
         }
         match &self.spent {
             Spent::Order(amounts) => {
-                if let Some((_, literal)) = amounts.range(gap + 1..).next() {
+                if let Some((_, literal)) = amounts.range(gap.saturating_add(1)..).next() {
                     formula.add(Family::Bound, [!*literal]);
                 }
             }
@@ -78,7 +79,7 @@ impl Encoding<'_> {
             self.formula.add(Family::Bound, []);
             return Some(Cost { lower: Int::MAX, spent: Spent::Order(BTreeMap::new()) });
         };
-        let gap = cost.limit - lower;
+        let gap = cost.limit.saturating_sub(lower);
         if gap < 0 {
             self.formula.add(Family::Bound, []);
             return Some(Cost { lower, spent: Spent::Order(BTreeMap::new()) });
@@ -133,6 +134,10 @@ impl Encoding<'_> {
     }
 
     /// The reduced cost of an operator with its cheapest designs, by abstract state where that matters.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "costs to go and the cost of an operator are at most GROWTH_LIMIT; steps are in memory"
+    )]
     fn reduced(
         &mut self,
         step: usize,
@@ -202,6 +207,10 @@ impl Encoding<'_> {
     }
 
     /// `spent ≥ v ∧ increment ≥ w → spent' ≥ v + w`; sums above the gap are conflicts.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "amounts are at most the gap, which is at most GROWTH_LIMIT; steps are in memory"
+    )]
     fn add_amounts(
         &mut self,
         source: &Increments,
@@ -253,6 +262,7 @@ impl Encoding<'_> {
     }
 
     /// The amounts of a source, each implying the next smaller one, and what it has more than that.
+    #[expect(clippy::arithmetic_side_effects, reason = "amounts come in ascending order")]
     fn apart(&mut self, source: &Increments, gap: Int, step: u32, stage: u32) -> Vec<(Lit, Int)> {
         let mut weighted: Vec<(Lit, Int)> = Vec::new();
         let mut before = 0;
@@ -266,6 +276,7 @@ impl Encoding<'_> {
         weighted
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
     fn add_in_binary(&mut self, steps: &[Vec<Increments>], gap: Int) -> Bits {
         let width = crate::encode::arithmetic::width(0, gap) + 2;
         let mut spent = Arithmetic::constant(0, 1);
@@ -290,6 +301,10 @@ impl Encoding<'_> {
 /// The tables of an operator in the task's numbering: combinations of (slot, design), and how much more than
 /// the cheapest each of them costs.
 #[allow(clippy::type_complexity)]
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "the numbers of a quantity fit together, whatever their signs"
+)]
 fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<Int>)> {
     let tables = operator.cost.tables.iter();
     tables
@@ -321,6 +336,10 @@ pub(super) fn combinations(operator: &Operator, slots: &[u32]) -> Vec<Vec<(usize
 }
 
 /// The amounts that can be spent after one more source.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "amounts are at most the gap, which is at most GROWTH_LIMIT"
+)]
 fn next_amounts(spent: &BTreeSet<Int>, increments: impl Iterator<Item = Int>, gap: Int) -> BTreeSet<Int> {
     let mut amounts = spent.clone();
     for increment in increments {

@@ -83,6 +83,7 @@ pub(super) fn equal_designs(task: &Task, slot: SlotId, limits: &Limits) -> Resul
 }
 
 /// All that speaks of the designs of a slot; what operators share is there once.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn witnesses<'t>(task: &'t Task, slot: SlotId, limits: &Limits) -> Result<Vec<Witness<'t>>, Interrupted> {
     let mut seen: FxHashSet<(*const u32, *const u8, SlotSet)> = FxHashSet::default();
     let mut found = Vec::new();

@@ -146,6 +146,7 @@ impl Formula {
     }
 
     /// Adds a clause; one that is true for constants' sake is dropped, false constants are left out.
+    #[expect(clippy::arithmetic_side_effects, reason = "clauses are held in memory")]
     pub(crate) fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
         let start = self.literals.len();
         let number = dense(self.clauses.len() + 1);
@@ -188,6 +189,7 @@ impl Formula {
     /// At most one of the literals: pairwise for few, else Sinz's sequential counter [1].
     ///
     /// [1] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most_one(&mut self, family: Family, literals: &[Lit]) {
         if literals.len() <= 5 {
             for (position, a) in literals.iter().enumerate() {
@@ -224,6 +226,7 @@ impl Formula {
     }
 
     /// The clauses after so many others.
+    #[expect(clippy::arithmetic_side_effects, reason = "the first clause is told apart")]
     pub(crate) fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
         (start..self.clauses.len()).map(|index| {
             let start = if index == 0 { 0 } else { self.clauses[index - 1].0 as usize };

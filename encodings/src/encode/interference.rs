@@ -172,6 +172,7 @@ struct Support {
 }
 
 impl Support {
+    #[expect(clippy::arithmetic_side_effects, reason = "basic variables come first; rules are of the others")]
     fn new(task: &Task) -> Self {
         let derived = task.variables.len() - task.basic;
         let mut support = Self { basic: task.basic, of: vec![(Vec::new(), Vec::new()); derived] };

@@ -70,6 +70,7 @@ impl Encoding<'_> {
         Some(next)
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
     fn next_number(
         &mut self,
         step: usize,
@@ -138,6 +139,7 @@ impl Encoding<'_> {
         Some(base)
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
     fn weighted(&mut self, shape: &Shape, numbers: &[Bits], ranges: &[Range]) -> Option<Bits> {
         let linear = Linear { coefficients: shape.clone(), quantity: Quantity::constant(0) };
         let range = linear_range(&linear, ranges)?;
@@ -217,6 +219,7 @@ impl Encoding<'_> {
     }
 
     /// The numeric conditions of the operators at a step.
+    #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
     fn comparisons(&mut self, step: usize, numbers: &[Bits], next: &[Bits], ranges: &[Range]) -> Option<()> {
         for index in 0..self.operators[step].len() {
             let (id, literal) = self.operators[step][index];
@@ -275,6 +278,10 @@ impl Encoding<'_> {
     }
 
     /// Whether an expression that mentions no designs is at least 0; none if its numbers do not fit.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "widths of numbers of 128 bits; a number has a bit at least"
+    )]
     pub(super) fn is_at_least_zero(
         &mut self,
         linear: &Linear<Int>,
@@ -285,7 +292,7 @@ impl Encoding<'_> {
             .iter()
             .map(|bits| {
                 // A number of so many bits is not larger, and `next_ranges` admits none of more.
-                let limit: Int = 1 << (bits.len() - 1).min(126);
+                let limit: Int = 1 << bits.len().saturating_sub(1).min(126);
                 Range { low: -limit, high: limit }
             })
             .collect();

@@ -50,6 +50,10 @@ impl Encoding<'_> {
     }
 
     /// What operators change, apart from numbers.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "steps are fewer than the horizon, whose formula is in memory"
+    )]
     pub(super) fn effects(&mut self, step: usize) {
         for index in 0..self.operators[step].len() {
             let (id, literal) = self.operators[step][index];

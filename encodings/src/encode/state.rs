@@ -16,6 +16,10 @@ use crate::task::{Fact, OperatorId, VariableId};
 
 impl Encoding<'_> {
     /// Makes the variables for operators, values and designs.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "steps are fewer than the horizon, whose formula is in memory"
+    )]
     pub(super) fn declare(&mut self, allowed: &[Vec<bool>], limits: &Limits) -> Result<(), Interrupted> {
         let task = self.task;
         let mut possible: Vec<Vec<bool>> =
@@ -111,6 +115,10 @@ impl Encoding<'_> {
     }
 
     /// A value that holds after the step held before it, or an operator at the step has brought it.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "steps are fewer than the horizon, whose formula is in memory"
+    )]
     pub(super) fn frame(&mut self, step: usize) {
         let mut producers: Vec<Vec<Vec<crate::sat::Lit>>> =
             self.task.variables.iter().map(|variable| vec![Vec::new(); variable.values.len()]).collect();

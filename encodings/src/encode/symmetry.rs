@@ -50,6 +50,7 @@ impl Symmetry {
 type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 
 /// Pairs of neighbours in classes of equal objects.
+#[expect(clippy::arithmetic_side_effects, reason = "work is looked at each time")]
 fn equal_objects(task: &Task, limits: &Limits) -> Result<Pairs, Interrupted> {
     if !task.axioms.is_empty() {
         return Ok(Vec::new());

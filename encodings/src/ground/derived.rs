@@ -57,6 +57,7 @@ impl World<'_> {
     }
 
     /// The rules of all derived atoms that have been met, and of those that their bodies lead to.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn instantiate_axioms(&mut self) -> Result<(), Failure> {
         let lifted = self.lifted;
         let limits = self.limits.clone();
@@ -195,6 +196,7 @@ fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) 
 }
 
 /// The body of each atom that has exactly one rule and does not depend on itself, free of such atoms.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 fn single_bodies(
     axioms: &[GroundAxiom],
     limits: &Limits,

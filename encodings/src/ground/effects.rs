@@ -316,6 +316,7 @@ impl GroundChange {
 
 /// Every way in which conditions can turn out: what must hold then, and which of them hold.
 #[allow(clippy::type_complexity)]
+#[expect(clippy::arithmetic_side_effects, reason = "cases are at most twice their limit")]
 fn split<'r>(
     schema: &Schema,
     conditions: impl Iterator<Item = &'r Residual>,
@@ -366,6 +367,7 @@ impl Case {
     }
 
     /// The operator of this case; everything but conditions and effects is that of the template.
+    #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
     pub(super) fn operator(
         self,
         world: &mut World<'_>,

@@ -376,6 +376,7 @@ fn multiply(
 }
 
 /// The objects for which a static comparison holds, one for each variable.
+#[expect(clippy::arithmetic_side_effects, reason = "variables of a condition are numbered in memory")]
 pub(super) fn satisfying(
     lifted: &Lifted,
     comparison: &Formula,

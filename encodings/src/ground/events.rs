@@ -136,6 +136,7 @@ fn interference(
 }
 
 /// Lets the events of time 0 take place in the initial state.
+#[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
 pub(super) fn begin(lifted: &mut Lifted) {
     let phases = (lifted.time.first_phase.0..).map(ObjectId);
     for (event, phase) in lifted.events.iter().take_while(|event| !event.time.is_positive()).zip(phases) {
@@ -156,6 +157,7 @@ pub(super) fn begin(lifted: &mut Lifted) {
 
 impl Timeline {
     /// None if nothing happens by itself.
+    #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
     pub(super) fn new(world: &mut World<'_>, events: &[Event]) -> Option<Self> {
         if events.is_empty() {
             return None;
@@ -182,6 +184,10 @@ impl Timeline {
     }
 
     /// The ways in which an action of this duration can lie in time.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
     pub(super) fn passages<'t>(
         &'t self,
         duration: &'t Quantity<Rational>,
@@ -248,6 +254,10 @@ impl Timeline {
     }
 
     /// Waiting until the next event, from each phase.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
     pub(super) fn waits(&self, schema: u32) -> impl Iterator<Item = GroundOperator> + '_ {
         self.events.iter().enumerate().skip(self.first).map(move |(phase, (time, changes))| {
             let condition =
@@ -341,6 +351,10 @@ pub(super) struct Interference {
 
 impl<'t> Passage<'t> {
     /// The time of the start, in terms of the clock before.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
     fn start(&self) -> Linear<Rational> {
         let events = &self.timeline.events;
         match self.start {
@@ -367,6 +381,10 @@ impl<'t> Passage<'t> {
     }
 
     /// When an action can start and end so.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
     pub(super) fn conditions(&self) -> Vec<Residual> {
         let Timeline { clock, phases, events, .. } = self.timeline;
         let mut conditions = vec![Residual::Literal { atom: phases[self.from], positive: true }];
@@ -400,12 +418,20 @@ impl<'t> Passage<'t> {
     }
 
     /// The events strictly between the start and the end, in order.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
     pub(super) fn events(&self) -> impl Iterator<Item = &'t [(AtomId, bool)]> + use<'t> {
         let last = if self.end == End::AtEvent { self.to - 1 } else { self.to };
         self.timeline.events[self.from..last].iter().map(|(_, changes)| &changes[..])
     }
 
     /// The event at the time of the end.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
     pub(super) fn event_at_end(&self) -> Option<&'t [(AtomId, bool)]> {
         (self.end == End::AtEvent).then(|| &self.timeline.events[self.to - 1].1[..])
     }
@@ -435,6 +461,10 @@ impl<'t> Passage<'t> {
     }
 
     /// When it starts at the earliest, each time with whether a moment later is meant.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
     pub(super) fn timing(&self) -> Timing<(Rational, bool)> {
         let events = &self.timeline.events;
         let by_end = matches!(self.start, Start::ByEnd | Start::LaterByEnd);

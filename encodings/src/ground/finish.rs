@@ -255,6 +255,7 @@ impl Atoms {
         self.facts[atom.index()]
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     fn effects(&self, operator: &GroundOperator) -> Vec<Fact> {
         let none = |fact: Fact| Fact { value: self.none[fact.variable.index()], ..fact };
         let deletes = operator.deletes.iter().filter_map(|atom| self.fact(*atom)).map(none);
@@ -394,6 +395,7 @@ impl<N: TaskNumber> Numbers<N> {
     }
 }
 
+#[expect(clippy::arithmetic_side_effects, reason = "above the least number of its type")]
 fn condition<N: TaskNumber>(
     ground: &GroundCondition,
     atoms: &Atoms,

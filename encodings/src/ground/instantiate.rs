@@ -286,6 +286,7 @@ pub(super) struct Build<'w, 'a> {
 
 impl Build<'_, '_> {
     /// What is left of conjuncts that mention no slot, after what is left of those that do.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     fn conditions(&mut self, closed: &[&Formula], open: &[Residual]) -> Result<Vec<Residual>, Failure> {
         let mut parts = Vec::with_capacity(open.len() + closed.len());
         parts.extend_from_slice(open);

@@ -119,10 +119,47 @@ impl<N: TaskNumber> Integers<N> {
 
     pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<N>, Error> {
         let (scale, what) = (self.scale, self.what);
-        self.tables.map(quantity, &|number| integer(number, scale, what))
+        let scaled = self.tables.map(quantity, &|number| integer(number, scale, what))?;
+        if N::fits(&scaled) { Ok(scaled) } else { Err(Error::Overflow { what: what.into() }) }
     }
 }
 
 fn integer<N: TaskNumber>(number: &Rational, scale: Int, what: &str) -> Result<N, Error> {
     N::from_rational(number, scale).ok_or_else(|| Error::Overflow { what: what.into() })
+}
+
+#[cfg(test)]
+mod tests {
+    use num_traits::Zero;
+
+    use super::*;
+
+    /// A quantity of so many tables over slots of their own, each of 0 and a number.
+    fn quantity(tables: u32, number: Int) -> Quantity<Rational> {
+        let values: Arc<[Rational]> = [Rational::zero(), Rational::from_integer(number)].into();
+        let table = |slot| Table { slots: [slot].into_iter().collect(), values: values.clone() };
+        Quantity { constant: Rational::zero(), tables: (0..tables).map(table).collect() }
+    }
+
+    #[test]
+    fn numbers_that_do_not_fit_together_are_refused() {
+        let number = LIMIT - 1;
+        for (tables, number, fits) in [
+            (1, number, true),
+            (31, number, true),
+            (32, number, true),
+            (33, number, false),
+            (33, -number, false),
+            (600, number, false),
+            (600, 1 << 113, true),
+        ] {
+            let mut integers: Integers<Int> = Denominator::new("costs").integers().expect("a factor");
+            let found = integers.quantity(&quantity(tables, number));
+            assert_eq!(found.is_ok(), fits, "{tables} tables of {number}");
+            if let Ok(found) = found {
+                let (choice, sizes) = (vec![1; tables as usize], vec![2; tables as usize]);
+                assert_eq!(found.at(&choice, &sizes), Int::from(tables) * number);
+            }
+        }
+    }
 }

@@ -41,6 +41,7 @@ pub(crate) struct Group {
 }
 
 /// Disjoint groups, largest first.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(crate) fn groups(
     task: &GroundTask<'_>,
     relevant: &FxHashSet<AtomId>,
@@ -106,6 +107,7 @@ fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<
 }
 
 /// The candidates that hold up.
+#[expect(clippy::arithmetic_side_effects, reason = "no more than the limit on candidates")]
 fn invariants(
     task: &GroundTask<'_>,
     relevant: &FxHashSet<AtomId>,
@@ -167,6 +169,7 @@ impl Change<'_> {
 }
 
 /// The operator itself and a key whose weight it may increase (or decrease without anybody knowing).
+#[expect(clippy::arithmetic_side_effects, reason = "atoms of one operator are counted")]
 fn broken_by<'o>(
     task: &GroundTask<'_>,
     candidate: &Candidate,
@@ -216,6 +219,7 @@ fn broken_by<'o>(
 }
 
 /// The candidate plus one predicate that the operator requires and deletes, its arguments matched to the key.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn refinements(
     task: &GroundTask<'_>,
     candidate: &Candidate,

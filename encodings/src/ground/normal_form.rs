@@ -138,7 +138,7 @@ fn clauses(residual: &Residual) -> Option<Vec<Vec<GroundLiteral>>> {
             let mut product: Vec<Vec<GroundLiteral>> = vec![Vec::new()];
             for part in parts {
                 let more = clauses(part)?;
-                if product.len() * more.len() > CLAUSE_LIMIT {
+                if product.len().saturating_mul(more.len()) > CLAUSE_LIMIT {
                     return None;
                 }
                 let pairs = product.iter().flat_map(|left| more.iter().map(move |right| (left, right)));

@@ -37,6 +37,7 @@ pub(crate) struct Reached {
 ///
 /// # Errors
 /// `Error::Rules` if the rule engine refuses the program, `Error::Interrupted` at a limit.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(crate) fn reach(
     lifted: &Lifted,
     slots: &[Vec<SlotParameter>],

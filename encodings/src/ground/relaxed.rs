@@ -62,6 +62,7 @@ impl<'a> Builder<'a> {
     }
 
     /// A relation that nothing else uses.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn fresh(&mut self, kind: &str) -> Symbol {
         self.relations += 1;
         self.names.table.name(&format!("{kind} {}", self.relations))

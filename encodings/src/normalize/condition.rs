@@ -7,6 +7,7 @@ use pddl::ast::{self, TypedName};
 
 impl Normalizer {
     /// A condition, or its negation, in negation normal form.
+    #[expect(clippy::arithmetic_side_effects, reason = "as many variables were pushed as are taken off")]
     pub(super) fn condition(
         &mut self,
         condition: &ast::Condition,
@@ -47,6 +48,7 @@ impl Normalizer {
     }
 
     /// Takes variables into sight.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn bind(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
         let mut all = Vec::with_capacity(variables.len());
         for variable in variables {
@@ -59,6 +61,7 @@ impl Normalizer {
     }
 
     /// Flattens an effect into changes, each with the variables and the condition that it stands under.
+    #[expect(clippy::arithmetic_side_effects, reason = "as many variables were pushed as are taken off")]
     pub(super) fn effect(&mut self, effect: &ast::Effect, scope: &mut Scope, out: &mut Vec<Effect>) {
         let change = match effect {
             ast::Effect::And(parts) => return parts.iter().for_each(|part| self.effect(part, scope, out)),

@@ -344,6 +344,7 @@ impl Normalizer {
     }
 
     /// Symbols for time. Their names have a space, so that no file can mean them.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     fn time(&mut self, events: &[Event]) -> Time {
         let time = Time {
             clock: FunctionId(dense(self.functions.len())),

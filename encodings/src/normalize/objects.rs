@@ -10,6 +10,7 @@ use crate::number::dense;
 use pddl::ast::{self, Identifier, Name, Span, TypeExpression};
 
 impl Normalizer {
+    #[expect(clippy::arithmetic_side_effects, reason = "an object was pushed before")]
     pub(super) fn declare_objects(&mut self, domain: &ast::Domain, problem: &ast::Problem) {
         let mut parents: FxHashMap<Name, Vec<Name>> = FxHashMap::default();
         for entry in &domain.types {

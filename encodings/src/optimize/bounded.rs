@@ -6,7 +6,7 @@ use crate::bounds::Bounds;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, TaskNumber};
 use crate::optimize::{Best, Config, Run, Tightened, optimize};
-use crate::plan::{GroundStep, decode, replay};
+use crate::plan::{GroundStep, cost, decode, pass};
 use crate::quantity::Quantity;
 use crate::solution::{Improvement, Proof, Solution, Status, Unbounded};
 use crate::task::Task;
@@ -29,7 +29,8 @@ impl Run<'_> {
         // changes nothing but the sign of the costs.
         let shifted = self.task.with_costs(|operator| {
             let mut cost = operator.cost.clone();
-            cost.constant -= lowest;
+            // The numbers of a quantity, and so its least value, stay below `QUANTITY_LIMIT`: nothing is cut off.
+            cost.constant = cost.constant.saturating_sub(lowest);
             cost
         });
         let config = Config { horizon: Some(steps), ..self.config.clone() };
@@ -49,7 +50,7 @@ impl Run<'_> {
             Err(solution) => return *solution,
         };
         let mut best = Best { plan, lower: 0 };
-        let tightened = match run.extent(&bounds, best.plan.cost - 1, &best) {
+        let tightened = match run.extent(&bounds, best.plan.below(), &best) {
             Ok(mut extent) => {
                 extent.allowed.truncate(steps);
                 run.within(&bounds, &extent, &mut best, false)
@@ -60,7 +61,8 @@ impl Run<'_> {
         let proof = is_proved.then_some(Proof::Sat { step_bound: steps });
         let mut plan = best.plan;
         let statistics = run.statistics;
-        plan.cost += lowest * steps as Int;
+        let Some(by_metric) = cost(self.task, &plan.steps) else { return unknown(shortest) };
+        plan.cost = by_metric;
         let unbounded = if self.task.can_repeat_reward(&plan.steps, &self.config.limits) {
             Unbounded::Proved
         } else {
@@ -81,7 +83,7 @@ impl Run<'_> {
 
 /// What is left of an answer by the number of steps where nothing is known by the metric.
 fn unknown(by_steps: Solution) -> Solution {
-    Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, ..by_steps }
+    Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, proof: None, ..by_steps }
 }
 
 impl Task {
@@ -101,7 +103,7 @@ impl<N: TaskNumber> Task<N> {
     /// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is; no if a
     /// limit is reached before one is found.
     pub(crate) fn can_repeat_reward(&self, plan: &[GroundStep], limits: &Limits) -> bool {
-        let Some((states, _)) = replay(self, plan) else { return false };
+        let Some(states) = pass(self, &self.initial, plan) else { return false };
         states.iter().any(|state| {
             self.operators.iter().filter(|operator| operator.cost.minimum() < N::zero()).any(|operator| {
                 operator.choices().take_while(|_| !limits.reached()).any(|choice| {

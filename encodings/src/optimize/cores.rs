@@ -36,6 +36,10 @@ struct Search {
 }
 
 impl Search {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "weights of one source are differences of its amounts, which are at most the gap"
+    )]
     fn new(encoding: &Encoding<'_>) -> Self {
         let (lower, literals) = encoding.payments();
         let mut weights = BTreeMap::new();
@@ -58,6 +62,10 @@ impl Search {
     }
 
     /// Takes note of a core: literals of which one at least is true.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a core has weights that are at most what the limit leaves, and the least of them is taken off each"
+    )]
     fn pay(&mut self, core: &[Lit], formula: &mut Formula) {
         let weight = core.iter().filter_map(|literal| self.weights.get(literal)).copied().min().unwrap_or(0);
         self.lower += weight;
@@ -74,12 +82,17 @@ impl Search {
         }
         formula.add(Family::Bound, core.iter().copied());
         if core.len() > 1 {
+            let newest = self.totalizers.len();
             self.totalizers.push(Totalizer::new(core));
-            self.output(self.totalizers.len() - 1, 1, weight, formula);
+            self.output(newest, 1, weight, formula);
         }
     }
 
     /// More than so many of a totalizer's literals cost so much more.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "weights are at most what the limit on the cost leaves, and each core has its own literals"
+    )]
     fn output(&mut self, totalizer: usize, count: usize, weight: Int, formula: &mut Formula) {
         let mut variables = dense(formula.variables());
         let mut clauses = Vec::new();
@@ -101,7 +114,7 @@ impl Search {
         let heavy: Vec<Lit> = self
             .weights
             .iter()
-            .filter(|(_, weight)| **weight > limit - lower)
+            .filter(|(_, weight)| **weight > limit.saturating_sub(lower))
             .map(|(literal, _)| *literal)
             .collect();
         for literal in heavy {
@@ -118,7 +131,7 @@ impl Run<'_> {
         let mut live = self.live(u64::MAX);
         let mut least = search.lighter(Int::MAX).unwrap_or(Int::MAX);
         loop {
-            let limit = limit.min(best.plan.cost - 1);
+            let limit = limit.min(best.plan.below());
             if search.lower > limit {
                 return Tightened::Exhausted;
             }
@@ -132,7 +145,7 @@ impl Run<'_> {
                     };
                     search.pay(&core, &mut encoding.formula);
                     if search.lower > best.lower {
-                        best.lower = search.lower.min(limit + 1);
+                        best.lower = search.lower.min(limit.saturating_add(1));
                         self.announce(best, encoding.horizon());
                     }
                 }

@@ -175,7 +175,7 @@ impl<'a> Run<'a> {
             status,
             plan: plan.map(|plan| decode(self.task, plan, &self.config.limits)),
             ground: plan.cloned(),
-            lower_bound: lower.map(|lower| metric(self.task, lower)),
+            lower_bound: lower.map(|lower| metric(self.task, &lower)),
             horizon,
             proof,
             unbounded: None,
@@ -232,9 +232,9 @@ impl<'a> Run<'a> {
             return self.conclude(&best, 0, Some(proof));
         }
         let unproved = exact.then_some(Proof::Search);
-        let mut stage = if exact { Int::MAX } else { (best.plan.cost - lower) / STAGES };
+        let mut stage = if exact { Int::MAX } else { best.plan.cost.saturating_sub(lower) / STAGES };
         loop {
-            let limit = (best.plan.cost - 1).min(lower.saturating_add(stage));
+            let limit = best.plan.below().min(lower.saturating_add(stage));
             let Ok(extent) = self.extent(&bounds, limit, &best) else {
                 return self.conclude(&best, 0, unproved);
             };
@@ -253,7 +253,7 @@ impl<'a> Run<'a> {
             }
             match (tightened, extent.step_bound) {
                 (Tightened::Exhausted, Some(step_bound)) => {
-                    best.lower = best.plan.cost.min(limit + 1);
+                    best.lower = best.plan.cost.min(limit.saturating_add(1));
                     if best.lower == best.plan.cost {
                         // What the search has proved does not come to rest on the word of a program.
                         let proof = unproved.filter(|_| self.statistics.unchecked.is_some());
@@ -276,7 +276,7 @@ impl<'a> Run<'a> {
         let cost = CostLimit { limit: extent.limit, bounds, counting };
         let semantics = self.semantics(Semantics::Sequential);
         let encoding = self.encoding(&extent.allowed, Some(cost), semantics);
-        self.statistics.encode += started.elapsed();
+        self.statistics.encode = self.statistics.encode.saturating_add(started.elapsed());
         let Some(encoding) = encoding else { return Tightened::Interrupted };
         if cores {
             self.raise(encoding, extent.limit, best)
@@ -305,7 +305,10 @@ impl<'a> Run<'a> {
             window.allowed
         } else {
             // Without a step bound longer plans are worth a try, though they prove nothing.
-            let longer = self.config.horizon.unwrap_or(2 * best.plan.steps.len() + 4);
+            let longer = self
+                .config
+                .horizon
+                .unwrap_or_else(|| best.plan.steps.len().saturating_mul(2).saturating_add(4));
             bounds.window(self.task, Some(limit), Some(longer), limits)?.allowed
         };
         Ok(Extent { limit, allowed, step_bound })
@@ -316,8 +319,8 @@ impl<'a> Run<'a> {
     fn confirm(&mut self, incumbent: &GroundPlan) -> Option<Proof> {
         let cheapest =
             self.task.operators.iter().map(|operator| operator.cost.minimum()).min().filter(|c| *c > 0)?;
-        let limit = incumbent.cost - 1;
-        let steps = usize::try_from(limit / cheapest).ok()?;
+        let limit = incumbent.below();
+        let steps = usize::try_from(limit.checked_div(cheapest)?).ok()?;
         if steps.saturating_mul(self.task.operators.len()) > CONFIRM_LIMIT {
             return None;
         }
@@ -326,7 +329,7 @@ impl<'a> Run<'a> {
         let bounds = Bounds::trivial(self.task, &self.config.limits).ok()?;
         let cost = CostLimit { limit, bounds: &bounds, counting: Counting::Sum };
         let encoding = self.encoding(&allowed, Some(cost), self.semantics(Semantics::Sequential));
-        self.statistics.encode += started.elapsed();
+        self.statistics.encode = self.statistics.encode.saturating_add(started.elapsed());
         let mut live = self.live(u64::MAX);
         let (answer, _) = self.call(&mut live, &encoding?, &[]);
         if answer == Answer::Satisfiable {
@@ -354,8 +357,8 @@ impl<'a> Run<'a> {
 
     fn announce(&mut self, best: &Best, horizon: usize) {
         let improvement = Improvement {
-            cost: metric(self.task, best.plan.cost),
-            lower_bound: metric(self.task, best.lower),
+            cost: metric(self.task, &best.plan.cost),
+            lower_bound: metric(self.task, &best.lower),
             horizon,
         };
         (self.report)(improvement);
@@ -363,7 +366,11 @@ impl<'a> Run<'a> {
 
     /// Any plan, with few steps: longer and longer formulas without a cost limit.
     fn first_plan(&mut self, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
-        let most = self.config.horizon.unwrap_or(usize::MAX).min(self.states().map_or(usize::MAX, |n| n - 1));
+        let most = self
+            .config
+            .horizon
+            .unwrap_or(usize::MAX)
+            .min(self.states().map_or(usize::MAX, |n| n.saturating_sub(1)));
         let mut horizon = 0;
         loop {
             let started = Instant::now();
@@ -371,7 +378,7 @@ impl<'a> Run<'a> {
             let encoding = window.ok().and_then(|window| {
                 self.encoding(&window.allowed, None, self.semantics(Semantics::ExistsStep))
             });
-            self.statistics.encode += started.elapsed();
+            self.statistics.encode = self.statistics.encode.saturating_add(started.elapsed());
             let answer = encoding.map_or((Answer::Interrupted, None), |encoding| {
                 let mut live = self.live(u64::MAX);
                 self.call(&mut live, &encoding, &[])
@@ -379,14 +386,14 @@ impl<'a> Run<'a> {
             match answer {
                 (_, Some(plan)) => return Ok(plan),
                 (Answer::Unsatisfiable, None) if horizon < most => {
-                    horizon = (horizon + 1 + horizon / 4).min(most);
+                    horizon = horizon.saturating_add(1).saturating_add(horizon / 4).min(most);
                     if horizon.saturating_mul(self.task.operators.len()) <= FORMULA_LIMIT {
                         continue;
                     }
                     return Err(Box::new(self.without_plan(Status::Unknown, horizon, None)));
                 }
                 (Answer::Unsatisfiable, None) => {
-                    let bounded = self.states().is_some_and(|states| horizon + 1 >= states);
+                    let bounded = self.states().is_some_and(|states| horizon.saturating_add(1) >= states);
                     let solution = if bounded {
                         self.without_plan(
                             Status::Unsolvable,

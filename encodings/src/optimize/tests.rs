@@ -31,7 +31,7 @@ fn config(backend: &Backend, strategy: Strategy, limits: Limits) -> Config {
 /// A plan, and what is claimed of it: a proof wherever plans have a step bound.
 fn check_optimum(context: &str, (task, best): (&Task, Int), config: &Config) -> bool {
     let solution = optimize(task, config, &mut |_| {});
-    let best = metric(task, best);
+    let best = metric(task, &best);
     let cost = solution.plan.as_ref().map(|plan| plan.cost.clone());
     let context = || format!("{config:?}: {context}: {solution:?}");
     let proved = solution.status == Status::Optimal;
@@ -69,7 +69,7 @@ fn every_strategy_finds_the_optimum_of_many() {
 /// them; returns whether it had come further than that.
 fn check_reports(context: &str, (task, best): (&Task, Int), config: &Config, stop_after: usize) -> bool {
     let interrupt = config.limits.interrupt();
-    let best = metric(task, best);
+    let best = metric(task, &best);
     let mut last: Option<(Exact, Exact)> = None;
     let mut reports = 0;
     let context = |solution: Option<&Solution>| format!("{config:?}, {stop_after}: {context}: {solution:?}");

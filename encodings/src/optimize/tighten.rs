@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::encode::Encoding;
 use crate::optimize::{Best, Run, Tightened};
-use crate::plan::{GroundPlan, GroundStep, replay};
+use crate::plan::{GroundPlan, GroundStep, cost, pass};
 use crate::sat::{Answer, Backend, Lit, Solver};
 
 /// A solver that has the clauses of a formula, up to some position.
@@ -41,9 +41,11 @@ impl Run<'_> {
             self.statistics.families = formula.counts();
         }
         let answer = live.solver.solve(assumptions);
-        self.statistics.calls += 1;
-        self.statistics.conflicts += live.solver.conflicts() - live.conflicts;
-        live.conflicts = live.solver.conflicts();
+        let conflicts = live.solver.conflicts();
+        let more = conflicts.saturating_sub(live.conflicts);
+        self.statistics.calls = self.statistics.calls.saturating_add(1);
+        self.statistics.conflicts = self.statistics.conflicts.saturating_add(more);
+        live.conflicts = conflicts;
         if let Some(reason) = live.solver.failure() {
             self.statistics.failure = Some(reason.to_owned());
         }
@@ -53,7 +55,7 @@ impl Run<'_> {
             let words: Vec<&str> = std::iter::once(command).chain(arguments).map(String::as_str).collect();
             self.statistics.unchecked = Some(words.join(" "));
         }
-        self.statistics.solve += started.elapsed();
+        self.statistics.solve = self.statistics.solve.saturating_add(started.elapsed());
         let plan = if answer == Answer::Satisfiable {
             self.check(encoding.decode(live.solver.as_ref()))
         } else {
@@ -64,11 +66,12 @@ impl Run<'_> {
 
     /// A plan of the solver, replayed. That it is applicable is what the encoding is for; that it is, is checked.
     fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
-        let Some((_, cost)) = replay(self.task, &steps) else {
+        if pass(self.task, &self.task.initial, &steps).is_none() {
             self.contradicted("a formula admits a sequence of actions that is not a plan");
             return None;
-        };
-        Some(GroundPlan { steps, cost })
+        }
+        // A plan whose cost does not fit is none that the rest can reckon with.
+        cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
     }
 
     /// Asks for cheaper and cheaper plans of a formula until there is none. The solver keeps what it has learnt: a lower limit is
@@ -83,7 +86,7 @@ impl Run<'_> {
             };
             best.plan = better;
             self.announce(best, encoding.horizon());
-            encoding.tighten(best.plan.cost - 1);
+            encoding.tighten(best.plan.below());
         }
     }
 }

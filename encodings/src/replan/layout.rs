@@ -47,6 +47,7 @@ pub(super) struct Situation {
 
 impl Layout {
     /// What a problem is in the task that was made of it with everything available.
+    #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
     pub(super) fn new(usage: Usage, assumed: &[Name], problem: &Problem, task: &Task) -> Self {
         let names = task.object_names.iter().map(|name| name.to_ascii_lowercase());
         let numbers = task.number_names.iter().map(|name| name.to_ascii_lowercase());

@@ -152,6 +152,7 @@ fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> b
 }
 
 /// The rows of a table that are left.
+#[expect(clippy::arithmetic_side_effects, reason = "a position in the table, which is in memory")]
 fn rows(table: &Table<Int>, kept: &Kept, sizes: &[usize]) -> Arc<[Int]> {
     let mut positions = vec![0_usize];
     for slot in &table.slots {

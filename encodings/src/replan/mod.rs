@@ -134,6 +134,15 @@ pub enum Replanned {
     Unknown,
 }
 
+/// How far a search for a plan is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Progress {
+    /// The metric of the mission with the best plan so far, if there is one.
+    pub metric: Option<BigRational>,
+    /// No plan gives the mission a better metric.
+    pub bound: BigRational,
+}
+
 impl Replanner {
     /// Grounds a problem with all that `available` says of some object taken for available. None if the domain does not lend
     /// itself to that: where availability is asked for otherwise than as a condition of actions on their parameters, where
@@ -157,6 +166,11 @@ impl Replanner {
 
     /// A best plan for a problem.
     pub fn plan(&mut self, query: &Query<'_>) -> Replanned {
+        self.plan_aloud(query, &mut |_| {})
+    }
+
+    /// As [`Replanner::plan`], telling on the way how far the search is.
+    pub fn plan_aloud(&mut self, query: &Query<'_>, report: &mut dyn FnMut(Progress)) -> Replanned {
         let base = self.base.clone();
         let Some(situation) = base.layout.situation(&base.task, query.problem) else {
             return Replanned::Misfit;
@@ -167,7 +181,7 @@ impl Replanner {
             };
             return solve::keep_old(&base, &task, &situation, query);
         };
-        solve::solve(&base, &set, &situation, query, STATE_LIMIT)
+        solve::solve(&base, &set, &situation, query, STATE_LIMIT, report)
     }
 
     /// The smallest part of what is not available that alone leaves no plan for an unsolvable problem: with any one of these objects
@@ -192,7 +206,7 @@ impl Replanner {
             let available: Vec<Vec<ObjectId>> = (0..all.len()).map(open).collect();
             let situation = Situation { available, ..situation.clone() };
             let set = base.restrict(&situation.available, query.limits).ok()?;
-            match solve::solve(&base, &set, &situation, query, BLOCKING_STATES) {
+            match solve::solve(&base, &set, &situation, query, BLOCKING_STATES, &mut |_| {}) {
                 Replanned::Optimal { .. } => Some(true),
                 Replanned::Unsolvable => Some(false),
                 Replanned::Feasible { .. } | Replanned::Misfit | Replanned::Unknown => None,
@@ -247,6 +261,7 @@ impl Base {
     }
 
     /// For each predicate the objects that some operator needs to be available, sorted.
+    #[expect(clippy::arithmetic_side_effects, reason = "predicates are held in memory")]
     fn possible(&self) -> Vec<Vec<ObjectId>> {
         let count = self.requirements.iter().flatten().map(|(_, predicate)| predicate + 1).max().unwrap_or(0);
         let mut found = vec![Vec::new(); count];

@@ -12,7 +12,7 @@ use crate::limits::Limits;
 use crate::number::{Int, dense};
 use crate::plan::{GroundPlan, GroundStep, decode, replay_from, resolve};
 use crate::replan::layout::Situation;
-use crate::replan::{Base, Query, Replanned, Set};
+use crate::replan::{Base, Progress, Query, Replanned, Set};
 use crate::search::{Found, search_from};
 use crate::task::{State, Task};
 use crate::ties;
@@ -36,6 +36,7 @@ pub(super) fn solve(
     situation: &Situation,
     query: &Query<'_>,
     most: usize,
+    report: &mut dyn FnMut(Progress),
 ) -> Replanned {
     if base.task.unreachable.is_some() {
         return Replanned::Unsolvable;
@@ -55,13 +56,25 @@ pub(super) fn solve(
     let known = incumbents.iter().flatten().min_by(|left, right| left.value.cmp(&right.value)).cloned();
     let mut best: Option<(BigRational, usize)> = None;
     let mut winners: Vec<(Start, GroundPlan)> = Vec::new();
-    for ((bound, start), incumbent) in open.into_iter().zip(incumbents) {
+    let next = open.iter().skip(1).map(|(bound, _)| Some(bound.clone())).chain([None]);
+    let next: Vec<Option<BigRational>> = next.collect();
+    for (((bound, start), incumbent), next) in open.into_iter().zip(incumbents).zip(next) {
         let least = best.iter().chain(known.iter().map(|known| &known.value)).map(|(value, _)| value).min();
         if least.is_some_and(|least| bound > *least) {
             break;
         }
         let limit = incumbent.map_or(Int::MAX, |known| known.plan.cost);
-        let found = search_from(&set.task, &set.bounds, prepared, &start.state, limit, most, query.limits);
+        let signed = |value: BigRational| if set.task.objective.maximize { -value } else { value };
+        let least = least.cloned();
+        let mut hear = |cost: Option<&Int>, bound: &Int| {
+            let cost = cost.map(|cost| &start.own + scale(*cost)).into_iter().chain(least.clone()).min();
+            let bounds = [Some(&start.own + scale(*bound)), next.clone(), cost.clone()];
+            if let Some(bound) = bounds.into_iter().flatten().min() {
+                report(Progress { metric: cost.map(signed), bound: signed(bound) });
+            }
+        };
+        let prepared = (&set.task, &set.bounds, prepared);
+        let found = search_from(prepared, &start.state, limit, most, query.limits, &mut hear);
         let plan = match found {
             Found::Optimal(plan) => plan,
             Found::None => continue,
@@ -184,6 +197,7 @@ fn choose(
 }
 
 /// The most changes that are fewer than these.
+#[expect(clippy::arithmetic_side_effects, reason = "those that are 0 are told apart")]
 fn fewer((departures, reconfigurations): ties::Changes) -> Option<ties::Changes> {
     match (departures, reconfigurations) {
         (0, 0) => None,

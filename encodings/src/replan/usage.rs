@@ -150,6 +150,7 @@ pub(super) fn identifier(term: &Term) -> &Name {
 /// For each action the parameters that must be available, by position, each with the predicate that says so, by position
 /// among `predicates`. None if one of the predicates is used otherwise: then a task in which more is available has
 /// not all operators of one in which less is.
+#[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<Vec<(usize, usize)>>> {
     let mut found = Vec::new();
     let mut mentions = 0;
@@ -184,6 +185,7 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
 }
 
 /// How often conditions and effects of a domain mention a predicate.
+#[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     let bodies = domain.actions.iter().map(|action| match &action.body {
         ActionBody::Instantaneous { precondition, effect } => {
@@ -201,6 +203,7 @@ fn occurrences(domain: &Domain, predicate: &Name) -> usize {
 }
 
 /// How often a condition mentions a predicate.
+#[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 pub(super) fn in_condition(condition: &Condition, predicate: &Name) -> usize {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
@@ -215,6 +218,7 @@ pub(super) fn in_condition(condition: &Condition, predicate: &Name) -> usize {
     }
 }
 
+#[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 fn in_effect(effect: &Effect, predicate: &Name) -> usize {
     match effect {
         Effect::And(parts) => parts.iter().map(|part| in_effect(part, predicate)).sum(),

@@ -32,6 +32,7 @@ struct Watch {
 }
 
 impl Callbacks for Watch {
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     fn on_new_clause(&mut self, _: &[batsat::Lit], kind: ClauseKind) {
         self.conflicts += u64::from(kind == ClauseKind::Learnt);
     }

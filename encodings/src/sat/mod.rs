@@ -49,6 +49,10 @@ impl Lit {
     }
 
     /// As in DIMACS files: variables count from 1, negation is the sign.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "fewer than 2^31 - 1 variables are held in memory with their clauses"
+    )]
     pub(crate) fn dimacs(self) -> i32 {
         let number = i32::try_from(self.variable()).expect("invariant: fewer than 2^31 variables") + 1;
         if self.is_positive() { number } else { -number }

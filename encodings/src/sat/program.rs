@@ -64,6 +64,10 @@ impl Program {
     }
 
     /// Keeps the assignment if it satisfies every clause.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "literals are not 0, and each clause has its 0 with it"
+    )]
     fn keep(&mut self, literals: &[i32]) -> Result<(), String> {
         self.assignment = vec![false; self.variables as usize];
         for literal in literals.iter().filter(|literal| **literal > 0) {
@@ -188,6 +192,7 @@ fn read(output: &str) -> Result<(Answer, Vec<i32>), String> {
 }
 
 impl Solver for Program {
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^31 variables")]
     fn add_clause(&mut self, clause: &[Lit]) {
         for literal in clause {
             self.variables = self.variables.max(literal.variable() + 1);

@@ -53,6 +53,7 @@ impl Varisat {
     }
 
     /// Decides the clauses under assumptions, once.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn ask(&mut self, assumptions: &[Lit]) -> Answer {
         let assumed: Vec<varisat::Lit> = assumptions.iter().copied().map(translate).collect();
         self.solver.assume(&assumed);
@@ -196,14 +197,15 @@ impl Default for Steps {
 impl Steps {
     /// One more byte; whether it completes the code of a learnt clause.
     fn byte(&mut self, byte: u8) -> bool {
-        self.number |= u128::from(byte) << (8 * self.bytes);
-        self.bytes += 1;
+        let place = self.bytes.saturating_mul(8);
+        self.number |= u128::from(byte).checked_shl(place).unwrap_or(0);
+        self.bytes = self.bytes.saturating_add(1);
         // At its low end a number of n bytes has n - 1 zeros and a one.
-        let total = self.number.trailing_zeros() + 1;
+        let total = self.number.trailing_zeros().saturating_add(1);
         if self.number == 0 || self.bytes < total {
             return false;
         }
-        let value = self.number >> total;
+        let value = self.number.checked_shr(total).unwrap_or(0);
         (self.number, self.bytes) = (0, 0);
         // A number that is too long is none of the codes that count.
         self.next(u64::try_from(value).unwrap_or(u64::MAX))
@@ -222,8 +224,8 @@ impl Steps {
                 10..=12 | 14..=16 => list(1, false),
                 _ => Part::Code,
             },
-            Part::Length { each, and_list } => Part::Numbers { left: number * each, and_list },
-            Part::Numbers { left, and_list } => Part::Numbers { left: left - 1, and_list },
+            Part::Length { each, and_list } => Part::Numbers { left: number.saturating_mul(each), and_list },
+            Part::Numbers { left, and_list } => Part::Numbers { left: left.saturating_sub(1), and_list },
         };
         if let Part::Numbers { left: 0, and_list } = self.part {
             self.part = if and_list { list(1, false) } else { Part::Code };
@@ -246,7 +248,7 @@ impl io::Write for CountingSink {
             return Err(io::Error::other("limit reached"));
         }
         let learnt = bytes.iter().filter(|byte| self.steps.byte(**byte)).count();
-        self.conflicts.set(self.conflicts.get() + learnt as u64);
+        self.conflicts.set(self.conflicts.get().saturating_add(learnt as u64));
         Ok(bytes.len())
     }
 
@@ -271,10 +273,10 @@ impl io::Write for DratSink {
         }
         let mut added = 0;
         for byte in bytes {
-            added += u64::from(self.at_line_start && *byte != b'd');
+            added = u64::saturating_add(added, u64::from(self.at_line_start && *byte != b'd'));
             self.at_line_start = *byte == b'\n';
         }
-        self.conflicts += added;
+        self.conflicts = self.conflicts.saturating_add(added);
         self.proof.write_all(bytes)?;
         Ok(bytes.len())
     }

@@ -90,15 +90,16 @@ impl Runtime {
         let (found, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
         let noted = self.mode == Mode::Retract && self.facts().is_true(found, terms::UPDATABLE);
         let recoveries = if noted { self.recoveries() } else { Vec::new() };
-        self.ground_and_forget(objective, design, recoveries)
+        self.ground_and_forget(objective, design, recoveries).map(|(grounding, _)| grounding)
     }
 
-    /// As [`Runtime::ground`], and what components have reported stays as it is, recoveries among it.
+    /// As [`Runtime::ground`], and what components have reported stays as it is, recoveries among it; returns what holds
+    /// since, and what no more.
     ///
     /// # Errors
     /// [`Error::Unknown`], [`Error::Engine`].
-    pub fn assign(&mut self, objective: &str, design: &str) -> Result<Individual, Error> {
-        self.ground_and_forget(objective, design, Vec::new())
+    pub fn assign(&mut self, objective: &str, design: &str) -> Result<Delta, Error> {
+        self.ground_and_forget(objective, design, Vec::new()).map(|(_, delta)| delta)
     }
 
     fn ground_and_forget(
@@ -106,7 +107,7 @@ impl Runtime {
         objective: &str,
         design: &str,
         forgotten: Vec<Fact>,
-    ) -> Result<Individual, Error> {
+    ) -> Result<(Individual, Delta), Error> {
         let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
         let (design, _) = self.all().find("function design", terms::FUNCTION_DESIGN, design)?;
         let mut delete = self.release(objective);
@@ -122,8 +123,8 @@ impl Runtime {
         for holder in measurements {
             insert.push(self.fact(terms::HAS_QA_VALUE[0], [grounding, holder]));
         }
-        self.apply(Delta { insert, delete })?;
-        Ok(Individual::new(&iri))
+        let delta = self.apply(Delta { insert, delete })?;
+        Ok((Individual::new(&iri), delta))
     }
 
     /// No design provides an objective's function from now on.

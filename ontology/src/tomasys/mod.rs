@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
 use num_rational::BigRational;
-use rules::{Engine, Fact, Literal, Symbol, Value};
+use rules::{Engine, Literal, Symbol, Value};
 
 use crate::vocab::local_name;
 use terms::Term;
@@ -134,11 +134,12 @@ impl<'a> View<'a> {
 
     /// The named individuals of all classes with that local name, in whatever vocabulary.
     pub fn individuals_of_class_named(&self, class_name: &str) -> Vec<Individual> {
-        let is_member = |fact: &Fact| {
-            fact.arguments.len() == 1
-                && self.name(fact.predicate).is_some_and(|iri| local_name(iri) == class_name)
+        let is_class = |&(predicate, arity): &(Symbol, usize)| {
+            arity == 1 && self.name(predicate).is_some_and(|iri| local_name(iri) == class_name)
         };
-        sorted(self.engine.facts().filter(is_member).filter_map(|fact| self.individual(fact.arguments[0])))
+        let classes = self.engine.predicates().filter(is_class);
+        let members = classes.flat_map(|(class, _)| self.engine.matching(class, &[None]));
+        sorted(members.filter_map(|row| self.individual(row[0])))
     }
 
     /// The values of a property of an individual, both by IRI: individuals first, then literals, each sorted.

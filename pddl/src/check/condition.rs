@@ -163,6 +163,7 @@ impl<'a> Checker<'a> {
         }
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn argument_type(&mut self, atom: &Atom, index: usize, given: &Given<'_>, wanted: &TypedName) {
         let (span, shown) = match &atom.arguments[index] {
             Term::Variable(identifier) => (identifier.span, format!("?{}", identifier.name)),

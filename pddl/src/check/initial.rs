@@ -21,6 +21,7 @@ fn key(atom: &Atom) -> Key<'_> {
 }
 
 impl<'a> Checker<'a> {
+    #[expect(clippy::arithmetic_side_effects, reason = "those that are counted are among them")]
     pub(super) fn initial_state(&mut self, init: &'a [InitialElement]) {
         let scope = Scope::new();
         let mut facts: FxHashMap<Key<'a>, (Span, bool)> = FxHashMap::default();

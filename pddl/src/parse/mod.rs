@@ -202,6 +202,7 @@ fn at_start(item: Item<'_>) -> Span {
     if item.is_list() { list_start(item) } else { item.span() }
 }
 
+#[expect(clippy::arithmetic_side_effects, reason = "a parenthesis is a byte of the text")]
 fn list_start(list: Item<'_>) -> Span {
     let span = list.span();
     let end = match list.items().next() {

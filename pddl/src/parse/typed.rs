@@ -44,6 +44,7 @@ impl Parser<'_> {
     }
 
     /// The type behind a dash; `glued` is what follows it without a space.
+    #[expect(clippy::arithmetic_side_effects, reason = "a dash is a byte of the text")]
     fn type_after_dash(&mut self, dash: Item<'_>, glued: &str, items: &mut Items<'_>) -> TypeExpression {
         if glued.starts_with(['?', ':']) {
             self.sink.error("P106", dash.span(), format!("`{glued}` is not a type"));

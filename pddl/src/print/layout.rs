@@ -32,6 +32,7 @@ pub(super) fn text(text: impl Into<String>) -> Doc {
 }
 
 /// `(head items…)`; broken, the first `beside` of head and items stay on the first line.
+#[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
 pub(super) fn list(head: &str, beside: usize, items: impl IntoIterator<Item = Doc>) -> Doc {
     let items: Vec<_> = std::iter::once(text(head)).chain(items).collect();
     let width = items.iter().map(|item| item.width + 1).sum::<usize>() + 1;
@@ -50,6 +51,7 @@ impl Doc {
     }
 
     /// The same behind a keyword.
+    #[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
     pub(super) fn after(mut self, keyword: &str) -> Self {
         keyword.clone_into(&mut self.keyword);
         self.width += keyword.len() + 1;
@@ -83,6 +85,7 @@ impl Doc {
         }
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "widths of what is written in memory")]
     fn write(&self, indent: usize, out: &mut String) {
         let Content::List(items, beside) = &self.content else { return self.write_inline(out) };
         if !self.is_broken && indent + self.width <= WIDTH {

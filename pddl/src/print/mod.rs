@@ -71,6 +71,7 @@ pub(crate) fn type_text(r#type: &TypeExpression) -> String {
 }
 
 /// A typed list in groups of one type, each name with `prefix`. Untyped names can stand bare only at the end.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
     let bare_from =
         entries.iter().rposition(|entry| !entry.r#type.alternatives.is_empty()).map_or(0, |last| last + 1);

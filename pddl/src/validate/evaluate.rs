@@ -144,6 +144,7 @@ impl<'e, 'p> Evaluator<'e, 'p> {
     }
 
     /// Whether the body holds for all objects of the variables from `place` on.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn for_all(
         &self,
         place: usize,

@@ -49,6 +49,7 @@ const READINGS: usize = 4096;
 ///
 /// A step whose name and objects fit several schemas stands for any of them: a plan is valid if some reading of it is, and
 /// the best one counts. Beyond 4,096 readings each such step is the first schema that can start.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &Options) -> Verdict {
     let world = World::new(domain, problem);
     let steps: Vec<_> =

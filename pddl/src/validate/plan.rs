@@ -5,6 +5,7 @@ use num_rational::BigRational;
 use crate::ast::{Name, Span};
 use crate::diagnostic::Sink;
 use crate::number::{Literal, literal};
+use crate::source::place;
 use crate::{Diagnostic, Source};
 
 /// A plan as somebody wrote it: the steps in the order of the text.
@@ -37,17 +38,25 @@ impl PlanText {
     /// # Errors
     ///
     /// Every line that is not a step.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions in a text in memory, which are at most its length"
+    )]
     pub fn parse(source: &Source) -> Result<Self, Vec<Diagnostic>> {
         let text = source.text();
         let announced = text.rfind("Solution Found");
         let begin = announced.map_or(0, |at| text[at..].find('\n').map_or(text.len(), |end| at + end + 1));
         let mut sink = Sink::new(source);
+        if u32::try_from(text.len()).is_err() {
+            sink.error("P100", Span::default(), "the file is larger than 4 GB");
+            return Err(sink.finish());
+        }
         let mut steps = Vec::new();
         let mut at = begin;
         for line in text[begin..].split_inclusive('\n') {
             let content = without_comment(line);
             let trimmed = content.trim();
-            let start = (at + content.len() - content.trim_start().len()) as u32;
+            let start = place(at + content.len() - content.trim_start().len());
             at += line.len();
             if trimmed.is_empty() || (announced.is_some() && !looks_like_step(trimmed)) {
                 continue;
@@ -55,7 +64,7 @@ impl PlanText {
             match step(trimmed) {
                 Ok(step) => steps.push(PlanStep { line: source.position(start).line, ..step }),
                 Err(message) => {
-                    let span = Span { start, end: start + trimmed.len() as u32 };
+                    let span = Span { start, end: start.saturating_add(place(trimmed.len())) };
                     sink.error("P150", span, message)
                         .help("a step is `(action object …)` or `0.000: (action object …) [duration]`");
                 }

@@ -69,6 +69,7 @@ pub(super) fn resolve<'p>(world: &World<'p>, number: usize, text: &'p PlanStep) 
 }
 
 /// All ways to choose one schema for each step that fits several; none if there is one way, or if there are more than `most`.
+#[expect(clippy::arithmetic_side_effects, reason = "each step has a way at least")]
 pub(super) fn readings<'p>(steps: &[Step<'p>], most: usize) -> Vec<Vec<Step<'p>>> {
     let ways = |step: &Step<'p>| step.instances.len().max(1);
     let count = steps.iter().try_fold(1_usize, |count, step| count.checked_mul(ways(step)));

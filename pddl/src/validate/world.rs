@@ -6,6 +6,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
 use crate::ast::{Atom, Domain, InitialElement, Name, Problem, Term, TypeExpression, TypedName};
+use crate::number::dense;
 use crate::strata::Strata;
 use crate::types::TypeHierarchy;
 
@@ -66,7 +67,7 @@ impl<'p> World<'p> {
         if let Some(symbol) = self.symbols.get(name) {
             return *symbol;
         }
-        let symbol = Symbol(self.names.len() as u32);
+        let symbol = Symbol(dense(self.names.len()));
         self.symbols.insert(name.clone(), symbol);
         self.names.push(name.clone());
         symbol
@@ -156,6 +157,7 @@ impl State {
     }
 
     /// For how many arguments a predicate holds.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn count(&self, predicate: Symbol) -> usize {
         let count =
             |facts: &FxHashMap<Symbol, FxHashSet<Arguments>>| facts.get(&predicate).map_or(0, FxHashSet::len);
@@ -165,6 +167,7 @@ impl State {
 
 /// The axioms by the layer of their head. Axioms through their own negation have no layers; the checker
 /// refuses them, and here they all come into one.
+#[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
 fn layers(domain: &Domain) -> Vec<Vec<usize>> {
     let strata = Strata::of(domain).ok();
     let mut layers: Vec<Vec<usize>> = Vec::new();

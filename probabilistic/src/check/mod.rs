@@ -5,6 +5,7 @@ mod query;
 mod steps;
 mod table;
 
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use num_rational::BigRational;
@@ -104,7 +105,7 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
         let exact = Program::<BigRational>::new(model, &options.settings)?.with_rewards(&wanted);
         let states = explore(&exact, &options.bounds)?;
         spent = again.elapsed();
-        build += spent;
+        build = build.saturating_add(spent);
         // A policy of the doubles is a good start where both have the same choices.
         let same = states.mdp.choice_count() == explored.mdp.choice_count()
             && states.mdp.transition_count() == explored.mdp.transition_count();
@@ -158,13 +159,10 @@ fn policy_table<N: Number>(
     let names = program.variables.iter().map(|variable| (variable.name.clone(), variable.is_bool)).collect();
     let mut table = PolicyTable { variables: names, rows: Vec::new() };
     let mut seen = vec![false; explored.mdp.states()];
-    let mut queue = vec![0_usize];
+    let mut queue = VecDeque::from([0_usize]);
     seen[0] = true;
-    let mut at = 0;
     let mut values = Vec::new();
-    while at < queue.len() {
-        let state = queue[at];
-        at += 1;
+    while let Some(state) = queue.pop_front() {
         let choice = policy[state];
         if choice == NONE {
             continue;
@@ -174,11 +172,13 @@ fn policy_table<N: Number>(
         table.rows.push(Row {
             values: values.clone(),
             action: program.action_name(explored.mdp.action(choice)).to_owned(),
-            choice: choice - explored.mdp.choices(state).start,
+            choice: choice
+                .checked_sub(explored.mdp.choices(state).start)
+                .expect("invariant: a choice of the state"),
         });
         for target in explored.mdp.targets(choice) {
             if !std::mem::replace(&mut seen[*target as usize], true) {
-                queue.push(*target as usize);
+                queue.push_back(*target as usize);
             }
         }
     }

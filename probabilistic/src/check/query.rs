@@ -2,6 +2,7 @@
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
+use num_traits::ToPrimitive;
 
 use crate::check::answer::{Answer, Outcome};
 use crate::check::{Options, reaches, steps};
@@ -15,6 +16,9 @@ use crate::prism::ast::{BinaryOp, Expr, ExprKind, ModelKind, Type};
 use crate::prism::{Code, Names, Packed, Program};
 use crate::property::{Path, Property, Question, RewardPath, Steps};
 use crate::solve::{Direction, Problem, Solution, solve};
+
+/// Fewer steps than this are counted one by one.
+const STEPS: u32 = 1_000_000_000;
 
 /// What a query needs.
 pub struct Query<'a, N> {
@@ -303,16 +307,13 @@ impl<N: Number> Query<'_, N> {
         value.map_err(|problem| Error::Property(vec![problem]))
     }
 
-    fn limit(&self, steps: &Steps) -> Result<u64, Error> {
-        let value = Number::to_f64(&self.constant(&steps.limit)?) - f64::from(u8::from(steps.strict));
-        if (0.0..1e9).contains(&value) {
-            return Ok(value as u64);
-        }
-        Err(property_error(
-            "Q503",
-            steps.limit.place,
-            "the number of steps must be at least 0 and below 10^9",
-        ))
+    fn limit(&self, steps: &Steps) -> Result<u32, Error> {
+        // It is whole, which `validate` has seen to.
+        let limit = self.constant(&steps.limit)?.to_integer() - u8::from(steps.strict);
+        limit.to_u32().filter(|most| *most < STEPS).ok_or_else(|| {
+            let text = "the number of steps must be at least 0 and below 10^9";
+            property_error("Q503", steps.limit.place, text)
+        })
     }
 
     /// The states in which an expression holds.

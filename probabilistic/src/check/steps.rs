@@ -1,13 +1,13 @@
 //! Values after a bounded number of steps: repeated application of the equations.
 
-use crate::number::Number;
+use crate::number::{Number, count};
 use crate::solve::{Direction, EXACT_WORK, Problem};
 
 /// Applies the equations of all states so many times, starting with `values`. Those of the states at which the problem ends
 /// do not change. The second result bounds the rounding error. None where exact arithmetic takes too long.
-pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u64) -> Option<(Vec<N>, f64)> {
+pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u32) -> Option<(Vec<N>, f64)> {
     let mdp = problem.mdp;
-    let (mut widest, mut work) = (1, 0);
+    let (mut widest, mut work) = (1, 0_u64);
     for _ in 0..steps {
         let mut next = values.clone();
         for state in (0..mdp.states()).filter(|state| !problem.is_sink(*state)) {
@@ -19,7 +19,10 @@ pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u64)
                     .transitions(choice)
                     .fold(start, |sum, (target, p)| sum.plus(&p.times(&values[target])));
                 // Fractions are reduced, which takes the square of their length.
-                work += if N::EXACT { value.size() * (1 + value.size() / 64) } else { 0 };
+                if N::EXACT {
+                    let square = value.size().saturating_mul((value.size() / 64).saturating_add(1));
+                    work = u64::saturating_add(work, square);
+                }
                 let better = best.as_ref().is_none_or(|best| match problem.direction {
                     Direction::Min => value < *best,
                     Direction::Max => value > *best,
@@ -43,6 +46,7 @@ pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u64)
     }
     let greatest = values.iter().map(Number::to_f64).fold(0.0, f64::max);
     // Values that settle may do so because of rounding, so that all steps count.
-    let error = if N::EXACT { 0.0 } else { steps as f64 * (widest + 2) as f64 * f64::EPSILON * greatest };
+    let error =
+        if N::EXACT { 0.0 } else { f64::from(steps) * (count(widest) + 2.0) * f64::EPSILON * greatest };
     Some((values, error))
 }

@@ -4,6 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::error::Error;
 use crate::explore::{Explored, Generator};
+use crate::mdp::dense;
 use crate::number::Number;
 use crate::prism::{Packed, Program};
 use crate::solve::NONE;
@@ -26,6 +27,11 @@ pub struct Row {
     pub action: String,
     /// Which of the state's choices it is, from 0, in the order of the commands.
     pub choice: usize,
+}
+
+/// What is wrong with a state, by its place in the list, from 1.
+fn numbered(number: usize, what: &str) -> String {
+    format!("state {}: {what}", number.saturating_add(1))
 }
 
 /// The name and version of the format.
@@ -59,7 +65,7 @@ impl PolicyTable {
         };
         let mut table = Self { variables: Vec::new(), rows: Vec::new() };
         for (number, entry) in states.iter().enumerate() {
-            let problem = |what: &str| wrong(format!("state {}: {what}", number + 1));
+            let problem = |what: &str| wrong(numbered(number, what));
             let Some(state) = entry["state"].as_object() else {
                 return Err(problem("`state` must be an object"));
             };
@@ -74,7 +80,8 @@ impl PolicyTable {
             }
             let action = entry["action"].as_str().ok_or_else(|| problem("`action` must be a text"))?;
             let choice = entry["choice"].as_u64().ok_or_else(|| problem("`choice` must be a number"))?;
-            table.rows.push(Row { values, action: action.to_owned(), choice: choice as usize });
+            let choice = usize::try_from(choice).map_err(|_| problem("`choice` is too large"))?;
+            table.rows.push(Row { values, action: action.to_owned(), choice });
         }
         Ok(table)
     }
@@ -96,21 +103,19 @@ impl PolicyTable {
         }
         let mut policy = vec![NONE; explored.mdp.states()];
         for (number, row) in self.rows.iter().enumerate() {
-            let problem = |what: &str| Error::Policy(format!("state {}: {what}", number + 1));
+            let problem = |what: &str| Error::Policy(numbered(number, what));
             let values: Vec<i64> = order.iter().map(|at| row.values[*at]).collect();
             let state = program
                 .pack(&values)
                 .and_then(|packed| explored.states.number(program.code(&packed), &packed));
             let state = state.ok_or_else(|| problem("the model does not reach this state"))?;
             let choices = explored.mdp.choices(state);
-            let choice = choices.start + row.choice;
-            if !choices.contains(&choice) {
-                return Err(problem("the model has no such choice there"));
-            }
+            let choice = choices.clone().nth(row.choice);
+            let choice = choice.ok_or_else(|| problem("the model has no such choice there"))?;
             if program.action_name(explored.mdp.action(choice)) != row.action {
                 return Err(problem("the choice has another action"));
             }
-            policy[state] = choice as u32;
+            policy[state] = dense(choice);
         }
         Ok(policy)
     }

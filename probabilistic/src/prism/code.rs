@@ -124,7 +124,7 @@ impl Code {
             Self::Negative(inner, Type::Double) => -inner.number(values)?,
             Self::Arithmetic(op, Type::Double, left, right) => {
                 let (left, right) = (left.number(values)?, right.number(values)?);
-                if left.size() + right.size() > BITS {
+                if left.size().saturating_add(right.size()) > BITS {
                     return Err(Fault("a number with too many digits"));
                 }
                 match op {
@@ -214,8 +214,16 @@ fn whole_call(function: Function, arguments: &[Code], values: &[i64]) -> Result<
             }
         }
         Function::Pow => {
-            let exponent = u32::try_from(whole(1)?).map_err(|_| Fault("a negative power of an integer"))?;
-            whole(0)?.checked_pow(exponent).ok_or(OVERFLOW)
+            let (base, exponent) = (whole(0)?, whole(1)?);
+            if exponent < 0 {
+                return Err(Fault("a negative power of an integer"));
+            }
+            match (base, u32::try_from(exponent)) {
+                (0 | 1, _) if exponent > 0 => Ok(base),
+                (-1, _) => Ok(if exponent % 2 == 0 { 1 } else { -1 }),
+                (_, Ok(exponent)) => base.checked_pow(exponent).ok_or(OVERFLOW),
+                (_, Err(_)) => Err(OVERFLOW),
+            }
         }
         Function::Floor | Function::Ceil | Function::Round => {
             let value = arguments[0].number(values)?;

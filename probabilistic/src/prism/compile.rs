@@ -128,16 +128,14 @@ impl Names {
         let mut used = Vec::new();
         value.names(&mut used);
         let mut waits = false;
-        let mut at = 0;
-        while at < used.len() {
-            let name = used[at].0;
+        for at in 0.. {
+            let Some((name, _)) = used.get(at).copied() else { break };
             waits |= !self.meanings.contains_key(name) && model.constants.iter().any(|c| c.name == name);
             if let Some(formula) = model.formulas.iter().find(|formula| formula.name == name)
                 && !used[..at].iter().any(|(known, _)| *known == name)
             {
                 formula.expression.names(&mut used);
             }
-            at += 1;
         }
         waits
     }
@@ -195,6 +193,10 @@ impl Names {
     }
 
     /// An expression as code, with its type.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "depth and parts are refused as soon as they pass their limits, and each leaves the depth that it entered"
+    )]
     pub fn compile(&mut self, expression: &Expr) -> Result<(Code, Type), Diagnostic> {
         if self.depth == 0 {
             self.parts[0] = 0;

@@ -46,7 +46,7 @@ impl<'a> Cursor<'a> {
 
     /// The token after so many others.
     pub fn peek_at(&self, offset: usize) -> &'a Kind {
-        &self.tokens[(self.at + offset).min(self.tokens.len() - 1)].kind
+        self.tokens.get(self.at.saturating_add(offset)).map_or(&Kind::End, |token| &token.kind)
     }
 
     /// Where the next token is.
@@ -56,8 +56,9 @@ impl<'a> Cursor<'a> {
 
     /// Takes a token.
     pub fn advance(&mut self) {
-        if self.at + 1 < self.tokens.len() {
-            self.at += 1;
+        let next = self.at.saturating_add(1);
+        if next < self.tokens.len() {
+            self.at = next;
         }
     }
 
@@ -129,6 +130,10 @@ impl<'a> Cursor<'a> {
     ///
     /// # Errors
     /// The first thing that is none.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "refused as soon as it passes its limit, and each leaves the depth that it entered"
+    )]
     pub fn expression(&mut self) -> Read<Expr> {
         if self.depth == 0 {
             self.operators = [0; 2];
@@ -162,6 +167,10 @@ impl<'a> Cursor<'a> {
         Some((found, found.sign().1))
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "refused as soon as it passes its limit; strengths are below 20"
+    )]
     fn binary(&mut self, least: u8) -> Read<Expr> {
         let mut left = self.unary(least)?;
         while let Some((op, strength)) = self.operator().filter(|(_, strength)| *strength >= least) {
@@ -179,6 +188,10 @@ impl<'a> Cursor<'a> {
         Ok(left)
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "refused as soon as it passes its limit, and each leaves the depth that it entered"
+    )]
     fn unary(&mut self, least: u8) -> Read<Expr> {
         let place = self.place();
         self.depth += 1;

@@ -48,6 +48,7 @@ const SIGNS: [&str; 30] = [
 ///
 /// # Errors
 /// Characters that no token starts with, and quotation marks without end.
+#[expect(clippy::arithmetic_side_effects, reason = "lines and columns of a text in memory")]
 pub fn tokens(text: &str) -> Result<Vec<Token>, Vec<Diagnostic>> {
     let (mut tokens, mut problems) = (Vec::new(), Vec::new());
     let mut place = Place { line: 1, column: 1 };
@@ -84,6 +85,10 @@ pub fn tokens(text: &str) -> Result<Vec<Token>, Vec<Diagnostic>> {
 }
 
 /// The first token of a text that is not empty, and its length in bytes.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "positions in a text in memory, which are at most its length"
+)]
 fn token(text: &str) -> Result<(Kind, usize), String> {
     let first = text.chars().next().unwrap_or(' ');
     let length = |good: fn(char) -> bool| text.find(|c| !good(c)).unwrap_or(text.len());

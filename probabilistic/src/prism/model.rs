@@ -4,17 +4,19 @@
 //! commands, so that the cost of a state does not grow with the number of commands for other states.
 
 use std::borrow::Cow;
+use std::cmp::Reverse;
 
 use rustc_hash::FxHashMap;
 
 use crate::error::{Diagnostic, Error, Place};
+use crate::mdp::dense;
 use crate::number::Number;
 use crate::prism::ast::{self, Model, ModelKind, Type};
 use crate::prism::build::{compile_command, declare, probabilities, reward_item};
 use crate::prism::code::Code;
 use crate::prism::compile::{Names, Settings};
 use crate::prism::guard::Guard;
-use crate::prism::state::{Layout, Packed, Valuation};
+use crate::prism::state::{Layout, Packed, Valuation, above_least};
 
 /// The action number of commands without name.
 pub const UNNAMED: u32 = u32::MAX - 1;
@@ -142,7 +144,7 @@ impl<N: Number> Program<N> {
                 Ok(found) => {
                     program.layout.push(found.least, found.greatest);
                     let kind = if found.is_bool { Type::Bool } else { Type::Int };
-                    let number = program.variables.len() as u32;
+                    let number = dense(program.variables.len());
                     names.variable(&found.name, number, kind, variable.place, &mut problems);
                     program.variables.push(found);
                 }
@@ -157,7 +159,7 @@ impl<N: Number> Program<N> {
             if let Some(action) = &command.action
                 && !numbers.contains_key(action.as_str())
             {
-                numbers.insert(action, program.actions.len() as u32);
+                numbers.insert(action, dense(program.actions.len()));
                 program.actions.push(action.clone());
             }
         }
@@ -267,21 +269,24 @@ impl<N: Number> Program<N> {
                 fixed.iter().filter(|fixed| fixed.iter().any(|(known, _)| *known == variable)).count()
             };
             let best =
-                (0..variables.len() as u32).max_by_key(|variable| (count(*variable), u32::MAX - variable));
+                (0..dense(variables.len())).max_by_key(|variable| (count(*variable), Reverse(*variable)));
             let Some(best) = best.filter(|best| count(*best) > 0) else { continue };
             let Variable { least, greatest, .. } = variables[best as usize];
             // The table must not outgrow the commands by much.
-            if greatest.wrapping_sub(least) as u64 > 1000 + 10 * group.commands.len() as u64 {
+            let most = group.commands.len().saturating_mul(10).saturating_add(1000);
+            let Ok(above) = usize::try_from(greatest.abs_diff(least)) else { continue };
+            if above > most {
                 continue;
             }
-            let mut table: Vec<Vec<u32>> = vec![Vec::new(); (greatest - least + 1) as usize];
+            let mut table: Vec<Vec<u32>> = vec![Vec::new(); above.saturating_add(1)];
             for (number, fixed) in fixed.iter().enumerate() {
                 match fixed.iter().find(|(known, _)| *known == best) {
-                    Some((_, value)) if (least..=greatest).contains(value) => {
-                        table[(value - least) as usize].push(number as u32);
+                    Some((_, value)) => {
+                        if let Some(list) = table.get_mut(above_least(*value, least)) {
+                            list.push(dense(number));
+                        }
                     }
-                    Some(_) => {}
-                    None => table.iter_mut().for_each(|list| list.push(number as u32)),
+                    None => table.iter_mut().for_each(|list| list.push(dense(number))),
                 }
             }
             group.index = Some((best, least, table));
@@ -295,10 +300,11 @@ impl<N: Number> Program<N> {
         let mut masks: Vec<Mask> = Vec::new();
         for (action, groups) in self.synchronised.iter().enumerate() {
             for (variable, least, commands) in groups.iter().filter_map(|group| group.index.as_ref()) {
-                let at = masks.iter().position(|mask| mask.variable == *variable).unwrap_or_else(|| {
+                let known = masks.iter().position(|mask| mask.variable == *variable);
+                let at = known.unwrap_or_else(|| {
                     let table = vec![vec![u64::MAX; words]; commands.len()];
                     masks.push(Mask { variable: *variable, least: *least, table });
-                    masks.len() - 1
+                    masks.len().saturating_sub(1)
                 });
                 for (row, list) in masks[at].table.iter_mut().zip(commands) {
                     if list.is_empty() {

@@ -47,11 +47,9 @@ pub fn module(
 
 /// An expression without names of formulas; `depth` stops at formulas that contain themselves.
 fn write_out(expression: &Expr, formulas: &[Named], depth: usize) -> Expr {
-    if depth == 0 {
-        return expression.clone();
-    }
+    let Some(depth) = depth.checked_sub(1) else { return expression.clone() };
     expression.replace(&|name| {
         let formula = formulas.iter().find(|formula| formula.name == name)?;
-        Some(write_out(&formula.expression, formulas, depth - 1))
+        Some(write_out(&formula.expression, formulas, depth))
     })
 }

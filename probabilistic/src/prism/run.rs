@@ -3,16 +3,19 @@
 //! Most commands stand alone, with probabilities that are constants: these write their successors straight into the packed
 //! state. Only commands of several modules that move together, and those of Markov chains, are combined first.
 
+use num_bigint::BigInt;
+use num_rational::BigRational;
 use num_traits::Signed;
 use smallvec::SmallVec;
 
 use crate::error::{Diagnostic, Error, Place};
 use crate::explore::{Choices, Generator};
+use crate::mdp::dense;
 use crate::number::Number;
 use crate::prism::ast::ModelKind;
-use crate::prism::code::{Code, Fault, from_whole, rounded};
+use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::model::{Command, Group, Program, RewardItem, UNNAMED, Variable};
-use crate::prism::state::{Packed, Valuation};
+use crate::prism::state::{Packed, Valuation, above_least};
 
 /// The values of the variables, of one state at a time.
 type Values = SmallVec<[i64; 16]>;
@@ -45,11 +48,11 @@ impl<N: Number> Program<N> {
                 return Ok(());
             }
             let mut next = Vec::new();
-            let (outcomes, mut ends) = (combined.iter().map(Vec::len).sum::<usize>(), 0);
+            let (outcomes, mut ends) = (combined.iter().map(Vec::len).sum::<usize>(), 0_usize);
             for command in enabled(group, values) {
                 let command = command?;
                 let effects = self.effects(command, values)?;
-                ends += outcomes * effects.len();
+                ends = ends.saturating_add(outcomes.saturating_mul(effects.len()));
                 if ends > COMBINED {
                     let text = format!("more than {COMBINED} ways in which modules move together in a state");
                     return Err(Diagnostic::new("Q306", command.place, text).into());
@@ -99,7 +102,7 @@ impl<N: Number> Program<N> {
         all.extend(found.drain(..).map(|outcome| (UNNAMED, outcome)));
         for (action, groups) in self.synchronised.iter().enumerate() {
             self.combine(groups, values, &mut found)?;
-            all.extend(found.drain(..).map(|outcome| (action as u32, outcome)));
+            all.extend(found.drain(..).map(|outcome| (dense(action), outcome)));
         }
         Ok(all)
     }
@@ -108,7 +111,7 @@ impl<N: Number> Program<N> {
 type Effect<N> = (N, Vec<(u32, i64)>);
 
 fn join<N: Number>(outcome: &Outcome<N>, effects: &[Effect<N>]) -> Outcome<N> {
-    let mut joined = Vec::with_capacity(outcome.len() * effects.len());
+    let mut joined = Vec::with_capacity(outcome.len().saturating_mul(effects.len()));
     for (values, before) in outcome {
         for (probability, changes) in effects {
             joined.push((changed(values, changes), before.times(probability)));
@@ -131,7 +134,7 @@ fn enabled<'a, N: Number>(
     values: &'a [i64],
 ) -> impl Iterator<Item = Result<&'a Command<N>, Error>> {
     let (listed, all): (&[u32], _) = match &group.index {
-        Some((variable, least, table)) => (&table[(values[*variable as usize] - least) as usize], 0),
+        Some((variable, least, table)) => (&table[above_least(values[*variable as usize], *least)], 0),
         None => (&[], group.commands.len()),
     };
     let candidates = listed.iter().map(|number| *number as usize).chain(0..all);
@@ -159,13 +162,17 @@ impl<N: Number> Program<N> {
     }
 
     /// The actions that the values of single variables leave possible.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "words hold 64 actions, and there are as many words as the actions need; bits is not 0 where its last one is taken"
+    )]
     fn possible(&self, values: &[i64]) -> impl Iterator<Item = usize> {
         let words = self.actions.len().div_ceil(64);
         (0..words).flat_map(move |word| {
             let count = self.actions.len() - word * 64;
             let all = if count >= 64 { u64::MAX } else { (1 << count) - 1 };
             let mut bits = self.masks.iter().fold(all, |bits, mask| {
-                bits & mask.table[(values[mask.variable as usize] - mask.least) as usize][word]
+                bits & mask.table[above_least(values[mask.variable as usize], mask.least)][word]
             });
             std::iter::from_fn(move || {
                 let first = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
@@ -216,7 +223,7 @@ impl<N: Number> Program<N> {
         }
         let mut found = Vec::new();
         for action in self.possible(values) {
-            let number = action as u32;
+            let number = dense(action);
             match &self.synchronised[action][..] {
                 [group] => {
                     for command in enabled(group, values) {
@@ -244,7 +251,7 @@ impl<N: Number> Program<N> {
         if all.is_empty() {
             return Ok(());
         }
-        let count = N::from_rational(&from_whole(all.len() as i64));
+        let count = N::from_rational(&BigRational::from(BigInt::from(all.len())));
         let mut total = self.state_rewards(values)?;
         for (action, outcome) in &all {
             for (sum, more) in total.iter_mut().zip(self.action_rewards(*action, values)?) {

@@ -2,11 +2,18 @@
 
 use smallvec::SmallVec;
 
+use crate::mdp::dense;
+
 /// A state: the values of the variables, each in as many bits as its range needs.
 pub type Packed = SmallVec<[u64; 2]>;
 
 /// The values of the variables, truth values as 0 and 1.
 pub type Valuation = Vec<i64>;
+
+/// How far a value is above the least one of its range; more than there are positions in any list, where it is below.
+pub fn above_least(value: i64, least: i64) -> usize {
+    if value < least { usize::MAX } else { usize::try_from(value.abs_diff(least)).unwrap_or(usize::MAX) }
+}
 
 /// Where each variable lies.
 #[derive(Debug, Clone, Default)]
@@ -30,9 +37,13 @@ struct Field {
 
 impl Layout {
     /// Adds a variable with its range.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "used is at most 64 and so is bits; words counts variables"
+    )]
     pub fn push(&mut self, least: i64, greatest: i64) {
-        let size = greatest.wrapping_sub(least) as u64;
-        let bits = 64 - size.leading_zeros();
+        let size = greatest.abs_diff(least);
+        let bits = size.checked_ilog2().map_or(0, |log| log + 1);
         if self.words == 0 || self.used + bits > 64 {
             self.words += 1;
             self.used = 0;
@@ -40,9 +51,9 @@ impl Layout {
         let mask = if bits == 64 { u64::MAX } else { (1 << bits) - 1 };
         // A variable of one value takes no bits; its shift must stay below the word's size.
         let shift = if bits == 0 { 0 } else { self.used };
-        self.fields.push(Field { least, greatest: size, word: self.words as u32 - 1, shift, mask });
+        self.fields.push(Field { least, greatest: size, word: dense(self.words - 1), shift, mask });
         self.used += bits;
-        self.order.push(self.order.len() as u32);
+        self.order.push(dense(self.order.len()));
         self.order.sort_by_key(|number| std::cmp::Reverse(self.fields[*number as usize].greatest));
     }
 
@@ -50,14 +61,14 @@ impl Layout {
     pub fn pack(&self, values: &[i64]) -> Packed {
         let mut packed: Packed = SmallVec::from_elem(0, self.words.max(1));
         for (field, value) in self.fields.iter().zip(values) {
-            packed[field.word as usize] |= (value.wrapping_sub(field.least) as u64) << field.shift;
+            packed[field.word as usize] |= value.abs_diff(field.least) << field.shift;
         }
         packed
     }
 
     /// The values of all variables.
     pub fn values(&self, packed: &Packed) -> impl Iterator<Item = i64> {
-        self.fields.iter().map(|field| field.least.wrapping_add(field.raw(packed) as i64))
+        self.fields.iter().map(|field| field.least.wrapping_add_unsigned(field.raw(packed)))
     }
 
     /// Unpacks all values into a buffer.
@@ -70,8 +81,7 @@ impl Layout {
     pub fn set(&self, packed: &mut Packed, variable: u32, value: i64) {
         let field = &self.fields[variable as usize];
         let word = &mut packed[field.word as usize];
-        *word =
-            *word & !(field.mask << field.shift) | (value.wrapping_sub(field.least) as u64) << field.shift;
+        *word = *word & !(field.mask << field.shift) | value.abs_diff(field.least) << field.shift;
     }
 
     /// How many combinations of values there are, if they can be counted.
@@ -79,11 +89,12 @@ impl Layout {
         self.fields.iter().try_fold(1_usize, |product, field| product.checked_mul(field.size()?))
     }
 
-    /// The number of a combination; the variable with the greatest range weighs most.
+    /// The number of a combination, which means nothing where they cannot be counted; the variable with the greatest range weighs most.
     pub fn code(&self, packed: &Packed) -> usize {
         self.order.iter().fold(0, |code, number| {
             let field = &self.fields[*number as usize];
-            code.wrapping_mul(field.size().unwrap_or(0)).wrapping_add(field.raw(packed) as usize)
+            code.wrapping_mul(field.size().unwrap_or(0))
+                .wrapping_add(usize::try_from(field.raw(packed)).unwrap_or(0))
         })
     }
 }

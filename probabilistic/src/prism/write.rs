@@ -91,6 +91,7 @@ pub fn expression(expression: &Expr) -> String {
     strong(expression, 0)
 }
 
+#[expect(clippy::arithmetic_side_effects, reason = "strengths are below 20")]
 fn strong(expression: &Expr, least: u8) -> String {
     let (text, strength) = match &expression.kind {
         ExprKind::Bool(value) => (value.to_string(), 20),
@@ -119,6 +120,10 @@ fn strong(expression: &Expr, least: u8) -> String {
 }
 
 /// A rational as a decimal if it is one, else as a fraction; with how strongly the text binds.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "at most 30 places, and digits are padded to more than there are places"
+)]
 pub(crate) fn decimal(value: &BigRational) -> (String, u8) {
     let mut scaled = value.clone();
     for places in 0..=30 {

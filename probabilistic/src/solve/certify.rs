@@ -6,7 +6,8 @@
 //! Value Iteration, CAV 2020). On the other side the found policy itself is a bound, and the same δw covers it. All is
 //! checked with rounding errors added; where the check fails, the error is infinite, which is honest if useless.
 
-use crate::number::Number;
+use crate::mdp::dense;
+use crate::number::{Number, count};
 use crate::solve::Direction;
 use crate::solve::chain::solve_chain;
 use crate::solve::component::Quotient;
@@ -27,7 +28,7 @@ pub fn certify<N: Number>(
     let rows: Vec<(f64, f64)> = (0..quotient.choices.len())
         .map(|row| {
             let value = quotient.rows.apply(row, values).to_f64();
-            (value, (64 + 3 * quotient.widest) as f64 * f64::EPSILON * value)
+            (value, (64.0 + 3.0 * count(quotient.widest)) * f64::EPSILON * value)
         })
         .collect();
     // How much worse a row is than the value that was found; negative where rounding makes it better.
@@ -45,7 +46,7 @@ pub fn certify<N: Number>(
     }
     for threshold in [1e-8, 1e-12] {
         let near = |block: usize, row: usize| {
-            loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] == row as u32
+            loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] as usize == row
         };
         let Some(steps) = longest(quotient, policy, near) else { continue };
         let own_rounding = |block: usize| 4.0 * f64::EPSILON * v[block];
@@ -54,7 +55,7 @@ pub fn certify<N: Number>(
             for row in quotient.range(block).filter(|row| near(block, *row)) {
                 let rounding = rows[row].1 + own_rounding(block);
                 delta = delta.max(rounding - loss(block, row));
-                if *chosen == row as u32 {
+                if *chosen as usize == row {
                     delta = delta.max(rounding + loss(block, row));
                 }
             }
@@ -94,7 +95,7 @@ fn longest<N: Number>(
         }
         rows.end(1.0, quotient.rows.leaving[row].to_f64());
     }
-    let idle = rows.len() as u32;
+    let idle = dense(rows.len());
     rows.end(1.0, 1.0);
     let mut policy: Vec<u32> = policy.iter().map(|row| if *row == NONE { idle } else { *row }).collect();
     for _ in 0..ROUNDS {
@@ -109,7 +110,7 @@ fn longest<N: Number>(
                 let value = rows.apply(row, &steps);
                 if value > best + 0.01 {
                     best = value;
-                    *chosen = row as u32;
+                    *chosen = dense(row);
                     changed = true;
                 }
             }

@@ -6,6 +6,7 @@
 //! the chain is left.
 
 use crate::graph::components;
+use crate::mdp::dense;
 use crate::number::Number;
 
 /// Rows of a chain: where a state leads inside, what it costs, and with which probability it leaves for good.
@@ -44,13 +45,17 @@ impl<N: Number> Rows<N> {
     }
 
     /// The entries of a row.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the start of the next one is there, because the end is listed, too"
+    )]
     pub fn range(&self, row: usize) -> std::ops::Range<usize> {
         self.first[row] as usize..self.first[row + 1] as usize
     }
 
     /// Ends the row that is being written.
     pub fn end(&mut self, constant: N, leaving: N) {
-        self.first.push(self.columns.len() as u32);
+        self.first.push(dense(self.columns.len()));
         self.constants.push(constant);
         self.leaving.push(leaving);
     }
@@ -133,8 +138,8 @@ fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) ->
         for at in chain.range(state) {
             let probability = &chain.probabilities[at];
             if let Some(j) = local(chain.columns[at]) {
-                row.entries.push((j as u32, probability.clone()));
-                users[j].push(i as u32);
+                row.entries.push((dense(j), probability.clone()));
+                users[j].push(dense(i));
             } else {
                 let value = &values[chain.columns[at] as usize];
                 row.constant = row.constant.plus(&probability.times(value));
@@ -157,7 +162,8 @@ fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) ->
         );
         for user in std::mem::take(&mut users[p]) {
             if !done[user as usize] {
-                work += (row.entries.len() + rows[user as usize].entries.len()) as u64;
+                let touched = row.entries.len().saturating_add(rows[user as usize].entries.len());
+                work = work.saturating_add(u64::try_from(touched).unwrap_or(u64::MAX));
                 substitute(&mut rows[user as usize], *pivot, &row, user, &mut users);
             }
         }
@@ -180,8 +186,8 @@ fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) ->
 
 /// Few entries first: rows that fill the others least. Greedy on the initial pattern.
 fn elimination_order<N>(rows: &[Row<N>], users: &[Vec<u32>]) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..rows.len() as u32).collect();
-    order.sort_by_key(|i| rows[*i as usize].entries.len() * users[*i as usize].len());
+    let mut order: Vec<u32> = (0..dense(rows.len())).collect();
+    order.sort_by_key(|i| rows[*i as usize].entries.len().saturating_mul(users[*i as usize].len()));
     order
 }
 

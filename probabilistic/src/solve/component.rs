@@ -1,5 +1,8 @@
 //! The equations of one component with cycles to the values of its states: end components merged, policy iteration.
 
+use std::collections::VecDeque;
+
+use crate::mdp::dense;
 use crate::number::Number;
 use crate::solve::certify::certify;
 use crate::solve::chain::{Rows, solve_chain};
@@ -27,11 +30,20 @@ pub struct Quotient<N> {
 }
 
 impl<N: Number> Quotient<N> {
-    fn blocks(&self) -> usize {
+    /// How many blocks there are.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the end is listed, too, so that the list is never empty"
+    )]
+    pub fn blocks(&self) -> usize {
         self.first.len() - 1
     }
 
     /// The rows of a block.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the start of the next one is there, because the end is listed, too"
+    )]
     pub fn range(&self, block: usize) -> std::ops::Range<usize> {
         self.first[block] as usize..self.first[block + 1] as usize
     }
@@ -137,7 +149,7 @@ impl<N: Number> Run<'_, N> {
         local.clear();
         local.states.extend_from_slice(states);
         for (number, state) in states.iter().enumerate() {
-            self.position[*state as usize] = number as u32;
+            self.position[*state as usize] = dense(number);
         }
         for state in states {
             for choice in self.problem.choices(*state as usize) {
@@ -161,10 +173,10 @@ impl<N: Number> Run<'_, N> {
                     }
                 }
                 local.rows.end(constant, leaving);
-                local.choices.push(choice as u32);
+                local.choices.push(dense(choice));
                 local.widest = local.widest.max(self.problem.mdp.targets(choice).len());
             }
-            local.first.push(local.choices.len() as u32);
+            local.first.push(dense(local.choices.len()));
         }
     }
 
@@ -253,7 +265,10 @@ impl<N: Number> Run<'_, N> {
                     break;
                 }
             }
-            self.work += values.iter().map(Number::size).sum::<u64>() * 8 * u64::from(N::EXACT);
+            if N::EXACT {
+                let sizes = values.iter().map(Number::size).fold(0, u64::saturating_add);
+                self.work = self.work.saturating_add(sizes.saturating_mul(8));
+            }
             if N::EXACT && self.work > super::EXACT_WORK {
                 return None;
             }
@@ -274,7 +289,7 @@ impl<N: Number> Run<'_, N> {
                     let choice = local.choices[quotient.choices[*row] as usize];
                     hint[self.problem.mdp.owner(choice as usize)] == choice
                 };
-                *row = quotient.range(block).find(hinted).map_or(NONE, |row| row as u32);
+                *row = quotient.range(block).find(hinted).map_or(NONE, dense);
             }
             let complete = (0..policy.len()).all(|b| policy[b] != NONE || quotient.range(b).is_empty());
             if complete {
@@ -318,24 +333,23 @@ fn to_exits<N: Number>(
     ends: &EndComponents,
     owners: &[u32],
     chosen: &mut [u32],
-    mut queue: Vec<u32>,
+    queue: Vec<u32>,
 ) {
     let mut users: Vec<Vec<u32>> = vec![Vec::new(); local.states.len()];
     for choice in (0..local.choices.len()).filter(|choice| ends.alive[*choice]) {
         for target in &local.rows.columns[local.rows.range(choice)] {
-            users[*target as usize].push(choice as u32);
+            users[*target as usize].push(dense(choice));
         }
     }
-    let mut at = 0;
-    while at < queue.len() {
-        for choice in &users[queue[at] as usize] {
+    let mut queue = VecDeque::from(queue);
+    while let Some(state) = queue.pop_front() {
+        for choice in &users[state as usize] {
             let owner = owners[*choice as usize];
             if chosen[owner as usize] == NONE {
                 chosen[owner as usize] = *choice;
-                queue.push(owner);
+                queue.push_back(owner);
             }
         }
-        at += 1;
     }
 }
 
@@ -366,7 +380,7 @@ fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32]) -> Option<Vec<N>> {
             let constant =
                 if *row == NONE { N::zero() } else { quotient.rows.constants[*row as usize].clone() };
             let leaving = if *row == NONE { N::one() } else { quotient.rows.leaving[*row as usize].clone() };
-            chosen.push(padded.len() as u32);
+            chosen.push(dense(padded.len()));
             padded.end(constant, leaving);
         }
         return solve_chain(&padded, &chosen, |row| padded.constants[row].clone());
@@ -386,7 +400,7 @@ fn improve<N: Number>(
     let old: Option<Vec<N>> = (!sweep).then(|| values.to_vec());
     for block in 0..quotient.blocks() {
         for row in quotient.range(block) {
-            if policy[block] == row as u32 {
+            if policy[block] as usize == row {
                 continue;
             }
             let value = quotient.rows.apply(row, old.as_deref().unwrap_or(values));
@@ -395,7 +409,7 @@ fn improve<N: Number>(
                 Direction::Max => values[block].clearly_less(&value),
             };
             if better {
-                policy[block] = row as u32;
+                policy[block] = dense(row);
                 values[block] = value;
                 changed = true;
             }
@@ -408,27 +422,25 @@ fn improve<N: Number>(
 fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let mut policy = vec![NONE; quotient.blocks()];
     let mut users: Vec<Vec<(u32, u32)>> = vec![Vec::new(); quotient.blocks()];
-    let mut queue = Vec::new();
+    let mut queue = VecDeque::new();
     for (block, chosen) in policy.iter_mut().enumerate() {
         for row in quotient.range(block) {
             if *chosen == NONE && !quotient.rows.leaving[row].is_zero() {
-                *chosen = row as u32;
-                queue.push(block);
+                *chosen = dense(row);
+                queue.push_back(block);
             }
             for at in quotient.rows.range(row) {
-                users[quotient.rows.columns[at] as usize].push((block as u32, row as u32));
+                users[quotient.rows.columns[at] as usize].push((dense(block), dense(row)));
             }
         }
     }
-    let mut at = 0;
-    while at < queue.len() {
-        for (block, row) in &users[queue[at]] {
+    while let Some(at) = queue.pop_front() {
+        for (block, row) in &users[at] {
             if policy[*block as usize] == NONE {
                 policy[*block as usize] = *row;
-                queue.push(*block as usize);
+                queue.push_back(*block as usize);
             }
         }
-        at += 1;
     }
     policy
 }
@@ -436,7 +448,7 @@ fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
 fn quotient<N: Number>(local: &Local<N>, ends: &EndComponents) -> Quotient<N> {
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); ends.blocks];
     for (state, block) in ends.block.iter().enumerate() {
-        members[*block as usize].push(state as u32);
+        members[*block as usize].push(dense(state));
     }
     let mut result =
         Quotient { first: vec![0], rows: Rows::new(), choices: Vec::new(), widest: local.widest };
@@ -468,10 +480,10 @@ fn quotient<N: Number>(local: &Local<N>, ends: &EndComponents) -> Quotient<N> {
                     result.rows.probabilities.push(scaled(probability));
                 }
                 result.rows.end(scaled(&local.rows.constants[choice]), scaled(&local.rows.leaving[choice]));
-                result.choices.push(choice as u32);
+                result.choices.push(dense(choice));
             }
         }
-        result.first.push(result.choices.len() as u32);
+        result.first.push(dense(result.choices.len()));
     }
     result
 }

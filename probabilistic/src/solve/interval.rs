@@ -7,7 +7,8 @@
 
 use num_rational::BigRational;
 
-use crate::number::Number;
+use crate::mdp::dense;
+use crate::number::{Number, count};
 use crate::solve::Direction;
 use crate::solve::component::Quotient;
 use crate::solve::local::NONE;
@@ -30,28 +31,28 @@ const UPPER_SWEEPS: usize = 40;
 /// Bounds on the values of all blocks; none where they do not get close in time.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction) -> Option<Enclosed<N>> {
     let rows = Rows::new(quotient, direction);
-    let blocks = quotient.first.len() - 1;
+    let blocks = quotient.blocks();
     let mut lower = vec![0.0_f64; blocks];
     let mut next = lower.clone();
-    let (mut sweeps, mut work, mut threshold) = (0_u64, 0_u64, WIDTH * 0.05);
+    let (mut sweeps, mut work, mut threshold) = (0.0_f64, 0_u64, WIDTH * 0.05);
     while work < WORK {
         loop {
             // All at once, and not one after the other, so that each sweep adds one rounding error only.
             let change = rows.sweep(&lower, &mut next, 1.0);
             std::mem::swap(&mut lower, &mut next);
-            sweeps += 1;
-            work += rows.constants.len() as u64;
+            sweeps += 1.0;
+            work = work.saturating_add(rows.constants.len() as u64);
             if change <= threshold || work >= WORK {
                 break;
             }
         }
         let mut upper: Vec<f64> = lower.iter().map(|value| value * (1.0 + WIDTH * 0.5)).collect();
         for _ in 0..UPPER_SWEEPS {
-            work += rows.constants.len() as u64;
+            work = work.saturating_add(rows.constants.len() as u64);
             let before = upper.clone();
             rows.sweep(&before, &mut upper, 1.0 + rows.rounding);
             if upper.iter().zip(&before).all(|(after, before)| after <= before) {
-                let rounded = 1.0 - sweeps as f64 * rows.rounding * 2.0;
+                let rounded = 1.0 - sweeps * rows.rounding * 2.0;
                 return Some(rows.enclosed(&lower, &upper, rounded.max(0.0)));
             }
         }
@@ -78,7 +79,7 @@ impl<'a, N: Number> Rows<'a, N> {
             direction,
             constants: rows.constants.iter().map(Number::to_f64).collect(),
             probabilities: rows.probabilities.iter().map(Number::to_f64).collect(),
-            rounding: (quotient.widest + 16) as f64 * f64::EPSILON,
+            rounding: (count(quotient.widest) + 16.0) * f64::EPSILON,
         }
     }
 
@@ -98,7 +99,7 @@ impl<'a, N: Number> Rows<'a, N> {
                 Direction::Max => value > best.1,
             };
             if best.0 == NONE || better {
-                best = (row as u32, value);
+                best = (dense(row), value);
             }
         }
         best

@@ -1,7 +1,10 @@
 //! One strongly connected component of a process, cut out: its choices with what they lead to inside, and what
 //! they are worth outside; and its end components.
 
+use std::collections::VecDeque;
+
 use crate::graph::components;
+use crate::mdp::dense;
 use crate::number::Number;
 use crate::solve::chain::Rows;
 
@@ -56,6 +59,10 @@ impl<N: Number> Local<N> {
     }
 
     /// The local choices of a local state.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "the start of the next one is there, because the end is listed, too"
+    )]
     pub fn range(&self, state: usize) -> std::ops::Range<usize> {
         self.first[state] as usize..self.first[state + 1] as usize
     }
@@ -69,7 +76,7 @@ impl<N: Number> Local<N> {
     pub fn owners(&self) -> Vec<u32> {
         let mut owners = vec![0; self.choices.len()];
         for state in 0..self.states.len() {
-            owners[self.range(state)].fill(state as u32);
+            owners[self.range(state)].fill(dense(state));
         }
         owners
     }
@@ -90,12 +97,16 @@ pub struct EndComponents {
 
 /// Maximal end components of the closed choices that `eligible` accepts (de Alfaro 1997): components of the graph,
 /// without the choices that leave one, until none does.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "the start of the next one is there, because the end is listed, too"
+)]
 pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> bool) -> EndComponents {
     let n = local.states.len();
     let mut alive: Vec<bool> =
         (0..local.choices.len()).map(|choice| local.is_closed(choice) && eligible(choice)).collect();
     if !alive.contains(&true) {
-        return EndComponents { block: (0..n as u32).collect(), blocks: n, inside: vec![false; n], alive };
+        return EndComponents { block: (0..dense(n)).collect(), blocks: n, inside: vec![false; n], alive };
     }
     if let Some(whole) = whole(local, &alive) {
         return whole;
@@ -107,12 +118,12 @@ pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> b
             for choice in local.range(state).filter(|choice| alive[*choice]) {
                 edges.extend_from_slice(&local.rows.columns[local.rows.range(choice)]);
             }
-            starts.push(edges.len() as u32);
+            starts.push(dense(edges.len()));
         }
         let found = components(n, |s| &edges[starts[s as usize] as usize..starts[s as usize + 1] as usize]);
         for (number, component) in found.iter().enumerate() {
             for state in component {
-                block[*state as usize] = number as u32;
+                block[*state as usize] = dense(number);
             }
         }
         let mut changed = false;
@@ -147,12 +158,12 @@ fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
             }
         }
     }
-    let all = u64::MAX >> (64 - n);
+    let all = (0..n).fold(0_u64, |all, state| all | 1 << state);
     let covers = |edges: &[u64; 64]| {
         let (mut seen, mut open) = (1_u64, 1_u64);
         while open != 0 {
             let state = open.trailing_zeros() as usize;
-            open &= open - 1;
+            open ^= 1 << state;
             let new = edges[state] & !seen;
             seen |= new;
             open |= new;
@@ -177,33 +188,31 @@ pub fn attractor<N: Number>(local: &Local<N>, fits: impl Fn(usize) -> bool) -> (
     let mut users: Vec<Vec<u32>> = vec![Vec::new(); n];
     for choice in 0..local.choices.len() {
         for target in &local.rows.columns[local.rows.range(choice)] {
-            users[*target as usize].push(choice as u32);
+            users[*target as usize].push(dense(choice));
         }
     }
     let mut usable: Vec<bool> = (0..local.choices.len()).map(&fits).collect();
     let mut candidate = vec![true; n];
     loop {
         let (mut reached, mut policy) = (vec![false; n], vec![NONE; n]);
-        let mut queue: Vec<u32> = Vec::new();
+        let mut queue: VecDeque<u32> = VecDeque::new();
         for choice in 0..local.choices.len() {
             let owner = owners[choice] as usize;
             if usable[choice] && !local.is_closed(choice) && !reached[owner] && candidate[owner] {
                 reached[owner] = true;
-                policy[owner] = choice as u32;
-                queue.push(owner as u32);
+                policy[owner] = dense(choice);
+                queue.push_back(dense(owner));
             }
         }
-        let mut at = 0;
-        while at < queue.len() {
-            for choice in &users[queue[at] as usize] {
+        while let Some(state) = queue.pop_front() {
+            for choice in &users[state as usize] {
                 let owner = owners[*choice as usize] as usize;
                 if usable[*choice as usize] && !reached[owner] && candidate[owner] {
                     reached[owner] = true;
                     policy[owner] = *choice;
-                    queue.push(owner as u32);
+                    queue.push_back(dense(owner));
                 }
             }
-            at += 1;
         }
         if reached == candidate {
             return (reached, policy);

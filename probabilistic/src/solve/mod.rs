@@ -17,7 +17,7 @@ mod ways;
 use fixedbitset::FixedBitSet;
 
 use crate::graph::visit_components;
-use crate::mdp::Mdp;
+use crate::mdp::{Mdp, dense};
 use crate::number::{Number, is_whole};
 
 pub use local::NONE;
@@ -207,7 +207,7 @@ impl<N: Number> Run<'_, N> {
                 *target as usize == state || self.solution.sure.contains(*target as usize)
             });
             match good && leaves {
-                true if sure == NONE => sure = choice as u32,
+                true if sure == NONE => sure = dense(choice),
                 true => {}
                 false => all_sure = false,
             }
@@ -237,12 +237,12 @@ impl<N: Number> Run<'_, N> {
                     Direction::Max => value > *known,
                 });
                 if better {
-                    best = Some((value, choice as u32, spread));
+                    best = Some((value, dense(choice), spread));
                 }
             }
         }
         if let Some((value, choice, own)) = best {
-            self.work += value.size();
+            self.work = self.work.saturating_add(value.size());
             if !N::EXACT {
                 // Nothing is less than zero, so that only the error of what is zero counts there.
                 self.solution.errors[state] = if value.is_zero() { own } else { error };
@@ -275,7 +275,9 @@ impl<N: Number> Run<'_, N> {
                 tiny |= !value.is_zero();
                 whole &= is_whole(value.to_f64());
             }
-            self.work += if N::EXACT { sum.size() * 4 } else { 0 };
+            if N::EXACT {
+                self.work = self.work.saturating_add(sum.size().saturating_mul(4));
+            }
         }
         if leaving.is_zero() {
             // It stays for ever: worth nothing where that is allowed.

@@ -4,7 +4,8 @@
 //! components of a co-adaptation process. The best value spreads from the choices that leave (Dijkstra 1959), so that no
 //! equations have to be solved, and the only errors are those of a few sums.
 
-use crate::number::{Number, is_whole};
+use crate::mdp::dense;
+use crate::number::{Number, count, is_whole};
 use crate::solve::{Direction, NONE, Run};
 
 /// States up to which the next best state is looked for one by one.
@@ -60,7 +61,7 @@ impl<N: Number> Run<'_, N> {
             return false;
         }
         for (number, state) in component.iter().enumerate() {
-            self.position[*state as usize] = number as u32;
+            self.position[*state as usize] = dense(number);
         }
         let fits = self.scan(component, ways);
         for state in component {
@@ -97,7 +98,7 @@ impl<N: Number> Run<'_, N> {
                     if position == NONE {
                         leaves = true;
                         sure &= self.solution.sure.contains(*target as usize);
-                    } else if position != from as u32 {
+                    } else if position != dense(from) {
                         if to != NONE {
                             return false;
                         }
@@ -106,11 +107,11 @@ impl<N: Number> Run<'_, N> {
                 }
                 match (to, leaves) {
                     (NONE, false) => {} // It stays where it is.
-                    (NONE, true) => ways.exits.push((from as u32, choice as u32, sure)),
+                    (NONE, true) => ways.exits.push((dense(from), dense(choice), sure)),
                     (_, true) => return false,
                     (to, false) => {
                         let (cost, divided) = self.step_cost(*state, choice);
-                        ways.steps.push(Step { from: from as u32, to, choice: choice as u32, cost, divided });
+                        ways.steps.push(Step { from: dense(from), to, choice: dense(choice), cost, divided });
                     }
                 }
             }
@@ -181,7 +182,7 @@ impl<N: Number> Run<'_, N> {
             let Some((value, error)) = self.single_choice(state, *choice as usize, must_be_sure) else {
                 continue;
             };
-            self.work += value.size();
+            self.work = self.work.saturating_add(value.size());
             ways.error = ways.error.max(error);
             if value.is_zero() {
                 ways.zero_error = ways.zero_error.max(error);
@@ -200,7 +201,7 @@ impl<N: Number> Run<'_, N> {
             let state = *state as usize;
             if !N::EXACT {
                 // Each step of the way adds once, and may divide and round its cost.
-                let sums = 3.0 * component.len() as f64 * f64::EPSILON * value.to_f64();
+                let sums = 3.0 * count(component.len()) * f64::EPSILON * value.to_f64();
                 let rounding = if ways.whole { 0.0 } else { sums };
                 self.solution.errors[state] =
                     if value.is_zero() { ways.zero_error } else { ways.error + rounding };
@@ -225,7 +226,7 @@ impl<N: Number> Ways<N> {
         self.settled.clear();
         self.settled.resize(states, false);
         (self.error, self.zero_error) = (0.0, 0.0);
-        let whole = |step: &Step<N>| !step.divided && is_whole(step.cost.to_f64() * SMALL as f64);
+        let whole = |step: &Step<N>| !step.divided && is_whole(step.cost.to_f64() * count(SMALL));
         self.whole = !N::EXACT && self.steps.iter().all(whole);
     }
 

@@ -99,8 +99,19 @@ impl Decimal {
 
     /// The nearest decimal with at most 34 fractional digits, rounded half away from zero.
     pub fn from_rational(value: &BigRational) -> Self {
+        if let Some(short) = Self::short(value) {
+            return short;
+        }
         let scaled = value * BigRational::from_integer(power_of_ten(DIVISION_DIGITS));
         Self::new(scaled.round().to_integer(), DIVISION_DIGITS)
+    }
+
+    /// The exact decimal, where a few digits are enough: no long product is made and stripped then.
+    fn short(value: &BigRational) -> Option<Self> {
+        let (numerator, denominator) = (value.numer().to_i64()?, value.denom().to_u64()?);
+        let scale = (0..=SMALL_SCALE).find(|&scale| 10_u64.pow(scale).is_multiple_of(denominator))?;
+        let factor = i64::try_from(10_u64.pow(scale) / denominator).ok()?;
+        Some(Self(Repr::Small { unscaled: numerator.checked_mul(factor)?, scale }))
     }
 
     /// The nearest double.
@@ -195,4 +206,26 @@ pub(super) fn in_range(value: &Decimal, minimum: Option<i128>, maximum: Option<i
 /// `10^exponent` as a decimal, for rounding.
 pub(crate) fn ten_to(exponent: u32) -> BigInt {
     if exponent == 0 { BigInt::one() } else { power_of_ten(exponent) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BigInt, BigRational, DIVISION_DIGITS, Decimal, power_of_ten};
+
+    /// The short way comes to what the long way comes to, representation included.
+    #[test]
+    fn few_digits_are_the_nearest_decimal() {
+        let mut values = vec![(i64::MAX, 1), (i64::MIN, 1), (i64::MAX, 10), (1, i64::MAX), (0, 7), (100, 1)];
+        values
+            .extend((-60..60).flat_map(|numerator| (1..70).map(move |denominator| (numerator, denominator))));
+        values
+            .extend((0..19_u32).flat_map(|power| [1, 7, -25, i64::MAX].map(|own| (own, 10_i64.pow(power)))));
+        for (numerator, denominator) in values {
+            let value = BigRational::new(numerator.into(), denominator.into());
+            let scaled = &value * BigRational::from_integer(power_of_ten(DIVISION_DIGITS));
+            let nearest: BigInt = scaled.round().to_integer();
+            let (found, expected) = (Decimal::from_rational(&value), Decimal::new(nearest, DIVISION_DIGITS));
+            assert_eq!(format!("{found:?}"), format!("{expected:?}"), "{numerator}/{denominator}");
+        }
+    }
 }

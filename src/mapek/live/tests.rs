@@ -148,7 +148,7 @@ impl Tally {
             stay_close: false,
         };
         let begun = Instant::now();
-        let found = control.planner.live.plan(&ask, &Limits::none());
+        let found = control.planner.live.plan(&ask, &Limits::none(), &Watch::default());
         self.live += begun.elapsed();
         let begun = Instant::now();
         let expected = from_scratch(&ask, Limits::none(), &Watch::default());

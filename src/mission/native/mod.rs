@@ -186,10 +186,9 @@ impl CoAdaptation {
 
     /// Adds which designs keep which bounds. Where no design of a function has an estimation of the attribute, the bounds do not
     /// concern the function.
-    pub(super) fn fill(&self, problem: &mut Problem, view: &View<'_>) {
-        let designs = view.function_designs();
+    pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         for quality in self.quality() {
-            for design in &designs {
+            for design in designs {
                 let concerned = self.needed().any(|needed| {
                     design.solves.iter().any(|function| function.name == needed.name)
                         && needed.attributes.contains(&quality.bounds.attribute)

@@ -45,6 +45,15 @@ impl Builder<'_> {
             let sparse = Expr::Function(applied(names.range, &[slots[0].1]));
             effects.push(Effect::Number(Change::Increase, applied(names.energy, &[]), sparse));
         }
+        if once_in(self.rng, 4) {
+            // A value that some designs do not have, and that counts in some states only.
+            let sparse = Expr::Function(applied(names.range, &[slots[0].1]));
+            let low = Expr::Number(self.draw());
+            let relation = one(self.rng, &[Relation::AtLeast, Relation::AtMost]);
+            let battery = Condition::Compare(relation, Self::number(names.battery), low);
+            let effect = Effect::Number(Change::Increase, applied(names.energy, &[]), sparse);
+            effects.push(Effect::When(vec![battery], vec![effect]));
+        }
         if once_in(self.rng, 6) {
             let low = self.draw();
             let battery =

@@ -30,6 +30,10 @@ pub struct Maker {
     pub(super) random: fastrand::Rng,
     pub(super) flavour: Flavour,
     pub(super) task: Task,
+    /// The predicate that says which objects are designs for which function, and the type of designs.
+    pub(super) designs: Option<(usize, usize)>,
+    /// The parameter of the action at hand that is its design, and little else.
+    slot: Option<usize>,
 }
 
 pub(super) fn constant(value: Q) -> Expression {
@@ -43,6 +47,15 @@ pub(super) fn none() -> Condition {
 impl Maker {
     /// A task from a seed, for plans that overlap if a unit of time is given.
     pub fn make(seed: u64, unit: Option<Q>) -> Task {
+        Self::build(seed, unit, false)
+    }
+
+    /// A task from a seed whose actions choose designs, of which durations and costs depend.
+    pub fn with_designs(seed: u64) -> Task {
+        Self::build(seed, None, true)
+    }
+
+    fn build(seed: u64, unit: Option<Q>, designs: bool) -> Task {
         let mut random = fastrand::Rng::with_seed(seed);
         let percent = |random: &mut fastrand::Rng, choices: &[u8]| choices[random.usize(..choices.len())];
         let flavour = Flavour {
@@ -66,8 +79,8 @@ impl Maker {
             goal: none(),
             measure: Measure::Steps,
         };
-        let mut maker = Self { random, flavour, task };
-        maker.fill();
+        let mut maker = Self { random, flavour, task, designs: None, slot: None };
+        maker.fill(designs);
         maker.random = fastrand::Rng::with_seed(!seed);
         maker.durations_in_effects();
         maker.task
@@ -81,7 +94,7 @@ impl Maker {
         choices[self.random.usize(..choices.len())].clone()
     }
 
-    fn fill(&mut self) {
+    fn fill(&mut self, designs: bool) {
         for kind in 0..self.task.types {
             let count = 1 + self.random.usize(..2);
             self.task.objects.extend(std::iter::repeat_n(kind, count));
@@ -89,6 +102,12 @@ impl Maker {
         for name in 0..3 + self.random.usize(..2) {
             let arity = self.pick(&[0, 0, 0, 0, 0, 1, 1, 1, 2]);
             self.task.predicates.push((format!("p{name}"), arity));
+        }
+        if designs {
+            let kind = self.task.types - 1;
+            self.task.objects.extend(std::iter::repeat_n(kind, 2));
+            self.designs = Some((self.task.predicates.len(), kind));
+            self.task.predicates.push(("fd_solve_f".to_owned(), 2));
         }
         for (name, arity) in [("level", 0), ("length", 1), ("maybe", 0), ("total-cost", 0)] {
             self.task.functions.push((name.to_owned(), arity));
@@ -133,10 +152,15 @@ impl Maker {
         self.task.axioms.iter().any(|axiom| axiom.predicate == predicate)
     }
 
+    /// Whether no effect and no event changes a predicate.
+    pub(super) fn is_fixed(&self, predicate: usize) -> bool {
+        self.is_derived(predicate) || self.designs.is_some_and(|(solves, _)| solves == predicate)
+    }
+
     /// An atom over variables of some types, or objects. Set by effects and events, or read.
     fn atom(&mut self, variables: usize, set: bool) -> Atom {
         let mut predicate = self.random.usize(..self.task.predicates.len());
-        while set && self.is_derived(predicate) {
+        while set && self.is_fixed(predicate) {
             predicate = self.random.usize(..self.task.predicates.len());
         }
         let terms = (0..self.task.predicates[predicate].1).map(|_| self.term(variables)).collect();
@@ -145,13 +169,23 @@ impl Maker {
 
     fn term(&mut self, variables: usize) -> Term {
         if variables > 0 && self.chance(85) {
-            Term::Var(self.random.usize(..variables))
+            let variable = self.random.usize(..variables);
+            // A parameter that what changes mentions is not a slot, but may have side effects.
+            if self.slot == Some(variable) && !self.chance(8) {
+                return Term::Object(self.random.usize(..self.task.objects.len()));
+            }
+            Term::Var(variable)
         } else {
             Term::Object(self.random.usize(..self.task.objects.len()))
         }
     }
 
     fn fluent(&mut self, function: usize, variables: usize) -> Fluent {
+        if let Some(slot) = self.slot.filter(|_| function == LENGTH)
+            && self.chance(70)
+        {
+            return Fluent { function, terms: vec![Term::Var(slot)] };
+        }
         let terms = (0..self.task.functions[function].1).map(|_| self.term(variables)).collect();
         Fluent { function, terms }
     }
@@ -302,10 +336,16 @@ impl Maker {
     }
 
     fn action(&mut self, number: usize) -> Action {
-        let parameters: Vec<usize> =
+        let mut parameters: Vec<usize> =
             (0..self.pick(&[0, 0, 1, 1, 2])).map(|_| self.random.usize(..self.task.types)).collect();
+        if let Some((_, kind)) = self.designs
+            && self.chance(70)
+        {
+            self.slot = Some(parameters.len());
+            parameters.push(kind);
+        }
         let variables = &parameters[..];
-        let body = if self.chance(self.flavour.durative) {
+        let mut body = if self.chance(self.flavour.durative) {
             let start = Part {
                 condition: self.conjunction(variables, &[0, 1, 1, 2]),
                 effects: self.effects(variables, &[0, 1, 1, 2]),
@@ -320,6 +360,14 @@ impl Maker {
             let condition = self.conjunction(variables, &[0, 1, 1, 2]);
             Body::Instantaneous(Part { condition, effects: self.effects(variables, &[1, 1, 2, 3]) })
         };
+        if let (Some((predicate, _)), Some(slot)) = (self.designs, self.slot.take()) {
+            let (Body::Instantaneous(start) | Body::Durative { start, .. }) = &mut body;
+            // The first object is the function that all require.
+            let solves = Atom { predicate, terms: vec![Term::Var(slot), Term::Object(0)] };
+            if let Condition::All(parts) = &mut start.condition {
+                parts.push(Condition::Atom(solves));
+            }
+        }
         Action { name: format!("a{number}"), parameters, body }
     }
 

@@ -112,6 +112,12 @@ fn actions_one_after_another() {
 }
 
 #[test]
+fn actions_with_designs() {
+    let case = |seed| vec![case_of(format!("designs-{seed}"), Maker::with_designs(seed), None)];
+    run(1000, case).finish();
+}
+
+#[test]
 fn overlapping_actions() {
     run(500, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
 }

@@ -9,7 +9,7 @@ impl Maker {
     fn ground_atoms(&self) -> Vec<Atom> {
         let objects = self.task.objects.len();
         let mut atoms = Vec::new();
-        for predicate in (0..self.task.predicates.len()).filter(|at| !self.is_derived(*at)) {
+        for predicate in (0..self.task.predicates.len()).filter(|at| !self.is_fixed(*at)) {
             let arity = self.task.predicates[predicate].1 as u32;
             for number in 0..objects.pow(arity) {
                 let digit = |at: u32| Term::Object(number / objects.pow(arity - 1 - at) % objects);
@@ -22,6 +22,16 @@ impl Maker {
     pub(super) fn initial(&mut self) {
         let atoms = self.ground_atoms();
         self.task.atoms = atoms.into_iter().filter(|_| self.chance(35)).collect();
+        if let Some((predicate, kind)) = self.designs {
+            for object in
+                (0..self.task.objects.len()).filter(|at| self.task.objects[*at] == kind).collect::<Vec<_>>()
+            {
+                if self.chance(75) {
+                    let terms = vec![Term::Object(object), Term::Object(0)];
+                    self.task.atoms.push(Atom { predicate, terms });
+                }
+            }
+        }
         let level = Fluent { function: LEVEL, terms: Vec::new() };
         self.task.values.push((level, q(self.random.i64(0..4))));
         for object in 0..self.task.objects.len() {
@@ -144,7 +154,7 @@ impl Maker {
             _ => None,
         };
         let set = |effect: &Effect| match effect {
-            Effect::Add(atom) | Effect::Delete(atom) => !self.is_derived(atom.predicate),
+            Effect::Add(atom) | Effect::Delete(atom) => !self.is_fixed(atom.predicate),
             _ => false,
         };
         let mut effects: Vec<_> = parts.iter().filter_map(literal).filter(set).collect();

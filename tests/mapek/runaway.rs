@@ -1,0 +1,111 @@
+//! A rule that runs away: no report is refused, nothing is begun while it is not known what follows, and all is as it would
+//! be without the rule once it has come to an end.
+
+use std::path::Path;
+use std::time::Duration;
+
+use metaplan::journal::{Journal, Policy, Sync};
+use metaplan::mapek::{Answer, Command, Loop};
+use metaplan::mission::Mission;
+use serde_json::json;
+
+use crate::common::feed;
+
+/// A counter that counts for ever as long as the first component is broken.
+const RUNAWAY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://metacontrol.org/tomasys#> .\n\
+    [counting] t:c_status(:c_0, \"FALSE\") ^ :counts(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> :counts(?x, ?m) .\n";
+
+fn read(directory: &Path) -> Loop {
+    let (mission, _) = Mission::read(&directory.join("m.toml")).expect("the mission is read");
+    let settings = mission.settings().clone();
+    Loop::new(mission, settings).expect("the mission can be planned for")
+}
+
+/// A mission with the rule that runs away, and a loop for it without the rule.
+fn mission(seed: u64) -> (tempfile::TempDir, Loop) {
+    let directory = crate::worlds::own_files(seed);
+    let append = |name: &str, more: &str| {
+        let path = directory.path().join(name);
+        let text = std::fs::read_to_string(&path).expect("text");
+        std::fs::write(&path, text + more).expect("written");
+    };
+    append("kb.ttl", ":counter :counts 0 .\n:counts a owl:DatatypeProperty .\n");
+    let tame = read(directory.path());
+    append("own.swrl", RUNAWAY);
+    (directory, tame)
+}
+
+fn component(number: usize, status: &str) -> String {
+    json!({ "event": "component_status", "component": format!("c_{number}"), "status": status }).to_string()
+}
+
+fn faults(answers: &[Answer]) -> Vec<Option<String>> {
+    let fault = |answer: &Answer| match answer {
+        Answer::Unconcluded { fault } => Some(fault.as_ref().map(|fault| fault.rule.clone())),
+        _ => None,
+    };
+    answers.iter().filter_map(fault).collect()
+}
+
+/// Nothing is asked for but to stop.
+fn nothing_begins(answers: &[Answer]) {
+    for effect in answers.iter().filter_map(Answer::effect) {
+        let stops = matches!(effect.command, Command::Suspend { .. } | Command::Cancel { .. });
+        assert!(stops, "{effect:?}");
+    }
+    assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })), "{answers:?}");
+}
+
+#[test]
+fn a_rule_that_runs_away_refuses_no_report() {
+    let (directory, mut tame) = mission(3);
+    let mut wild = read(directory.path());
+    tame.start();
+    wild.start();
+    assert_eq!(wild.knowledge().available(), tame.knowledge().available());
+    let answers = feed(&mut wild, &component(0, "FALSE"));
+    assert_eq!(faults(&answers), [Some("counting".to_owned())], "{answers:?}");
+    nothing_begins(&answers);
+    assert!(wild.knowledge().available().is_empty());
+    for (number, status) in [(1, "FALSE"), (2, "FALSE"), (1, "TRUE"), (2, "TRUE")] {
+        let answers = feed(&mut wild, &component(number, status));
+        assert_eq!(faults(&answers), [], "it is said once: {answers:?}");
+        nothing_begins(&answers);
+        feed(&mut tame, &component(number, status));
+    }
+    nothing_begins(&feed(&mut wild, r#"{"event":"tick"}"#));
+    // A restart knows no more, and forgets nothing.
+    let mut again = read(directory.path());
+    again.restore(&wild.snapshot()).expect("the snapshot fits");
+    assert_eq!(again.snapshot(), wild.snapshot());
+    for control in [&mut wild, &mut again] {
+        let answers = feed(control, &component(0, "TRUE"));
+        assert_eq!(faults(&answers), [None], "{answers:?}");
+    }
+    feed(&mut tame, &component(0, "TRUE"));
+    for control in [&wild, &again] {
+        assert_eq!(control.knowledge().available(), tame.knowledge().available());
+        assert_eq!(control.knowledge().statuses(), tame.knowledge().statuses());
+        assert!(control.knowledge().running().is_some() && !control.knowledge().suspended());
+    }
+}
+
+#[test]
+fn a_journal_comes_back_to_where_a_rule_ran_away() {
+    let (directory, _) = mission(3);
+    let place = tempfile::tempdir().expect("a directory");
+    let policy = Policy { sync: Sync::Never, snapshot_every: 3 };
+    let mut control = read(directory.path());
+    let (mut journal, _) = Journal::open(place.path(), policy, &mut control).expect("it opens");
+    journal.begin(&mut control).expect("written");
+    for (number, status) in [(1, "FALSE"), (0, "FALSE"), (2, "FALSE"), (1, "TRUE")] {
+        journal.handle(&mut control, &component(number, status), Duration::ZERO).expect("written");
+    }
+    drop(journal);
+    let mut again = read(directory.path());
+    let (mut journal, recovery) = Journal::open(place.path(), policy, &mut again).expect("it opens again");
+    journal.begin(&mut again).expect("written");
+    assert!(recovery.warnings.is_empty(), "{:?}", recovery.warnings);
+    assert_eq!(again.snapshot(), control.snapshot());
+    assert!(again.knowledge().available().is_empty());
+}
