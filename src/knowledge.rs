@@ -8,8 +8,8 @@ use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::Status;
-use ontology::{EntityKind, Equality, Iri, Ontology, ReadOptions};
-use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Symbols, Value};
+use ontology::{Annotation, EntityKind, Equality, Iri, Ontology, ReadOptions};
+use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Rule, Symbols, Syntax, Value};
 use serde::{Deserialize, Serialize};
 
 use crate::message::Message;
@@ -45,6 +45,7 @@ pub struct Knowledge {
     warnings: Vec<Message>,
     sources: Sources,
     entities: Arc<[(EntityKind, Iri)]>,
+    annotations: Arc<[(Iri, Annotation)]>,
 }
 
 /// A stated fact, with names and values in place of symbols.
@@ -127,11 +128,9 @@ impl Stated {
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
         let mut own = Vec::new();
-        for file in &sources.rules {
-            match parse_rule_file(file, &mut symbols) {
-                Ok(program) => own.extend(program.rules),
-                Err(more) => errors.extend(more),
-            }
+        match parse_rule_files(&sources.rules, &mut symbols) {
+            Ok(rules) => own.extend(rules),
+            Err(more) => errors.extend(more),
         }
         let ontology = match read {
             Ok(ontology) if errors.is_empty() => ontology,
@@ -188,7 +187,8 @@ impl Knowledge {
         warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
         let runtime = Runtime::new(engine, Mode::Retract);
         let (sources, entities) = (sources.clone(), ontology.entities.into());
-        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources, entities })
+        let annotations = ontology.annotations.into();
+        Ok(Self { origin: runtime.clone(), runtime, rule_count, warnings, sources, entities, annotations })
     }
 
     /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
@@ -200,8 +200,9 @@ impl Knowledge {
         let engine = Engine::new(symbols, program, facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let runtime = Runtime::new(engine, Mode::Retract);
-        let (sources, entities) = (Sources::default(), Arc::default());
-        Ok(Self { origin: runtime.clone(), runtime, rule_count: 0, warnings: Vec::new(), sources, entities })
+        let (sources, entities, annotations) = (Sources::default(), Arc::default(), Arc::default());
+        let warnings = Vec::new();
+        Ok(Self { origin: runtime.clone(), runtime, rule_count: 0, warnings, sources, entities, annotations })
     }
 
     /// What is questionable about the documents.
@@ -212,6 +213,11 @@ impl Knowledge {
     /// The classes, properties and individuals that the documents name.
     pub fn entities(&self) -> &[(EntityKind, Iri)] {
         &self.entities
+    }
+
+    /// What the documents say in annotations of entities.
+    pub fn annotations(&self) -> &[(Iri, Annotation)] {
+        &self.annotations
     }
 
     /// What it was read from.
@@ -438,8 +444,19 @@ pub(crate) fn rule_text(file: &str) -> Result<String, Message> {
     text.map_err(|error| Message::at("M101", file, None, format!("cannot be read: {error}")))
 }
 
-fn parse_rule_file(file: &str, symbols: &mut Symbols) -> Result<Program, Vec<Message>> {
-    let text = rule_text(file).map_err(|message| vec![message])?;
-    rules::parse_rules(&text, file, symbols, &Prefixes::default())
-        .map_err(|errors| errors.iter().map(Message::from_rules).collect())
+/// The rules of all files. What one file asks for, another may conclude.
+fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Vec<Message>> {
+    let (mut texts, mut errors) = (Vec::new(), Vec::new());
+    for file in files {
+        match rule_text(file) {
+            Ok(text) => texts.push((file, text)),
+            Err(error) => errors.push(error),
+        }
+    }
+    let texts: Vec<(&str, &str)> = texts.iter().map(|(file, text)| (file.as_str(), text.as_str())).collect();
+    match rules::parse_rules_together(&texts, symbols, &Prefixes::default(), &Syntax::default()) {
+        Ok(program) if errors.is_empty() => Ok(program.rules),
+        Ok(_) => Err(errors),
+        Err(more) => Err(errors.into_iter().chain(more.iter().map(Message::from_rules)).collect()),
+    }
 }

@@ -23,6 +23,9 @@ use crate::owl::{
 use crate::read::Parts;
 use crate::vocab::{rdfs, swrla};
 
+/// What a class expression is called of which no axiom says anything.
+pub(crate) const UNUSED_CLASS: &str = "the class expression ";
+
 /// The stack on which horned-owl runs, in bytes of address space: it recurses into lists and expressions.
 const STACK: usize = 1 << 29;
 
@@ -436,7 +439,7 @@ impl Builder {
             format!("the list ({})", items.join(" "))
         });
         let classes =
-            rest.class_expression.iter().map(|class| format!("the class expression {}", self.class(class)));
+            rest.class_expression.iter().map(|class| format!("{UNUSED_CLASS}{}", self.class(class)));
         let annotations = rest.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
         let statements = simple.chain(nodes).chain(lists).chain(classes).chain(annotations);
         let reason = || "part of no axiom or rule".to_owned();
