@@ -89,13 +89,14 @@ pub fn is_subsumed(datatypes: &[&str], by: &str) -> bool {
         return true;
     }
     let ranges: Vec<_> = known.iter().filter_map(|datatype| integer_range(datatype)).collect();
-    let (Some((least, most)), false) = (integer_range(by), ranges.is_empty()) else { return false };
     let low = ranges.iter().filter_map(|(low, _)| *low).max();
     let high = ranges.iter().filter_map(|(_, high)| *high).min();
-    let is_empty = low.zip(high).is_some_and(|(low, high)| low > high);
+    if low.zip(high).is_some_and(|(low, high)| low > high) {
+        return true;
+    }
+    let (Some((least, most)), false) = (integer_range(by), ranges.is_empty()) else { return false };
     let is_above = least.is_none_or(|least| low.is_some_and(|low| low >= least));
-    let is_below = most.is_none_or(|most| high.is_some_and(|high| high <= most));
-    is_empty || (is_above && is_below)
+    is_above && most.is_none_or(|most| high.is_some_and(|high| high <= most))
 }
 
 #[cfg(test)]
