@@ -157,14 +157,12 @@ fn parse_ntriples(text: &[u8], sink: &mut Sink) -> bool {
         return false;
     }
     for result in oxttl::NTriplesParser::new().for_slice(text) {
-        match result {
-            Ok(triple) => sink.add(triple),
-            Err(_) => {
-                sink.triples.clear();
-                sink.blanks.clear();
-                return false;
-            }
-        }
+        let Ok(triple) = result else {
+            sink.triples.clear();
+            sink.blanks.clear();
+            return false;
+        };
+        sink.add(triple);
     }
     true
 }
