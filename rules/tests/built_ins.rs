@@ -7,7 +7,10 @@
 
 use std::collections::BTreeSet;
 
-use metaplan_rules::{Engine, Literal, Prefixes, Program, Symbols, Syntax, parse_rules_together};
+use metaplan_rules::replay::replay;
+use metaplan_rules::{
+    Delta, Engine, Fact, Literal, Prefixes, Program, Symbols, Syntax, parse_rules_together,
+};
 
 fn parse(texts: &[(&str, &str)], symbols: &mut Symbols) -> Result<Program, Vec<String>> {
     parse_rules_together(texts, symbols, &Prefixes::new(), &Syntax::default())
@@ -233,4 +236,39 @@ fn unknown_built_ins_are_errors() {
     let message =
         format!("test:1:9: R104 built-in <{library}soon> belongs to a library that the engine does not have");
     check(&format!("p(?x) ^ <{library}soon>(?x) -> q(?x)"), &[&message]);
+}
+
+#[test]
+fn what_is_taken_apart_comes_and_goes() {
+    let rules = "said(?x, ?text) ^ swrlb:tokenize(?word, ?text, \" \") -> word(?x, ?word) .
+        born(?x, ?date) ^ swrlb:date(?date, ?year, ?month, ?day) ^ swrlb:lessThan(?month, 7) -> early(?x, ?year) .";
+    let mut symbols = Symbols::new();
+    let program = parse(&[("test", rules)], &mut symbols).expect("rules");
+    let date = |text: &str| Literal::parse(text, Some("http://www.w3.org/2001/XMLSchema#date"), None);
+    let mut fact = |predicate: &str, literal: Literal| {
+        Fact::new(symbols.name(predicate), [symbols.name("i"), symbols.literal(literal)])
+    };
+    let (short, long) = (fact("said", Literal::string("a b")), fact("said", Literal::string("b c d")));
+    let (spring, autumn) = (fact("born", date("2001-03-04")), fact("born", date("2002-10-04")));
+    let [a, b, c] = ["a", "b", "c"].map(|word| fact("word", Literal::string(word)));
+    let [in_2001, in_2002] = [2001, 2002].map(|year| fact("early", Literal::integer(year)));
+    let mut engine = Engine::new(symbols, program, [short.clone(), autumn.clone()]).expect("safe");
+    let check = |engine: &Engine, holds: &[&Fact], fails: &[&Fact]| {
+        assert!(holds.iter().all(|fact| engine.holds(fact) && engine.why(fact).is_some()));
+        for fact in fails {
+            assert!(!engine.holds(fact) && !engine.why_not(fact).is_empty());
+        }
+        let stated: Vec<Fact> = engine.facts().filter(|fact| engine.is_asserted(fact)).collect();
+        let derived = engine.facts().count() - stated.len();
+        let mut symbols = engine.symbols().clone();
+        let replayed = replay(engine.program(), &mut symbols, &stated, &engine.everything());
+        assert_eq!(replayed.expect("what holds").derived, derived);
+    };
+    check(&engine, &[&a, &b], &[&c, &in_2001, &in_2002]);
+    engine.apply(Delta { insert: vec![long.clone(), spring.clone()], delete: Vec::new() }).expect("it ends");
+    check(&engine, &[&a, &b, &c, &in_2001], &[&in_2002]);
+    engine.apply(Delta { insert: Vec::new(), delete: vec![short, spring] }).expect("it ends");
+    check(&engine, &[&b, &c], &[&a, &in_2001]);
+    engine.apply(Delta { insert: Vec::new(), delete: vec![long, autumn] }).expect("it ends");
+    check(&engine, &[], &[&a, &b, &c]);
 }
