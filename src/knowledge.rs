@@ -12,8 +12,8 @@ use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::Status;
-use ontology::{EntityKind, Equality, Iri, Ontology, ReadOptions};
-use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Symbols};
+use ontology::{Annotation, EntityKind, Equality, Iri, Ontology, ReadOptions};
+use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Rule, Symbols, Syntax};
 
 use crate::message::Message;
 pub(crate) use catalogue::Catalogue;
@@ -58,6 +58,7 @@ pub struct Knowledge {
     entities: Arc<[(EntityKind, Iri)]>,
     /// The names of all documents, those that are imported among them.
     documents: Arc<[String]>,
+    annotations: Arc<[(Iri, Annotation)]>,
 }
 
 /// What documents and rule files say, before anything is concluded.
@@ -81,11 +82,9 @@ impl Stated {
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
         let mut own = Vec::new();
-        for file in &sources.rules {
-            match parse_rule_file(file, &mut symbols) {
-                Ok(program) => own.extend(program.rules),
-                Err(more) => errors.extend(more),
-            }
+        match parse_rule_files(&sources.rules, &mut symbols) {
+            Ok(rules) => own.extend(rules),
+            Err(more) => errors.extend(more),
         }
         let ontology = match read {
             Ok(ontology) if errors.is_empty() => ontology,
@@ -144,7 +143,8 @@ impl Knowledge {
         let runtime = Runtime::new(engine, Mode::Retract);
         let (sources, entities) = (sources.clone(), ontology.entities.into());
         let documents = ontology.sources.into_iter().map(|source| source.name).collect();
-        Ok(Self { documents, ..Self::of(runtime, rule_count, warnings, sources, entities) })
+        let annotations = ontology.annotations.into();
+        Ok(Self { documents, annotations, ..Self::of(runtime, rule_count, warnings, sources, entities) })
     }
 
     /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
@@ -168,8 +168,19 @@ impl Knowledge {
         entities: Arc<[(EntityKind, Iri)]>,
     ) -> Self {
         let (catalogue, waiting, origin) = (OnceLock::new(), Waiting::default(), runtime.clone());
-        let documents = Arc::default();
-        Self { runtime, catalogue, waiting, origin, rule_count, warnings, sources, entities, documents }
+        let (documents, annotations) = (Arc::default(), Arc::default());
+        Self {
+            runtime,
+            catalogue,
+            waiting,
+            origin,
+            rule_count,
+            warnings,
+            sources,
+            entities,
+            documents,
+            annotations,
+        }
     }
 
     /// What is questionable about the documents.
@@ -180,6 +191,11 @@ impl Knowledge {
     /// The classes, properties and individuals that the documents name.
     pub fn entities(&self) -> &[(EntityKind, Iri)] {
         &self.entities
+    }
+
+    /// What the documents say in annotations of entities.
+    pub fn annotations(&self) -> &[(Iri, Annotation)] {
+        &self.annotations
     }
 
     /// What it was read from.
@@ -445,8 +461,19 @@ pub(crate) fn rule_text(file: &str) -> Result<String, Message> {
     text.map_err(|error| Message::at("M101", file, None, format!("cannot be read: {error}")))
 }
 
-fn parse_rule_file(file: &str, symbols: &mut Symbols) -> Result<Program, Vec<Message>> {
-    let text = rule_text(file).map_err(|message| vec![message])?;
-    rules::parse_rules(&text, file, symbols, &Prefixes::default())
-        .map_err(|errors| errors.iter().map(Message::from_rules).collect())
+/// The rules of all files. What one file asks for, another may conclude.
+fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Vec<Message>> {
+    let (mut texts, mut errors) = (Vec::new(), Vec::new());
+    for file in files {
+        match rule_text(file) {
+            Ok(text) => texts.push((file, text)),
+            Err(error) => errors.push(error),
+        }
+    }
+    let texts: Vec<(&str, &str)> = texts.iter().map(|(file, text)| (file.as_str(), text.as_str())).collect();
+    match rules::parse_rules_together(&texts, symbols, &Prefixes::default(), &Syntax::default()) {
+        Ok(program) if errors.is_empty() => Ok(program.rules),
+        Ok(_) => Err(errors),
+        Err(more) => Err(errors.into_iter().chain(more.iter().map(Message::from_rules)).collect()),
+    }
 }

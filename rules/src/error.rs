@@ -42,9 +42,9 @@ pub enum Error {
         /// As written.
         name: String,
     },
-    /// A `swrlb` name whose arguments or results are lists or URIs.
+    /// A `swrlb` name whose arguments or results are lists.
     #[error(
-        "{file}:{line}:{column}: R104 built-in `{name}` works on lists or URIs, which the engine has no values for"
+        "{file}:{line}:{column}: R104 built-in `{name}` works on lists, which the engine has no values for"
     )]
     RefusedBuiltIn {
         /// The source as named by the caller.
@@ -69,6 +69,23 @@ pub enum Error {
         column: u32,
         /// Its IRI.
         name: String,
+    },
+    /// An atom that no class and no property can have, and that no rule concludes.
+    #[error(
+        "{file}:{line}:{column}: R104 <{name}> with {count} arguments is no class, no property and nothing that a rule \
+         concludes, and a built-in of this name is not known"
+    )]
+    UnknownRelation {
+        /// The source as named by the caller.
+        file: String,
+        /// Counted from 1.
+        line: u32,
+        /// In characters, counted from 1.
+        column: u32,
+        /// Its IRI.
+        name: String,
+        /// How many arguments it has.
+        count: usize,
     },
     /// An atom that SWRL does not have, in text that is to be SWRL.
     #[error("{file}:{line}:{column}: R105 {what} is not SWRL")]

@@ -254,6 +254,9 @@ impl Round<'_> {
                     built_in.compute(&literals(symbols, arguments, bound)?)
                 })
             }
+            Step::Solve { built_in, arguments, known } => {
+                self.solve(&block, width, plan.rule, *built_in, (arguments, known))
+            }
             Step::Aggregate { matches, function, index, group, result, binds } => {
                 let group = Group { relation: self.store.get(*matches), index: *index, key: group };
                 self.aggregate(block, width, *function, &group, (*result, *binds))
@@ -380,7 +383,7 @@ impl Round<'_> {
 }
 
 /// The symbol of a computed value; symbols that a clone shares are copied only for a new one.
-fn intern(symbols: &mut Arc<Symbols>, value: Literal) -> Symbol {
+pub(crate) fn intern(symbols: &mut Arc<Symbols>, value: Literal) -> Symbol {
     symbols.find_literal(&value).unwrap_or_else(|| Arc::make_mut(symbols).literal(value))
 }
 

@@ -50,6 +50,8 @@ pub(crate) enum Step {
     Test { built_in: BuiltIn, arguments: Vec<Source> },
     /// A built-in that binds its first argument.
     Compute { built_in: BuiltIn, result: u16, arguments: Vec<Source> },
+    /// A built-in that binds whatever is not known of its arguments, in any number of ways.
+    Solve { built_in: BuiltIn, arguments: Vec<Source>, known: Vec<bool> },
     /// Binds a variable to a known value.
     Equate { variable: u16, source: Source },
     /// What an aggregate makes of a group: rows that agree on their first columns.
@@ -174,6 +176,11 @@ impl Bound {
         }
     }
 
+    /// Which of some sources it knows.
+    pub fn known(&self, sources: &[Source]) -> Vec<bool> {
+        sources.iter().map(|&source| self.knows(source)).collect()
+    }
+
     pub fn knows_all(&self, sources: &[Source]) -> bool {
         sources.iter().all(|&source| self.knows(source))
     }
@@ -287,20 +294,16 @@ impl Planner<'_> {
                 let known = |column: &usize| bound.knows(sources[*column]);
                 let columns: Vec<usize> = (0..sources.len()).filter(known).collect();
                 let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
-                let index = (mask != 0).then(|| self.store.get_mut(*relation).index(mask));
+                // Of a closure, most rows are no links, and looking at each would cost more than all that is concluded.
+                let without = is_link.then_some(self.number);
+                let index = (mask != 0).then(|| self.store.get_mut(*relation).index_without(mask, without));
                 let key = columns.iter().map(|&column| sources[column]).collect();
                 let others =
                     sources.iter().copied().enumerate().filter(|(column, _)| mask & (1 << column) == 0);
                 Step::Join { relation: *relation, skip, index, key, pattern: bound.pattern(others), is_link }
             }
             Condition::Not(relation, sources) => Step::Absent { relation: *relation, key: sources.clone() },
-            Condition::BuiltIn(built_in, sources) => match sources[0] {
-                Source::Variable(result) if !bound.knows(sources[0]) => {
-                    bound.bind(result);
-                    Step::Compute { built_in: *built_in, result, arguments: sources[1..].to_vec() }
-                }
-                _ => Step::Test { built_in: *built_in, arguments: sources.clone() },
-            },
+            Condition::BuiltIn(built_in, sources) => built_in_step(*built_in, sources, bound),
             Condition::Aggregate { matches, function, group, result } => {
                 let mask = (0..group.len()).fold(0, |mask, column| mask | 1 << column);
                 let index = (mask != 0).then(|| self.store.get_mut(*matches).index(mask));
@@ -325,11 +328,28 @@ impl Planner<'_> {
     }
 }
 
+/// A test, a function of the other arguments, or the more general way that gives values to any of them.
+fn built_in_step(built_in: BuiltIn, sources: &[Source], bound: &mut Bound) -> Step {
+    let known = bound.known(sources);
+    for source in sources {
+        if let Source::Variable(number) = *source {
+            bound.bind(number);
+        }
+    }
+    match (known.iter().position(|known| !known), sources.first()) {
+        (None, _) => Step::Test { built_in, arguments: sources.to_vec() },
+        (Some(0), Some(&Source::Variable(result))) if built_in.is_function() => {
+            Step::Compute { built_in, result, arguments: sources[1..].to_vec() }
+        }
+        _ => Step::Solve { built_in, arguments: sources.to_vec(), known },
+    }
+}
+
 /// Whether a condition that does not enumerate rows can be evaluated.
 fn is_ready(condition: &Condition, bound: &Bound) -> bool {
     match condition {
         Condition::Same(left, right) => bound.knows(*left) || bound.knows(*right),
-        Condition::BuiltIn(built_in, sources) if built_in.is_function() => bound.knows_all(&sources[1..]),
+        Condition::BuiltIn(built_in, sources) => built_in.binds(&bound.known(sources)),
         Condition::Aggregate { group, .. } => bound.knows_all(group),
         other => bound.knows_all(&other.sources()),
     }

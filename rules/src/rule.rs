@@ -1,10 +1,11 @@
 //! Rules as data: what the engine evaluates, whatever syntax it came from.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
 use crate::builtin::BuiltIn;
-use crate::symbol::Symbol;
+use crate::symbol::{Symbol, Symbols};
 
 /// A variable, numbered within its rule from 0.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
@@ -175,6 +176,30 @@ pub struct Program {
     /// Whether `owl:sameAs` is equality, as [`crate::owl_rl::with_equality`] has it: what holds of an individual holds
     /// of all its names. Otherwise it is a relation like any other, and every name stands for an individual of its own.
     pub equality: bool,
+}
+
+impl Program {
+    /// The relations that heads conclude, with the number of their arguments.
+    pub(crate) fn concluded(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
+        relations(self.rules.iter().flat_map(|rule| &rule.head), symbols)
+    }
+
+    /// The relations that bodies ask for, with the number of their arguments.
+    pub(crate) fn asked(&self, symbols: &Symbols) -> BTreeSet<(String, usize)> {
+        let bodies = self.rules.iter().flat_map(|rule| &rule.body);
+        relations(bodies.flat_map(|atom| std::iter::once(atom).chain(atom.parts())), symbols)
+    }
+}
+
+/// The relations of some atoms.
+fn relations<'a>(atoms: impl Iterator<Item = &'a Atom>, symbols: &Symbols) -> BTreeSet<(String, usize)> {
+    let relation = |atom: &Atom| match atom {
+        Atom::Relation { predicate, arguments } | Atom::Not { predicate, arguments } => {
+            symbols.value(*predicate).as_name().map(|name| (name.to_owned(), arguments.len()))
+        }
+        _ => None,
+    };
+    atoms.filter_map(relation).collect()
 }
 
 impl Term {

@@ -59,9 +59,7 @@ fn close(atoms: &[Atom], bound: &mut Bound, optimistic: bool) {
             let binds: &[Source] = match atom {
                 Atom::Relation { .. } => &terms,
                 Atom::Same(..) if terms.iter().any(|&term| bound.knows(term)) => &terms,
-                Atom::BuiltIn { built_in, .. } if built_in.is_function() && bound.knows_all(&terms[1..]) => {
-                    &terms[..1]
-                }
+                Atom::BuiltIn { built_in, .. } if built_in.binds(&bound.known(&terms)) => &terms,
                 Atom::Aggregate { .. } if optimistic => &terms[..1],
                 _ => &[],
             };

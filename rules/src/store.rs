@@ -131,6 +131,8 @@ pub(crate) struct Relation {
 #[derive(Clone, Debug)]
 struct Index {
     columns: u32,
+    /// The rule whose conclusions are left out.
+    without: Option<u32>,
     heads: HashTable<Row>,
     next: Vec<Row>,
     previous: Vec<Row>,
@@ -198,7 +200,7 @@ impl Relation {
         let indexes = std::mem::take(&mut self.indexes);
         *self = Self::new(self.predicate, self.arity);
         for index in indexes {
-            self.index(index.columns);
+            self.index_without(index.columns, index.without);
         }
     }
 
@@ -219,7 +221,16 @@ impl Relation {
     }
 
     pub fn set_record(&mut self, row: Row, record: Record) {
-        self.records[row as usize] = record;
+        let before = std::mem::replace(&mut self.records[row as usize], record);
+        let (all, arity) = (&self.arguments, self.arity);
+        let row_of = |row: Row| &all[row as usize * arity..(row as usize + 1) * arity];
+        for index in &mut self.indexes {
+            match (index.has(before), index.has(record)) {
+                (true, false) => index.remove(row, row_of),
+                (false, true) => index.insert(row, row_of),
+                _ => {}
+            }
+        }
     }
 
     pub fn find(&self, arguments: &[Symbol]) -> Option<Row> {
@@ -244,7 +255,7 @@ impl Relation {
         let row_of = |row: Row| &all[row as usize * arity..(row as usize + 1) * arity];
         self.rows
             .insert_unique(hash(arguments.iter().copied()), row, |&row| hash(row_of(row).iter().copied()));
-        for index in &mut self.indexes {
+        for index in self.indexes.iter_mut().filter(|index| index.has(record)) {
             index.insert(row, row_of);
         }
         row
@@ -257,7 +268,8 @@ impl Relation {
         if let Ok(entry) = self.rows.find_entry(hash(row_of(row).iter().copied()), |&other| other == row) {
             entry.remove();
         }
-        for index in &mut self.indexes {
+        let record = self.records[row as usize];
+        for index in self.indexes.iter_mut().filter(|index| index.has(record)) {
             index.remove(row, row_of);
         }
         self.states[row as usize] = state::FREE;
@@ -266,18 +278,25 @@ impl Relation {
     }
 
     pub fn has_index(&self, columns: u32) -> bool {
-        self.indexes.iter().any(|index| index.columns == columns)
+        self.indexes.iter().any(|index| index.columns == columns && index.without.is_none())
     }
 
     /// The number of the index on these columns, built on first use.
     pub fn index(&mut self, columns: u32) -> usize {
-        if let Some(position) = self.indexes.iter().position(|index| index.columns == columns) {
+        self.index_without(columns, None)
+    }
+
+    /// The number of the index on these columns of all rows but those that a rule has concluded, built on first use.
+    pub fn index_without(&mut self, columns: u32, without: Option<u32>) -> usize {
+        let same = |index: &Index| index.columns == columns && index.without == without;
+        if let Some(position) = self.indexes.iter().position(same) {
             return position;
         }
-        let mut index = Index { columns, heads: HashTable::new(), next: Vec::new(), previous: Vec::new() };
+        let (heads, next, previous) = (HashTable::new(), Vec::new(), Vec::new());
+        let mut index = Index { columns, without, heads, next, previous };
         let (all, arity) = (&self.arguments, self.arity);
         for row in 0..self.states.len() as Row {
-            if self.states[row as usize] & state::FREE == 0 {
+            if self.states[row as usize] & state::FREE == 0 && index.has(self.records[row as usize]) {
                 index.insert(row, |row| &all[row as usize * arity..(row as usize + 1) * arity]);
             }
         }
@@ -287,7 +306,8 @@ impl Relation {
 
     /// The index on the most columns among those given, with its columns.
     pub fn best_index(&self, bound: u32) -> Option<(usize, u32)> {
-        let usable = self.indexes.iter().enumerate().filter(|(_, index)| index.columns & !bound == 0);
+        let fits = |index: &Index| index.columns & !bound == 0 && index.without.is_none();
+        let usable = self.indexes.iter().enumerate().filter(|(_, index)| fits(index));
         usable.max_by_key(|(_, index)| index.columns.count_ones()).map(|(at, index)| (at, index.columns))
     }
 
@@ -327,6 +347,11 @@ impl Iterator for Rows<'_> {
 }
 
 impl Index {
+    /// Whether rows with this record are in it.
+    fn has(&self, record: Record) -> bool {
+        self.without.is_none_or(|rule| rule != record.rule)
+    }
+
     fn key(mask: u32, row: &[Symbol]) -> impl Iterator<Item = Symbol> + '_ {
         columns(mask).map(|column| row[column])
     }

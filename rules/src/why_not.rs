@@ -234,8 +234,9 @@ impl Search<'_> {
                 Condition::Relation(_, sources) => 1 + known(sources),
                 Condition::Not(_, sources) if known(sources) == sources.len() => 100,
                 Condition::BuiltIn(built_in, sources) => {
-                    let open = usize::from(built_in.is_function());
-                    if known(&sources[open..]) == sources.len() - open { 100 } else { 0 }
+                    let known: Vec<bool> =
+                        sources.iter().map(|&s| value(s, &state.bound).is_some()).collect();
+                    if built_in.binds(&known) { 100 } else { 0 }
                 }
                 Condition::Aggregate { group, .. } if known(group) == group.len() => 100,
                 Condition::Same(a, b) if known(&[*a, *b]) > 0 => 100,
@@ -337,27 +338,28 @@ impl Search<'_> {
         let symbols = &self.engine.symbols;
         let arguments: Vec<Option<Symbol>> = sources.iter().map(|&s| value(s, &state.bound)).collect();
         let literal = |symbol: &Option<Symbol>| symbol.and_then(|symbol| symbols.as_literal(symbol));
-        let open = usize::from(built_in.is_function() && arguments[0].is_none());
-        if arguments[open..].iter().any(Option::is_none) {
+        if !built_in.binds(&arguments.iter().map(Option::is_some).collect::<Vec<_>>()) {
             return;
         }
-        let values: Option<Vec<_>> = arguments[open..].iter().map(literal).collect();
-        let satisfied = match &values {
-            Some(values) if open == 1 => match built_in.compute(values) {
-                Some(result) => symbols.find_literal(&result).is_some_and(|symbol| {
-                    bind(sources[0], symbol, &mut state.bound);
-                    true
-                }),
-                None => false,
-            },
-            Some(values) => built_in.holds(values),
-            None => false,
+        let known = |symbol: &Option<Symbol>| match symbol {
+            Some(_) => literal(symbol).map(Some),
+            None => Some(None),
         };
-        if satisfied {
-            return;
+        let values: Option<Vec<Option<&Literal>>> = arguments.iter().map(known).collect();
+        let open: Vec<Source> =
+            sources.iter().zip(&arguments).filter(|(_, known)| known.is_none()).map(|(&s, _)| s).collect();
+        // Of several ways the first that the knowledge has values for.
+        for solution in values.iter().flat_map(|values| built_in.solve(values)) {
+            let found: Option<Vec<Symbol>> =
+                solution.iter().map(|value| symbols.find_literal(value)).collect();
+            let mut bound = state.bound.clone();
+            if found.is_some_and(|found| unify(&open, &found, &mut bound)) {
+                state.bound = bound;
+                return;
+            }
         }
         let gap = match values.as_deref() {
-            Some([left, right]) if open == 0 => {
+            Some([Some(left), Some(right)]) => {
                 left.as_rational().zip(right.as_rational()).map(|(left, right)| (left - right).abs())
             }
             _ => None,

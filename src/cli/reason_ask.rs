@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 use metaplan::knowledge::Knowledge;
 use metaplan::message::Message;
-use ontology::entail::{Answer, Schema, SchemaEntity, entailments, schema};
+use ontology::entail::{Answer, Schema, SchemaEntity, annotations, entailments, schema};
 use ontology::vocab::{local_name, rdf};
 use rules::{Atom, Engine, Fact, Literal, Symbol, Term, Value};
 use serde_json::{Value as Json, json};
@@ -64,8 +64,9 @@ impl Questions {
         let options = ontology::ReadOptions { allow_missing_imports: true, ..imports.options() };
         let conclusions = ontology::read_files(&self.entails, &options)
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
-        let found =
+        let mut found =
             entailments(knowledge.engine(), &conclusions).map_err(|error| Message::from_rules(&error))?;
+        found.extend(annotations(knowledge.engine(), knowledge.annotations(), &conclusions));
         let (mut text, mut all) = (String::new(), true);
         for entailment in &found {
             match &entailment.answer {

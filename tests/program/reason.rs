@@ -155,6 +155,14 @@ fn limits_and_missing_imports_are_options() {
         3,
         &["R301 step budget of 1000000", "count.swrl#0"],
     );
+    let unknown = "<http://x#n>(?x, ?n) ^ <http://my#add>(?m, ?n, 1) -> <http://x#n>(?x, ?m) .\n";
+    std::fs::write(directory.path().join("unknown.swrl"), unknown).expect("a file");
+    let arguments = ["reason", "model.ttl", "--rules", "unknown.swrl", "-q"];
+    check(
+        &metaplan_in(directory.path(), &arguments, ""),
+        3,
+        &["unknown.swrl:1:24", "R104", "<http://my#add> with 3 arguments"],
+    );
     let imports = "<http://x> a <http://www.w3.org/2002/07/owl#Ontology> ;
         <http://www.w3.org/2002/07/owl#imports> <http://nowhere.example/y> .";
     check(&run(&["reason", "-"], imports), 3, &["O103", "--ignore-missing-imports"]);

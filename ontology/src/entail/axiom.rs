@@ -10,8 +10,8 @@ use crate::vocab::owl;
 impl Prover {
     /// Whether an axiom follows.
     pub(super) fn axiom(&self, axiom: &Axiom) -> Result<Answer, Error> {
-        if let Axiom::DataPropertyRange(..) | Axiom::DatatypeDefinition(..) = axiom {
-            return Ok(Answer::Open("what a data range contains is not asked for"));
+        if let Axiom::DatatypeDefinition(..) = axiom {
+            return Ok(Answer::Open("what a datatype is defined to be is not asked for"));
         }
         let reason = match self.classes(axiom)? {
             Some(reason) => Some(reason),
@@ -188,6 +188,7 @@ impl Prover {
             Axiom::FunctionalDataProperty(property) => {
                 Ok(refuted(&[assumed(&[(property, 1), (property, 2)])?]))
             }
+            Axiom::DataPropertyRange(property, range) => Ok(self.range(property, range)?),
             Axiom::DataPropertyDomain(property, class) => {
                 Self::is_in(&assumed(&[(property, 1)])?, class, &Self::fresh(0), &mut 1)
             }

@@ -8,12 +8,16 @@
 mod assume;
 mod axiom;
 mod query;
+mod range;
 mod schema;
 
 use rules::{Engine, Error, Fact, Literal, Program, Symbol};
 
-use crate::owl::{ANONYMOUS, Axiom, Iri, ObjectPropertyExpression, Ontology};
+use crate::Warning;
+use crate::horned::UNUSED_CLASS;
+use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Axiom, Iri, ObjectPropertyExpression, Ontology};
 use crate::vocab::owl;
+use assume::refuted;
 pub use schema::{Schema, SchemaEntity, schema};
 
 /// What is known of a statement.
@@ -34,7 +38,8 @@ pub struct Entailment {
     pub answer: Answer,
 }
 
-/// Asks for every axiom of `conclusions`. Its anonymous individuals stand for any individual.
+/// Asks for every axiom of `conclusions`. Its anonymous individuals stand for any individual. What could not be read of it was
+/// not shown; for its annotations see [`annotations`].
 ///
 /// # Errors
 /// A rule does not come to an end.
@@ -65,7 +70,49 @@ pub fn entailments(engine: &Engine, conclusions: &Ontology) -> Result<Vec<Entail
             answer: Answer::Open("rules are not asked for"),
         });
     }
+    found.extend(conclusions.warnings.iter().filter_map(unread));
     Ok(found)
+}
+
+/// Asks for every annotation of `conclusions` whether it is among those that are `stated`, of its subject or of something that
+/// is the same, because nothing else follows from annotations.
+pub fn annotations(engine: &Engine, stated: &[(Iri, Annotation)], conclusions: &Ontology) -> Vec<Entailment> {
+    conclusions.annotations.iter().map(|annotation| annotated(engine, annotation, stated)).collect()
+}
+
+fn annotated(
+    engine: &Engine,
+    (subject, wanted): &(Iri, Annotation),
+    stated: &[(Iri, Annotation)],
+) -> Entailment {
+    let is_same = |other: &Iri| {
+        let names = [owl::SAME_AS, other, subject].map(|name| engine.symbols().find_name(name));
+        let [Some(predicate), Some(other), Some(subject)] = names else { return false };
+        engine.holds(&Fact::new(predicate, [other, subject]))
+    };
+    let found = stated.iter().find(|(other, own)| own == wanted && (other == subject || is_same(other)));
+    let answer = match found {
+        Some((other, _)) if other == subject => Answer::Follows("it is stated\n".to_owned()),
+        Some((other, _)) => Answer::Follows(format!("it is stated of <{other}>, which is the same\n")),
+        None => Answer::Open("it is an annotation that is not stated"),
+    };
+    let Annotation { property, value } = wanted;
+    let value = match value {
+        AnnotationValue::Literal(literal) => literal.to_string(),
+        AnnotationValue::Iri(iri) => format!("<{iri}>"),
+    };
+    Entailment { statement: format!("AnnotationAssertion(<{property}> <{subject}> {value})"), answer }
+}
+
+/// What was not read of the conclusions. A class expression that nothing is said of claims nothing.
+fn unread(warning: &Warning) -> Option<Entailment> {
+    let statement = match warning {
+        Warning::Unread { statement, .. } if statement.starts_with(UNUSED_CLASS) => return None,
+        Warning::Unread { statement, .. } => statement.clone(),
+        Warning::UnreadRule { ontology, position, .. } => format!("rule <{ontology}>#{position}"),
+        _ => return None,
+    };
+    Some(Entailment { statement, answer: Answer::Open("it could not be read") })
 }
 
 /// Whether a statement is about somebody, whoever that is.

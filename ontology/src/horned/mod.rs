@@ -3,8 +3,11 @@
 //!
 //! horned-owl returns sets in hash order; everything is sorted here. What it leaves over becomes warnings.
 
+mod sort;
+mod stack;
 mod transcribe;
 
+use stack::with_stack;
 pub(crate) use transcribe::{Fault, owl_xml, transcribe};
 
 use std::sync::Arc;
@@ -23,17 +26,8 @@ use crate::owl::{
 use crate::read::Parts;
 use crate::vocab::{rdfs, swrla};
 
-/// The stack on which horned-owl runs, in bytes of address space: it recurses into lists and expressions.
-const STACK: usize = 1 << 29;
-
-/// Runs a reader or writer where long lists do not overflow the stack.
-fn with_stack<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T, String> {
-    std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);
-        let thread = thread.map_err(|error| format!("there is no room for the OWL reader: {error}"))?;
-        thread.join().map_err(|_| "the OWL reader failed on it".to_owned())
-    })
-}
+/// What a class expression is called of which no axiom says anything.
+pub(crate) const UNUSED_CLASS: &str = "the class expression ";
 
 /// Reads a normalised N-Triples document about the ontology `about`, and adds what it says to `plain`, whose IRIs are
 /// `names`; `origins` says where each rule comes from.
@@ -71,14 +65,13 @@ fn build_here(
         builder.component(annotated.component, annotated.ann);
     }
     let unread = builder.leftovers(&rest);
-    let Builder { mut parts, mut rules, .. } = builder;
+    let Builder { mut parts, mut rules, names, .. } = builder;
     rules.sort_by_key(|(index, _)| *index);
     parts.rules =
         rules.into_iter().filter_map(|(index, rule)| Some(located(rule, origins.get(index)?))).collect();
     parts.entities.sort();
     parts.entities.dedup();
-    parts.axioms.sort();
-    parts.axioms.dedup();
+    sort::axioms(&mut parts.axioms, &names);
     parts.annotations.sort();
     parts.annotations.dedup();
     parts.warnings.extend(unread);
@@ -436,7 +429,7 @@ impl Builder {
             format!("the list ({})", items.join(" "))
         });
         let classes =
-            rest.class_expression.iter().map(|class| format!("the class expression {}", self.class(class)));
+            rest.class_expression.iter().map(|class| format!("{UNUSED_CLASS}{}", self.class(class)));
         let annotations = rest.ann_map.keys().map(|about| format!("an annotation of {}", triple(about)));
         let statements = simple.chain(nodes).chain(lists).chain(classes).chain(annotations);
         let reason = || "part of no axiom or rule".to_owned();

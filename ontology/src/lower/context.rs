@@ -97,6 +97,14 @@ impl<'a> Context<'a> {
         self.entities.contains(&(kind, iri.clone()))
     }
 
+    /// The entities of a kind, sorted.
+    pub(crate) fn all(&self, kind: EntityKind) -> Vec<Iri> {
+        let mut all: Vec<Iri> =
+            self.entities.iter().filter(|(other, _)| *other == kind).map(|(_, iri)| iri.clone()).collect();
+        all.sort();
+        all
+    }
+
     /// That a term is an individual.
     pub(crate) fn thing(&mut self, term: Term) -> Atom {
         self.relation(owl::THING, [term])

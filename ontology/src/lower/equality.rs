@@ -8,12 +8,15 @@
 //! Under the unique-name assumption of [`Equality::UniqueNames`] no rule of this file is needed: a functional object
 //! property then concludes nothing, and any two names differ.
 
-use rules::{Atom, Rule, RuleIdentity, Term};
+use std::collections::HashSet;
+
+use rules::{Atom, Rule, RuleIdentity, Symbol, Term};
 
 use super::AXIOM_SOURCE;
 use super::context::{Context, Variables};
 use super::groups;
-use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression};
+use crate::error::Warning;
+use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression, EntityKind};
 use crate::vocab::owl;
 
 /// Whether two names can stand for one individual.
@@ -40,8 +43,45 @@ pub(crate) fn lower(axioms: &[AnnotatedAxiom], context: &mut Context) -> bool {
     if context.rules.iter().any(asks) {
         difference(axioms, context);
     }
+    if merges {
+        entities(context);
+    }
     merges
 }
+
+/// Classes and properties that are individuals, too, and may turn out to be one individual, have the same members then (eq-rep
+/// of OWL 2 RL; those that are stated to be one have the same members anyway).
+fn entities(context: &mut Context) {
+    let identity = RuleIdentity { source: AXIOM_SOURCE.into(), label: Some("eq-rep".into()), position: 0 };
+    let mut variables = Variables::default();
+    let (x, y) = (variables.fresh("x"), variables.fresh("y"));
+    let named: HashSet<Symbol> = context.facts.iter().flat_map(|fact| fact.arguments.to_vec()).collect();
+    for (kind, arguments) in [
+        (EntityKind::Class, vec![x]),
+        (EntityKind::ObjectProperty, vec![x, y]),
+        (EntityKind::DataProperty, vec![x, y]),
+    ] {
+        let all: Vec<Symbol> = context.all(kind).iter().map(|iri| context.name(iri)).collect();
+        let punned: Vec<Symbol> = all.into_iter().filter(|symbol| named.contains(symbol)).collect();
+        if punned.len() > MOST_PUNNED {
+            let what = format!("{} names of {kind:?}s are individuals, too", punned.len());
+            let reason = "too many to ask of each pair whether it is one".to_owned();
+            context.warnings.push(Warning::OutsideProfile { axiom: what, partly: true, reason });
+            continue;
+        }
+        for (one, other) in punned.iter().flat_map(|one| punned.iter().map(move |other| (*one, *other))) {
+            if one != other {
+                let same = Atom::Same(Term::Constant(one), Term::Constant(other));
+                let body = vec![Atom::relation(one, arguments.clone()), same];
+                let head = vec![Atom::relation(other, arguments.clone())];
+                context.rule(&identity, head, body, &variables);
+            }
+        }
+    }
+}
+
+/// Of so many names that stand for an individual and a class at once, each pair has a rule.
+const MOST_PUNNED: usize = 32;
 
 fn identity(label: &str, position: usize) -> RuleIdentity {
     RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: position as u32 }

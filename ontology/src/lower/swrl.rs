@@ -190,10 +190,27 @@ fn condition(
         Atom::BuiltIn(iri, arguments) => {
             let built_in =
                 BuiltIn::from_iri(iri).ok_or_else(|| format!("the built-in <{iri}> is not known"))?;
+            let arguments = with_names(built_in, arguments.clone());
             let arguments = arguments.iter().map(|argument| term(context, argument, variables)).collect();
             vec![vec![rules::Atom::BuiltIn { built_in, arguments }]]
         }
     })
+}
+
+/// The arguments of a built-in; an expression among them is told the names of its variables.
+fn with_names(built_in: BuiltIn, mut arguments: Vec<Argument>) -> Vec<Argument> {
+    if let [_, Argument::Literal(text), values @ ..] = arguments.as_mut_slice() {
+        let name = |argument: &Argument| match argument {
+            Argument::Variable(iri) => Some(iri.to_string()),
+            _ => None,
+        };
+        let names: Vec<Option<String>> = values.iter().map(name).collect();
+        let names: Vec<Option<&str>> = names.iter().map(Option::as_deref).collect();
+        if let Some(named) = built_in.with_names(&text.lexical, &names) {
+            text.lexical = named.into();
+        }
+    }
+    arguments
 }
 
 /// An atom of a head.

@@ -7,6 +7,7 @@
 //! | pass | rewrites |
 //! |---|---|
 //! | here | headers of imported ontologies (taken away) |
+//! | `bulk` | nothing: tells which statements no other pass looks at |
 //! | `swrl` | every rule into one canonical shape |
 //! | `forms` | definitions as OWL 1 writes them, expressions without types, axioms with IRIs |
 //! | `lists` | disjointness of many into pairs, shared lists into copies, property chains checked |
@@ -15,6 +16,7 @@
 //! | `plain` | statements that need no reader into our own structures |
 
 mod anonymous;
+mod bulk;
 mod depth;
 mod forms;
 mod kinds;
@@ -26,8 +28,8 @@ pub(crate) use depth::DEEPEST;
 pub(crate) use swrl::{INDIVIDUAL, ORIGIN, TRUE, VARIABLE};
 
 use crate::error::{Error, Warning};
-use crate::graph::{Graph, is_type};
-use crate::names::Names;
+use crate::graph::Graph;
+use crate::names::{Compact, Names, Object};
 use crate::owl::Iri;
 use crate::read::{Document, Parts};
 use crate::vocab::{self, owl, rdf, rdfs, xsd};
@@ -57,32 +59,50 @@ pub(crate) struct Origin {
     pub iri: Option<Iri>,
 }
 
-/// One graph of all documents, with the header of the first only, and for each document where it starts and the
-/// ontology that it is.
-pub(crate) fn merge(documents: Vec<Document>) -> (Graph, Vec<(usize, Iri)>) {
-    let (mut graph, mut parts) = (Graph::default(), Vec::new());
+/// The triples of all documents, with the header of the first only.
+pub(crate) struct Merged {
+    pub graph: Graph,
+    /// Statements that are left out of the graph.
+    pub bulk: Vec<Compact>,
+    /// For each document, where it starts in the graph, and the ontology that it is.
+    pub parts: Vec<(usize, Iri)>,
+}
+
+/// Merges documents; what `is_bulk` holds of stays out of the graph.
+pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&Compact) -> bool) -> Merged {
+    let (mut graph, mut bulk, mut parts) = (Graph::default(), Vec::new(), Vec::new());
+    let [kind, ontology, imports, version] =
+        [rdf::TYPE, owl::ONTOLOGY, owl::IMPORTS, owl::VERSION_IRI].map(|iri| names.find(iri));
     for (index, document) in documents.into_iter().enumerate() {
         let name = document.iri.clone().unwrap_or_else(|| document.name.as_str().into());
         let start = graph.len();
         for triple in document.triples {
-            let header = is_type(&triple, owl::ONTOLOGY)
-                || [owl::IMPORTS, owl::VERSION_IRI].contains(&triple.predicate.as_str());
-            if triple.predicate.as_str() != owl::IMPORTS && !(header && index > 0) {
-                graph.add(triple);
+            let predicate = Some(triple.predicate);
+            let is_ontology = matches!(triple.object, Object::Node(class) if Some(class) == ontology);
+            let header = predicate == version || (predicate == kind && is_ontology);
+            if predicate == imports || (header && index > 0) {
+                continue;
+            }
+            if is_bulk(&triple) {
+                bulk.push(triple);
+            } else {
+                graph.add(names.triple(triple));
             }
         }
         parts.push((start, name));
     }
-    (graph, parts)
+    Merged { graph, bulk, parts }
 }
 
 /// Merges and rewrites; see the module documentation.
 ///
 /// # Errors
 /// Class expressions are nested too deep.
-pub(crate) fn normalize(documents: Vec<Document>) -> Result<Normal, Error> {
+pub(crate) fn normalize(documents: Vec<Document>, mut names: Names) -> Result<Normal, Error> {
     let files: Vec<String> = documents.iter().map(|document| document.name.clone()).collect();
-    let ((mut graph, parts), mut warnings) = (merge(documents), Vec::new());
+    let known = bulk::Known::of(&documents, &names);
+    let Merged { mut graph, bulk, parts } = merge(documents, &names, |triple| known.is_bulk(triple));
+    let mut warnings = Vec::new();
     if let Some(index) = depth::too_deep(&graph) {
         let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);
         return Err(Error::TooDeep { file: files[part].clone(), position: None, deepest: DEEPEST });
@@ -92,8 +112,7 @@ pub(crate) fn normalize(documents: Vec<Document>) -> Result<Normal, Error> {
     let disjoint = lists::rewrite(&mut graph, &mut warnings);
     anonymous::rewrite(&mut graph, &mut warnings);
     kinds::declare(&mut graph, &mut warnings);
-    let mut names = Names::default();
-    let mut plain = plain::take(&mut graph, &mut names);
+    let mut plain = plain::take(&mut graph, bulk, &mut names);
     plain.axioms.extend(disjoint);
     Ok(Normal { ntriples: graph.to_ntriples(), plain, names, rules, warnings })
 }

@@ -10,10 +10,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::is_reserved;
 use crate::graph::Graph;
-use crate::names::Names;
+use crate::names::{Compact, Names, Object};
 use crate::owl::{
-    AnnotatedAxiom, Annotation, AnnotationValue, Axiom, ClassExpression, EntityKind, Literal,
-    ObjectPropertyExpression,
+    AnnotatedAxiom, Annotation, AnnotationValue, Axiom, ClassExpression, EntityKind, ObjectPropertyExpression,
 };
 use crate::read::{Parts, iri_of};
 use crate::vocab::{owl, rdf, rdfs};
@@ -39,10 +38,19 @@ struct Kinds {
     property: Option<Result<Statement, ()>>,
 }
 
-/// Takes plain statements from a graph whose entities are all declared.
-pub(crate) fn take(graph: &mut Graph, names: &mut Names) -> Parts {
+/// Takes plain statements from a graph whose entities are all declared, and those that were left out of it.
+pub(crate) fn take(graph: &mut Graph, bulk: Vec<Compact>, names: &mut Names) -> Parts {
     let mut parts = Parts::default();
-    for (index, statement) in statements(graph) {
+    let (statements, declared) = (statements(graph), Declared::of(graph, names));
+    parts.axioms.reserve(bulk.len() + statements.len());
+    for triple in bulk {
+        if declared.contains(&triple) {
+            parts.axioms.push(axiom(triple, names));
+        } else {
+            graph.add(names.triple(triple));
+        }
+    }
+    for (index, statement) in statements {
         if let Some(triple) = graph.take(index) {
             convert(triple, statement, names, &mut parts);
         }
@@ -81,6 +89,50 @@ fn statements(graph: &Graph) -> Vec<(usize, Statement)> {
         }
     };
     graph.iter().filter_map(|(index, triple)| Some((index, of(triple)?))).collect()
+}
+
+/// The kinds of what is declared in the end, by number.
+struct Declared {
+    kinds: FxHashMap<u32, Kinds>,
+    kind: Option<u32>,
+}
+
+impl Declared {
+    fn of(graph: &Graph, names: &Names) -> Self {
+        let all = kinds(graph).into_iter();
+        let kinds = all.filter_map(|(iri, kinds)| Some((names.find(iri)?, kinds))).collect();
+        Self { kinds, kind: names.find(rdf::TYPE) }
+    }
+
+    /// Whether a statement is one by itself with these kinds.
+    fn contains(&self, triple: &Compact) -> bool {
+        let property = || self.kinds.get(&triple.predicate).and_then(|kinds| kinds.property);
+        match &triple.object {
+            Object::Node(class) if Some(triple.predicate) == self.kind => {
+                self.kinds.get(class).is_some_and(|kinds| kinds.class)
+            }
+            Object::Node(_) => matches!(property(), Some(Ok(Statement::Object))),
+            Object::Literal(_) => matches!(property(), Some(Ok(Statement::Data))),
+        }
+    }
+}
+
+/// What a statement of numbers says.
+fn axiom(triple: Compact, names: &Names) -> AnnotatedAxiom {
+    let text = |number| names.text(number).clone();
+    let (subject, predicate) = (text(triple.subject), text(triple.predicate));
+    let axiom = match triple.object {
+        Object::Node(class) if &*predicate == rdf::TYPE => {
+            Axiom::ClassAssertion(ClassExpression::Class(text(class)), subject)
+        }
+        Object::Node(object) => Axiom::ObjectPropertyAssertion(
+            ObjectPropertyExpression::Property(predicate),
+            subject,
+            text(object),
+        ),
+        Object::Literal(literal) => Axiom::DataPropertyAssertion(predicate, subject, *literal),
+    };
+    AnnotatedAxiom { axiom, annotations: Vec::new() }
 }
 
 fn named(triple: &Triple) -> Option<&str> {
@@ -139,7 +191,7 @@ fn convert(triple: Triple, statement: Statement, names: &mut Names, parts: &mut 
         (Statement::Annotation, value) => {
             let value = match value {
                 Term::NamedNode(iri) => AnnotationValue::Iri(names.iri(iri.as_str())),
-                Term::Literal(value) => AnnotationValue::Literal(literal(value, names)),
+                Term::Literal(value) => AnnotationValue::Literal(names.literal(value)),
                 Term::BlankNode(_) => return,
             };
             parts.annotations.push((subject, Annotation { property: predicate, value }));
@@ -152,17 +204,8 @@ fn convert(triple: Triple, statement: Statement, names: &mut Names, parts: &mut 
             let property = ObjectPropertyExpression::Property(predicate);
             Axiom::ObjectPropertyAssertion(property, subject, names.iri(object.as_str()))
         }
-        (_, Term::Literal(value)) => Axiom::DataPropertyAssertion(predicate, subject, literal(value, names)),
+        (_, Term::Literal(value)) => Axiom::DataPropertyAssertion(predicate, subject, names.literal(value)),
         (_, Term::BlankNode(_)) => return,
     };
     parts.axioms.push(AnnotatedAxiom { axiom, annotations: Vec::new() });
-}
-
-fn literal(literal: oxrdf::Literal, names: &mut Names) -> Literal {
-    let (lexical, datatype, language) = literal.destruct();
-    Literal {
-        lexical: lexical.into(),
-        datatype: datatype.map(|datatype| names.iri(datatype.as_str())),
-        language: language.map(Into::into),
-    }
 }

@@ -4,15 +4,16 @@
 //! this file sees triples only.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term, Triple};
+use rustc_hash::FxHashMap as HashMap;
 
 use super::structural::Structural;
 use super::syntax::{self, Syntax};
 use super::{encoding, entities, foreign};
 use crate::error::{Error, Position};
+use crate::names::{Compact, Names, Object};
 use crate::vocab::{owl, rdf};
 
 /// After so many syntax errors in one document its parser is stopped.
@@ -32,7 +33,7 @@ pub(crate) struct Document {
     pub version: Option<Arc<str>>,
     /// The IRIs imported, in order of appearance, with the place of each where it is spelled out.
     pub imports: Vec<(String, Option<Position>)>,
-    pub triples: Vec<Triple>,
+    pub triples: Vec<Compact>,
 }
 
 /// The text of a document in UTF-8, without a byte order mark.
@@ -43,42 +44,76 @@ pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, 
     })
 }
 
-/// Parses `text`. Relative IRIs are resolved against `base`; blank nodes get names that start with `prefix`.
-pub(crate) fn parse(text: &[u8], name: &str, base: &str, prefix: &str) -> Result<Document, Vec<Error>> {
+/// Parses `text`. Relative IRIs are resolved against `base`; blank nodes get names that start with `prefix`, and all names
+/// numbers of `names`.
+pub(crate) fn parse(
+    text: &[u8],
+    name: &str,
+    base: &str,
+    prefix: &str,
+    names: &mut Names,
+) -> Result<Document, Vec<Error>> {
     if let Some(what) = foreign::recognized(text) {
         return Err(vec![Error::OtherSyntax { position: Position::of_offset(name, text, 0), what }]);
     }
     let syntax = Syntax::detect(text);
-    let triples = match syntax {
-        Syntax::Turtle => parse_turtle(text, name, base)?,
-        Syntax::RdfXml => parse_rdf_xml(text, name, base)?,
+    let mut sink = Sink { names, prefix, blanks: HashMap::default(), triples: Vec::new() };
+    match syntax {
+        Syntax::Turtle if parse_ntriples(text, &mut sink) => {}
+        Syntax::Turtle => parse_turtle(text, name, base, &mut sink)?,
+        Syntax::RdfXml => parse_rdf_xml(text, name, base, &mut sink)?,
         Syntax::OwlXml => {
             let ntriples = Structural { name, text, syntax }.owl_xml()?;
-            parse_turtle(&ntriples, name, base)?
+            parse_turtle(&ntriples, name, base, &mut sink)?;
         }
         Syntax::Functional => {
             let ntriples = Structural { name, text, syntax }.functional()?;
-            parse_turtle(&ntriples, name, base)?
+            parse_turtle(&ntriples, name, base, &mut sink)?;
         }
+    }
+    let Sink { names, triples, .. } = sink;
+    let [kind, ontology, imports, version] =
+        [rdf::TYPE, owl::ONTOLOGY, owl::IMPORTS, owl::VERSION_IRI].map(|iri| names.number(iri));
+    let is_header = |triple: &&Compact| {
+        triple.predicate == kind
+            && matches!(triple.object, Object::Node(class) if class == ontology)
+            && !names.is_blank(triple.subject)
     };
-    let triples = rename_blank_nodes(triples, prefix);
-    let header = triples.iter().find_map(|triple| match (&triple.subject, &triple.object) {
-        (NamedOrBlankNode::NamedNode(subject), Term::NamedNode(object))
-            if triple.predicate.as_str() == rdf::TYPE && object.as_str() == owl::ONTOLOGY =>
-        {
-            Some(Arc::from(subject.as_str()))
-        }
-        _ => None,
-    });
-    let objects = |predicate: &str| -> Vec<String> {
-        let matching = triples.iter().filter(|triple| triple.predicate.as_str() == predicate);
-        matching.filter_map(|triple| iri_of(&triple.object)).map(str::to_owned).collect()
+    let header = triples.iter().find(is_header).map(|triple| names.text(triple.subject).clone());
+    let objects = |predicate: u32| {
+        let matching = triples.iter().filter(move |triple| triple.predicate == predicate);
+        matching.filter_map(|triple| match triple.object {
+            Object::Node(object) if !names.is_blank(object) => Some(names.text(object).clone()),
+            _ => None,
+        })
     };
-    let version = objects(owl::VERSION_IRI).first().map(|iri| Arc::from(iri.as_str()));
+    let version = objects(version).next();
     let place = |iri: &str| std::str::from_utf8(text).ok()?.find(iri);
-    let position = |iri: &String| place(iri).map(|offset| Position::of_offset(name, text, offset));
-    let imports = objects(owl::IMPORTS).into_iter().map(|iri| (iri.clone(), position(&iri))).collect();
+    let position = |iri: &str| place(iri).map(|offset| Position::of_offset(name, text, offset));
+    let imports = objects(imports).map(|iri| (iri.to_string(), position(&iri))).collect();
     Ok(Document { name: name.to_owned(), syntax, iri: header, version, imports, triples })
+}
+
+/// Takes triples, and numbers blank nodes in order of appearance: parsers give anonymous ones random names, and two documents
+/// may use one name for two nodes.
+struct Sink<'a> {
+    names: &'a mut Names,
+    prefix: &'a str,
+    blanks: HashMap<String, u32>,
+    triples: Vec<Compact>,
+}
+
+impl Sink<'_> {
+    fn add(&mut self, triple: Triple) {
+        let (blanks, prefix) = (&mut self.blanks, self.prefix);
+        let blank = |names: &mut Names, node: &BlankNode| {
+            let next = blanks.len();
+            let fresh = || names.blank(&format!("{prefix}b{next}"));
+            *blanks.entry(node.as_str().to_owned()).or_insert_with(fresh)
+        };
+        let triple = self.names.compact(triple, blank);
+        self.triples.push(triple);
+    }
 }
 
 /// The ontology IRI declared in `head`, the start of a document (its end may be cut off).
@@ -114,15 +149,33 @@ fn between(text: &[u8], start: &str, end: char) -> Option<String> {
     rest.find(end).map(|length| rest[..length].to_owned())
 }
 
-fn parse_turtle(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<Error>> {
+/// Takes the triples of a document that is N-Triples, which is Turtle without abbreviations: nothing is left to resolve. `false`
+/// where it is not, or where resolving would change an IRI.
+fn parse_ntriples(text: &[u8], sink: &mut Sink) -> bool {
+    let start = text.iter().find(|byte| !byte.is_ascii_whitespace());
+    if !matches!(start, Some(b'<' | b'_' | b'#')) || text.windows(2).any(|pair| pair == b"/.") {
+        return false;
+    }
+    for result in oxttl::NTriplesParser::new().for_slice(text) {
+        let Ok(triple) = result else {
+            sink.triples.clear();
+            sink.blanks.clear();
+            return false;
+        };
+        sink.add(triple);
+    }
+    true
+}
+
+fn parse_turtle(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<(), Vec<Error>> {
     let mut parser = oxttl::TurtleParser::new();
     if let Ok(with_base) = parser.clone().with_base_iri(base) {
         parser = with_base;
     }
-    let (mut triples, mut errors) = (Vec::new(), Vec::new());
+    let mut errors = Vec::new();
     for result in parser.for_slice(text) {
         match result {
-            Ok(triple) => triples.push(triple),
+            Ok(triple) => sink.add(triple),
             Err(error) => {
                 errors.push(malformed_turtle(&error, name));
                 if errors.len() == MOST_ERRORS {
@@ -131,7 +184,7 @@ fn parse_turtle(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<
             }
         }
     }
-    if errors.is_empty() { Ok(triples) } else { Err(errors) }
+    if errors.is_empty() { Ok(()) } else { Err(errors) }
 }
 
 /// Refuses what is not N-Triples: entities and prefixes can make much of a short text.
@@ -148,7 +201,7 @@ fn malformed_turtle(error: &oxttl::TurtleSyntaxError, name: &str) -> Error {
     Error::Malformed { position, syntax: Syntax::Turtle, message: shortened(error.message()) }
 }
 
-fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec<Error>> {
+fn parse_rdf_xml(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<(), Vec<Error>> {
     let mut parser = oxrdfxml::RdfXmlParser::new();
     if let Ok(with_base) = parser.clone().with_base_iri(base) {
         parser = with_base;
@@ -159,10 +212,9 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec
     };
     let flat = entities::expanded(text).map_err(|fault| malformed(fault.offset, &fault.message))?;
     let mut parser = parser.for_slice(&flat.text);
-    let mut triples = Vec::new();
     while let Some(result) = parser.next() {
         match result {
-            Ok(triple) => triples.push(triple),
+            Ok(triple) => sink.add(triple),
             Err(error) => {
                 let offset = usize::try_from(parser.buffer_position()).unwrap_or(usize::MAX);
                 return Err(malformed(flat.origin(offset), &error.to_string()));
@@ -173,7 +225,7 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str) -> Result<Vec<Triple>, Vec
     if let Some(root) = syntax::unclosed_root(&flat.text) {
         return Err(malformed(text.len(), &format!("the document ends before </{root}>")));
     }
-    Ok(triples)
+    Ok(())
 }
 
 /// Parsers quote what they cannot read, which may be the whole document.
@@ -182,26 +234,6 @@ pub(super) fn shortened(message: &str) -> String {
         Some((end, _)) => format!("{}…", &message[..end]),
         None => message.to_owned(),
     }
-}
-
-/// Numbers blank nodes in order of appearance: parsers give anonymous ones random names, and two documents may use
-/// one name for two nodes.
-fn rename_blank_nodes(mut triples: Vec<Triple>, prefix: &str) -> Vec<Triple> {
-    let mut names: HashMap<String, BlankNode> = HashMap::new();
-    let mut rename = |node: &mut BlankNode| {
-        let next = names.len();
-        let name = names.entry(node.as_str().to_owned());
-        *node = name.or_insert_with(|| BlankNode::new_unchecked(format!("{prefix}b{next}"))).clone();
-    };
-    for triple in &mut triples {
-        if let NamedOrBlankNode::BlankNode(node) = &mut triple.subject {
-            rename(node);
-        }
-        if let Term::BlankNode(node) = &mut triple.object {
-            rename(node);
-        }
-    }
-    triples
 }
 
 pub(crate) fn iri_of(term: &Term) -> Option<&str> {

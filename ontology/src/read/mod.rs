@@ -14,21 +14,24 @@ mod imports;
 mod spelling;
 mod structural;
 mod syntax;
+mod text;
 
 pub(crate) use document::{Document, iri_of};
 pub use syntax::Syntax;
 
-use std::collections::{HashSet, VecDeque};
+use std::borrow::Cow;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use oxrdf::Triple;
 
 use crate::error::{Error, Warning};
 use crate::horned;
+use crate::names::{Compact, Names};
 use crate::normalize::{self, Normal};
 use crate::owl::{AnnotatedAxiom, Annotation, EntityKind, Iri, Ontology, Rule, Source};
 use imports::{Resolution, Resolver};
+use text::{Seen, Text};
 
 /// Where to look for what a document imports.
 #[derive(Clone, Debug, Default)]
@@ -71,8 +74,10 @@ pub(crate) fn merged<P: AsRef<Path>>(
     options: &ReadOptions,
 ) -> Result<(Vec<Triple>, Vec<Warning>), Vec<Error>> {
     let roots = files.iter().map(|file| Pending::File(file.as_ref().to_owned()));
-    let (documents, warnings) = closure(roots.collect(), options, &mut Vec::new())?;
-    Ok((normalize::merge(documents).0.into_triples(), warnings))
+    let mut names = Names::default();
+    let (documents, warnings) = closure(roots.collect(), options, &mut Vec::new(), &mut names)?;
+    let keep_all = |_: &Compact| false;
+    Ok((normalize::merge(documents, &names, keep_all).graph.into_triples(), warnings))
 }
 
 /// A document still to be read.
@@ -92,12 +97,12 @@ pub(crate) struct Parts {
 }
 
 fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
-    let mut texts = Vec::new();
-    let (documents, mut warnings) = closure(roots, options, &mut texts)?;
+    let (mut texts, mut names) = (Vec::new(), Names::default());
+    let (documents, mut warnings) = closure(roots, options, &mut texts, &mut names)?;
     let sources: Vec<Source> = documents.iter().map(source).collect();
     let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
     let Normal { ntriples, plain, names, rules, warnings: more } =
-        normalize::normalize(documents).map_err(|error| vec![error])?;
+        normalize::normalize(documents, names).map_err(|error| vec![error])?;
     warnings.extend(more);
     let parts = horned::build(&ntriples, &about, &rules, plain, names).map_err(|reason| {
         let place = spelling::place(&reason, &texts);
@@ -131,15 +136,16 @@ fn source(document: &Document) -> Source {
 fn closure(
     mut pending: VecDeque<Pending>,
     options: &ReadOptions,
-    texts: &mut Vec<(String, Arc<[u8]>)>,
+    texts: &mut Vec<(String, Text)>,
+    names: &mut Names,
 ) -> Result<(Vec<Document>, Vec<Warning>), Vec<Error>> {
     let resolver = Resolver::new(options)?;
     let (mut documents, mut paths) = (Vec::<Document>::new(), Vec::<Option<PathBuf>>::new());
-    let (mut seen, mut errors, mut warnings) = (HashSet::new(), Vec::new(), Vec::new());
+    let (mut seen, mut errors, mut warnings) = (Seen::default(), Vec::new(), Vec::new());
     let mut next = 0;
     loop {
         while let Some(item) = pending.pop_front() {
-            match load(item, documents.len(), &mut seen, options) {
+            match load(item, documents.len(), &mut seen, options, names) {
                 Ok(Some((document, path, text))) => {
                     texts.push((document.name.clone(), text));
                     warnings.extend(twice(&document, &documents));
@@ -179,14 +185,15 @@ fn closure(
     if errors.is_empty() { Ok((documents, warnings)) } else { Err(errors) }
 }
 
-type Loaded = Option<(Document, Option<PathBuf>, Arc<[u8]>)>;
+type Loaded = Option<(Document, Option<PathBuf>, Text)>;
 
 /// Reads and parses one document; `None` if the same file, or the same text, has been read already.
 fn load(
     item: Pending,
     index: usize,
-    seen: &mut HashSet<Arc<[u8]>>,
+    seen: &mut Seen,
     options: &ReadOptions,
+    names: &mut Names,
 ) -> Result<Loaded, Vec<Error>> {
     let (name, text, path) = match item {
         Pending::Text(name, text) => (name, text, None),
@@ -196,7 +203,7 @@ fn load(
                 vec![Error::Unreadable { file: file.clone(), reason: error.to_string() }]
             };
             let path = file.canonicalize().map_err(unreadable)?;
-            if !seen.insert(path.as_os_str().as_encoded_bytes().into()) {
+            if !seen.paths.insert(path.clone()) {
                 return Ok(None);
             }
             let text = regular_file(&path).map_err(unreadable)?;
@@ -208,22 +215,25 @@ fn load(
     if options.closed {
         document::require_ntriples(&text, &name)?;
     }
-    let text = document::decoded(&text, &name)?;
-    let document = document::parse(&text, &name, &base, &format!("d{index}"))?;
-    let text: Arc<[u8]> = text.into();
-    Ok(if seen.insert(Arc::clone(&text)) { Some((document, path, text)) } else { None })
+    let text = match document::decoded(&text, &name)? {
+        Cow::Borrowed(decoded) if decoded.len() == text.len() => text,
+        decoded => decoded.into_owned(),
+    };
+    let document = document::parse(&text, &name, &base, &format!("d{index}"), names)?;
+    Ok(seen.text(text, path.as_deref()).map(|text| (document, path, text)))
 }
 
 /// Documents with more bytes are not read.
 const LARGEST: u64 = 1 << 30;
 
 /// The bytes of a regular file: a pipe would keep us waiting, and some devices have no end.
-fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
+pub(crate) fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
     use std::io::Read;
-    if !std::fs::metadata(path)?.is_file() {
+    let metadata = std::fs::metadata(path)?;
+    if !metadata.is_file() {
         return Err(std::io::Error::other("it is no regular file"));
     }
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(metadata.len().min(LARGEST) as usize + 1);
     std::fs::File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LARGEST {
         return Err(std::io::Error::other(format!("it has more than {LARGEST} bytes")));

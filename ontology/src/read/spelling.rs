@@ -1,31 +1,37 @@
 //! Where documents spell the names that warnings are about. Parsers hand on triples without their places, so the text is
 //! searched for the name: as a whole IRI, or its last part behind a prefix.
 
-use std::sync::Arc;
-
+use super::text::Text;
 use crate::error::{Position, Warning};
 
 /// Only so many warnings are given a place: each costs a search through all documents.
 const MOST_SEARCHES: usize = 100;
 
 /// Gives undeclared names the place where a document spells them first.
-pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Arc<[u8]>)]) {
-    for warning in warnings.iter_mut().take(MOST_SEARCHES) {
-        if let Warning::Undeclared { iri, position, .. } = warning {
-            *position = texts.iter().find_map(|(name, text)| {
-                let offset = offset(iri, std::str::from_utf8(text).ok()?)?;
-                Some(Position::of_offset(name, text, offset))
-            });
+pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
+    let undeclared = |warning: &&mut Warning| matches!(warning, Warning::Undeclared { .. });
+    let mut open: Vec<&mut Warning> = warnings.iter_mut().take(MOST_SEARCHES).filter(undeclared).collect();
+    for (name, text) in texts {
+        if open.is_empty() {
+            return;
         }
+        let text = text.get();
+        let Ok(words) = std::str::from_utf8(&text) else { continue };
+        open.retain_mut(|warning| {
+            let Warning::Undeclared { iri, position, .. } = &mut **warning else { return false };
+            *position = offset(iri, words).map(|offset| Position::of_offset(name, &text, offset));
+            position.is_none()
+        });
     }
 }
 
 /// Where documents spell the first IRI that a message names in angle brackets.
-pub(super) fn place(message: &str, texts: &[(String, Arc<[u8]>)]) -> Option<Position> {
+pub(super) fn place(message: &str, texts: &[(String, Text)]) -> Option<Position> {
     let iri = message.split_once('<')?.1.split_once('>')?.0;
     texts.iter().find_map(|(name, text)| {
-        let offset = offset(iri, std::str::from_utf8(text).ok()?)?;
-        Some(Position::of_offset(name, text, offset))
+        let text = text.get();
+        let offset = offset(iri, std::str::from_utf8(&text).ok()?)?;
+        Some(Position::of_offset(name, &text, offset))
     })
 }
 

@@ -3,13 +3,21 @@
 //! Arguments of an unsuitable kind make a built-in false, never an error. A computed result is compared with a bound
 //! first argument by value *identity* (interned value), so that the outcome does not depend on evaluation order.
 //!
+//! A built-in that makes a value of its parts (a date of year, month and day) works backwards, too: the parts of a known
+//! value are those from which it would be made. What SWRL has a sequence for (`tokenize`) holds of each of its members.
+//!
 //! [1] W3C Member Submission: SWRL, 2004.
+//! [2] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
+//! [3] RFC 3986: Uniform Resource Identifier, 2005.
 
 mod custom;
+mod library;
 mod math;
+mod parts;
 mod pattern;
 mod temporal;
 mod text;
+mod uri;
 
 use std::cmp::Ordering;
 
@@ -53,11 +61,17 @@ macro_rules! built_ins {
     };
 }
 
-/// A test has no result; a function computes its first argument from the others.
+/// How arguments come to their values.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
+    /// All have to be known.
     Test,
+    /// The first is computed from the others.
     Function,
+    /// The first is computed from the others, or the others from it: its parts.
+    Parts,
+    /// The first is any one of several values that the others give.
+    Choice,
 }
 
 built_ins! {
@@ -147,16 +161,23 @@ built_ins! {
     Matches "matches" 2..=3 Test,
     /// The second, each match of the third's regular expression replaced by the fourth; flags may follow.
     Replace "replace" 4..=5 Function,
+    /// One of the substrings of the second between matches of the third's regular expression; flags may follow. SWRL has a
+    /// sequence of them, for which the engine has no value.
+    Tokenize "tokenize" 3..=4 Choice,
+    /// URI of scheme, host, port, path, query and fragment, each empty where there is none.
+    AnyUri "anyURI" 7..=7 Parts,
+    /// The reference in the second relative to the base in the third ([3], section 5.2).
+    ResolveUri "resolveURI" 3..=3 Function,
     /// Duration of so many years and months.
-    YearMonthDuration "yearMonthDuration" 3..=3 Function,
+    YearMonthDuration "yearMonthDuration" 3..=3 Parts,
     /// Duration of so many days, hours, minutes and seconds.
-    DayTimeDuration "dayTimeDuration" 5..=5 Function,
+    DayTimeDuration "dayTimeDuration" 5..=5 Parts,
     /// Moment from year, month, day, hour, minute, second and, if given, time zone (`Z`, `+02:00`).
-    DateTime "dateTime" 7..=8 Function,
+    DateTime "dateTime" 7..=8 Parts,
     /// Date from year, month, day and, if given, time zone.
-    Date "date" 4..=5 Function,
+    Date "date" 4..=5 Parts,
     /// Time from hour, minute, second and, if given, time zone.
-    Time "time" 4..=5 Function,
+    Time "time" 4..=5 Parts,
     /// Sum of two durations in months.
     AddYearMonthDurations "addYearMonthDurations" 3..=3 Function,
     /// Difference of two durations in months.
@@ -203,9 +224,8 @@ built_ins! {
     SubtractDateTimesYieldingDayTimeDuration "subtractDateTimesYieldingDayTimeDuration" 3..=3 Function,
 }
 
-/// Members of `swrlb` whose arguments or results are lists, or whose meaning is relative to a document.
-const REFUSED: [&str; 12] = [
-    "anyURI",
+/// Members of `swrlb` whose arguments or results are lists.
+const REFUSED: [&str; 9] = [
     "empty",
     "first",
     "length",
@@ -213,21 +233,22 @@ const REFUSED: [&str; 12] = [
     "listIntersection",
     "listSubtraction",
     "member",
-    "resolveURI",
     "rest",
     "sublist",
-    "tokenize",
 ];
 
-/// Whether a local name is SWRL's but works on lists or URIs, which the engine has no values for.
+/// Whether a local name is SWRL's but works on lists, which the engine has no values for.
 pub(crate) fn is_refused(local: &str) -> bool {
     REFUSED.contains(&local)
 }
 
 impl BuiltIn {
-    /// The built-in of an IRI in the `swrlb` namespace.
+    /// The built-in of an IRI: of `swrlb`, or of the libraries `swrlm` and `temporal` of `SWRLTab` in any of their versions.
     pub fn from_iri(iri: &str) -> Option<Self> {
-        Self::from_name(iri.strip_prefix(SWRLB)?)
+        match iri.strip_prefix(SWRLB) {
+            Some(local) => Self::from_name(local),
+            None => library::find(iri),
+        }
     }
 
     /// The built-in of `swrlb` with this local name.
@@ -249,13 +270,45 @@ impl BuiltIn {
     pub fn is_function(self) -> bool {
         match self {
             Self::Custom(custom) => custom.definition().is_function(),
-            _ => self.shape().is_some_and(|(.., kind)| kind == Kind::Function),
+            _ => matches!(self.shape(), Some((.., Kind::Function | Kind::Parts))),
+        }
+    }
+
+    /// Whether the arguments that are known give the values of those that are not.
+    pub fn binds(self, known: &[bool]) -> bool {
+        let kind = self.shape().map(|(.., kind)| kind);
+        let rest = known.get(1..).is_some_and(|rest| rest.iter().all(|known| *known));
+        match known.first() {
+            _ if known.iter().all(|known| *known) => true,
+            Some(false) => rest && (self.is_function() || kind == Some(Kind::Choice)),
+            _ => kind == Some(Kind::Parts),
+        }
+    }
+
+    /// All ways in which a built-in holds: for each, the values of the arguments that are not known, in their order. Empty
+    /// unless it [binds](Self::binds) them.
+    pub fn solve(self, arguments: &[Option<&Literal>]) -> Vec<Vec<Literal>> {
+        let known: Option<Vec<&Literal>> = arguments.iter().copied().collect();
+        if let Some(known) = known {
+            return if self.holds(&known) { vec![Vec::new()] } else { Vec::new() };
+        }
+        let rest: Option<Vec<&Literal>> = arguments.iter().skip(1).copied().collect();
+        match (arguments.first(), rest, self.shape()) {
+            (Some(None), Some(rest), Some((.., Kind::Choice))) => {
+                pattern::tokens(&rest).into_iter().map(|token| vec![token]).collect()
+            }
+            (Some(None), Some(rest), _) => self.compute(&rest).map(|value| vec![value]).into_iter().collect(),
+            (Some(Some(whole)), None, Some((.., Kind::Parts))) => {
+                self.parts(whole, &arguments[1..]).into_iter().collect()
+            }
+            _ => Vec::new(),
         }
     }
 
     /// Whether a test holds of its arguments; for a function, whether the first argument is its result.
     pub fn holds(self, arguments: &[&Literal]) -> bool {
         match (self, arguments) {
+            (Self::Tokenize, [token, rest @ ..]) => pattern::tokens(rest).iter().any(|other| other == *token),
             (Self::Custom(custom), _) if !self.is_function() => custom.definition().holds(arguments),
             (_, [result, rest @ ..]) if self.is_function() => {
                 self.compute(rest).is_some_and(|value| value == **result)
@@ -295,6 +348,6 @@ impl BuiltIn {
             return custom.definition().compute(arguments);
         }
         let result = math::compute(self, arguments).or_else(|| text::compute(self, arguments));
-        result.or_else(|| temporal::compute(self, arguments))
+        result.or_else(|| temporal::compute(self, arguments)).or_else(|| uri::compute(self, arguments))
     }
 }

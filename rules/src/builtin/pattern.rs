@@ -1,5 +1,9 @@
 //! Regular expressions, as far as those of `XPath` and of the `regex` crate agree: no back references, no character
 //! class subtraction. A pattern that cannot be read makes its built-in false.
+//!
+//! [2] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
+
+use std::collections::HashSet;
 
 use regex::{Regex, RegexBuilder};
 
@@ -30,6 +34,21 @@ pub(super) fn replace(arguments: &[&Literal]) -> Option<Literal> {
     };
     let regex = compile(pattern, flags).filter(|regex| !regex.is_match(""))?;
     Some(Literal::String(regex.replace_all(text, expand(replacement)?.as_str()).into()))
+}
+
+/// The parts of the first argument between matches of the second, each once, in their order. None of the empty text, nor for
+/// a pattern that matches the empty text ([2], section 7.6.4).
+pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
+    let texts = arguments.iter().map(|argument| as_text(argument)).collect::<Option<Vec<&str>>>();
+    let (text, pattern, flags) = match texts.as_deref() {
+        Some([text, pattern]) => (text, pattern, ""),
+        Some([text, pattern, flags]) => (text, pattern, *flags),
+        _ => return Vec::new(),
+    };
+    let regex = compile(pattern, flags).filter(|regex| !regex.is_match("") && !text.is_empty());
+    let Some(regex) = regex else { return Vec::new() };
+    let mut seen = HashSet::new();
+    regex.split(text).filter(|token| seen.insert(*token)).map(|token| Literal::String(token.into())).collect()
 }
 
 fn compile(pattern: &str, flags: &str) -> Option<Regex> {

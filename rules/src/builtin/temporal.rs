@@ -27,20 +27,28 @@ pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Liter
 
 /// A value from its parts, by way of its lexical form.
 fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
-    let texts: Vec<String> = arguments.iter().map(|argument| argument.lexical()).collect();
+    let mut texts: Vec<String> = arguments.iter().map(|argument| argument.lexical()).collect();
+    let is_duration = matches!(built_in, BuiltIn::YearMonthDuration | BuiltIn::DayTimeDuration);
+    let sign = if is_duration { common_sign(arguments, &mut texts)? } else { "" };
     let is_whole = |at: usize| texts[at].bytes().all(|b| b.is_ascii_digit());
     let two = |at: usize| is_whole(at).then(|| format!("{:0>2}", texts[at]));
     let seconds = |at: usize| {
         let whole = texts[at].split('.').next().unwrap_or_default().len();
         format!("{}{}", "0".repeat(2_usize.saturating_sub(whole)), texts[at])
     };
-    let date = || Some(format!("{:0>4}-{}-{}", texts[0], two(1)?, two(2)?));
+    let year = || match texts[0].strip_prefix('-') {
+        Some(year) => format!("-{year:0>4}"),
+        None => format!("{:0>4}", texts[0]),
+    };
+    let date = || Some(format!("{}-{}-{}", year(), two(1)?, two(2)?));
     let clock = |at: usize| Some(format!("{}:{}:{}", two(at)?, two(at + 1)?, seconds(at + 2)));
     let zone = |at: usize| texts.get(at).map(String::as_str).unwrap_or_default();
     let (lexical, local) = match (built_in, texts.as_slice()) {
-        (BuiltIn::YearMonthDuration, [years, months]) => (format!("P{years}Y{months}M"), "yearMonthDuration"),
+        (BuiltIn::YearMonthDuration, [years, months]) => {
+            (format!("{sign}P{years}Y{months}M"), "yearMonthDuration")
+        }
         (BuiltIn::DayTimeDuration, [days, hours, minutes, seconds]) => {
-            (format!("P{days}DT{hours}H{minutes}M{seconds}S"), "dayTimeDuration")
+            (format!("{sign}P{days}DT{hours}H{minutes}M{seconds}S"), "dayTimeDuration")
         }
         (BuiltIn::Date, _) => (format!("{}{}", date()?, zone(3)), "date"),
         (BuiltIn::Time, _) => (format!("{}{}", clock(0)?, zone(3)), "time"),
@@ -48,6 +56,19 @@ fn construct(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     };
     let literal = Literal::parse(&lexical, Some(&format!("{XSD}{local}")), None);
     (!literal.is_ill_typed()).then_some(literal)
+}
+
+/// The sign that all parts of a duration have, which is taken off their texts; `None` where they differ in it.
+fn common_sign(arguments: &[&Literal], texts: &mut [String]) -> Option<&'static str> {
+    let zero = BigRational::zero();
+    let numbers = arguments.iter().map(|argument| argument.as_rational()).collect::<Option<Vec<_>>>()?;
+    if numbers.iter().all(|number| *number >= zero) {
+        return Some("");
+    }
+    for text in &mut *texts {
+        *text = text.trim_start_matches('-').to_owned();
+    }
+    numbers.iter().all(|number| *number <= zero).then_some("-")
 }
 
 fn is_months(duration: &Duration) -> bool {

@@ -16,6 +16,7 @@
 mod binary;
 mod decimal;
 mod membership;
+mod subsumption;
 mod temporal;
 mod text;
 
@@ -26,6 +27,7 @@ use num_rational::BigRational;
 
 pub use decimal::Decimal;
 pub(crate) use decimal::ten_to;
+pub use subsumption::is_subsumed;
 pub use temporal::{Duration, Moment, MomentKind};
 
 /// Namespace of the XML Schema datatypes.

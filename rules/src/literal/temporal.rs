@@ -126,6 +126,30 @@ impl Moment {
         Some(Duration { months: if negative { -months } else { months }, seconds: Decimal::from(0) })
     }
 
+    /// Year, month and day, and hours, minutes and seconds, in its time zone.
+    pub(crate) fn calendar(&self) -> ([i64; 3], (i64, i64, Decimal)) {
+        let (day, clock) = split_day(&self.local());
+        let (year, month, date) = civil_from_days(day);
+        let [hours, minutes] = [0, 3].map(|at| clock[at..at + 2].parse().unwrap_or(0));
+        let seconds = Decimal::parse(&clock[6..]).unwrap_or(Decimal::from(0));
+        ([year, month, date], (hours, minutes, seconds))
+    }
+
+    /// The same instant in UTC; as it is without a time zone.
+    pub(crate) fn in_utc(&self) -> Self {
+        Self { zone: self.zone.map(|_| 0), ..self.clone() }
+    }
+
+    /// The beginning of a date.
+    pub(crate) fn as_date_time(&self) -> Self {
+        Self { kind: MomentKind::DateTime, ..self.clone() }
+    }
+
+    /// The time zone as text; empty where there is none.
+    pub(crate) fn zone_text(&self) -> String {
+        self.zone.map(zone_text).unwrap_or_default()
+    }
+
     /// Which datatype.
     pub fn kind(&self) -> MomentKind {
         self.kind
@@ -225,6 +249,15 @@ impl Duration {
     /// The part in seconds.
     pub fn seconds(&self) -> &Decimal {
         &self.seconds
+    }
+
+    /// Its seconds as days, hours, minutes and seconds, all of one sign; `None` beyond the range of days.
+    pub(crate) fn clock(&self) -> Option<(i64, i64, i64, Decimal)> {
+        let (unscaled, scale) = self.seconds.parts();
+        let unit = super::ten_to(scale);
+        let whole = i64::try_from(&unscaled / &unit).ok()?;
+        let rest = Decimal::new(unscaled % unit, scale);
+        Some((whole / DAY, whole % DAY / 3600, whole % 3600 / 60, add_seconds(&rest, whole % 60)))
     }
 
     /// As long, in the other direction.

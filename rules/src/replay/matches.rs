@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 
 use crate::aggregate::Function;
+use crate::builtin::BuiltIn;
 use crate::fact::Fact;
 use crate::literal::Literal;
 use crate::plan::Source;
@@ -74,8 +75,13 @@ impl Matcher<'_> {
         let without =
             |at: usize| -> Vec<usize> { open.iter().copied().filter(|other| *other != at).collect() };
         if let Some(at) = open.iter().copied().find(|at| is_ready(body, *at, &values)) {
-            if let Some(longer) = self.filter(body, at, values) {
-                self.extend(body, &without(at), longer, found);
+            let rest = without(at);
+            if let Atom::BuiltIn { built_in, arguments } = &body[at] {
+                for longer in self.solve(*built_in, arguments, &values) {
+                    self.extend(body, &rest, longer, found);
+                }
+            } else if let Some(longer) = self.filter(body, at, values) {
+                self.extend(body, &rest, longer, found);
             }
             return;
         }
@@ -114,6 +120,29 @@ impl Matcher<'_> {
         Some(longer)
     }
 
+    /// The values with all that a built-in gives to those of its arguments that have none.
+    fn solve(&mut self, built_in: BuiltIn, arguments: &[Term], values: &Values) -> Vec<Values> {
+        let literal = |term: &Term| match value(*term, values) {
+            Some(symbol) => self.symbols.value(symbol).as_literal().map(Some),
+            None => Some(None),
+        };
+        let Some(given) = arguments.iter().map(literal).collect::<Option<Vec<_>>>() else {
+            return Vec::new();
+        };
+        let open = arguments.iter().filter(|term| value(**term, values).is_none());
+        let open: Vec<Variable> = open.filter_map(|term| term.as_variable()).collect();
+        let mut all = Vec::new();
+        for solution in built_in.solve(&given) {
+            let mut longer = values.clone();
+            let agrees = open.iter().zip(solution).all(|(variable, literal)| {
+                let symbol = self.symbols.literal(literal);
+                *longer[usize::from(variable.0)].get_or_insert(symbol) == symbol
+            });
+            all.extend(agrees.then_some(longer));
+        }
+        all
+    }
+
     /// The values with what an atom that is no relation adds to them; none where it does not hold.
     fn filter(&mut self, body: &[Atom], at: usize, mut values: Values) -> Option<Values> {
         let bound = match &body[at] {
@@ -124,11 +153,6 @@ impl Matcher<'_> {
                 (Some(known), None) => Some((*right, known)),
                 (None, known) => known.map(|known| (*left, known)),
             },
-            Atom::BuiltIn { built_in, arguments } if value(arguments[0], &values).is_none() => {
-                let literals = self.literals(&arguments[1..], &values)?;
-                let result = built_in.compute(&literals.iter().collect::<Vec<_>>())?;
-                Some((arguments[0], self.symbols.literal(result)))
-            }
             Atom::Aggregate { result, .. } if value(*result, &values).is_none() => {
                 let outcome = self.aggregate(body, at, &values)?;
                 Some((*result, self.symbols.literal(outcome)))
@@ -217,7 +241,7 @@ fn is_ready(body: &[Atom], at: usize, values: &Values) -> bool {
         Atom::Same(left, right) => known(left) || known(right),
         Atom::Different(left, right) => known(left) && known(right),
         Atom::BuiltIn { built_in, arguments } => {
-            arguments[1..].iter().all(known) && (built_in.is_function() || known(&arguments[0]))
+            built_in.binds(&arguments.iter().map(known).collect::<Vec<_>>())
         }
         Atom::Aggregate { .. } => group(body, at).iter().all(known),
     }

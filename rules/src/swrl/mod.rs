@@ -13,9 +13,10 @@
 //!
 //! [1] W3C Member Submission: SWRL, 2004.
 
+mod foreign;
 mod lexer;
 mod parser;
 mod printer;
 
-pub use parser::{Prefixes, Syntax, parse_rules, parse_rules_as};
+pub use parser::{Prefixes, Syntax, parse_rules, parse_rules_as, parse_rules_together};
 pub use printer::print_rules;

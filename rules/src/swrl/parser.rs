@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::foreign::{ForeignAtom, unknown};
 use super::lexer::{Fault, Spanned, Token, tokens};
 use crate::builtin::{BuiltIn, SWRLB, is_refused};
 use crate::error::Error;
@@ -14,7 +15,7 @@ use crate::symbol::{Symbol, Symbols};
 const LIBRARIES: [&str; 2] =
     ["http://swrl.stanford.edu/ontologies/built-ins/", "http://sqwrl.stanford.edu/ontologies/built-ins/"];
 
-/// Abbreviations of IRIs. `swrlb`, `xsd`, `rdf`, `rdfs` and `owl` are always there unless declared otherwise.
+/// Abbreviations of IRIs. `swrlb`, `swrlm`, `temporal`, `xsd`, `rdf`, `rdfs` and `owl` are always there unless declared otherwise.
 ///
 /// A name without colon takes the empty prefix where that is declared, and else stands for itself.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -27,6 +28,8 @@ impl Default for Prefixes {
             ("rdf", "http://www.w3.org/1999/02/22-rdf-syntax-ns#"),
             ("rdfs", "http://www.w3.org/2000/01/rdf-schema#"),
             ("swrlb", SWRLB),
+            ("swrlm", "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#"),
+            ("temporal", "http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#"),
             ("xsd", XSD),
         ];
         Self(standard.into_iter().map(|(prefix, iri)| (prefix.to_string(), iri.to_string())).collect())
@@ -96,14 +99,51 @@ pub fn parse_rules_as(
     prefixes: &Prefixes,
     syntax: &Syntax,
 ) -> Result<Program, Vec<Error>> {
+    parse(text, source, symbols, prefixes, syntax).map(|(program, _)| program)
+}
+
+/// Reads several rule texts, each with its source, that are about one ontology: what they ask for and none of them concludes has
+/// to be a class or a property. An atom that can be neither (three arguments, or a literal for the individual) is an
+/// unknown built-in.
+///
+/// # Errors
+/// As [`parse_rules_as`] for each text, and R104 for unknown built-ins of any namespace.
+pub fn parse_rules_together(
+    texts: &[(&str, &str)],
+    symbols: &mut Symbols,
+    prefixes: &Prefixes,
+    syntax: &Syntax,
+) -> Result<Program, Vec<Error>> {
+    let (mut program, mut foreign, mut errors) = (Program::default(), Vec::new(), Vec::new());
+    for (source, text) in texts {
+        match parse(text, source, symbols, prefixes, syntax) {
+            Ok((own, atoms)) => {
+                foreign.extend(atoms.into_iter().map(|atom| (*source, atom)));
+                program.rules.extend(own.rules);
+            }
+            Err(more) => errors.extend(more),
+        }
+    }
+    if errors.is_empty() {
+        errors = unknown(foreign, &program, symbols);
+    }
+    if errors.is_empty() { Ok(program) } else { Err(errors) }
+}
+
+fn parse(
+    text: &str,
+    source: &str,
+    symbols: &mut Symbols,
+    prefixes: &Prefixes,
+    syntax: &Syntax,
+) -> Result<(Program, Vec<ForeignAtom>), Vec<Error>> {
     let (tokens, faults) = tokens(text);
     let errors = faults.into_iter().map(|fault| fault_at(source, fault)).collect();
     let source: Arc<str> = source.into();
-    let prefixes = prefixes.clone();
-    let mut parser =
-        Parser { tokens, at: 0, source, symbols, prefixes, syntax, variables: Vec::new(), errors };
+    let (variables, foreign, prefixes) = (Vec::new(), Vec::new(), prefixes.clone());
+    let mut parser = Parser { tokens, at: 0, source, symbols, prefixes, syntax, variables, foreign, errors };
     let program = parser.program();
-    if parser.errors.is_empty() { Ok(program) } else { Err(parser.errors) }
+    if parser.errors.is_empty() { Ok((program, parser.foreign)) } else { Err(parser.errors) }
 }
 
 fn fault_at(source: &str, fault: Fault) -> Error {
@@ -118,6 +158,8 @@ struct Parser<'a> {
     prefixes: Prefixes,
     syntax: &'a Syntax,
     variables: Vec<Box<str>>,
+    /// Relations that an ontology cannot have.
+    foreign: Vec<ForeignAtom>,
     errors: Vec<Error>,
 }
 
@@ -248,6 +290,7 @@ impl Parser<'_> {
             }
             self.expect(&Token::Close, "`,` or `)`")?;
         }
+        self.foreign.extend(ForeignAtom::of(&predicate, &arguments, at, self.symbols));
         if negated {
             self.refuse_in_swrl("negation as failure", at)?;
             if let (true, [value]) = (is_datatype(&predicate), arguments.as_slice()) {
@@ -264,6 +307,10 @@ impl Parser<'_> {
                 Some(built_in) => Ok(Atom::BuiltIn { built_in, arguments }),
                 None => Err(self.unknown_built_in(local, at)),
             };
+        }
+        if let Some(built_in) = BuiltIn::from_iri(&predicate) {
+            self.name_expression(built_in, &mut arguments);
+            return Ok(Atom::BuiltIn { built_in, arguments });
         }
         // A predicate of a library of built-ins is none of the knowledge base, which would be empty.
         if LIBRARIES.iter().any(|library| predicate.starts_with(library)) {
@@ -283,6 +330,17 @@ impl Parser<'_> {
             (Some("differentFrom"), &[left, right]) => Atom::Different(left, right),
             _ => Atom::Relation { predicate: self.symbols.name(&predicate), arguments },
         })
+    }
+
+    /// Tells an expression the names of the variables that follow it.
+    fn name_expression(&mut self, built_in: BuiltIn, arguments: &mut [Term]) {
+        let [_, Term::Constant(text), values @ ..] = arguments else { return };
+        let Some(Literal::String(expression)) = self.symbols.value(*text).as_literal() else { return };
+        let name = |term: &Term| Some(&*self.variables[usize::from(term.as_variable()?.0)]);
+        let names: Vec<Option<&str>> = values.iter().map(name).collect();
+        if let Some(named) = built_in.with_names(expression, &names) {
+            *text = self.symbols.literal(Literal::String(named.into()));
+        }
     }
 
     /// `?n = count { atoms }`, `?n = sum { term | atoms }`, and `min` and `max` likewise.

@@ -1,0 +1,95 @@
+//! What individuals, classes that are individuals, and pieces of XML mean in rules and axioms: `owl:Thing` of constants, equality
+//! of classes and properties that is stated or derived (eq-rep of OWL 2 RL), and XML that may be one value.
+
+use ontology::{Equality, ReadOptions, lower_together, ntriples, read_text};
+use rules::{Engine, Fact, Prefixes, Symbols, parse_rules};
+
+const HEAD: &str = "@prefix : <http://e/#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+";
+
+fn engine(document: &str, rules: &str) -> Engine {
+    let ontology = read_text(document, "t", &ReadOptions::default()).expect("well-formed");
+    let mut symbols = Symbols::new();
+    let prefixes = Prefixes::new().with("", "http://e/#");
+    let own = parse_rules(rules, "rules", &mut symbols, &prefixes).expect("rules").rules;
+    let lowered = lower_together(&ontology, own, Equality::Owl, &mut symbols);
+    Engine::new(symbols, lowered.program, lowered.facts).expect("safe")
+}
+
+/// What follows and is not stated, in short.
+fn inferred(engine: &Engine) -> Vec<String> {
+    let facts: Vec<Fact> = engine.facts().filter(|fact| !engine.is_asserted(fact)).collect();
+    let text = ntriples(engine.symbols(), &facts);
+    let short =
+        text.replace("http://e/#", "").replace("http://www.w3.org/1999/02/22-rdf-syntax-ns#type", "a");
+    let short = short.replace("http://www.w3.org/2002/07/owl#", "").replace(['<', '>'], "");
+    short.lines().map(|line| line.trim_end_matches(" .").to_owned()).collect()
+}
+
+#[test]
+fn every_constant_is_a_thing() {
+    let people = format!("{HEAD}:A a owl:Class . :i a :A . :p a owl:NamedIndividual .");
+    for (rule, expected) in [
+        ("owl:Thing(:p) -> :Hit(:p)", vec!["p a Hit"]),
+        // Named nowhere but in the rule.
+        ("owl:Thing(:q) -> :Hit(:q)", vec!["q a Hit"]),
+        (":A(?x) ^ owl:Thing(:p) -> :near(?x, :p)", vec!["i near p"]),
+        ("owl:Thing(?x) ^ owl:Thing(:p) -> :near(?x, :p)", vec!["i near p", "p near p"]),
+        ("owl:Nothing(:p) -> :Hit(:p)", vec![]),
+    ] {
+        assert_eq!(inferred(&engine(&people, rule)), expected, "{rule}");
+    }
+    let functional =
+        "Prefix(:=<http://e/#>) Prefix(owl:=<http://www.w3.org/2002/07/owl#>) Ontology(<http://e/>
+        Declaration(Class(:Hit)) Declaration(NamedIndividual(:p))
+        DLSafeRule(Body(ClassAtom(owl:Thing :p)) Head(ClassAtom(:Hit :p))))";
+    assert_eq!(inferred(&engine(functional, "")), ["p a Hit"]);
+}
+
+#[test]
+fn classes_and_properties_that_are_one_have_the_same_members() {
+    let head = format!(
+        "{HEAD}:A a owl:Class . :B a owl:Class . :C a owl:Class . :p a owl:ObjectProperty . :q a owl:ObjectProperty .
+        :d a owl:DatatypeProperty . :e a owl:DatatypeProperty . :of a owl:FunctionalProperty , owl:ObjectProperty .
+        :i a :A ; :p :j ; :d \"1\" .\n"
+    );
+    for (text, expected) in [
+        (":A owl:sameAs :B . :p owl:sameAs :q . :d owl:sameAs :e .", vec!["i a B", "i q j", "i e \"1\""]),
+        (":x :of :A , :B , :C .", vec!["i a B", "i a C"]),
+        (":x :of :p , :q . :y :of :d , :e .", vec!["i q j", "i e \"1\""]),
+        (":x :of :A . :y :of :B .", vec![]),
+    ] {
+        let found = inferred(&engine(&format!("{head}{text}"), ""));
+        let missing: Vec<&str> =
+            expected.iter().copied().filter(|one| !found.iter().any(|line| line == one)).collect();
+        assert_eq!(missing, [""; 0], "{text}: {found:?}");
+        let about = |line: &&String| line.starts_with("i ");
+        assert_eq!(found.iter().filter(about).count(), expected.len(), "{text}: {found:?}");
+    }
+    // What follows from it goes with it.
+    let mut changing = engine(&format!("{head}:x :of :A , :B ."), "");
+    let names = ["http://e/#of", "http://e/#x", "http://e/#B", "http://e/#i"]
+        .map(|name| changing.symbols_mut().name(name));
+    let (said, concluded) = (Fact::new(names[0], [names[1], names[2]]), Fact::new(names[2], [names[3]]));
+    assert!(changing.holds(&concluded));
+    changing.apply(rules::Delta { insert: Vec::new(), delete: vec![said] }).expect("it ends");
+    assert!(!changing.holds(&concluded));
+}
+
+#[test]
+fn xml_is_one_value_or_undecided() {
+    let xml = |first: &str, second: &str| {
+        let property = ":d a owl:FunctionalProperty , owl:DatatypeProperty .";
+        let values = [first, second].map(|text| format!("\"{text}\"^^rdf:XMLLiteral")).join(" , ");
+        engine(&format!("{HEAD}{property} :i :d {values} ."), "").violations().is_empty()
+    };
+    assert!(xml("<a x='1' y='2'/>", "<a y='2' x='1'/>"), "one value after canonicalisation");
+    assert!(xml("<a/>", "<b/>"), "two values, which is not decided");
+    let mixed = format!(
+        "{HEAD}:d a owl:FunctionalProperty , owl:DatatypeProperty . :i :d \"<a/>\"^^rdf:XMLLiteral , \"<a/>\" ."
+    );
+    assert!(!engine(&mixed, "").violations().is_empty(), "no string is a piece of XML");
+}

@@ -1,0 +1,83 @@
+//! `swrlm`: square root, natural logarithm, and the value of an expression.
+//!
+//! An expression of `eval` names the variables of its atom (`swrlm:eval(?r, "(57 * x) / y", ?x, ?y)`). A built-in sees
+//! values, and no names, so that [`BuiltIn::with_names`] puts the names into the text when a rule is made: `"x, y: (57 * x) / y"`.
+//! Text of that form stays as it is.
+
+use super::expression;
+use crate::builtin::{BuiltIn, Definition};
+use crate::literal::Literal;
+
+const EVAL: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#eval";
+const SQRT: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#sqrt";
+const LOG: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#log";
+
+/// A function of one number.
+struct Unary(&'static str, fn(f64) -> f64);
+
+/// The value of an expression.
+struct Eval;
+
+pub(super) const ALL: [&dyn Definition; 3] = [&Unary(SQRT, f64::sqrt), &Unary(LOG, f64::ln), &Eval];
+
+/// A finite number, exact where it is whole.
+fn number(value: f64) -> Option<Literal> {
+    value.is_finite().then(|| Literal::double(value))
+}
+
+impl Definition for Unary {
+    fn iri(&self) -> &'static str {
+        self.0
+    }
+
+    fn accepts(&self, count: usize) -> bool {
+        count == 2
+    }
+
+    fn is_function(&self) -> bool {
+        true
+    }
+
+    fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
+        number((self.1)(arguments[0].as_f64()?))
+    }
+}
+
+impl Definition for Eval {
+    fn iri(&self) -> &'static str {
+        EVAL
+    }
+
+    fn accepts(&self, count: usize) -> bool {
+        count >= 2
+    }
+
+    fn is_function(&self) -> bool {
+        true
+    }
+
+    fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
+        let [text, values @ ..] = arguments else { return None };
+        let Literal::String(text) = text else { return None };
+        let (names, text) = text.split_once(':').unwrap_or(("", text));
+        let names: Vec<&str> = names.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
+        let values = values.iter().map(|value| value.as_f64()).collect::<Option<Vec<f64>>>()?;
+        if names.len() > values.len() {
+            return None;
+        }
+        let named: Vec<(&str, f64)> = names.into_iter().zip(values).collect();
+        number(expression::value(text, &named)?)
+    }
+}
+
+impl BuiltIn {
+    /// The expression of a `swrlm:eval` atom with the names of the arguments that follow it; `None` where it has them, and for
+    /// other built-ins. A constant has no name.
+    pub fn with_names(self, expression: &str, names: &[Option<&str>]) -> Option<String> {
+        let is_eval = self.name() == EVAL && !expression.contains(':') && !names.is_empty();
+        let local = |name: &str| name.rsplit(['#', '/', ':']).next().map(str::to_owned);
+        let names: Vec<String> =
+            names.iter().map(|name| name.and_then(local).unwrap_or("_".into())).collect();
+        is_eval.then(|| format!("{}: {expression}", names.join(", ")))
+    }
+}

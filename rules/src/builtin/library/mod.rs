@@ -1,0 +1,31 @@
+//! The libraries `swrlm` and `temporal` of `SWRLTab` as [custom built-ins](super::Definition) ([1], [2]). Their ontologies
+//! have been published in several versions; the built-ins are those of any of them.
+//!
+//! `temporal` is there in its *basic mode*, about dates and times. Its advanced mode is about individuals of the temporal
+//! ontology, and a built-in sees values only: such atoms are false.
+//!
+//! [1] `SWRLTab` wiki: Mathematical Built-In Library.
+//! [2] `SWRLTab` wiki: Temporal Built-In Library, Basic Mode.
+
+mod expression;
+mod math;
+mod temporal;
+
+use std::sync::LazyLock;
+
+use super::{BuiltIn, Definition};
+
+/// Where the libraries of `SWRLTab` live, followed by a version.
+const ROOT: &str = "http://swrl.stanford.edu/ontologies/built-ins/";
+
+/// All built-ins of the libraries.
+static ALL: LazyLock<Vec<&'static dyn Definition>> =
+    LazyLock::new(|| math::ALL.iter().copied().chain(temporal::all()).collect());
+
+/// The built-in of an IRI, whichever version of its library the IRI names.
+pub(super) fn find(iri: &str) -> Option<BuiltIn> {
+    let name = |iri: &str| iri.strip_prefix(ROOT)?.split_once('/').map(|(_, name)| name.to_owned());
+    let wanted = name(iri)?;
+    let found = ALL.iter().find(|definition| name(definition.iri()).as_ref() == Some(&wanted));
+    found.map(|definition| BuiltIn::custom(*definition))
+}

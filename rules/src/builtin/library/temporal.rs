@@ -1,0 +1,304 @@
+//! `temporal` in its basic mode: durations between moments, moments later, and Allen's relations between instants.
+//!
+//! A moment is an `xsd:date`, an `xsd:dateTime`, or text of either, which may be incomplete from the month, the day, the hour,
+//! the minute or the second on (`1998-12-02T12`): what is missing is the first possible. Moments are compared by *granules*
+//! (years, months, days, hours, minutes, seconds or milliseconds since the beginning of year 1), so that the difference
+//! of 1999-12-31 and 2000-01-01 is one year at the granularity of years. With a time zone they are taken in UTC; one with
+//! and one without do not compare. `now` is no moment, because what has been concluded would have to be concluded again.
+//! An operation on a period takes the two instants that bound it as second and third argument.
+
+use std::cmp::Ordering;
+
+use num_bigint::BigInt;
+use num_traits::ToPrimitive;
+
+use crate::builtin::Definition;
+use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
+
+/// Units of time, the finest last.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Granularity {
+    Years,
+    Months,
+    Days,
+    Hours,
+    Minutes,
+    Seconds,
+    Milliseconds,
+}
+
+use Granularity as G;
+
+impl Granularity {
+    fn of(literal: &Literal) -> Option<Self> {
+        let Literal::String(name) = literal else { return None };
+        Some(match name.to_ascii_lowercase().as_str() {
+            "years" => G::Years,
+            "months" => G::Months,
+            "days" => G::Days,
+            "hours" => G::Hours,
+            "minutes" => G::Minutes,
+            "seconds" => G::Seconds,
+            "milliseconds" => G::Milliseconds,
+            _ => return None,
+        })
+    }
+
+    /// The granule that a moment lies in, counted from any one.
+    fn granule(self, moment: &Moment) -> Option<i64> {
+        let ([year, month, _], _) = moment.in_utc().calendar();
+        let per_second = match self {
+            G::Years => return Some(year),
+            G::Months => return Some(year * 12 + month),
+            G::Days => (1, 86_400),
+            G::Hours => (1, 3600),
+            G::Minutes => (1, 60),
+            G::Seconds => (1, 1),
+            G::Milliseconds => (1000, 1),
+        };
+        let seconds = moment.seconds().to_rational();
+        let granules = seconds * BigInt::from(per_second.0) / BigInt::from(per_second.1);
+        granules.floor().to_integer().to_i64()
+    }
+
+    /// So many granules as a duration.
+    fn duration(self, count: i64) -> Option<Duration> {
+        let seconds = |unit: i64| Some(Duration::new(0, Decimal::from(count.checked_mul(unit)?)));
+        match self {
+            G::Years => Some(Duration::new(count.checked_mul(12)?, Decimal::from(0))),
+            G::Months => Some(Duration::new(count, Decimal::from(0))),
+            G::Days => seconds(86_400),
+            G::Hours => seconds(3600),
+            G::Minutes => seconds(60),
+            G::Seconds => seconds(1),
+            G::Milliseconds => Some(Duration::new(0, Decimal::new(count.into(), 3))),
+        }
+    }
+}
+
+/// The moment that an argument is, or is the text of.
+fn moment(literal: &Literal) -> Option<Moment> {
+    let text = match literal {
+        Literal::Moment(moment) if moment.kind() != MomentKind::Time => return Some(moment.clone()),
+        Literal::String(text) => text,
+        Literal::IllTyped { lexical, datatype }
+            if ["date", "dateTime"].iter().any(|local| datatype.strip_prefix(XSD) == Some(local)) =>
+        {
+            lexical
+        }
+        _ => return None,
+    };
+    let missing = match text.trim().len() {
+        4 => "-01-01T00:00:00",
+        7 => "-01T00:00:00",
+        10 => "T00:00:00",
+        13 => ":00:00",
+        16 => ":00",
+        _ => "",
+    };
+    let whole = format!("{}{missing}", text.trim());
+    match Literal::parse(&whole, Some(&format!("{XSD}dateTime")), None) {
+        Literal::Moment(moment) => Some(moment),
+        _ => None,
+    }
+}
+
+/// Whether both have a time zone, or neither.
+fn comparable(moments: &[Moment]) -> bool {
+    moments.windows(2).all(|pair| pair[0].zone_text().is_empty() == pair[1].zone_text().is_empty())
+}
+
+/// The granules between two moments.
+fn difference(arguments: &[&Literal]) -> Option<i64> {
+    let [from, to, granularity] = arguments else { return None };
+    let (granularity, moments) = (Granularity::of(granularity)?, [moment(from)?, moment(to)?]);
+    let [from, to] = [granularity.granule(&moments[0])?, granularity.granule(&moments[1])?];
+    comparable(&moments).then(|| (to - from).abs())
+}
+
+/// `temporal:duration`: granules between two moments.
+struct Between;
+
+/// `temporal:add`: a moment so many granules later.
+struct Later;
+
+/// `temporal:durationLessThan` and its like: how the first compares with the granules between two moments.
+struct Compared {
+    iri: &'static str,
+    orders: &'static [Ordering],
+    negated: bool,
+}
+
+/// Allen's relations, between instants or periods.
+struct Allen {
+    iri: &'static str,
+    relation: fn(Period, Period) -> bool,
+    negated: bool,
+}
+
+/// First and last granule.
+type Period = (i64, i64);
+
+impl Definition for Between {
+    fn iri(&self) -> &'static str {
+        "http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#duration"
+    }
+
+    fn accepts(&self, count: usize) -> bool {
+        count == 4
+    }
+
+    fn is_function(&self) -> bool {
+        true
+    }
+
+    fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
+        difference(arguments).map(Literal::integer)
+    }
+}
+
+impl Definition for Later {
+    fn iri(&self) -> &'static str {
+        "http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#add"
+    }
+
+    fn accepts(&self, count: usize) -> bool {
+        count == 4
+    }
+
+    fn is_function(&self) -> bool {
+        true
+    }
+
+    /// An `xsd:dateTime`; of a date, an `xsd:date` where the granularity is days or coarser.
+    fn compute(&self, arguments: &[&Literal]) -> Option<Literal> {
+        let [from, count, granularity] = arguments else { return None };
+        let granularity = Granularity::of(granularity)?;
+        let count = count.as_rational().filter(num_rational::Ratio::is_integer)?.to_integer().to_i64()?;
+        let from = moment(from)?;
+        let from = if granularity > G::Days { from.as_date_time() } else { from };
+        from.later(&granularity.duration(count)?).map(Literal::Moment)
+    }
+}
+
+impl Definition for Compared {
+    fn iri(&self) -> &'static str {
+        self.iri
+    }
+
+    fn accepts(&self, count: usize) -> bool {
+        count == 4
+    }
+
+    fn holds(&self, arguments: &[&Literal]) -> bool {
+        let [wanted, rest @ ..] = arguments else { return false };
+        let order = difference(rest).and_then(|found| wanted.compare(&Literal::integer(found)));
+        order.is_some_and(|order| self.orders.contains(&order) != self.negated)
+    }
+}
+
+impl Definition for Allen {
+    fn iri(&self) -> &'static str {
+        self.iri
+    }
+
+    fn accepts(&self, count: usize) -> bool {
+        (2..=4).contains(&count)
+    }
+
+    fn holds(&self, arguments: &[&Literal]) -> bool {
+        periods(arguments).is_some_and(|(first, second)| (self.relation)(first, second) != self.negated)
+    }
+}
+
+/// An instant, then an instant or the two that bound a period, then a granularity if it is not milliseconds.
+fn periods(arguments: &[&Literal]) -> Option<(Period, Period)> {
+    let (granularity, moments) = match arguments.split_last()? {
+        (last, rest) if rest.len() >= 2 => match Granularity::of(last) {
+            Some(granularity) => (granularity, rest),
+            None => (G::Milliseconds, arguments),
+        },
+        _ => (G::Milliseconds, arguments),
+    };
+    let moments = moments.iter().map(|literal| moment(literal)).collect::<Option<Vec<_>>>()?;
+    if !comparable(&moments) {
+        return None;
+    }
+    let granules = moments.iter().map(|m| granularity.granule(m)).collect::<Option<Vec<_>>>()?;
+    let bounded = |from: i64, to: i64| (from <= to).then_some((from, to));
+    match granules[..] {
+        [first, second] => Some(((first, first), (second, second))),
+        [first, from, to] => Some(((first, first), bounded(from, to)?)),
+        _ => None,
+    }
+}
+
+fn contains(a: Period, b: Period) -> bool {
+    b.0 >= a.0 && b.1 <= a.1
+}
+
+fn overlaps(a: Period, b: Period) -> bool {
+    a.0 <= b.0 && a.1 <= b.1 && a.1 >= b.0
+}
+
+macro_rules! table {
+    ($kind:ident { $($local:literal $negated:literal => $field:ident: $value:expr,)* }) => {
+        &[$($kind {
+            iri: concat!("http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#", $local),
+            negated: $negated,
+            $field: $value,
+        },)*]
+    };
+}
+
+static COMPARED: &[Compared] = table!(Compared {
+    "durationLessThan" false => orders: &[Ordering::Less],
+    "durationLessThanOrEqualTo" false => orders: &[Ordering::Less, Ordering::Equal],
+    "durationEqualTo" false => orders: &[Ordering::Equal],
+    "durationGreaterThan" false => orders: &[Ordering::Greater],
+    "durationGreaterThanOrEqualTo" false => orders: &[Ordering::Greater, Ordering::Equal],
+    "notDurationLessThan" true => orders: &[Ordering::Less],
+    "notDurationLessThanOrEqualTo" true => orders: &[Ordering::Less, Ordering::Equal],
+    "notDurationEqualTo" true => orders: &[Ordering::Equal],
+    "notDurationGreaterThan" true => orders: &[Ordering::Greater],
+    "notDurationGreaterThanOrEqualTo" true => orders: &[Ordering::Greater, Ordering::Equal],
+});
+
+static ALLEN: &[Allen] = table!(Allen {
+    "equals" false => relation: |a, b| a == b,
+    "before" false => relation: |a, b| a.1 < b.0,
+    "after" false => relation: |a, b| a.0 > b.1,
+    "meets" false => relation: |a, b| a.1 + 1 == b.0,
+    "metBy" false => relation: |a, b| b.1 + 1 == a.0,
+    "overlaps" false => relation: overlaps,
+    "overlappedBy" false => relation: |a, b| overlaps(b, a),
+    "contains" false => relation: contains,
+    "during" false => relation: |a, b| contains(b, a) && a != b,
+    "starts" false => relation: |a, b| a.0 == b.0 && a.1 < b.1,
+    "startedBy" false => relation: |a, b| a.0 == b.0 && b.1 < a.1,
+    "finishes" false => relation: |a, b| a.0 > b.0 && a.1 == b.1,
+    "finishedBy" false => relation: |a, b| b.0 > a.0 && a.1 == b.1,
+    "intersects" false => relation: |a, b| a.0 <= b.1 && b.0 <= a.1,
+    "notEquals" true => relation: |a, b| a == b,
+    "notBefore" true => relation: |a, b| a.1 < b.0,
+    "notAfter" true => relation: |a, b| a.0 > b.1,
+    "notMeets" true => relation: |a, b| a.1 + 1 == b.0,
+    "notMetBy" true => relation: |a, b| b.1 + 1 == a.0,
+    "notOverlaps" true => relation: overlaps,
+    "notOverlappedBy" true => relation: |a, b| overlaps(b, a),
+    "notContains" true => relation: contains,
+    "notDuring" true => relation: |a, b| contains(b, a) && a != b,
+    "notStarts" true => relation: |a, b| a.0 == b.0 && a.1 < b.1,
+    "notStartedBy" true => relation: |a, b| a.0 == b.0 && b.1 < a.1,
+    "notFinishes" true => relation: |a, b| a.0 > b.0 && a.1 == b.1,
+    "notFinishedBy" true => relation: |a, b| b.0 > a.0 && a.1 == b.1,
+    "notIntersects" true => relation: |a, b| a.0 <= b.1 && b.0 <= a.1,
+});
+
+/// All built-ins of the library.
+pub(super) fn all() -> Vec<&'static dyn Definition> {
+    let mut all: Vec<&'static dyn Definition> = vec![&Between, &Later];
+    all.extend(COMPARED.iter().map(|one| one as &dyn Definition));
+    all.extend(ALLEN.iter().map(|one| one as &dyn Definition));
+    all
+}
