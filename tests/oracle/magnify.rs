@@ -206,7 +206,9 @@ fn decimals_beside_integers() {
         println!("skipped: needs python3 and {}", tool.display());
         return;
     }
-    let directory = tempfile::tempdir().expect("a temporary directory");
+    let temporary = tempfile::tempdir().expect("a temporary directory");
+    // `ORACLE_SAVE` keeps the missions and the certificates.
+    let directory = std::env::var_os("ORACLE_SAVE").map_or(temporary.path().to_owned(), PathBuf::from);
     let mut all_numbers = [0, 0];
     let (mut ratios, mut wrong) = ([Vec::new(), Vec::new(), Vec::new()], Vec::new());
     println!(
@@ -214,9 +216,9 @@ fn decimals_beside_integers() {
     );
     for (position, size) in sizes().iter().enumerate() {
         let encoding = ["n", "f"][position % 2];
-        let Some(name) = generate(&tool, directory.path(), size, encoding) else { continue };
-        let whole = all_runs(directory.path(), &name);
-        let digits = all_runs(directory.path(), &format!("{name}.decimals"));
+        let Some(name) = generate(&tool, &directory, size, encoding) else { continue };
+        let whole = all_runs(&directory, &name);
+        let digits = all_runs(&directory, &format!("{name}.decimals"));
         let mut line = name.clone();
         for (part, (whole, digits)) in whole.iter().zip(&digits).enumerate() {
             let ratio = digits.time.max(LEAST) / whole.time.max(LEAST);
@@ -229,10 +231,8 @@ fn decimals_beside_integers() {
             }
         }
         println!("{line}");
-        let planned = run(
-            &plan_arguments(directory.path(), &format!("{name}.all")).each_ref().map(String::as_str),
-            true,
-        );
+        let planned =
+            run(&plan_arguments(&directory, &format!("{name}.all")).each_ref().map(String::as_str), true);
         all_numbers[usize::from(planned.status == 0)] += 1;
         let failed = |runs: &[Run; 3]| runs.iter().any(|run| run.status != 0);
         if failed(&digits) {

@@ -37,6 +37,24 @@ fn missions_have_certificates() {
     }
 }
 
+/// A goal that says one thing twice makes a clause with a literal twice.
+#[test]
+fn what_is_said_twice_is_proved_once() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let domain = "(define (domain d) (:predicates (p) (seen ?a))
+      (:derived (seen ?a) (p))
+      (:action look :parameters () :precondition (or (p) (not (p))) :effect (p)))";
+    let problem = "(define (problem p) (:domain d) (:objects a b) (:init) (:goal (exists (?a) (seen ?a))))";
+    std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+    std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
+    let planned = metaplan_in(directory.path(), &["plan", "d.pddl", "p.pddl", "--certificate", "c"], "");
+    assert_eq!(planned.status, 0, "{planned:#?}");
+    let formula = std::fs::read_to_string(directory.path().join("c/formula.cnf")).expect("a formula");
+    assert!(formula.contains("\n2 2 0\n"), "{formula}");
+    let outcome = metaplan_in(directory.path(), &["verify", "c"], "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+}
+
 #[test]
 fn that_there_is_no_plan_has_a_certificate() {
     let directory = tempfile::tempdir().expect("a directory");

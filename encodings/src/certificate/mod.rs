@@ -21,6 +21,7 @@ mod argument;
 mod check;
 mod clausal;
 mod faithful;
+mod integer;
 mod model;
 mod semantics;
 mod shape;

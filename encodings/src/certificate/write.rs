@@ -7,6 +7,7 @@ use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
 use crate::certificate::argument::{Argument, Label, Need, Potential};
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{
     Argument as Parameter, Condition, Conditional, Exclusion, Layer, Linear, Model, Objective, Operator,
     Quantity,
@@ -45,10 +46,11 @@ pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Cert
     let bounds = Bounds::of_projections(task, limits).ok()?;
     let cost = solution.ground.as_ref().map(|plan| plan.cost);
     let labels = closed_labels(task, &bounds, limits, cost)?;
-    let label = |(values, numbers, cost): (Vec<u32>, Vec<Int>, Int)| Label(values, numbers, cost);
+    let label =
+        |(values, numbers, cost): (Vec<u32>, Vec<Int>, Int)| Label(values, integers(&numbers), cost.into());
     let potential = |projection: &crate::bounds::Projection| Potential {
         pattern: projection.pattern.iter().map(|variable| variable.0).collect(),
-        values: projection.costs().to_vec(),
+        values: bounds_of(projection.costs()),
     };
     let argument = Argument {
         format: ARGUMENT_FORMAT.into(),
@@ -58,12 +60,20 @@ pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Cert
             .map(|(number, projection, values)| Need {
                 number: number.0,
                 pattern: projection.pattern.iter().map(|variable| variable.0).collect(),
-                values: values.to_vec(),
+                values: bounds_of(values),
             })
             .collect(),
         labels: labels.into_iter().map(label).collect(),
     };
     written(&model(task), &argument)
+}
+
+fn integers(numbers: &[Int]) -> Vec<Integer> {
+    numbers.iter().copied().map(Integer::from).collect()
+}
+
+fn bounds_of(values: &[Option<Int>]) -> Vec<Option<Integer>> {
+    values.iter().map(|value| value.map(Integer::from)).collect()
 }
 
 fn written(task: &Model, argument: &Argument) -> Option<Certificate> {
@@ -97,7 +107,7 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
 type Uses = Vec<(u32, Vec<u32>)>;
 
 struct Writer {
-    tables: Pool<Arc<[Int]>, Vec<Int>>,
+    tables: Pool<Arc<[Int]>, Vec<Integer>>,
     uses: Pool<Arc<[task::SlotUse]>, Uses>,
     exclusions: Pool<Arc<[task::Forbidden]>, Vec<Exclusion>>,
 }
@@ -124,9 +134,9 @@ fn model(task: &Task) -> Model {
         variables: task.variables.iter().map(|variable| variable.values.clone()).collect(),
         basic: task.basic,
         values: task.initial.values.clone(),
-        numbers: task.initial.numbers.clone(),
+        numbers: integers(&task.initial.numbers),
         fluents: task.number_names.clone(),
-        number_scale: task.number_scale,
+        number_scale: task.number_scale.into(),
         slots: task.slots.iter().map(|slot| slot.designs.iter().map(|design| design.0).collect()).collect(),
         uses: writer.uses.all,
         exclusions: writer.exclusions.all,
@@ -135,12 +145,11 @@ fn model(task: &Task) -> Model {
         axioms,
         goal,
         objective: Objective {
-            scale: task.objective.scale,
-            offset: task.objective.offset,
+            scale: task.objective.scale.into(),
+            offset: task.objective.offset.into(),
             maximize: task.objective.maximize,
         },
-        time_scale: task.time_scale,
-        number_limit: 0,
+        time_scale: task.time_scale.into(),
     }
 }
 
@@ -185,7 +194,7 @@ impl Writer {
                 .collect(),
             cost: self.quantity(&operator.cost),
             duration: self.quantity(&operator.duration),
-            wait: operator.wait,
+            wait: operator.wait.map(Integer::from),
         }
     }
 
@@ -199,7 +208,11 @@ impl Writer {
 
     fn linear(&mut self, linear: &crate::quantity::Linear<Int>) -> Linear {
         Linear {
-            factors: linear.coefficients.iter().map(|(number, factor)| (number.0, *factor)).collect(),
+            factors: linear
+                .coefficients
+                .iter()
+                .map(|(number, factor)| (number.0, Integer::from(*factor)))
+                .collect(),
             quantity: self.quantity(&linear.quantity),
         }
     }
@@ -207,10 +220,10 @@ impl Writer {
     fn quantity(&mut self, quantity: &crate::quantity::Quantity<Int>) -> Quantity {
         let tables = quantity.tables.iter();
         Quantity {
-            constant: quantity.constant,
+            constant: quantity.constant.into(),
             tables: tables
                 .map(|table| {
-                    (table.slots.to_vec(), self.tables.position(&table.values, |values| values.to_vec()))
+                    (table.slots.to_vec(), self.tables.position(&table.values, |values| integers(values)))
                 })
                 .collect(),
         }

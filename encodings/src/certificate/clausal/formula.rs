@@ -10,6 +10,7 @@ use std::io::{BufRead, Read, Write};
 
 use crate::certificate::clausal::lines;
 use crate::certificate::clausal::sums::Sums;
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{Argument, Fact, Literal, Model, Operator};
 
 /// A variable of the formula, or its negation.
@@ -27,14 +28,14 @@ pub(super) struct Formula {
 
 impl Formula {
     /// The formula of a task; an error says what it does not cover.
-    pub(super) fn new(model: &Model, cost: i128, steps: usize, limit: usize) -> Result<Self, String> {
+    pub(super) fn new(model: &Model, cost: &Integer, steps: usize, limit: usize) -> Result<Self, String> {
         if !model.axioms.is_empty() {
             return Err("derived predicates are not covered".into());
         }
         if model.operators.iter().any(|operator| !operator.conditional.is_empty()) {
             return Err("conditional effects are not covered".into());
         }
-        if cost < 1 {
+        if !cost.is_positive() {
             return Err("no plan costs less than nothing".into());
         }
         let mut formula = Self { literals: Vec::new(), count: 0, names: Vec::new(), limit };

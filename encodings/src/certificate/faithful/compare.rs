@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use num_rational::BigRational;
-use num_traits::Zero;
+use num_traits::{One, Zero};
 use rustc_hash::FxHashMap;
 
 use crate::certificate::faithful::effects::{self, Made};
@@ -12,7 +12,7 @@ use crate::certificate::faithful::formula::{Formula, Known};
 use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::meaning::Case;
 use crate::certificate::faithful::reader::{Reader, TOTAL_TIME};
-use crate::certificate::faithful::translation::{Translation, integer};
+use crate::certificate::faithful::translation::Translation;
 use crate::certificate::faithful::verdict::{Cause, Difference, Obstacle};
 use crate::certificate::faithful::world::Key;
 use crate::certificate::model::{Argument, Operator};
@@ -121,7 +121,7 @@ impl<'c> Comparison<'c> {
             }
         }
         for (key, number) in names.fluents.iter().zip(&model.numbers) {
-            if integer(*number) != self.initial_value(key)? * integer(model.number_scale) {
+            if number.to_rational() != self.initial_value(key)? * model.number_scale.to_rational() {
                 return Err(Difference::Initial { what: self.task.world.show(key) }.into());
             }
         }
@@ -132,7 +132,7 @@ impl<'c> Comparison<'c> {
                 offset += factor * self.initial_value(key)?;
             }
         }
-        if integer(model.objective.offset) != offset * integer(model.objective.scale) {
+        if model.objective.offset.to_rational() != offset * model.objective.scale.to_rational() {
             return Err(Difference::Initial { what: "the metric".into() }.into());
         }
         Ok(())
@@ -264,7 +264,7 @@ impl<'c> Comparison<'c> {
             .map_err(|what| Difference::WrongEffect { instance: (instance.name)(), what })?;
         let model = self.task.model;
         let own = model.quantity(&operator.cost, choice, &model.sizes(operator));
-        if integer(own) > &instance.cost * integer(model.objective.scale) {
+        if own.to_rational() > &instance.cost * model.objective.scale.to_rational() {
             let cost = instance.cost.to_string();
             return Err(Difference::WrongCost { instance: (instance.name)(), cost });
         }
@@ -275,7 +275,7 @@ impl<'c> Comparison<'c> {
     fn cost(&self, case: &Case) -> Result<BigRational> {
         let duration = case.duration.clone().unwrap_or_else(BigRational::zero);
         let Some(metric) = &self.metric else {
-            return Ok(if self.timed { duration } else { integer(1) });
+            return Ok(if self.timed { duration } else { BigRational::one() });
         };
         let mut sum = Linear::constant(BigRational::zero());
         for (key, factor) in &metric.factors {

@@ -92,11 +92,11 @@ fn verdict(obstacle: Obstacle) -> Faithful {
 
 fn read(task: &str) -> Result<Model> {
     let form = |reason: String| Obstacle::Differs(Difference::Form { reason });
-    let mut model: Model = serde_json::from_str(task).map_err(|error| form(error.to_string()))?;
+    let model: Model = serde_json::from_str(task).map_err(|error| form(error.to_string()))?;
     if model.format != TASK_FORMAT {
         return Err(form(format!("format `{}`, where `{TASK_FORMAT}` is expected", model.format)));
     }
-    shape::task(&mut model).map_err(form)?;
+    shape::task(&model).map_err(form)?;
     Ok(model)
 }
 
