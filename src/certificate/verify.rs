@@ -4,7 +4,7 @@ use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 
-use encodings::pddl::ast::{Domain, Problem};
+use encodings::pddl::ast::{Domain, InitialElement, Problem};
 use encodings::pddl::{self, Source};
 use encodings::validate::{Options, PlanText, validate};
 use encodings::{
@@ -12,7 +12,6 @@ use encodings::{
     verification_conditions,
 };
 use num_rational::BigRational;
-use num_traits::Zero;
 
 use super::files::{read, text};
 use super::{
@@ -165,11 +164,14 @@ pub(super) fn plan(
     if plan.steps.iter().all(|step| step.start.is_some()) {
         plan.steps.sort_by(|left, right| left.start.cmp(&right.start));
     }
-    // One step after the other, each as long as the files say: what is written may be rounded.
+    // One step after the other, each as long as the files say: what is written may be rounded. Where nothing happens by
+    // itself, each starts when the one before it has ended; otherwise when it is written, or a little later for that reason.
+    let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     for step in &mut plan.steps {
-        (step.start, step.duration) = (None, None);
+        step.start = step.start.take().filter(|_| is_timed);
+        step.duration = None;
     }
-    let options = Options { tolerance: BigRational::zero(), ..Options::default() };
+    let options = Options::default();
     let verdict = validate(domain, problem, &plan, &options);
     if let Some(violation) = verdict.violation {
         return Err(violation.message);

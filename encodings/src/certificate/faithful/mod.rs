@@ -14,8 +14,8 @@
 //! that no instance leaves it is checked together with the rest.
 //!
 //! Covered are conditions of all kinds; conditional and universal effects; linear numbers; derived predicates, also recursive ones
-//! that are variables of the task with the same rules; actions with and without a fixed duration, one after another; metrics to be
-//! minimized. Of everything else this says that it is not covered. Shared with grounding is the syntax tree and nothing else.
+//! that are variables of the task with the same rules; actions with and without a fixed duration, one after another; timed initial
+//! literals (`timeline`); metrics of both directions. Of everything else this says that it is not covered. Shared with grounding is the syntax tree and nothing else.
 //!
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
 
@@ -29,10 +29,15 @@ mod invariant;
 mod linear;
 mod meaning;
 mod reader;
+mod reads;
+mod timeline;
 mod translation;
 mod verdict;
 mod world;
 
+use std::collections::BTreeSet;
+
+use num_rational::BigRational;
 use num_traits::Zero;
 
 use crate::certificate::model::Model;
@@ -154,7 +159,9 @@ impl<'f> Files<'f> {
 
     fn witness(&self) -> Result<String> {
         let mut widening = Widening::new(&self.world);
-        let plain: Vec<bool> = self.domain.actions.iter().map(is_plain).collect();
+        let untimed = self.world.timeline.is_empty();
+        let plain: Vec<bool> = self.domain.actions.iter().map(|action| untimed && is_plain(action)).collect();
+        let waits = meaning::waits(&self.world.timeline, &self.names.structure)?;
         // An instance that always does the same need not be looked at again.
         let mut open: Vec<&Instance> = self.instances.iter().collect();
         for _ in 0..ROUND_LIMIT {
@@ -162,6 +169,9 @@ impl<'f> Files<'f> {
             // What is known of derived atoms is about the invariant as it is now.
             let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
             let (mut news, mut next) = (false, Vec::new());
+            for case in &waits {
+                news |= widening.include(&self.names.structure, case);
+            }
             for instance in open {
                 let invariant = frozen.as_ref().unwrap_or(&widening.invariant);
                 let cases = self.cases(instance, invariant, &axioms)?;
@@ -185,10 +195,15 @@ impl<'f> Files<'f> {
         let axioms = Axioms::new(&self.world, &invariant, &self.names.linked)?;
         let task = Translation::new(&self.world, self.model, &self.names, &invariant, &axioms)?;
         let timed = self.world.problem.metric.is_none() && self.takes_time(&invariant, &axioms)?;
-        let comparison = Comparison::new(&task, timed)?;
+        let unit = self.unit(&invariant, &axioms)?;
+        let comparison = Comparison::new(&task, timed, unit)?;
         comparison.initial()?;
         comparison.goal()?;
         comparison.rules()?;
+        for case in meaning::waits(&self.world.timeline, &self.names.structure)? {
+            invariant.admits(&self.world, &self.names.structure, &case)?;
+            comparison.wait(&case)?;
+        }
         let (mut instances, mut idle) = (0, 0);
         for instance in &self.instances {
             let cases = self.cases(instance, &invariant, &axioms)?;
@@ -202,6 +217,18 @@ impl<'f> Files<'f> {
             idle += usize::from(!cases.is_empty() && !changes);
         }
         Ok(Faithful::Yes { instances, idle, timed })
+    }
+
+    /// What the times of events and all durations are multiples of.
+    fn unit(&self, invariant: &Invariant, axioms: &Axioms) -> Result<BigRational> {
+        let mut durations = BTreeSet::new();
+        if !self.world.timeline.is_empty() {
+            for instance in &self.instances {
+                let cases = self.cases(instance, invariant, axioms)?;
+                durations.extend(cases.into_iter().filter_map(|case| case.duration));
+            }
+        }
+        Ok(self.world.timeline.unit(durations.iter()))
     }
 
     /// Whether an instance that can be executed has a duration other than 0.
