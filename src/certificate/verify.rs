@@ -8,7 +8,7 @@ use encodings::pddl::ast::{Domain, InitialElement, Problem};
 use encodings::pddl::{self, Source};
 use encodings::validate::{Options, PlanText, validate};
 use encodings::{
-    Checked, Faithful, Limits, RefutationInputs, check_certificate, check_refutation, faithful,
+    Checked, Exact, Faithful, Limits, RefutationInputs, check_certificate, check_refutation, faithful,
     verification_conditions,
 };
 use num_rational::BigRational;
@@ -178,9 +178,8 @@ pub(super) fn plan(
     }
     let steps = plan.steps.len();
     let value = measure(problem, &verdict, steps, timed).ok_or("the metric has no value after the plan")?;
-    let decimal = rules::Decimal::from_rational(&value);
-    let is_decimal = decimal.to_rational() == value && decimal.to_string() == claimed;
-    if value.to_string() != claimed && !is_decimal {
+    // As a decimal where there is one, or as a fraction.
+    if value.to_string() != claimed && Exact::from(value.clone()).to_string() != claimed {
         return Err(format!("its metric is {value}, where {claimed} is claimed"));
     }
     Ok((format!("{steps} steps, valid, metric {claimed}"), value))

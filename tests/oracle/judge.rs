@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use encodings::pddl::Source;
 use encodings::pddl::ast::{Name, Problem};
 use encodings::validate::{Options, PlanStep, PlanText, Verdict, validate};
-use encodings::{Config, Exact, Limits, Plan, Solution, Status, Task, Unbounded};
-use metaplan::certificate::{self, Contents};
+use encodings::{Config, Exact, ExactTask, Limits, Plan, Solution, Status, Task, Unbounded};
+use metaplan::certificate::{self, Contents, Ground};
 use metaplan::measure::measure;
 use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission};
@@ -98,12 +98,18 @@ enum Answer {
 }
 
 #[derive(Debug)]
+enum Planned {
+    Integers(Box<Task>),
+    Exact(Box<ExactTask>),
+}
+
+#[derive(Debug)]
 struct Solved {
     solution: Solution,
     /// Where there is no metric: whether plans are measured by their time.
     timed: bool,
     /// The task, where a certificate can be written.
-    task: Option<Task>,
+    task: Option<Planned>,
 }
 
 /// An exact number of the planner.
@@ -198,7 +204,8 @@ fn plan(mission: &Mission, problem: &Problem, mode: &Mode, limits: &Limits) -> A
                     Ok(task) => {
                         let config = Config { limits: limits.clone(), ..Config::default() };
                         let solution = encodings::optimize_exact(&task, &config);
-                        Answer::Solved(Box::new(Solved { solution, timed: task.is_timed(), task: None }))
+                        let (timed, task) = (task.is_timed(), Some(Planned::Exact(Box::new(task))));
+                        Answer::Solved(Box::new(Solved { solution, timed, task }))
                     }
                 }
             }
@@ -207,7 +214,8 @@ fn plan(mission: &Mission, problem: &Problem, mode: &Mode, limits: &Limits) -> A
                 let config = Config { limits: limits.clone(), ..Config::default() };
                 let point = encodings::lexicographic(&task, &config, &mut |_| {});
                 let timed = task.is_timed();
-                Answer::Solved(Box::new(Solved { solution: point.solution, timed, task: Some(task) }))
+                let task = Some(Planned::Integers(Box::new(task)));
+                Answer::Solved(Box::new(Solved { solution: point.solution, timed, task }))
             }
         },
         Mode::Concurrent(separation) => match mission.ground_concurrent(problem, &[], separation, limits) {
@@ -455,7 +463,7 @@ fn without_names(message: &str) -> String {
 fn check_certificate(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
-    task: &Task,
+    task: &Planned,
     solution: &Solution,
     tally: &mut Tally,
 ) {
@@ -465,6 +473,10 @@ fn check_certificate(
     let parent = tempfile::tempdir().expect("a temporary directory");
     let directory = parent.path().join("certificate");
     let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_lines(&steps_of(plan)));
+    let task = match task {
+        Planned::Integers(task) => Ground::Integers(task),
+        Planned::Exact(task) => Ground::Exact(task),
+    };
     let contents = Contents { mission, problem, task, solution, plan: &plan };
     let limits = || Limits::none().with_time(case.limit);
     if let Err(message) = certificate::write(&directory, &contents, &limits()) {

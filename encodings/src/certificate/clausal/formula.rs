@@ -24,6 +24,8 @@ pub(super) struct Formula {
     count: usize,
     names: Vec<String>,
     limit: usize,
+    /// How many bits the longest of its numbers has.
+    widest: usize,
 }
 
 impl Formula {
@@ -38,11 +40,12 @@ impl Formula {
         if !cost.is_positive() {
             return Err("no plan costs less than nothing".into());
         }
-        let mut formula = Self { literals: Vec::new(), count: 0, names: Vec::new(), limit };
+        let mut formula = Self { literals: Vec::new(), count: 0, names: Vec::new(), limit, widest: 0 };
         let truth = formula.variable(|| "true".to_owned());
         formula.clause(&[truth]);
         let mut timeline = Timeline::new(model, &mut formula);
         let mut sums = Sums::new(model, &mut formula, cost, steps)?;
+        formula.widest = sums.widest();
         for step in 0..steps {
             timeline.advance(model, &mut formula, step);
             sums.advance(model, &mut formula, &timeline, step)?;
@@ -111,6 +114,10 @@ impl Formula {
     pub(super) fn clauses(&self) -> impl Iterator<Item = &[Var]> {
         // The last clause ends with 0, too.
         self.literals.split(|literal| *literal == 0).take(self.count)
+    }
+
+    pub(super) fn widest(&self) -> usize {
+        self.widest
     }
 
     pub(super) fn count(&self) -> usize {

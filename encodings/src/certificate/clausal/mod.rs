@@ -33,8 +33,10 @@ use formula::Formula;
 
 /// A formula with more literals than this is not written.
 const LITERAL_LIMIT: usize = 4_000_000;
-/// After learning so many clauses, a solver gives up on a formula.
+/// After learning so many clauses, a solver gives up on a formula…
 const CONFLICT_LIMIT: u64 = 20_000;
+/// … whose numbers have at most so many bits; after fewer in proportion if they have more, as each costs more.
+const NARROW: usize = 16;
 
 /// Where the parts of a refutation go.
 pub struct Outputs<'o> {
@@ -92,11 +94,12 @@ pub fn refute(
     let failed = |error: std::io::Error| format!("it cannot be written: {error}");
     formula.write_dimacs(outputs.formula).map_err(failed)?;
     formula.write_legend(outputs.legend).map_err(failed)?;
-    match refute_with_proof(formula.clauses(), outputs.draft, limits, CONFLICT_LIMIT) {
+    let conflicts = CONFLICT_LIMIT * NARROW as u64 / formula.widest().max(NARROW) as u64;
+    match refute_with_proof(formula.clauses(), outputs.draft, limits, conflicts) {
         Answer::Unsatisfiable => {}
         Answer::Satisfiable => return Err("the formula has a model".to_owned()),
         Answer::Interrupted => {
-            return Err(format!("not refuted within the limits ({CONFLICT_LIMIT} conflicts)"));
+            return Err(format!("not refuted within the limits ({conflicts} conflicts)"));
         }
     }
     let mut draft = (outputs.written_draft)().map_err(failed)?;

@@ -94,10 +94,16 @@ impl Sums {
         for (number, initial) in (0..).zip(&model.numbers) {
             numbers.push(formula.constant(initial, number_width(model, number, steps)?));
         }
-        if numbers.iter().chain([&spent]).any(|bits| bits.len() > WIDTH_LIMIT) {
+        let sums = Self { spent, limit, numbers };
+        if sums.widest() > WIDTH_LIMIT {
             return Err(format!("numbers of more than {WIDTH_LIMIT} bits are not covered"));
         }
-        Ok(Self { spent, limit, numbers })
+        Ok(sums)
+    }
+
+    /// How many bits the longest number has.
+    pub(super) fn widest(&self) -> usize {
+        self.numbers.iter().chain([&self.spent]).map(Vec::len).max().unwrap_or(0)
     }
 
     pub(super) fn advance(
