@@ -4,7 +4,7 @@ use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 
-use encodings::pddl::ast::{Domain, InitialElement, Problem};
+use encodings::pddl::ast::{ActionBody, Comparison, Domain, InitialElement, Name, Problem};
 use encodings::pddl::{self, Source};
 use encodings::validate::{Options, PlanText, validate};
 use encodings::{
@@ -12,6 +12,7 @@ use encodings::{
     verification_conditions,
 };
 use num_rational::BigRational;
+use num_traits::Zero;
 
 use super::files::{read, text};
 use super::{
@@ -164,14 +165,16 @@ pub(super) fn plan(
     if plan.steps.iter().all(|step| step.start.is_some()) {
         plan.steps.sort_by(|left, right| left.start.cmp(&right.start));
     }
-    // One step after the other, each as long as the files say: what is written may be rounded. Where nothing happens by
-    // itself, each starts when the one before it has ended; otherwise when it is written, or a little later for that reason.
+    // One step after the other, each as long as the files say, unless they leave a choice: what is written may be rounded. Where
+    // nothing happens by itself, each starts when the one before it has ended; otherwise when it is written, or a little
+    // later for that reason.
     let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     for step in &mut plan.steps {
         step.start = step.start.take().filter(|_| is_timed);
-        step.duration = None;
+        step.duration = step.duration.take().filter(|_| is_chosen(domain, &step.action));
     }
-    let options = Options::default();
+    let tolerance = if is_timed { Options::default().tolerance } else { BigRational::zero() };
+    let options = Options { tolerance, ..Options::default() };
     let verdict = validate(domain, problem, &plan, &options);
     if let Some(violation) = verdict.violation {
         return Err(violation.message);
@@ -183,6 +186,18 @@ pub(super) fn plan(
         return Err(format!("its metric is {value}, where {claimed} is claimed"));
     }
     Ok((format!("{steps} steps, valid, metric {claimed}"), value))
+}
+
+/// Whether an action of this name has a duration that is not fixed.
+fn is_chosen(domain: &Domain, name: &Name) -> bool {
+    let mut bodies =
+        domain.actions.iter().filter(|action| action.identifier.name == *name).map(|action| &action.body);
+    bodies.any(|body| match body {
+        ActionBody::Durative { duration, .. } => {
+            !matches!(&duration[..], [only] if only.operator == Comparison::Equal)
+        }
+        ActionBody::Instantaneous { .. } => false,
+    })
 }
 
 /// Whether the task stands for the files, and whether plans are measured by time where there is no metric.

@@ -345,12 +345,14 @@ fn contradictions_are_no_steps() {
 /// What is not covered is named.
 #[test]
 fn what_is_not_covered_is_named() {
-    let domain = "(define (domain d) (:predicates (p) (q))
-      (:durative-action a :parameters () :duration (>= ?duration 2) :condition (at start (p)) :effect (at end (q))))";
+    let domain = "(define (domain d) (:predicates (p) (q) (r)) (:functions (p) (total-cost))
+      (:derived (r) (not (p)))
+      (:action a :parameters () :precondition (not (r)) :effect (and (q) (increase (total-cost) (p)))))";
     let example = Example {
-        name: "chosen",
+        name: "one name",
         domain,
-        problem: "(define (problem p) (:domain d) (:init (p)) (:goal (q)))",
+        problem: "(define (problem x) (:domain d) (:init (p) (= (p) 3) (= (total-cost) 0)) (:goal (q))
+          (:metric minimize (total-cost)))",
         optimum: None,
     };
     let (files, problem) = files(&example);
@@ -358,7 +360,7 @@ fn what_is_not_covered_is_named() {
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     let certificate = certify(&task, &solution, &Limits::none()).expect("a certificate");
     let found = witness(&files, &problem, &certificate.task, &Limits::none());
-    let construct = "durations that are chosen".to_owned();
+    let construct = "derived predicates beside a predicate and a function of one name".to_owned();
     assert_eq!(found, Err(Faithful::Undecided(ComparisonCause::Unsupported { construct })));
 }
 

@@ -254,4 +254,16 @@ pub const TASKS: &[Example] = &[
           (:goal (at d)) (:metric maximize (* 2 (fuel))))",
         optimum: Some("25"),
     },
+    // Work takes as little as it may; the shorter of two kinds may not take less than the longer of its bounds.
+    Example {
+        name: "as little",
+        domain: "(define (domain d) (:predicates (p ?x) (q)) (:functions (least ?x))
+          (:durative-action work :parameters (?x)
+            :duration (and (>= ?duration (least ?x)) (<= ?duration 9)) :condition (at start (p ?x)) :effect (at end (q)))
+          (:durative-action clear :parameters (?x) :duration (and (>= ?duration 0.5)) :condition ()
+            :effect (at end (p ?x))))",
+        problem: "(define (problem p) (:domain d) (:objects a b c)
+          (:init (p a) (= (least a) 5.25) (= (least b) 10) (= (least c) 2.5)) (:goal (q)))",
+        optimum: Some("3"),
+    },
 ];

@@ -36,7 +36,7 @@ const LITERAL_LIMIT: usize = 4_000_000;
 /// After learning so many clauses, a solver gives up on a formula…
 const CONFLICT_LIMIT: u64 = 20_000;
 /// … whose numbers have at most so many bits; after fewer in proportion if they have more, as each costs more.
-const NARROW: usize = 16;
+const NARROW: usize = 32;
 
 /// Where the parts of a refutation go.
 pub struct Outputs<'o> {

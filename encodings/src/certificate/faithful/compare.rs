@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 
 use crate::certificate::faithful::effects::{self, Made};
 use crate::certificate::faithful::formula::{Formula, Known};
+use crate::certificate::faithful::lengths::Length;
 use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::meaning::Case;
 use crate::certificate::faithful::reader::{Reader, TOTAL_TIME};
@@ -316,22 +317,29 @@ impl<'c> Comparison<'c> {
         let value = self.task.value(value, choice, &self.task.model.sizes(operator));
         let passed = value.clone().minus(&Linear::fluent(timeline::clock()));
         match (passed.value(), value.value()) {
-            (Some(passed), _) => *passed == case.duration.clone().unwrap_or_default(),
+            (Some(passed), _) => {
+                let length = case.length.as_ref().and_then(Length::fixed);
+                *passed == length.cloned().unwrap_or_default()
+            }
             (None, Some(set)) => stands_for(set, &case.passage.end, &self.unit),
             (None, None) => false,
         }
     }
 
-    /// What a case adds to the metric.
+    /// The least that a case adds to the metric.
     fn cost(&self, case: &Case) -> Result<BigRational> {
-        let duration = case.duration.clone().unwrap_or_else(BigRational::zero);
+        let one = BigRational::one();
+        let time = |factor: &BigRational| match &case.length {
+            Some(length) => length.least_times(factor),
+            None => Ok(BigRational::zero()),
+        };
         let Some(metric) = &self.metric else {
-            return Ok(if self.timed { duration } else { BigRational::one() });
+            return Ok(if self.timed { time(&one)? } else { one });
         };
         let mut sum = Linear::constant(BigRational::zero());
         for (key, factor) in &metric.factors {
             if *key == TOTAL_TIME {
-                sum.constant += &duration * factor;
+                sum.constant += time(factor)?;
             } else if let Some(after) = case.changes.get(key) {
                 let growth = after.clone().minus(&Linear::fluent(key.clone()));
                 sum = sum.plus(&growth, factor);

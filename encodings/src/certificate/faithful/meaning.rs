@@ -5,10 +5,11 @@
 use std::collections::BTreeMap;
 
 use num_rational::BigRational;
-use num_traits::{Signed, Zero};
+use num_traits::Zero;
 
 use crate::certificate::faithful::formula::{Formula, Known, Structure};
 use crate::certificate::faithful::happening;
+use crate::certificate::faithful::lengths::Length;
 use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::reader::{Applied, Reader};
 use crate::certificate::faithful::reads::Reads;
@@ -16,8 +17,8 @@ use crate::certificate::faithful::timeline::{self, Event, Passage, Timeline};
 use crate::certificate::faithful::verdict::Cause;
 use crate::certificate::faithful::world::Key;
 use crate::pddl::ast::{
-    Action, ActionBody, Assignment, Comparison, Condition, ConditionTime, DurationConstraint, Effect,
-    EffectTime, Expression,
+    Action, ActionBody, Assignment, Condition, ConditionTime, DurationConstraint, Effect, EffectTime,
+    Expression,
 };
 
 /// One way in which the conditions of an instance can turn out. Cases may overlap; together they are all.
@@ -31,7 +32,8 @@ pub(super) struct Case {
     pub(super) effects: Vec<(Formula, Key, bool)>,
     /// Fluents that have these values afterwards.
     pub(super) changes: BTreeMap<Key, Linear>,
-    pub(super) duration: Option<BigRational>,
+    /// None for an instantaneous action, and for a wait.
+    pub(super) length: Option<Length>,
     pub(super) passage: Passage,
 }
 
@@ -50,7 +52,7 @@ pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Ca
                 truths,
                 effects: Vec::new(),
                 changes: Changes::new(),
-                duration: None,
+                length: None,
                 passage,
             });
         }
@@ -99,12 +101,9 @@ pub(super) fn cases<'r>(
             Ok(all)
         }
         ActionBody::Durative { duration, conditions, effects } => {
-            let Some(length) = reader.length(duration)? else { return Ok(Vec::new()) };
-            if length.is_negative() {
-                return Ok(Vec::new());
-            }
-            let at_once = length.is_zero();
-            reader.duration = Some(length);
+            let Some(length) = reader.lengths(duration)? else { return Ok(Vec::new()) };
+            let at_once = length.least.is_zero();
+            reader.length = Some(length);
             let durative = Durative { duration, conditions, effects };
             if at_once { durative.at_once(reader, structure) } else { durative.cases(reader, structure) }
         }
@@ -173,7 +172,7 @@ impl<'r> Durative<'r> {
             let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
             let own = Formula::junction(own.into_iter().cloned(), true);
             for known in Known::default().assume(structure, &own)? {
-                all.extend(both.last(structure, known, &applied, (&passage, reader.duration.as_ref()))?);
+                all.extend(both.last(structure, known, &applied, (&passage, reader.length.as_ref()))?);
             }
         }
         Ok(all)
@@ -187,7 +186,8 @@ impl<'r> Durative<'r> {
         }
         let start = reader.moment(self.effects(EffectTime::AtStart))?;
         let timeline = &reader.world.timeline;
-        for passage in timeline.passages(&reader.duration.clone().unwrap_or_default()) {
+        let least = reader.length.as_ref().map(|length| length.least.clone()).unwrap_or_default();
+        for passage in timeline.passages(&least) {
             let event = passage.at_start(timeline);
             if event.is_some_and(|event| self.reads(&reader, EffectTime::AtStart).event(event)) {
                 continue;
@@ -238,26 +238,13 @@ impl<'r> Durative<'r> {
         applied.truths.extend(event.into_iter().flat_map(|event| event.truths.clone()));
         applied.truths.extend(passage.truths(timeline));
         for known in known.assume(structure, &Formula::junction(later, true))? {
-            all.extend(end.last(structure, known, &applied, (passage, reader.duration.as_ref()))?);
+            all.extend(end.last(structure, known, &applied, (passage, reader.length.as_ref()))?);
         }
         Ok(all)
     }
 }
 
 impl<'r> Reader<'r> {
-    /// The duration; none if it has no value.
-    fn length(&mut self, duration: &'r [DurationConstraint]) -> Result<Option<BigRational>, Cause> {
-        let [constraint] = duration else { return Err(Cause::unsupported("durations that are chosen")) };
-        if constraint.operator != Comparison::Equal {
-            return Err(Cause::unsupported("durations that are chosen"));
-        }
-        let Some(length) = self.expression(&constraint.expression)? else { return Ok(None) };
-        match length.value() {
-            Some(length) => Ok(Some(length.clone())),
-            None => Err(Cause::unsupported("durations that depend on the state")),
-        }
-    }
-
     /// What a happening with these conditions and effects reads.
     fn reads(
         &self,
@@ -332,7 +319,7 @@ impl Moment {
         structure: &Structure,
         known: Known,
         applied: &Applied,
-        (passage, duration): (&Passage, Option<&BigRational>),
+        (passage, length): (&Passage, Option<&Length>),
     ) -> Result<Vec<Case>, Cause> {
         let mut all = Vec::new();
         for known in known.split(structure, self.numbers.iter().map(|(guard, ..)| guard))? {
@@ -340,8 +327,8 @@ impl Moment {
                 let mut changes = applied.changes.clone();
                 changes.extend(own);
                 let (truths, effects) = (applied.truths.clone(), self.atoms.clone());
-                let (passage, duration) = (passage.clone(), duration.cloned());
-                all.push(Case { known, truths, effects, changes, duration, passage });
+                let (passage, length) = (passage.clone(), length.cloned());
+                all.push(Case { known, truths, effects, changes, length, passage });
             }
         }
         Ok(all)

@@ -14,7 +14,7 @@
 //! that no instance leaves it is checked together with the rest.
 //!
 //! Covered are conditions of all kinds; conditional and universal effects; linear numbers; derived predicates, also recursive ones
-//! that are variables of the task with the same rules; actions with and without a fixed duration, one after another; timed initial
+//! that are variables of the task with the same rules; actions with and without duration, one after another; timed initial
 //! literals (`timeline`); metrics of both directions. Of everything else this says that it is not covered. Shared with grounding is the syntax tree and nothing else.
 //!
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
@@ -26,6 +26,7 @@ mod formula;
 mod happening;
 mod instances;
 mod invariant;
+mod lengths;
 mod linear;
 mod meaning;
 mod reader;
@@ -225,7 +226,8 @@ impl<'f> Files<'f> {
         if !self.world.timeline.is_empty() {
             for instance in &self.instances {
                 let cases = self.cases(instance, invariant, axioms)?;
-                durations.extend(cases.into_iter().filter_map(|case| case.duration));
+                let lengths = cases.into_iter().filter_map(|case| case.length);
+                durations.extend(lengths.map(|length| length.least));
             }
         }
         Ok(self.world.timeline.unit(durations.iter()))
@@ -236,7 +238,8 @@ impl<'f> Files<'f> {
         for instance in &self.instances {
             if matches!(self.domain.actions[instance.action].body, ActionBody::Durative { .. }) {
                 let cases = self.cases(instance, invariant, axioms)?;
-                if cases.iter().any(|case| case.duration.as_ref().is_some_and(|length| !length.is_zero())) {
+                if cases.iter().any(|case| case.length.as_ref().is_some_and(|length| !length.least.is_zero()))
+                {
                     return Ok(true);
                 }
             }

@@ -61,12 +61,12 @@ impl<'w> World<'w> {
         for declaration in domain.predicates.iter().chain(&domain.functions) {
             world.intern(&declaration.identifier.name);
         }
-        if domain
-            .predicates
-            .iter()
-            .any(|own| domain.functions.iter().any(|other| other.identifier.name == own.identifier.name))
+        let is_function = |name: &Name| domain.functions.iter().any(|own| own.identifier.name == *name);
+        if !domain.derived.is_empty() && domain.predicates.iter().any(|own| is_function(&own.identifier.name))
         {
-            return Err(Cause::unsupported("a predicate and a function of one name"));
+            return Err(Cause::unsupported(
+                "derived predicates beside a predicate and a function of one name",
+            ));
         }
         world.intern(&Name::new("total-cost"));
         for entry in domain.constants.iter().chain(&problem.objects) {
