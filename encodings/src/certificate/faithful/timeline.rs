@@ -124,8 +124,8 @@ impl Timeline {
         if to > 0 {
             range.begin(&(self.time(to) - duration), at_end);
         }
-        for end in [self.over(from).cloned(), self.over(to).map(|time| time - duration)] {
-            end.into_iter().for_each(|end| range.before((end, true)));
+        for end in self.over(from).cloned().into_iter().chain(self.over(to).map(|time| time - duration)) {
+            range.before((end, true));
         }
         let end = (&range.low.0 + duration, range.low.1);
         (!range.is_empty()).then_some(Passage { from, to, at_start, at_end, latest: range.high, end })
