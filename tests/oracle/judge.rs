@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use encodings::pddl::Source;
-use encodings::pddl::ast::{Name, Problem};
+use encodings::pddl::ast::{InitialElement, Name, Problem};
 use encodings::validate::{Options, PlanStep, PlanText, Verdict, validate};
 use encodings::{Config, Exact, ExactTask, Limits, Plan, Solution, Status, Task, Unbounded};
 use metaplan::certificate::{self, Contents, Ground};
@@ -495,7 +495,10 @@ fn check_certificate(
     let wrong = report.parts.iter().find_map(|part| Some((part.part, part.result.as_ref().err()?)));
     match (wrong, refuted) {
         (None, true) => tally.fail(case, "A FALSE CLAIM IS VERIFIED", &format!("{:?}", report.claim)),
-        (None, false) => tally.count("certificate: verified"),
+        (None, false) => {
+            let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
+            tally.count(if is_timed { "certificate: verified, timed" } else { "certificate: verified" });
+        }
         (Some((part, reason)), true) => {
             tally.count(format!("certificate of a false claim fails: {part}: {reason:.40}"));
         }

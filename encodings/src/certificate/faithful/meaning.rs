@@ -2,6 +2,7 @@
 //! its start effects take place before the conditions of its middle and end are looked at, and before its end effects. One without
 //! duration is one happening. Where there are events, there are cases for each passage.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use num_rational::BigRational;
@@ -92,9 +93,9 @@ pub(super) fn cases<'r>(
                 if event.is_some_and(|event| reads().event(event)) {
                     continue;
                 }
-                let own = [condition.clone(), passage.condition(timeline), moment.leaves(event)];
+                let own = all_of(&condition, [passage.condition(timeline), moment.leaves(event)]);
                 let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
-                for known in Known::default().assume(structure, &Formula::junction(own, true))? {
+                for known in Known::default().assume(structure, &own)? {
                     all.extend(moment.last(structure, known, &applied, (&passage, None))?);
                 }
             }
@@ -108,6 +109,14 @@ pub(super) fn cases<'r>(
             if at_once { durative.at_once(reader, structure) } else { durative.cases(reader, structure) }
         }
     }
+}
+
+/// A condition, and others, most of which say nothing.
+fn all_of(condition: &Formula, others: [Formula; 2]) -> Cow<'_, Formula> {
+    if others.iter().all(|other| other.is(true)) {
+        return Cow::Borrowed(condition);
+    }
+    Cow::Owned(Formula::junction(std::iter::once(condition.clone()).chain(others), true))
 }
 
 struct Durative<'r> {
@@ -192,8 +201,8 @@ impl<'r> Durative<'r> {
             if event.is_some_and(|event| self.reads(&reader, EffectTime::AtStart).event(event)) {
                 continue;
             }
-            let own = [condition.clone(), passage.condition(timeline), start.leaves(event)];
-            for known in Known::default().assume(structure, &Formula::junction(own, true))? {
+            let own = all_of(&condition, [passage.condition(timeline), start.leaves(event)]);
+            for known in Known::default().assume(structure, &own)? {
                 let guards = start.atoms.iter().map(|(guard, ..)| guard);
                 let guards = guards.chain(start.numbers.iter().map(|(guard, ..)| guard));
                 for known in known.split(structure, guards)? {

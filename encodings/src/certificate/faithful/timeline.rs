@@ -93,6 +93,10 @@ impl Timeline {
 
     /// All passages that an action of this duration can have.
     pub(super) fn passages(&self, duration: &BigRational) -> Vec<Passage> {
+        if self.is_empty() {
+            let end = (duration.clone(), false);
+            return vec![Passage { from: 0, to: 0, at_start: false, at_end: false, latest: None, end }];
+        }
         let mut all = Vec::new();
         for from in self.begun..=self.events.len() {
             for to in from..=self.events.len() {
