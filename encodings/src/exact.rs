@@ -31,7 +31,7 @@ const COST_BITS: u64 = 90;
 
 /// A ground task in rationals of any size.
 #[derive(Debug, Clone)]
-pub struct ExactTask(Task<Rational>);
+pub struct ExactTask(pub(crate) Task<Rational>);
 
 /// Grounds a domain and a problem that have passed `pddl::check`, whatever the size of their numbers. Such a task is planned by
 /// [`optimize_exact`]; a task that [`crate::ground`] accepts is planned faster and with more proofs.
@@ -210,14 +210,26 @@ impl Task<Rational> {
 }
 
 /// Bounds of a task without numbers, whose costs are those of the task times a factor, rounded down.
-struct RoundedBounds {
-    bounds: Bounds,
+pub(crate) struct RoundedBounds {
+    pub(crate) bounds: Bounds,
     /// What an integer of the bounds is worth.
-    unit: Rational,
+    pub(crate) unit: Rational,
 }
 
 impl RoundedBounds {
     fn new(task: &Task<Rational>, limits: &Limits) -> Result<Self, Interrupted> {
+        Self::of(task, |bare| Bounds::new(bare, limits))
+    }
+
+    /// Bounds that each rest on one projection.
+    pub(crate) fn of_projections(task: &Task<Rational>, limits: &Limits) -> Result<Self, Interrupted> {
+        Self::of(task, |bare| Bounds::of_projections(bare, limits))
+    }
+
+    fn of(
+        task: &Task<Rational>,
+        bounds: impl FnOnce(&Task) -> Result<Bounds, Interrupted>,
+    ) -> Result<Self, Interrupted> {
         let costs: Vec<BigRational> =
             task.operators.iter().map(|operator| operator.cost.minimum().to_big()).collect();
         let factor = factor(&costs);
@@ -244,7 +256,7 @@ impl RoundedBounds {
             time_scale: 1,
             unreachable: None,
         };
-        Ok(Self { bounds: Bounds::new(&bare, limits)?, unit: Rational::from_big(factor.recip()) })
+        Ok(Self { bounds: bounds(&bare)?, unit: Rational::from_big(factor.recip()) })
     }
 }
 

@@ -62,8 +62,8 @@ mod tests;
 pub use alternatives::{Alternatives, Forced, alternatives};
 pub use certificate::{
     Cause as ComparisonCause, Certificate, Checked, Difference, Faithful, Fault, Inputs as RefutationInputs,
-    Outputs as RefutationOutputs, StepBound, certify, check as check_certificate, check_refutation, faithful,
-    refute, verification_conditions, witness,
+    Outputs as RefutationOutputs, StepBound, certify, certify_exact, check as check_certificate,
+    check_refutation, faithful, refute, verification_conditions, witness,
 };
 pub use concurrent::{Concurrent, ground_concurrent, optimize_concurrent};
 pub use encode::Semantics;

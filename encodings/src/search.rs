@@ -167,30 +167,31 @@ fn cheaper<N: Ord>(one: Option<GroundPlan<N>>, other: Option<GroundPlan<N>>) -> 
 }
 
 /// A state's basic values and numbers, and what was paid on the way to it.
-pub(crate) type ClosedLabel = (Vec<u32>, Vec<Int>, Int);
+pub(crate) type ClosedLabel<N> = (Vec<u32>, Vec<N>, N);
 
 /// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
 /// nothing left; none if there is a cheaper plan, or if a limit comes first.
 #[expect(clippy::arithmetic_side_effects, reason = "what was paid, and estimates, are at most GROWTH_LIMIT")]
-pub(crate) fn closed_labels(
-    task: &Task,
-    bounds: &Bounds,
+pub(crate) fn closed_labels<N: TaskNumber>(
+    task: &Task<N>,
+    bounds: &impl Estimate<N>,
     limits: &Limits,
-    cost: Option<Int>,
-) -> Option<Vec<ClosedLabel>> {
+    cost: Option<&N>,
+) -> Option<Vec<ClosedLabel<N>>> {
     let prepared = Prepared::new(task, limits).ok()??;
     let mut search = Search::new(task, bounds, &prepared, &task.initial, false);
     match (search.run(limits, STATE_LIMIT, &mut |_, _| {})?, cost) {
-        (Found::Optimal(plan), Some(cost)) if plan.cost >= cost => {}
+        (Found::Optimal(plan), Some(cost)) if plan.cost >= *cost => {}
         (Found::None, None) => {}
         _ => return None,
     }
-    let below = |node: &&Node<Int>| {
-        let estimate = bounds.estimate(&node.state);
-        !node.dominated && estimate.is_some_and(|more| cost.is_none_or(|cost| node.cost + more < cost))
+    let below = |node: &&Node<N>| {
+        let total = bounds.estimate(&node.state).and_then(|more| node.cost.plus(&more));
+        !node.dominated && total.is_some_and(|total| cost.is_none_or(|cost| total < *cost))
     };
-    let label =
-        |node: &Node<Int>| (node.state.values[..task.basic].to_vec(), node.state.numbers.clone(), node.cost);
+    let label = |node: &Node<N>| {
+        (node.state.values[..task.basic].to_vec(), node.state.numbers.clone(), node.cost.clone())
+    };
     Some(search.nodes.iter().filter(below).map(label).collect())
 }
 

@@ -22,8 +22,8 @@ use std::io::{BufRead, BufReader, BufWriter};
 use std::path::Path;
 
 use encodings::{
-    Faithful, Limits, RefutationOutputs, Solution, Status, StepBound, Task, certify, check_certificate,
-    refute, witness,
+    Certificate, ExactTask, Faithful, Limits, RefutationOutputs, Solution, Status, StepBound, Task, certify,
+    certify_exact, check_certificate, refute, witness,
 };
 use num_rational::BigRational;
 use pddl::ast::Problem;
@@ -126,6 +126,31 @@ impl Report {
     }
 }
 
+/// A ground task.
+#[derive(Debug, Clone, Copy)]
+pub enum Ground<'c> {
+    /// In integers.
+    Integers(&'c Task),
+    /// In rationals of any size.
+    Exact(&'c ExactTask),
+}
+
+impl Ground<'_> {
+    fn certify(self, solution: &Solution, limits: &Limits) -> Option<Certificate> {
+        match self {
+            Self::Integers(task) => certify(task, solution, limits),
+            Self::Exact(task) => certify_exact(task, solution, limits),
+        }
+    }
+
+    fn is_timed(self) -> bool {
+        match self {
+            Self::Integers(task) => task.is_timed(),
+            Self::Exact(task) => task.is_timed(),
+        }
+    }
+}
+
 /// What a certificate is about.
 #[derive(Debug, Clone, Copy)]
 pub struct Contents<'c> {
@@ -134,7 +159,7 @@ pub struct Contents<'c> {
     /// The problem as it was planned, with its metric.
     pub problem: &'c Problem,
     /// What they ground to.
-    pub task: &'c Task,
+    pub task: Ground<'c>,
     /// What was found.
     pub solution: &'c Solution,
     /// The plan as lines with start and duration, for the mission's domain.
@@ -159,11 +184,11 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     let Contents { mission, problem, task, solution, plan } = *contents;
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
     let name = directory.display().to_string();
-    let Some(certificate) = certify(task, solution, limits) else {
+    let Some(certificate) = task.certify(solution, limits) else {
         let reason = match solution.status {
             Status::Optimal | Status::Unsolvable => {
                 "the proof is not of a kind that certificates can express: several objectives, actions that improve the \
-                 metric, or a search that does not end within the limits"
+                 metric, numbers that are multiplied by fractions, or a search that does not end within the limits"
             }
             _ => "nothing is proved for plans of any length",
         };
@@ -196,7 +221,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     };
     let whole = tempfile::tempdir_in(parent).map_err(failed)?;
     let metric = contents.metric().map_err(|reason| wrong(&reason))?;
-    // What `verify` would refuse, because its numbers have less room than the planner's, is not written.
+    // What `verify` would refuse is not written.
     check_certificate(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref())
         .map_err(|fault| wrong(&fault))?;
     let refutation =

@@ -5,14 +5,14 @@ use std::io::BufReader;
 use std::path::Path;
 
 use encodings::{
-    Checked, Faithful, Limits, RefutationInputs, check_certificate, check_refutation, faithful,
+    Checked, Exact, Faithful, Limits, RefutationInputs, check_certificate, check_refutation, faithful,
     verification_conditions,
 };
 use num_rational::BigRational;
 use num_traits::Zero;
-use pddl::ast::{Domain, Problem};
+use pddl::ast::{ActionBody, Comparison, Domain, InitialElement, Name, Problem};
 use pddl::validate::{Options, PlanText, validate};
-use pddl::{self, Source};
+use pddl::Source;
 
 use super::files::{read, text};
 use super::{
@@ -165,23 +165,39 @@ pub(super) fn plan(
     if plan.steps.iter().all(|step| step.start.is_some()) {
         plan.steps.sort_by(|left, right| left.start.cmp(&right.start));
     }
-    // One step after the other, each as long as the files say: what is written may be rounded.
+    // One step after the other, each as long as the files say, unless they leave a choice: what is written may be rounded. Where
+    // nothing happens by itself, each starts when the one before it has ended; otherwise when it is written, or a little
+    // later for that reason.
+    let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     for step in &mut plan.steps {
-        (step.start, step.duration) = (None, None);
+        step.start = step.start.take().filter(|_| is_timed);
+        step.duration = step.duration.take().filter(|_| is_chosen(domain, &step.action));
     }
-    let options = Options { tolerance: BigRational::zero(), ..Options::default() };
+    let tolerance = if is_timed { Options::default().tolerance } else { BigRational::zero() };
+    let options = Options { tolerance, ..Options::default() };
     let verdict = validate(domain, problem, &plan, &options);
     if let Some(violation) = verdict.violation {
         return Err(violation.message);
     }
     let steps = plan.steps.len();
     let value = measure(problem, &verdict, steps, timed).ok_or("the metric has no value after the plan")?;
-    let decimal = rules::Decimal::from_rational(&value);
-    let is_decimal = decimal.to_rational() == value && decimal.to_string() == claimed;
-    if value.to_string() != claimed && !is_decimal {
+    // As a decimal where there is one, or as a fraction.
+    if value.to_string() != claimed && Exact::from(value.clone()).to_string() != claimed {
         return Err(format!("its metric is {value}, where {claimed} is claimed"));
     }
     Ok((format!("{steps} steps, valid, metric {claimed}"), value))
+}
+
+/// Whether an action of this name has a duration that is not fixed.
+fn is_chosen(domain: &Domain, name: &Name) -> bool {
+    let mut bodies =
+        domain.actions.iter().filter(|action| action.identifier.name == *name).map(|action| &action.body);
+    bodies.any(|body| match body {
+        ActionBody::Durative { duration, .. } => {
+            !matches!(&duration[..], [only] if only.operator == Comparison::Equal)
+        }
+        ActionBody::Instantaneous { .. } => false,
+    })
 }
 
 /// Whether the task stands for the files, and whether plans are measured by time where there is no metric.

@@ -1,7 +1,7 @@
 //! `metaplan plan`.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -10,7 +10,7 @@ use encodings::{
     Solution, Status, Task,
 };
 use indicatif::{ProgressBar, ProgressStyle};
-use metaplan::certificate;
+use metaplan::certificate::{self, Ground};
 use metaplan::measure::measure;
 use metaplan::message::Message;
 use metaplan::mission::{Blocking, Mission};
@@ -203,15 +203,16 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Err(refused) if plan_exact::is_too_large(&refused) && !arguments.asks_for_more() => {
             let found = plan_exact::solve(&mission, &problem, &objectives, &config, refused.clone());
             progress.finish_and_clear();
-            let (point, reading) = found.map_err(failed)?;
+            let (task, point, reading) = found.map_err(failed)?;
             objectives.confirm(&mission, &problem, &point, &reading)?;
             if common.verbose {
                 plan_exact::explain(&refused);
             }
-            let exit =
-                finish(point, &Beside::default(), &mission, &objectives, &stages, (arguments, common))?;
-            let asked = arguments.certificate.as_ref();
-            return Ok(certified(exit, asked.map_or(Ok(()), |_| Err(plan_exact::no_certificate(&refused)))));
+            let subject = (&mission, &problem, Ground::Exact(&task));
+            let certified = certify(arguments, subject, &objectives, &point.solution, &config.limits);
+            let beside = Beside::default();
+            let exit = finish(point, &beside, &mission, &objectives, &stages, (arguments, common))?;
+            return Ok(certified_or(certified, exit));
         }
         Err(messages) => return Err(failed(messages)),
     };
@@ -226,12 +227,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return Err(fault(reason));
     }
     objectives.confirm(&mission, &problem, &point, &Reading::sequential(task.is_timed()))?;
-    let certificate = match &arguments.certificate {
-        Some(directory) => {
-            certify(directory, &mission, &problem, &objectives, &task, &point.solution, &config.limits)
-        }
-        None => Ok(()),
-    };
+    let subject = (&mission, &problem, Ground::Integers(&task));
+    let certified = certify(arguments, subject, &objectives, &point.solution, &config.limits);
     if let Some(reason) = &point.solution.statistics.failure {
         let text = format!("the SAT solver gave up: {reason}");
         output::warnings(common, &[Message::warning("M114", text)]);
@@ -246,12 +243,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let beside = Beside { others, blocking };
     let exit = finish(point, &beside, &mission, &objectives, &stages, (arguments, common))?;
-    Ok(certified(exit, certificate))
+    Ok(certified_or(certified, exit))
 }
 
-/// The exit status where a certificate was asked for: the plan is there, and what was asked for besides may not be.
-fn certified(exit: Exit, certificate: Result<(), Message>) -> Exit {
-    match certificate {
+/// How the program ends: the plan is there, but what was asked for besides may not be.
+fn certified_or(certified: Result<(), Message>, exit: Exit) -> Exit {
+    match certified {
         Ok(()) => exit,
         Err(message) => {
             output::note(message.text());
@@ -330,16 +327,15 @@ fn show(
     }
 }
 
-/// Writes why nothing is better than the solution.
+/// Writes why nothing is better than the solution, if that is asked for.
 fn certify(
-    directory: &Path,
-    mission: &Mission,
-    problem: &Problem,
+    arguments: &Arguments,
+    (mission, problem, task): (&Mission, &Problem, Ground<'_>),
     objectives: &Objectives,
-    task: &Task,
     solution: &Solution,
     limits: &Limits,
 ) -> Result<(), Message> {
+    let Some(directory) = &arguments.certificate else { return Ok(()) };
     let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(plan, PlanFormat::Ipc));
     let mut problem = problem.clone();
     if let [metric] = &objectives.metrics[..] {

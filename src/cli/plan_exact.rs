@@ -1,6 +1,6 @@
 //! `metaplan plan` where numbers are too large for the integers of formulas: by search alone, in exact rationals.
 
-use encodings::{Config, Point, optimize_exact};
+use encodings::{Config, ExactTask, Point, optimize_exact};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use pddl::ast::Problem;
@@ -24,14 +24,15 @@ pub(super) fn solve(
     objectives: &Objectives,
     config: &Config,
     refused: Vec<Message>,
-) -> Result<(Point, Reading), Vec<Message>> {
+) -> Result<(ExactTask, Point, Reading), Vec<Message>> {
     if objectives.metrics.len() > 1 {
         return Err(refused);
     }
     let task = mission.ground_exact(problem, &objectives.metrics, &config.limits)?;
     let solution = optimize_exact(&task, config);
     let values = solution.plan.iter().map(|plan| plan.cost.clone()).collect();
-    Ok((Point { values, solution }, Reading::sequential(task.is_timed())))
+    let reading = Reading::sequential(task.is_timed());
+    Ok((task, Point { values, solution }, reading))
 }
 
 /// Says why this is not planned as other tasks are.
@@ -39,10 +40,4 @@ pub(super) fn explain(refused: &[Message]) {
     for message in refused {
         output::note(&format!("planned by search alone, in exact numbers: {}\n", message.message));
     }
-}
-
-/// Why there is no certificate.
-pub(super) fn no_certificate(refused: &[Message]) -> Message {
-    let reasons: Vec<&str> = refused.iter().map(|message| message.message.as_str()).collect();
-    Message::error("M120", format!("no certificate: {}", reasons.join("; ")))
 }

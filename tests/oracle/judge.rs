@@ -8,15 +8,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use encodings::{Config, Exact, Limits, Plan, Solution, Status, Task, Unbounded};
-use metaplan::certificate::{self, Contents};
+use encodings::{Config, Exact, ExactTask, Limits, Plan, Solution, Status, Task, Unbounded};
+use metaplan::certificate::{self, Contents, Ground};
 use metaplan::measure::measure;
 use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission};
 use num_rational::BigRational;
 use num_traits::Zero as _;
 use pddl::Source;
-use pddl::ast::{Name, Problem};
+use pddl::ast::{InitialElement, Name, Problem};
 use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
 
 /// One action of a plan, with its exact times.
@@ -98,12 +98,18 @@ enum Answer {
 }
 
 #[derive(Debug)]
+enum Planned {
+    Integers(Box<Task>),
+    Exact(Box<ExactTask>),
+}
+
+#[derive(Debug)]
 struct Solved {
     solution: Solution,
     /// Where there is no metric: whether plans are measured by their time.
     timed: bool,
     /// The task, where a certificate can be written.
-    task: Option<Task>,
+    task: Option<Planned>,
 }
 
 /// An exact number of the planner.
@@ -198,7 +204,8 @@ fn plan(mission: &Mission, problem: &Problem, mode: &Mode, limits: &Limits) -> A
                     Ok(task) => {
                         let config = Config { limits: limits.clone(), ..Config::default() };
                         let solution = encodings::optimize_exact(&task, &config);
-                        Answer::Solved(Box::new(Solved { solution, timed: task.is_timed(), task: None }))
+                        let (timed, task) = (task.is_timed(), Some(Planned::Exact(Box::new(task))));
+                        Answer::Solved(Box::new(Solved { solution, timed, task }))
                     }
                 }
             }
@@ -207,7 +214,8 @@ fn plan(mission: &Mission, problem: &Problem, mode: &Mode, limits: &Limits) -> A
                 let config = Config { limits: limits.clone(), ..Config::default() };
                 let point = encodings::lexicographic(&task, &config, &mut |_| {});
                 let timed = task.is_timed();
-                Answer::Solved(Box::new(Solved { solution: point.solution, timed, task: Some(task) }))
+                let task = Some(Planned::Integers(Box::new(task)));
+                Answer::Solved(Box::new(Solved { solution: point.solution, timed, task }))
             }
         },
         Mode::Concurrent(separation) => match mission.ground_concurrent(problem, &[], separation, limits) {
@@ -436,11 +444,26 @@ fn check_plan(
     }
 }
 
+/// A message without what stands in parentheses.
+fn without_names(message: &str) -> String {
+    let mut depth = 0_usize;
+    let mut kept = String::new();
+    for character in message.chars() {
+        match character {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ if depth == 0 => kept.push(character),
+            _ => {}
+        }
+    }
+    kept
+}
+
 /// What is claimed is certified, and the certificate has to be verified if the claim is true, and only then.
 fn check_certificate(
     case: &Case,
     (mission, problem): (&Mission, &Problem),
-    task: &Task,
+    task: &Planned,
     solution: &Solution,
     tally: &mut Tally,
 ) {
@@ -450,10 +473,15 @@ fn check_certificate(
     let parent = tempfile::tempdir().expect("a temporary directory");
     let directory = parent.path().join("certificate");
     let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_lines(&steps_of(plan)));
+    let task = match task {
+        Planned::Integers(task) => Ground::Integers(task),
+        Planned::Exact(task) => Ground::Exact(task),
+    };
     let contents = Contents { mission, problem, task, solution, plan: &plan };
     let limits = || Limits::none().with_time(case.limit);
     if let Err(message) = certificate::write(&directory, &contents, &limits()) {
-        return tally.count(format!("no certificate: {}", message.code));
+        // Without what is said of one task alone.
+        return tally.count(format!("{}: {:.120}", message.code, without_names(&message.message)));
     }
     let report = certificate::verify(&directory, None, &limits());
     let refuted = match (&case.truth, &solution.plan) {
@@ -467,7 +495,10 @@ fn check_certificate(
     let wrong = report.parts.iter().find_map(|part| Some((part.part, part.result.as_ref().err()?)));
     match (wrong, refuted) {
         (None, true) => tally.fail(case, "A FALSE CLAIM IS VERIFIED", &format!("{:?}", report.claim)),
-        (None, false) => tally.count("certificate: verified"),
+        (None, false) => {
+            let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
+            tally.count(if is_timed { "certificate: verified, timed" } else { "certificate: verified" });
+        }
         (Some((part, reason)), true) => {
             tally.count(format!("certificate of a false claim fails: {part}: {reason:.40}"));
         }

@@ -1,6 +1,6 @@
 //! The argument of a certificate as it is written.
 
-use crate::number::Int;
+use crate::certificate::integer::Integer;
 use serde::{Deserialize, Serialize};
 
 /// Why no plan is cheaper.
@@ -19,7 +19,7 @@ pub(super) struct Argument {
 pub(super) struct Potential {
     pub(super) pattern: Vec<u32>,
     /// For each combination of values, the last variable varying fastest; null where no goal state is within reach.
-    pub(super) values: Vec<Option<Int>>,
+    pub(super) values: Vec<Option<Integer>>,
 }
 
 /// A lower bound on what must be left of a number, by the values of a few variables.
@@ -29,9 +29,9 @@ pub(super) struct Need {
     pub(super) number: u32,
     pub(super) pattern: Vec<u32>,
     /// As in [`Potential::values`].
-    pub(super) values: Vec<Option<Int>>,
+    pub(super) values: Vec<Option<Integer>>,
 }
 
 /// A state, derived variables left out, and what was paid on the way to it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Label(pub(super) Vec<u32>, pub(super) Vec<Int>, pub(super) Int);
+pub(super) struct Label(pub(super) Vec<u32>, pub(super) Vec<Integer>, pub(super) Integer);

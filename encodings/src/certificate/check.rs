@@ -3,17 +3,16 @@
 use std::rc::Rc;
 
 use num_rational::BigRational;
-use num_traits::ToPrimitive;
 use rustc_hash::FxHashMap;
 use serde::de::DeserializeOwned;
 
 use crate::certificate::argument::Argument;
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{Model, Operator};
 use crate::certificate::semantics::{State, holds_without_numbers};
 use crate::certificate::shape;
 use crate::certificate::table::{Table, check_need, check_potential};
 use crate::certificate::write::{ARGUMENT_FORMAT, TASK_FORMAT};
-use crate::number::Int;
 
 /// Combinations of designs that matter, of all operators together, are not more than this.
 const CHOICE_LIMIT: usize = 1 << 20;
@@ -96,9 +95,9 @@ pub fn check(task: &str, argument: &str, claim: Option<&BigRational>) -> Result<
         })?;
         needs.push((need.number as usize, table));
     }
-    let mut labels: FxHashMap<&[u32], Vec<(&[Int], Int)>> = FxHashMap::default();
+    let mut labels: FxHashMap<&[u32], Vec<(&[Integer], &Integer)>> = FxHashMap::default();
     for label in &argument.labels {
-        labels.entry(&label.0).or_default().push((&label.1, label.2));
+        labels.entry(&label.0).or_default().push((&label.1, &label.2));
     }
     let monotone = model.more_never_hurts();
     let checker = Checker {
@@ -123,8 +122,8 @@ pub(super) fn parse(
     task: &str,
     argument: &str,
     claim: Option<&BigRational>,
-) -> Result<(Model, Argument, Option<i128>), Fault> {
-    let mut model: Model = read("the task", task)?;
+) -> Result<(Model, Argument, Option<Integer>), Fault> {
+    let model: Model = read("the task", task)?;
     let argument: Argument = read("the argument", argument)?;
     for (document, found, expected) in
         [("the task", &model.format, TASK_FORMAT), ("the argument", &argument.format, ARGUMENT_FORMAT)]
@@ -133,7 +132,7 @@ pub(super) fn parse(
             return Err(form(document, format!("format `{found}`, where `{expected}` is expected")));
         }
     }
-    shape::task(&mut model).map_err(|reason| form("the task", reason))?;
+    shape::task(&model).map_err(|reason| form("the task", reason))?;
     shape::argument(&model, &argument).map_err(|reason| form("the argument", reason))?;
     let cost = claim.map(|claim| cost(&model, claim)).transpose()?;
     Ok((model, argument, cost))
@@ -148,25 +147,22 @@ fn read<T: DeserializeOwned>(document: &'static str, text: &str) -> Result<T, Fa
 }
 
 /// The sum of operator costs that a metric stands for.
-fn cost(model: &Model, metric: &BigRational) -> Result<i128, Fault> {
-    let scaled = metric * BigRational::from_integer(model.objective.scale.into());
+fn cost(model: &Model, metric: &BigRational) -> Result<Integer, Fault> {
+    let scaled = metric * model.objective.scale.to_rational();
     let scaled = if model.objective.maximize { -scaled } else { scaled };
-    let cost = if scaled.is_integer() { scaled.to_integer().to_i128() } else { None };
-    let cost = cost.and_then(|cost| cost.checked_sub(model.objective.offset));
-    // A claim is as large as other costs, so that sums with it are integers.
-    let cost = cost.filter(|cost| shape::is_small(*cost));
+    let cost = scaled.is_integer().then(|| &Integer::from(scaled.to_integer()) - &model.objective.offset);
     cost.ok_or_else(|| Fault::Cost(metric.to_string()))
 }
 
 /// A combination of designs with what it costs.
-type Choice = (Vec<u32>, i128);
+type Choice = (Vec<u32>, Integer);
 
 struct Checker<'c> {
     model: &'c Model,
-    cost: Option<i128>,
+    cost: Option<Integer>,
     potentials: Vec<Table<'c>>,
     needs: Vec<(usize, Table<'c>)>,
-    labels: FxHashMap<&'c [u32], Vec<(&'c [Int], Int)>>,
+    labels: FxHashMap<&'c [u32], Vec<(&'c [Integer], &'c Integer)>>,
     monotone: bool,
     /// For each operator.
     choices: Vec<Rc<[Choice]>>,
@@ -178,15 +174,15 @@ impl Checker<'_> {
         if self.cost.is_none() && self.model.goal.clauses.iter().any(Vec::is_empty) {
             return Ok(());
         }
-        if !self.is_covered(&self.model.initial(), 0) {
+        if !self.is_covered(&self.model.initial(), &Integer::ZERO) {
             return Err(Fault::Initial);
         }
         let index = Index::new(self.model);
         for (label, position) in argument.labels.iter().zip(0..) {
             let state = self.model.state(&label.0, &label.1);
-            let paid = label.2;
+            let paid = &label.2;
             if self.model.holds(&self.model.goal, &state, &[], &[])
-                && self.cost.is_none_or(|cost| paid < cost)
+                && self.cost.as_ref().is_none_or(|cost| paid < cost)
             {
                 return Err(Fault::Goal(position));
             }
@@ -199,7 +195,7 @@ impl Checker<'_> {
         Ok(())
     }
 
-    fn successors_are_covered(&self, position: usize, state: &State, paid: i128) -> bool {
+    fn successors_are_covered(&self, position: usize, state: &State, paid: &Integer) -> bool {
         let operator = &self.model.operators[position];
         if !holds_without_numbers(&operator.condition, state) {
             return true;
@@ -207,31 +203,28 @@ impl Checker<'_> {
         let sizes = self.model.sizes(operator);
         self.choices[position].iter().all(|(choice, cost)| {
             !self.model.holds(&operator.condition, state, choice, &sizes)
-                || self
-                    .model
-                    .successor(operator, state, choice, &sizes)
-                    .is_some_and(|next| self.is_covered(&next, paid + cost))
+                || self.is_covered(&self.model.successor(operator, state, choice, &sizes), &(paid + cost))
         })
     }
 
     /// Whether every plan that goes on from a state costs at least as much as is claimed, by a label or by a bound.
-    fn is_covered(&self, state: &State, paid: i128) -> bool {
-        let hopeless = self.potentials.iter().any(|potential| match (potential.at(state), self.cost) {
+    fn is_covered(&self, state: &State, paid: &Integer) -> bool {
+        let hopeless = self.potentials.iter().any(|potential| match (potential.at(state), &self.cost) {
             (None, _) => true,
-            (Some(more), Some(cost)) => paid + more >= cost,
+            (Some(more), Some(cost)) => paid + more >= *cost,
             (Some(_), None) => false,
         });
         let exhausted = |(number, need): &(usize, Table<'_>)| {
-            need.at(state).is_none_or(|need| need != 0 && need > state.numbers[*number])
+            need.at(state).is_none_or(|need| !need.is_zero() && *need > state.numbers[*number])
         };
         if hopeless || self.needs.iter().any(exhausted) {
             return true;
         }
         let known = self.labels.get(&state.values[..self.model.basic]);
         known.into_iter().flatten().any(|(numbers, cost)| {
-            let mut pairs = numbers.iter().copied().zip(&state.numbers);
-            (*cost) <= paid
-                && if self.monotone { pairs.all(|(a, b)| a >= *b) } else { pairs.all(|(a, b)| a == *b) }
+            let mut pairs = numbers.iter().zip(&state.numbers);
+            *cost <= paid
+                && if self.monotone { pairs.all(|(a, b)| a >= b) } else { pairs.all(|(a, b)| a == b) }
         })
     }
 }
@@ -247,8 +240,8 @@ fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
         let key = (operator.uses, operator.exclusions, &operator.cost, quantities.clone());
         let own = known.entry(key).or_insert_with(|| {
             let sizes = model.sizes(operator);
-            let mut front: Vec<(Choice, Vec<i128>)> = Vec::new();
-            let as_good = |a: &(Choice, Vec<i128>), b: &(Choice, Vec<i128>)| {
+            let mut front: Vec<(Choice, Vec<Integer>)> = Vec::new();
+            let as_good = |a: &(Choice, Vec<Integer>), b: &(Choice, Vec<Integer>)| {
                 let mut pairs = a.1.iter().zip(&b.1);
                 a.0.1 <= b.0.1
                     && if monotone { pairs.all(|(a, b)| a >= b) } else { pairs.all(|(a, b)| a == b) }

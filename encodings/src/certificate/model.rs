@@ -1,6 +1,6 @@
 //! A ground task as a certificate writes it: plain lists of numbers.
 
-use crate::number::Int;
+use crate::certificate::integer::Integer;
 use serde::{Deserialize, Serialize};
 
 /// A variable, counted from 0, and one of its values.
@@ -18,26 +18,23 @@ pub(super) struct Model {
     /// The variables from here on are derived.
     pub(super) basic: usize,
     pub(super) values: Vec<u32>,
-    pub(super) numbers: Vec<Int>,
+    pub(super) numbers: Vec<Integer>,
     /// The numeric fluents that they are, and how many times their values.
     pub(super) fluents: Vec<String>,
-    pub(super) number_scale: Int,
+    pub(super) number_scale: Integer,
     /// The designs that may fill each slot, as objects.
     pub(super) slots: Vec<Vec<u32>>,
     /// Lists of slots that operators fill, each with the designs that suit.
     pub(super) uses: Vec<Vec<(u32, Vec<u32>)>>,
     pub(super) exclusions: Vec<Vec<Exclusion>>,
-    pub(super) tables: Vec<Vec<Int>>,
+    pub(super) tables: Vec<Vec<Integer>>,
     pub(super) operators: Vec<Operator>,
     /// In the order of evaluation.
     pub(super) axioms: Vec<Layer>,
     pub(super) goal: Condition,
     pub(super) objective: Objective,
     /// Durations are this many times the values of the files.
-    pub(super) time_scale: Int,
-    /// Numbers stay below this in magnitude, so that no sum outgrows an integer; not written, but worked out.
-    #[serde(skip)]
-    pub(super) number_limit: Int,
+    pub(super) time_scale: Integer,
 }
 
 /// Combinations of designs (positions in lists of suitable designs) that are not admitted for some slots of an operator.
@@ -65,7 +62,7 @@ pub(super) struct Operator {
     pub(super) cost: Quantity,
     pub(super) duration: Quantity,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) wait: Option<Int>,
+    pub(super) wait: Option<Integer>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -101,7 +98,7 @@ pub(super) struct Conditional {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Quantity {
-    pub(super) constant: Int,
+    pub(super) constant: Integer,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) tables: Vec<(Vec<u32>, u32)>,
 }
@@ -111,7 +108,7 @@ pub(super) struct Quantity {
 #[serde(deny_unknown_fields)]
 pub(super) struct Linear {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(super) factors: Vec<(u32, Int)>,
+    pub(super) factors: Vec<(u32, Integer)>,
     pub(super) quantity: Quantity,
 }
 
@@ -127,9 +124,9 @@ pub(super) struct Layer {
 #[serde(deny_unknown_fields)]
 pub(super) struct Objective {
     /// Costs are this many times the metric,
-    pub(super) scale: Int,
+    pub(super) scale: Integer,
     /// which has this added (in costs),
-    pub(super) offset: Int,
+    pub(super) offset: Integer,
     /// and the opposite sign if it is maximized.
     pub(super) maximize: bool,
 }

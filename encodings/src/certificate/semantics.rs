@@ -1,23 +1,18 @@
 //! What a written task means: states, operators and what they cost. Slow and plain; all arithmetic is exact.
 
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
-use crate::number::Int;
 
 /// Values of all variables and numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct State {
     pub(super) values: Vec<u32>,
-    pub(super) numbers: Vec<i128>,
+    pub(super) numbers: Vec<Integer>,
 }
 
 impl Model {
-    /// Whether the value of a number is small enough to calculate with.
-    pub(super) fn in_range(&self, number: Int) -> bool {
-        number.unsigned_abs() < self.number_limit.unsigned_abs()
-    }
-
     /// A state with these basic values; the derived ones follow.
-    pub(super) fn state(&self, basic: &[u32], numbers: &[Int]) -> State {
+    pub(super) fn state(&self, basic: &[u32], numbers: &[Integer]) -> State {
         let mut values = basic.to_vec();
         values.resize(self.variables.len(), 0);
         let mut state = State { values, numbers: numbers.to_vec() };
@@ -75,36 +70,36 @@ impl Model {
     }
 
     /// The value of a quantity for a combination of designs.
-    pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> i128 {
-        let mut sum = quantity.constant;
+    pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> Integer {
+        let mut sum = quantity.constant.clone();
         for (slots, table) in &quantity.tables {
             let mut row = 0;
             for slot in slots {
                 row = row * sizes[*slot as usize] + choice[*slot as usize] as usize;
             }
-            sum += self.tables[*table as usize][row];
+            sum = &sum + &self.tables[*table as usize][row];
         }
         sum
     }
 
     /// A lower bound on a quantity for all combinations of designs.
-    pub(super) fn least(&self, quantity: &Quantity) -> i128 {
-        let least = |table: &u32| self.tables[*table as usize].iter().min().copied().unwrap_or(0);
-        let tables = quantity.tables.iter().map(|(_, table)| least(table));
-        quantity.constant + tables.sum::<i128>()
+    pub(super) fn least(&self, quantity: &Quantity) -> Integer {
+        let tables =
+            quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().min());
+        tables.chain([&quantity.constant]).sum()
     }
 
     /// An upper bound, as `least` is a lower one.
-    pub(super) fn most(&self, quantity: &Quantity) -> i128 {
-        let most = |table: &u32| self.tables[*table as usize].iter().max().copied().unwrap_or(0);
-        let tables = quantity.tables.iter().map(|(_, table)| most(table));
-        quantity.constant + tables.sum::<i128>()
+    pub(super) fn most(&self, quantity: &Quantity) -> Integer {
+        let tables =
+            quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().max());
+        tables.chain([&quantity.constant]).sum()
     }
 
-    pub(super) fn linear(&self, linear: &Linear, state: &State, choice: &[u32], sizes: &[usize]) -> i128 {
+    pub(super) fn linear(&self, linear: &Linear, state: &State, choice: &[u32], sizes: &[usize]) -> Integer {
+        let quantity = self.quantity(&linear.quantity, choice, sizes);
         let numbers = linear.factors.iter();
-        let numbers = numbers.map(|(number, factor)| state.numbers[*number as usize] * *factor);
-        self.quantity(&linear.quantity, choice, sizes) + numbers.sum::<i128>()
+        numbers.fold(quantity, |sum, (number, factor)| &sum + &(&state.numbers[*number as usize] * factor))
     }
 
     /// Whether a condition holds; its finite-domain part does not depend on designs.
@@ -116,17 +111,20 @@ impl Model {
         sizes: &[usize],
     ) -> bool {
         holds_without_numbers(condition, state)
-            && condition.comparisons.iter().all(|linear| self.linear(linear, state, choice, sizes) >= 0)
+            && condition
+                .comparisons
+                .iter()
+                .all(|linear| !self.linear(linear, state, choice, sizes).is_negative())
     }
 
-    /// The state after an applicable operator; none if a number gets out of hand.
+    /// The state after an applicable operator.
     pub(super) fn successor(
         &self,
         operator: &Operator,
         state: &State,
         choice: &[u32],
         sizes: &[usize],
-    ) -> Option<State> {
+    ) -> State {
         let mut next = state.clone();
         for (variable, value) in &operator.effects {
             next.values[*variable as usize] = *value;
@@ -139,14 +137,10 @@ impl Model {
             }
         }
         for (number, value) in &operator.changes {
-            let value = self.linear(value, state, choice, sizes);
-            if !self.in_range(value) {
-                return None;
-            }
-            next.numbers[*number as usize] = value;
+            next.numbers[*number as usize] = self.linear(value, state, choice, sizes);
         }
         self.derive(&mut next);
-        Some(next)
+        next
     }
 
     /// Whether more of any number never hurts: no factor in any condition or change is negative, and no derived variable
@@ -158,7 +152,7 @@ impl Model {
             self.operators.iter().flat_map(|operator| operator.changes.iter().map(|(_, value)| value));
         let mut linears = conditions.flat_map(|condition| &condition.comparisons).chain(changes);
         rules.into_iter().all(|(_, body)| body.comparisons.is_empty())
-            && linears.all(|linear| linear.factors.iter().all(|(_, factor)| *factor >= 0))
+            && linears.all(|linear| linear.factors.iter().all(|(_, factor)| !factor.is_negative()))
     }
 }
 

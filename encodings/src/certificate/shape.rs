@@ -1,17 +1,12 @@
 //! Whether the parts of a certificate that refer to each other exist: after this, no index is out of range.
 
 use crate::certificate::argument::Argument;
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{
     self, Condition, Exclusion, Fact, Linear, Literal, Model, Operator, Quantity,
 };
-use crate::number::Int;
 
 type Found = Result<(), String>;
-
-/// Constants, entries of tables, products of factors with numbers, and costs are smaller, so that their sums fit 128 bits.
-const LARGE: Int = 1 << 108;
-/// As many summands, and fewer, are added up.
-const SUMMANDS: usize = 1 << 10;
 
 /// An operator with more combinations of designs is refused rather than gone through.
 const CHOICE_LIMIT: usize = 1 << 20;
@@ -30,28 +25,8 @@ fn are_distinct(numbers: impl Iterator<Item = u32>) -> bool {
     all.len() == count
 }
 
-pub(super) fn is_small(number: Int) -> bool {
-    number.unsigned_abs() < LARGE.unsigned_abs()
-}
-
-/// Checks a task, and works out how large numbers may become.
-pub(super) fn task(model: &mut Model) -> Found {
-    let factor = linears(model).flat_map(|linear| &linear.factors).map(|(_, factor)| factor.unsigned_abs());
-    let factor = factor.max().unwrap_or(1).max(1);
-    model.number_limit = Int::try_from(LARGE.unsigned_abs() / factor).unwrap_or(0);
-    well_formed(model)
-}
-
-/// All linear expressions of a task.
-fn linears(model: &Model) -> impl Iterator<Item = &Linear> {
-    let operators = model.operators.iter().map(|operator| &operator.condition);
-    let bodies = model.axioms.iter().flat_map(|layer| &layer.rules).map(|(_, body)| body);
-    let changes = model.operators.iter().flat_map(|operator| &operator.changes).map(|(_, value)| value);
-    let conditions = operators.chain(bodies).chain([&model.goal]);
-    conditions.flat_map(|condition| &condition.comparisons).chain(changes)
-}
-
-fn well_formed(model: &Model) -> Found {
+/// Checks a task.
+pub(super) fn task(model: &Model) -> Found {
     let count = model.variables.len();
     require(model.basic <= count, || "more basic variables than variables".into())?;
     require(model.values.len() == count, || "the initial state has not one value for each variable".into())?;
@@ -59,14 +34,9 @@ fn well_formed(model: &Model) -> Found {
     for fact in (0..).zip(model.values.iter().copied()) {
         model.check_fact(fact)?;
     }
-    let small = model.tables.iter().flatten().all(|value| is_small(*value));
-    require(small && model.numbers.iter().all(|number| model.in_range(*number)), || {
-        "a number is too large".into()
-    })?;
     require(model.fluents.len() == model.numbers.len(), || "not one fluent for each number".into())?;
-    require(model.objective.scale > 0 && model.time_scale > 0 && model.number_scale > 0, || {
-        "a scale that is not positive".into()
-    })?;
+    let scales = [&model.objective.scale, &model.time_scale, &model.number_scale];
+    require(scales.iter().all(|scale| scale.is_positive()), || "a scale that is not positive".into())?;
     for uses in &model.uses {
         for (slot, designs) in uses {
             let slot = model.slots.get(*slot as usize).ok_or("a slot that is not there")?;
@@ -101,7 +71,6 @@ pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
         let size =
             sizes.into_iter().try_fold(1_usize, usize::checked_mul).filter(|size| *size <= TABLE_LIMIT);
         require(size == Some(values.len()), || "a table of the wrong size".into())?;
-        require(values.iter().flatten().all(|value| is_small(*value)), || "a bound is too large".into())?;
     }
     let numbers = model.numbers.len();
     require(argument.needs.iter().all(|need| (need.number as usize) < numbers), || "no such number".into())?;
@@ -109,8 +78,6 @@ pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
         let sizes = model.variables[..model.basic].iter().map(Vec::len);
         let fits = label.0.len() == model.basic
             && label.1.len() == numbers
-            && label.1.iter().all(|number| model.in_range(*number))
-            && is_small(label.2)
             && label.0.iter().zip(sizes).all(|(value, size)| (*value as usize) < size);
         require(fits, || format!("label {position} is no state"))?;
     }
@@ -172,18 +139,15 @@ impl Model {
     }
 
     fn check_linear(&self, linear: &Linear, sizes: &[usize]) -> Found {
-        let exists = |(number, _): &(u32, Int)| (*number as usize) < self.numbers.len();
+        let exists = |(number, _): &(u32, Integer)| (*number as usize) < self.numbers.len();
         require(linear.factors.iter().all(exists), || "no such number".into())?;
         require(are_distinct(linear.factors.iter().map(|(number, _)| *number)), || {
             "a number with two factors".into()
         })?;
-        require(linear.factors.len() < SUMMANDS, || "too many factors".into())?;
         self.check_quantity(&linear.quantity, sizes)
     }
 
     fn check_quantity(&self, quantity: &Quantity, sizes: &[usize]) -> Found {
-        let small = is_small(quantity.constant) && quantity.tables.len() < SUMMANDS;
-        require(small, || "a constant that is too large".into())?;
         for (slots, table) in &quantity.tables {
             let table = self.tables.get(*table as usize).ok_or("no such table")?;
             let own = slots.iter().map(|slot| sizes.get(*slot as usize).copied());

@@ -10,8 +10,8 @@ use num_rational::BigRational;
 
 use crate::certificate::argument::{Argument, Label, Need, Potential};
 use crate::certificate::check::{Fault, parse};
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
-use crate::number::Int;
 
 /// The verification conditions for a claim, as `check` takes it. None for tasks with derived variables, whose least
 /// fixpoints have no short form.
@@ -34,7 +34,7 @@ pub fn verification_conditions(
 struct Writer<'w> {
     model: &'w Model,
     argument: &'w Argument,
-    cost: Option<i128>,
+    cost: Option<Integer>,
     monotone: bool,
 }
 
@@ -56,9 +56,8 @@ fn any(parts: impl IntoIterator<Item = String>) -> String {
     join("or", "false", parts)
 }
 
-fn number(number: impl Into<i128>) -> String {
-    let number = number.into();
-    if number < 0 { format!("(- {})", number.unsigned_abs()) } else { number.to_string() }
+fn number(number: &Integer) -> String {
+    if number.is_negative() { format!("(- {})", -number) } else { number.to_string() }
 }
 
 fn fact((variable, value): Fact) -> String {
@@ -90,12 +89,12 @@ impl Writer<'_> {
             let _ = writeln!(text, "(declare-const {name} Int)");
         }
         let values = self.model.values.iter().map(ToString::to_string);
-        let numbers = self.model.numbers.iter().map(|value| number(*value));
+        let numbers = self.model.numbers.iter().map(number);
         let initial: Vec<String> = values.chain(numbers).chain(["0".to_owned()]).collect();
         let initial = [format!("(not (invariant {}))", initial.join(" "))];
         question(&mut text, "the initial state", "", &initial);
         let mut goal = vec![self.holds(), self.condition(&self.model.goal)];
-        goal.extend(self.cost.map(|cost| format!("(< paid {})", number(cost))));
+        goal.extend(self.cost.iter().map(|cost| format!("(< paid {})", number(cost))));
         question(&mut text, "goal states", "", &goal);
         for (operator, position) in self.model.operators.iter().zip(0..) {
             self.operator(&mut text, operator, position);
@@ -131,11 +130,11 @@ impl Writer<'_> {
     fn entries(
         &self,
         pattern: &[u32],
-        values: &[Option<Int>],
-        entry: impl Fn(Option<Int>) -> Option<String>,
+        values: &[Option<Integer>],
+        entry: impl Fn(Option<&Integer>) -> Option<String>,
     ) -> String {
         any(values.iter().enumerate().filter_map(|(row, value)| {
-            let said = entry(*value)?;
+            let said = entry(value.as_ref())?;
             let mut rest = row;
             let mut parts = vec![said];
             for variable in pattern.iter().rev() {
@@ -148,9 +147,9 @@ impl Writer<'_> {
     }
 
     fn cut_off(&self, potential: &Potential) -> String {
-        self.entries(&potential.pattern, &potential.values, |value| match (value, self.cost) {
+        self.entries(&potential.pattern, &potential.values, |value| match (value, &self.cost) {
             (None, _) => Some("true".to_owned()),
-            (Some(more), Some(cost)) => Some(format!("(>= paid {})", number(cost - more))),
+            (Some(more), Some(cost)) => Some(format!("(>= paid {})", number(&(cost - more)))),
             (Some(_), None) => None,
         })
     }
@@ -158,7 +157,7 @@ impl Writer<'_> {
     fn exhausted(&self, need: &Need) -> String {
         self.entries(&need.pattern, &need.values, |value| match value {
             None => Some("true".to_owned()),
-            Some(0) => None,
+            Some(value) if value.is_zero() => None,
             Some(value) => Some(format!("(< n{} {})", need.number, number(value))),
         })
     }
@@ -167,8 +166,8 @@ impl Writer<'_> {
         let values = values.iter().enumerate().map(|(variable, value)| format!("(= v{variable} {value})"));
         let relation = if self.monotone { "<=" } else { "=" };
         let numbers = numbers.iter().enumerate();
-        let numbers = numbers.map(|(own, value)| format!("({relation} n{own} {})", number(*value)));
-        all(values.chain(numbers).chain([format!("(>= paid {})", number(*cost))]))
+        let numbers = numbers.map(|(own, value)| format!("({relation} n{own} {})", number(value)));
+        all(values.chain(numbers).chain([format!("(>= paid {})", number(cost))]))
     }
 
     fn condition(&self, condition: &Condition) -> String {
@@ -178,7 +177,7 @@ impl Writer<'_> {
 
     fn linear(&self, linear: &Linear, sizes: &[usize]) -> String {
         let factors = linear.factors.iter();
-        let factors = factors.map(|(own, factor)| format!("(* {} n{own})", number(*factor)));
+        let factors = factors.map(|(own, factor)| format!("(* {} n{own})", number(factor)));
         join("+", "0", factors.chain([self.quantity(&linear.quantity, sizes)]))
     }
 
@@ -192,11 +191,11 @@ impl Writer<'_> {
                 slots.iter().fold("0".to_owned(), key)
             };
             let key = row(slots);
-            let last = rows.last().map_or_else(|| "0".to_owned(), |value| number(*value));
+            let last = rows.last().map_or_else(|| "0".to_owned(), number);
             let rest = rows.iter().enumerate().rev().skip(1);
-            rest.fold(last, |rest, (row, value)| format!("(ite (= {key} {row}) {} {rest})", number(*value)))
+            rest.fold(last, |rest, (row, value)| format!("(ite (= {key} {row}) {} {rest})", number(value)))
         });
-        join("+", "0", std::iter::once(number(quantity.constant)).chain(tables))
+        join("+", "0", std::iter::once(number(&quantity.constant)).chain(tables))
     }
 
     fn operator(&self, text: &mut String, operator: &Operator, position: usize) {

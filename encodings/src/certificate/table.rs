@@ -5,31 +5,31 @@
 //! otherwise: one that uses the number requires that it stays at least 0, and whatever else changes it may only stand where
 //! nothing is needed.
 
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
 use crate::certificate::semantics::State;
-use crate::number::Int;
 
 /// A bound; none is infinity.
-type Bound = Option<i128>;
+type Bound<'b> = Option<&'b Integer>;
 
 /// A value (none for infinity) for each combination of values of the pattern.
 pub(super) struct Table<'t> {
     pattern: &'t [u32],
     sizes: Vec<usize>,
-    values: &'t [Option<Int>],
+    values: &'t [Option<Integer>],
 }
 
 impl<'t> Table<'t> {
-    pub(super) fn new(model: &Model, pattern: &'t [u32], values: &'t [Option<Int>]) -> Self {
+    pub(super) fn new(model: &Model, pattern: &'t [u32], values: &'t [Option<Integer>]) -> Self {
         let sizes = pattern.iter().map(|variable| model.variables[*variable as usize].len()).collect();
         Self { pattern, sizes, values }
     }
 
-    pub(super) fn at(&self, state: &State) -> Option<i128> {
+    pub(super) fn at(&self, state: &State) -> Bound<'_> {
         self.at_row(self.row_of(state))
     }
 
-    fn value(&self, values: &[u32]) -> Option<i128> {
+    fn value(&self, values: &[u32]) -> Bound<'_> {
         self.at_row(self.row(values))
     }
 
@@ -49,8 +49,8 @@ impl<'t> Table<'t> {
         self.values.len()
     }
 
-    pub(super) fn at_row(&self, row: usize) -> Option<i128> {
-        self.values[row]
+    pub(super) fn at_row(&self, row: usize) -> Bound<'_> {
+        self.values[row].as_ref()
     }
 
     /// Every combination that agrees with some facts.
@@ -105,12 +105,12 @@ impl<'t> Table<'t> {
     fn each_transition(
         &self,
         model: &Model,
-        check: &dyn Fn(&Operator, Bound, Bound) -> bool,
+        check: &dyn Fn(&Operator, Bound<'_>, Bound<'_>) -> bool,
     ) -> Result<(), String> {
         for (operator, position) in model.operators.iter().zip(0..) {
             if !self.touches(operator) {
                 // It leads from each combination to itself; any finite value stands for all.
-                let finite = self.values.iter().flatten().max().copied();
+                let finite = self.values.iter().flatten().max();
                 if finite.is_some() && !check(operator, finite, finite) {
                     return Err(format!("operator {position}, which changes nothing that the table knows"));
                 }
@@ -129,38 +129,38 @@ impl<'t> Table<'t> {
 }
 
 /// Whether `left ≤ right + step`, where none is infinite.
-fn at_most(left: Option<i128>, right: Option<i128>, step: i128) -> bool {
-    right.is_none_or(|right| left.is_some_and(|left| left <= right + step))
+fn at_most(left: Bound<'_>, right: Bound<'_>, step: &Integer) -> bool {
+    right.is_none_or(|right| left.is_some_and(|left| *left <= right + step))
 }
 
 /// Checks that a table bounds the cost to the goal from below.
 pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), String> {
     for values in table.matching(&model.goal.facts) {
-        if !at_most(table.value(&values), Some(0), 0) {
+        if !at_most(table.value(&values), Some(&Integer::ZERO), &Integer::ZERO) {
             return Err(format!("the goal may hold at {values:?}"));
         }
     }
     table.each_transition(model, &|operator, before, after| {
-        at_most(before, after, model.least(&operator.cost))
+        at_most(before, after, &model.least(&operator.cost))
     })
 }
 
 /// What an operator does to a number.
 enum Use {
     /// It lowers it by at least so much (≥ 0), and requires that at least 0 is left then.
-    Lowers(i128),
+    Lowers(Integer),
     /// Anything else.
     Other,
 }
 
 fn use_of(model: &Model, operator: &Operator, number: u32) -> Use {
     let mut changes = operator.changes.iter().filter(|(own, _)| *own == number);
-    let Some((_, value)) = changes.next() else { return Use::Lowers(0) };
+    let Some((_, value)) = changes.next() else { return Use::Lowers(Integer::ZERO) };
     let most = model.most(&value.quantity);
     let guarded =
-        most == 0 && value.quantity.tables.is_empty() || operator.condition.comparisons.contains(value);
-    if changes.next().is_none() && value.factors == [(number, 1)] && most <= 0 && guarded {
-        Use::Lowers(-most)
+        most.is_zero() && value.quantity.tables.is_empty() || operator.condition.comparisons.contains(value);
+    if changes.next().is_none() && is_alone(value, number) && !most.is_positive() && guarded {
+        Use::Lowers(-&most)
     } else {
         Use::Other
     }
@@ -168,7 +168,7 @@ fn use_of(model: &Model, operator: &Operator, number: u32) -> Use {
 
 /// Checks that a table bounds from below what must be left of a number, where it is not 0.
 pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Result<(), String> {
-    if table.values.iter().flatten().any(|need| *need < 0) {
+    if table.values.iter().flatten().any(Integer::is_negative) {
         return Err("it is negative".into());
     }
     let left = model
@@ -177,21 +177,26 @@ pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Resul
         .iter()
         .filter_map(|linear| lower_end(linear, number))
         .max()
-        .unwrap_or(0)
-        .max(0);
+        .unwrap_or_default()
+        .max(Integer::ZERO);
     for values in table.matching(&model.goal.facts) {
-        if !at_most(table.value(&values), Some(left), 0) {
+        if !at_most(table.value(&values), Some(&left), &Integer::ZERO) {
             return Err(format!("the goal may hold at {values:?}"));
         }
     }
     table.each_transition(model, &|operator, before, after| match use_of(model, operator, number) {
-        Use::Lowers(least) => at_most(before, after, least),
-        Use::Other => before == Some(0) || (before.is_none() && after.is_none()),
+        Use::Lowers(least) => at_most(before, after, &least),
+        Use::Other => before.is_some_and(Integer::is_zero) || (before.is_none() && after.is_none()),
     })
 }
 
 /// The value that a number must have for a comparison to hold, if it is about that number alone.
-fn lower_end(linear: &Linear, number: u32) -> Option<i128> {
+fn lower_end(linear: &Linear, number: u32) -> Option<Integer> {
     let Quantity { constant, tables } = &linear.quantity;
-    (linear.factors == [(number, 1)] && tables.is_empty()).then(|| -(*constant))
+    (is_alone(linear, number) && tables.is_empty()).then(|| -constant)
+}
+
+/// Whether a linear expression is a number plus a quantity.
+pub(super) fn is_alone(linear: &Linear, number: u32) -> bool {
+    linear.factors == [(number, Integer::from(1))]
 }

@@ -3,17 +3,22 @@
 use std::hash::Hash;
 use std::sync::Arc;
 
+use num_traits::One;
 use rustc_hash::FxHashMap;
 
-use crate::bounds::Bounds;
+use crate::bounds::{Bounds, Projection};
 use crate::certificate::argument::{Argument, Label, Need, Potential};
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{
     Argument as Parameter, Condition, Conditional, Exclusion, Layer, Linear, Model, Objective, Operator,
     Quantity,
 };
+use crate::certificate::scales::{Scales, scaled, whole};
+use crate::exact::{ExactTask, RoundedBounds};
 use crate::limits::Limits;
-use crate::number::Int;
-use crate::search::closed_labels;
+use crate::number::{Int, Rational, TaskNumber};
+use crate::quantity::NumericId;
+use crate::search::{Estimate, closed_labels};
 use crate::solution::{Solution, Status};
 use crate::task::{self, Task};
 
@@ -32,38 +37,74 @@ pub struct Certificate {
 /// Makes the certificate of a solution. Nothing if the solution is not proved for plans of any length, if the task has several
 /// objectives or one that plans improve without bound, or if the search does not end within the limits.
 pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Certificate> {
+    let cost = solution.ground.as_ref().map(|plan| plan.cost);
+    let bounds = || Some((Bounds::of_projections(task, limits).ok()?, Scales::one()));
+    certified(task, (solution, cost), limits, &Scales::one(), bounds, |bounds| bounds)
+}
+
+/// The same for a task in rationals. Nothing either if its numbers have no common denominator.
+pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> Option<Certificate> {
+    let task = &task.0;
+    let metric = solution.plan.as_ref().map(|plan| Rational::from_big(plan.cost.to_rational()));
+    let cost =
+        metric.map(|metric| if task.objective.maximize { -metric } else { metric } - &task.objective.offset);
+    let scales = Scales::of(task, &Rational::one())?;
+    let bounds = || {
+        let bounds = RoundedBounds::of_projections(task, limits).ok()?;
+        let scales = Scales::of(task, &bounds.unit)?;
+        Some((bounds, scales))
+    };
+    certified(task, (solution, cost), limits, &scales, bounds, |rounded| &rounded.bounds)
+}
+
+/// Makes a certificate with some bounds, and the factors that go with them; `plain` are those of them in integers.
+fn certified<N: TaskNumber, E: Estimate<N>>(
+    task: &Task<N>,
+    (solution, cost): (&Solution, Option<N>),
+    limits: &Limits,
+    scales: &Scales,
+    bounds: impl FnOnce() -> Option<(E, Scales)>,
+    plain: impl Fn(&E) -> &Bounds,
+) -> Option<Certificate> {
     if !matches!(solution.status, Status::Optimal | Status::Unsolvable)
         || !task.others.is_empty()
-        || task.operators.iter().any(|operator| operator.cost.minimum() < 0)
+        || task.operators.iter().any(|operator| operator.cost.minimum() < N::zero())
     {
         return None;
     }
     if task.unreachable.is_some() {
         let argument = Argument { format: ARGUMENT_FORMAT.into(), ..Argument::default() };
-        return written(&model(task), &argument);
+        return written(&model(task, scales), &argument);
     }
-    let bounds = Bounds::of_projections(task, limits).ok()?;
-    let cost = solution.ground.as_ref().map(|plan| plan.cost);
-    let labels = closed_labels(task, &bounds, limits, cost)?;
-    let label = |(values, numbers, cost): (Vec<u32>, Vec<Int>, Int)| Label(values, numbers, cost);
-    let potential = |projection: &crate::bounds::Projection| Potential {
-        pattern: projection.pattern.iter().map(|variable| variable.0).collect(),
-        values: projection.costs().to_vec(),
+    let (bounds, scales) = bounds()?;
+    let labels = closed_labels(task, &bounds, limits, cost.as_ref())?;
+    let label = |(values, numbers, cost): (Vec<u32>, Vec<N>, N)| {
+        Label(values, integers(&numbers, &scales.numbers), scaled(&cost, &scales.costs))
+    };
+    let table = |values: &[Option<Int>], scale: &Integer| {
+        values.iter().map(|value| value.map(|value| scaled(&value, scale))).collect()
+    };
+    let pattern = |projection: &Projection| projection.pattern.iter().map(|variable| variable.0).collect();
+    let potential = |projection: &Projection| Potential {
+        pattern: pattern(projection),
+        values: table(projection.costs(), &scales.bounds),
+    };
+    let need = |(number, projection, values): (NumericId, &Projection, &[Option<Int>])| Need {
+        number: number.0,
+        pattern: pattern(projection),
+        values: table(values, &scales.numbers),
     };
     let argument = Argument {
         format: ARGUMENT_FORMAT.into(),
-        potentials: bounds.projections.iter().map(potential).collect(),
-        needs: bounds
-            .needs()
-            .map(|(number, projection, values)| Need {
-                number: number.0,
-                pattern: projection.pattern.iter().map(|variable| variable.0).collect(),
-                values: values.to_vec(),
-            })
-            .collect(),
+        potentials: plain(&bounds).projections.iter().map(potential).collect(),
+        needs: plain(&bounds).needs().map(need).collect(),
         labels: labels.into_iter().map(label).collect(),
     };
-    written(&model(task), &argument)
+    written(&model(task, &scales), &argument)
+}
+
+fn integers<N: TaskNumber>(numbers: &[N], scale: &Integer) -> Vec<Integer> {
+    numbers.iter().map(|number| scaled(number, scale)).collect()
 }
 
 fn written(task: &Model, argument: &Argument) -> Option<Certificate> {
@@ -96,14 +137,15 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
 /// Slots, each with the designs that suit.
 type Uses = Vec<(u32, Vec<u32>)>;
 
-struct Writer {
-    tables: Pool<Arc<[Int]>, Vec<Int>>,
+struct Writer<'w, N> {
+    scales: &'w Scales,
+    tables: Pool<(Arc<[N]>, Integer), Vec<Integer>>,
     uses: Pool<Arc<[task::SlotUse]>, Uses>,
     exclusions: Pool<Arc<[task::Forbidden]>, Vec<Exclusion>>,
 }
 
-fn model(task: &Task) -> Model {
-    let mut writer = Writer { tables: Pool::new(), uses: Pool::new(), exclusions: Pool::new() };
+fn model<N: TaskNumber>(task: &Task<N>, scales: &Scales) -> Model {
+    let mut writer = Writer { scales, tables: Pool::new(), uses: Pool::new(), exclusions: Pool::new() };
     let operators = task.operators.iter().map(|operator| writer.operator(operator)).collect();
     let axioms = task
         .axioms
@@ -124,9 +166,9 @@ fn model(task: &Task) -> Model {
         variables: task.variables.iter().map(|variable| variable.values.clone()).collect(),
         basic: task.basic,
         values: task.initial.values.clone(),
-        numbers: task.initial.numbers.clone(),
+        numbers: integers(&task.initial.numbers, &scales.numbers),
         fluents: task.number_names.clone(),
-        number_scale: task.number_scale,
+        number_scale: &Integer::from(task.number_scale) * &scales.numbers,
         slots: task.slots.iter().map(|slot| slot.designs.iter().map(|design| design.0).collect()).collect(),
         uses: writer.uses.all,
         exclusions: writer.exclusions.all,
@@ -135,12 +177,11 @@ fn model(task: &Task) -> Model {
         axioms,
         goal,
         objective: Objective {
-            scale: task.objective.scale,
-            offset: task.objective.offset,
+            scale: &Integer::from(task.objective.scale) * &scales.costs,
+            offset: scaled(&task.objective.offset, &scales.costs),
             maximize: task.objective.maximize,
         },
-        time_scale: task.time_scale,
-        number_limit: 0,
+        time_scale: &Integer::from(task.time_scale) * &scales.times,
     }
 }
 
@@ -152,8 +193,9 @@ fn literal(literal: &task::Literal) -> ((u32, u32), bool) {
     (fact(literal.fact), literal.positive)
 }
 
-impl Writer {
-    fn operator(&mut self, operator: &task::Operator) -> Operator {
+impl<N: TaskNumber> Writer<'_, N> {
+    fn operator(&mut self, operator: &task::Operator<N>) -> Operator {
+        let scales = self.scales;
         let exclusion = |rule: &task::Forbidden| Exclusion {
             slots: rule.slots.to_vec(),
             combinations: rule.combinations.iter().map(|combination| combination.to_vec()).collect(),
@@ -181,38 +223,45 @@ impl Writer {
             changes: operator
                 .numeric_effects
                 .iter()
-                .map(|effect| (effect.variable.0, self.linear(&effect.value)))
+                .map(|effect| (effect.variable.0, self.linear(&effect.value, &Integer::from(1))))
                 .collect(),
-            cost: self.quantity(&operator.cost),
-            duration: self.quantity(&operator.duration),
-            wait: operator.wait,
+            cost: self.quantity(&operator.cost, &scales.costs),
+            duration: self.quantity(&operator.duration, &scales.times),
+            wait: operator.wait.as_ref().map(|time| scaled(time, &scales.times)),
         }
     }
 
-    fn condition(&mut self, condition: &task::Condition) -> Condition {
+    fn condition(&mut self, condition: &task::Condition<N>) -> Condition {
+        let mut comparisons: Vec<Linear> =
+            condition.comparisons.iter().map(|linear| self.linear(linear, &whole(linear))).collect();
+        for linear in &condition.above {
+            let mut strict = self.linear(linear, &whole(linear));
+            // An integer above 0 is at least 1.
+            strict.quantity.constant = &strict.quantity.constant - &Integer::from(1);
+            comparisons.push(strict);
+        }
         Condition {
             facts: condition.facts.iter().copied().map(fact).collect(),
             clauses: condition.clauses.iter().map(|clause| clause.iter().map(literal).collect()).collect(),
-            comparisons: condition.comparisons.iter().map(|linear| self.linear(linear)).collect(),
+            comparisons,
         }
     }
 
-    fn linear(&mut self, linear: &crate::quantity::Linear<Int>) -> Linear {
+    /// A linear expression, multiplied by a factor besides.
+    fn linear(&mut self, linear: &crate::quantity::Linear<N>, factor: &Integer) -> Linear {
+        let factors = linear.coefficients.iter();
+        let scale = &self.scales.numbers * factor;
         Linear {
-            factors: linear.coefficients.iter().map(|(number, factor)| (number.0, *factor)).collect(),
-            quantity: self.quantity(&linear.quantity),
+            factors: factors.map(|(number, own)| (number.0, scaled(own, factor))).collect(),
+            quantity: self.quantity(&linear.quantity, &scale),
         }
     }
 
-    fn quantity(&mut self, quantity: &crate::quantity::Quantity<Int>) -> Quantity {
-        let tables = quantity.tables.iter();
-        Quantity {
-            constant: quantity.constant,
-            tables: tables
-                .map(|table| {
-                    (table.slots.to_vec(), self.tables.position(&table.values, |values| values.to_vec()))
-                })
-                .collect(),
-        }
+    fn quantity(&mut self, quantity: &crate::quantity::Quantity<N>, scale: &Integer) -> Quantity {
+        let tables = quantity.tables.iter().map(|table| {
+            let key = (table.values.clone(), scale.clone());
+            (table.slots.to_vec(), self.tables.position(&key, |(values, scale)| integers(values, scale)))
+        });
+        Quantity { tables: tables.collect(), constant: scaled(&quantity.constant, scale) }
     }
 }

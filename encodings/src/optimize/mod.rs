@@ -37,6 +37,8 @@ const CONFIRM_SIZE: usize = 5_000;
 const STAGES: Int = 8;
 /// Formulas with at most this many operator variables are solved once more without the help of bounds.
 const CONFIRM_LIMIT: usize = 400;
+/// Costs from here on, as products of decimals have them once they are integers, make no formula small.
+const CONFIRM_COST: Int = 1 << 64;
 
 /// How the SAT solver is made to find a cheapest plan.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -244,7 +246,8 @@ impl<'a> Run<'a> {
                 stage = Int::MAX;
                 continue;
             }
-            if extent.size() > if exact { CONFIRM_SIZE } else { FORMULA_LIMIT } {
+            let is_small = extent.size() <= CONFIRM_SIZE && limit < CONFIRM_COST;
+            if exact && !is_small || extent.size() > FORMULA_LIMIT {
                 return self.conclude(&best, horizon, unproved);
             }
             let tightened = self.within(&bounds, &extent, &mut best, exact);
@@ -321,7 +324,7 @@ impl<'a> Run<'a> {
             self.task.operators.iter().map(|operator| operator.cost.minimum()).min().filter(|c| *c > 0)?;
         let limit = incumbent.below();
         let steps = usize::try_from(limit.checked_div(cheapest)?).ok()?;
-        if steps.saturating_mul(self.task.operators.len()) > CONFIRM_LIMIT {
+        if steps.saturating_mul(self.task.operators.len()) > CONFIRM_LIMIT || limit >= CONFIRM_COST {
             return None;
         }
         let started = Instant::now();

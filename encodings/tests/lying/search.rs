@@ -42,7 +42,8 @@ pub fn optimum(text: &str) -> Option<Best> {
     if scale <= 0 {
         return None;
     }
-    let metric = |cost: i64| BigRational::new((cost + offset).into(), scale.into());
+    let sign = if objective["maximize"].as_bool()? { -1 } else { 1 };
+    let metric = |cost: i64| BigRational::new((sign * (cost + offset)).into(), scale.into());
     task.cheapest(metric)
 }
 

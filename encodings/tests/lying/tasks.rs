@@ -171,4 +171,99 @@ pub const TASKS: &[Example] = &[
           (:goal (and (at a) (at b))))",
         optimum: None,
     },
+    // The shop closes at 6: preparing and buying end just then. Ordering takes longer.
+    Example {
+        name: "shop",
+        domain: "(define (domain d) (:predicates (open) (money) (have) (home))
+          (:durative-action prepare :parameters () :duration (= ?duration 4.5) :condition (at start (not (money)))
+            :effect (at end (money)))
+          (:durative-action buy :parameters () :duration (= ?duration 1.5)
+            :condition (and (at start (money)) (at start (open)) (over all (open))) :effect (at end (have)))
+          (:durative-action order :parameters () :duration (= ?duration 9) :condition () :effect (at end (have)))
+          (:durative-action go :parameters () :duration (= ?duration 1) :condition (at start (have))
+            :effect (at end (home))))",
+        problem: "(define (problem p) (:domain d) (:init (at 3 (open)) (at 6 (not (open)))) (:goal (home)))",
+        optimum: Some("7"),
+    },
+    // It has to start between 2 and 5, when nothing happens.
+    Example {
+        name: "between",
+        domain: "(define (domain d) (:predicates (p) (q) (done))
+          (:durative-action long :parameters () :duration (= ?duration 10) :condition (and (at start (p)) (at end (q)))
+            :effect (at end (done)))
+          (:durative-action dear :parameters () :duration (= ?duration 100) :condition () :effect (at end (done))))",
+        problem: "(define (problem p) (:domain d) (:init (p) (at 5 (not (p))) (at 12 (q))) (:goal (done)))",
+        optimum: Some("10"),
+    },
+    // It has to start less than a thousandth after 3, and what comes next before 6.
+    Example {
+        name: "moment",
+        domain: "(define (domain d) (:predicates (p) (q) (r) (done))
+          (:durative-action tight :parameters () :duration (= ?duration 1.999)
+            :condition (and (at start (p)) (at end (q))) :effect (at end (r)))
+          (:durative-action next :parameters () :duration (= ?duration 1)
+            :condition (and (at start (r)) (over all (p))) :effect (at end (done)))
+          (:durative-action dearer :parameters () :duration (= ?duration 50) :condition (at start (r))
+            :effect (at end (done))))",
+        problem: "(define (problem p) (:domain d) (:init (q) (at 3 (p)) (at 5 (not (q))) (at 6 (not (p)))) (:goal (done)))",
+        optimum: Some("2999/1000"),
+    },
+    // What an event sets right on the way counts at the end, and so does what one spoils.
+    Example {
+        name: "on the way",
+        domain: "(define (domain d) (:predicates (lit) (seen) (wet) (done)) (:functions (total-cost))
+          (:durative-action pass :parameters () :duration (= ?duration 4)
+            :condition (and (at start (not (seen))) (at end (lit)))
+            :effect (and (at start (not (lit))) (when (at end (not (wet))) (at end (seen)))
+              (at end (increase (total-cost) 3))))
+          (:action switch :parameters () :precondition (seen)
+            :effect (and (done) (when (wet) (not (done))) (increase (total-cost) 1)))
+          (:action give-up :parameters () :precondition () :effect (and (done) (increase (total-cost) 20))))",
+        problem: "(define (problem p) (:domain d) (:init (lit) (wet) (= (total-cost) 0)
+            (at 2 (lit)) (at 2 (not (wet))) (at 6.5 (wet)) (at 9 (not (lit))))
+          (:goal (done)) (:metric minimize (total-cost)))",
+        optimum: Some("4"),
+    },
+    // An event at time 0, one that interferes with a start, and one that ends all hope.
+    Example {
+        name: "late",
+        domain: "(define (domain d) (:predicates (up) (key) (in) (out))
+          (:durative-action climb :parameters () :duration (= ?duration 2) :condition (at start (up)) :effect (at end (in)))
+          (:action leave :parameters () :precondition (and (in) (key)) :effect (out)))",
+        problem: "(define (problem p) (:domain d) (:init (key) (at 0 (up)) (at 2 (not (key)))) (:goal (out)))",
+        optimum: None,
+    },
+    Example {
+        name: "in time",
+        domain: "(define (domain d) (:predicates (up) (key) (in) (out))
+          (:durative-action climb :parameters () :duration (= ?duration 2) :condition (at start (up)) :effect (at end (in)))
+          (:durative-action wait-for-key :parameters () :duration (= ?duration 30) :condition () :effect (at end (key)))
+          (:action leave :parameters () :precondition (and (in) (key)) :effect (out)))",
+        problem: "(define (problem p) (:domain d) (:init (key) (at 0 (up)) (at 2.001 (not (key)))) (:goal (out)))",
+        optimum: Some("2"),
+    },
+    // What is left is to be as much as possible: the way round takes less of it.
+    Example {
+        name: "left",
+        domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (fuel) (use ?a ?b))
+          (:action go :parameters (?a ?b) :precondition (and (at ?a) (way ?a ?b) (>= (fuel) (use ?a ?b)))
+            :effect (and (at ?b) (not (at ?a)) (decrease (fuel) (use ?a ?b)))))",
+        problem: "(define (problem p) (:domain d) (:objects a b c d)
+          (:init (at a) (way a b) (way b c) (way a c) (way c d) (= (fuel) 20) (= (use a b) 2) (= (use b c) 2.5)
+            (= (use a c) 5) (= (use c d) 3))
+          (:goal (at d)) (:metric maximize (* 2 (fuel))))",
+        optimum: Some("25"),
+    },
+    // Work takes as little as it may; the shorter of two kinds may not take less than the longer of its bounds.
+    Example {
+        name: "as little",
+        domain: "(define (domain d) (:predicates (p ?x) (q)) (:functions (least ?x))
+          (:durative-action work :parameters (?x)
+            :duration (and (>= ?duration (least ?x)) (<= ?duration 9)) :condition (at start (p ?x)) :effect (at end (q)))
+          (:durative-action clear :parameters (?x) :duration (and (>= ?duration 0.5)) :condition ()
+            :effect (at end (p ?x))))",
+        problem: "(define (problem p) (:domain d) (:objects a b c)
+          (:init (p a) (= (least a) 5.25) (= (least b) 10) (= (least c) 2.5)) (:goal (q)))",
+        optimum: Some("3"),
+    },
 ];

@@ -1,20 +1,14 @@
 //! Numbers in two's complement, bit by bit, the lowest bit first.
 
 use crate::certificate::clausal::formula::{Formula, Var};
+use crate::certificate::integer::Integer;
 
 /// The bits of a number.
 pub(super) type Bits = Vec<Var>;
 
 /// How many bits hold all numbers from one to another.
-pub(super) fn width(least: i128, most: i128) -> usize {
-    let needed =
-        |number: i128| 128 - if number < 0 { (!number).leading_zeros() } else { number.leading_zeros() };
-    needed(least).max(needed(most)) as usize + 1
-}
-
-/// A bit of a number.
-pub(super) fn bit(number: i128, position: usize) -> bool {
-    number >> position.min(126) & 1 == 1
+pub(super) fn width(least: &Integer, most: &Integer) -> usize {
+    least.width().max(most.width())
 }
 
 impl Formula {
@@ -24,8 +18,8 @@ impl Formula {
     }
 
     /// The bits of a constant.
-    pub(super) fn constant(&self, number: i128, width: usize) -> Bits {
-        (0..width).map(|position| if bit(number, position) { self.truth() } else { -self.truth() }).collect()
+    pub(super) fn constant(&self, number: &Integer, width: usize) -> Bits {
+        (0..width).map(|position| if number.bit(position) { self.truth() } else { -self.truth() }).collect()
     }
 
     /// The sum of two numbers, where it does not overflow.
@@ -55,7 +49,7 @@ impl Formula {
     }
 
     /// Where a condition holds (all its literals), a number is at least another one.
-    pub(super) fn at_least(&mut self, condition: &[Var], number: &Bits, least: i128) {
+    pub(super) fn at_least(&mut self, condition: &[Var], number: &Bits, least: &Integer) {
         let ordered = ordered(number, least);
         for position in 0..ordered.len() {
             if ordered[position].1 {
@@ -68,7 +62,7 @@ impl Formula {
     }
 
     /// Where a condition holds, a number is at most another one.
-    pub(super) fn at_most(&mut self, condition: &[Var], number: &Bits, most: i128) {
+    pub(super) fn at_most(&mut self, condition: &[Var], number: &Bits, most: &Integer) {
         let ordered = ordered(number, most);
         for position in 0..ordered.len() {
             if !ordered[position].1 {
@@ -82,11 +76,11 @@ impl Formula {
 }
 
 /// Literals of a number and the bits of another one, with the sign turned so that larger numbers come later.
-fn ordered(number: &Bits, other: i128) -> Vec<(Var, bool)> {
+fn ordered(number: &Bits, other: &Integer) -> Vec<(Var, bool)> {
     let last = number.len() - 1;
     let turned = |(position, literal): (usize, &Var)| {
         let is_sign = position == last;
-        (if is_sign { -literal } else { *literal }, bit(other, position) != is_sign)
+        (if is_sign { -literal } else { *literal }, other.bit(position) != is_sign)
     };
     number.iter().enumerate().map(turned).collect()
 }

@@ -10,6 +10,7 @@ use std::io::{BufRead, Read, Write};
 
 use crate::certificate::clausal::lines;
 use crate::certificate::clausal::sums::Sums;
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{Argument, Fact, Literal, Model, Operator};
 
 /// A variable of the formula, or its negation.
@@ -23,25 +24,28 @@ pub(super) struct Formula {
     count: usize,
     names: Vec<String>,
     limit: usize,
+    /// How many bits the longest of its numbers has.
+    widest: usize,
 }
 
 impl Formula {
     /// The formula of a task; an error says what it does not cover.
-    pub(super) fn new(model: &Model, cost: i128, steps: usize, limit: usize) -> Result<Self, String> {
+    pub(super) fn new(model: &Model, cost: &Integer, steps: usize, limit: usize) -> Result<Self, String> {
         if !model.axioms.is_empty() {
             return Err("derived predicates are not covered".into());
         }
         if model.operators.iter().any(|operator| !operator.conditional.is_empty()) {
             return Err("conditional effects are not covered".into());
         }
-        if cost < 1 {
+        if !cost.is_positive() {
             return Err("no plan costs less than nothing".into());
         }
-        let mut formula = Self { literals: Vec::new(), count: 0, names: Vec::new(), limit };
+        let mut formula = Self { literals: Vec::new(), count: 0, names: Vec::new(), limit, widest: 0 };
         let truth = formula.variable(|| "true".to_owned());
         formula.clause(&[truth]);
         let mut timeline = Timeline::new(model, &mut formula);
         let mut sums = Sums::new(model, &mut formula, cost, steps)?;
+        formula.widest = sums.widest();
         for step in 0..steps {
             timeline.advance(model, &mut formula, step);
             sums.advance(model, &mut formula, &timeline, step)?;
@@ -110,6 +114,10 @@ impl Formula {
     pub(super) fn clauses(&self) -> impl Iterator<Item = &[Var]> {
         // The last clause ends with 0, too.
         self.literals.split(|literal| *literal == 0).take(self.count)
+    }
+
+    pub(super) fn widest(&self) -> usize {
+        self.widest
     }
 
     pub(super) fn count(&self) -> usize {

@@ -1,6 +1,5 @@
 //! Lines of numbers, each ended by 0, as DIMACS and DRAT have them; read one at a time.
 
-use crate::number::Int;
 use std::io::{BufRead, Read};
 
 /// A line is not longer than this, in bytes.
@@ -20,9 +19,9 @@ pub(super) fn numbers(line: &[u8], limit: usize, numbers: &mut Vec<i32>) -> Opti
     loop {
         let word = words.next()?;
         let (digits, negative) = word.strip_prefix(b"-").map_or((word, false), |rest| (rest, true));
-        let digit = |number: Int, digit: &u8| {
-            let number = number * 10 + Int::from(digit.is_ascii_digit().then(|| digit - b'0')?);
-            (number <= limit as Int).then_some(number)
+        let digit = |number: i128, digit: &u8| {
+            let number = number * 10 + i128::from(digit.is_ascii_digit().then(|| digit - b'0')?);
+            (number <= limit as i128).then_some(number)
         };
         let number = digits.iter().try_fold(0, digit)? as i32;
         if digits.is_empty() {

@@ -25,6 +25,7 @@ use num_rational::BigRational;
 
 use crate::certificate::argument::Argument;
 use crate::certificate::check::{Fault, parse};
+use crate::certificate::integer::Integer;
 use crate::certificate::model::Model;
 use crate::limits::Limits;
 use crate::sat::{Answer, refute_with_proof};
@@ -32,8 +33,10 @@ use formula::Formula;
 
 /// A formula with more literals than this is not written.
 const LITERAL_LIMIT: usize = 4_000_000;
-/// After learning so many clauses, a solver gives up on a formula.
+/// After learning so many clauses, a solver gives up on a formula…
 const CONFLICT_LIMIT: u64 = 20_000;
+/// … whose numbers have at most so many bits; after fewer in proportion if they have more, as each costs more.
+const NARROW: usize = 32;
 
 /// Where the parts of a refutation go.
 pub struct Outputs<'o> {
@@ -86,16 +89,17 @@ pub fn refute(
 ) -> Result<usize, String> {
     let (model, argument, cost) = parse(task, argument, claim).map_err(|fault| fault.to_string())?;
     let cost = cost.ok_or("that there is no plan is not a matter of a number of steps")?;
-    let steps = steps::bound(&model, &argument, cost, by)?;
-    let formula = Formula::new(&model, cost, steps, LITERAL_LIMIT)?;
+    let steps = steps::bound(&model, &argument, &cost, by)?;
+    let formula = Formula::new(&model, &cost, steps, LITERAL_LIMIT)?;
     let failed = |error: std::io::Error| format!("it cannot be written: {error}");
     formula.write_dimacs(outputs.formula).map_err(failed)?;
     formula.write_legend(outputs.legend).map_err(failed)?;
-    match refute_with_proof(formula.clauses(), outputs.draft, limits, CONFLICT_LIMIT) {
+    let conflicts = CONFLICT_LIMIT * NARROW as u64 / formula.widest().max(NARROW) as u64;
+    match refute_with_proof(formula.clauses(), outputs.draft, limits, conflicts) {
         Answer::Unsatisfiable => {}
         Answer::Satisfiable => return Err("the formula has a model".to_owned()),
         Answer::Interrupted => {
-            return Err(format!("not refuted within the limits ({CONFLICT_LIMIT} conflicts)"));
+            return Err(format!("not refuted within the limits ({conflicts} conflicts)"));
         }
     }
     let mut draft = (outputs.written_draft)().map_err(failed)?;
@@ -116,16 +120,16 @@ pub fn check_refutation(
         let reason = || Fault::Form { document: "the manifest", reason: "a formula without a cost".into() };
         Ok((model, argument, cost.ok_or_else(reason)?))
     });
-    let (model, argument, cost): (Model, Argument, i128) = match prepared {
+    let (model, argument, cost): (Model, Argument, Integer) = match prepared {
         Ok(prepared) => prepared,
         Err(fault) => {
             let failed = || Err(fault.to_string());
             return [("formula", failed()), ("proof", failed()), ("steps", failed())];
         }
     };
-    let steps_checked = steps::check(&model, &argument, cost, steps)
+    let steps_checked = steps::check(&model, &argument, &cost, steps)
         .map(|position| format!("no plan of more than {steps} steps is cheaper, by potential {position}"));
-    let formula = Formula::new(&model, cost, steps, LITERAL_LIMIT);
+    let formula = Formula::new(&model, &cost, steps, LITERAL_LIMIT);
     let (formula_checked, proof_checked) = match formula {
         Ok(formula) => {
             let same = formula.compare(written, legend).map(|()| {

@@ -100,10 +100,11 @@ impl Checker {
             };
             let clause = &self.literals[self.ends[number]..self.ends[number + 1]];
             let mut open = clause.iter().filter(|literal| !self.is_true[index(-**literal)]);
-            match (open.next().copied(), open.next()) {
-                (None, _) => return true,
-                (Some(literal), None) => self.settle(literal),
-                _ => return false,
+            match open.next().copied() {
+                None => return true,
+                // A literal may stand in a clause twice.
+                Some(literal) if open.all(|other| *other == literal) => self.settle(literal),
+                Some(_) => return false,
             }
         }
         false
@@ -146,6 +147,15 @@ mod tests {
             text.extend(&line);
         }
         text
+    }
+
+    /// A clause is a set, however often a literal is written.
+    #[test]
+    fn a_literal_may_stand_in_a_clause_twice() {
+        let clauses = [vec![1, 1], vec![-1, 2, -1, 2], vec![-2, -2]];
+        let (proof, hints) = (text(&[Vec::new()]), text(&[vec![1, 2, 3]]));
+        let borrowed = clauses.iter().map(Vec::as_slice);
+        assert_eq!(check(borrowed, 2, &mut proof.as_slice(), &mut hints.as_slice()), Ok(1));
     }
 
     /// Whatever proofs and hints say, clauses that have a model are not refuted; some of the others are.

@@ -6,16 +6,20 @@
 
 use std::collections::BTreeMap;
 
-use crate::certificate::clausal::binary::{Bits, bit, width};
+use crate::certificate::clausal::binary::{Bits, width};
 use crate::certificate::clausal::formula::{Formula, Timeline, Var};
+use crate::certificate::integer::Integer;
 use crate::certificate::model::{Linear, Model, Operator, Quantity};
-use crate::number::Int;
+use crate::certificate::table::is_alone;
+
+/// Numbers of more bits make no formula.
+const WIDTH_LIMIT: usize = 4_096;
 
 /// The sums after the latest step.
 pub(super) struct Sums {
     spent: Bits,
     /// What may be spent at most.
-    limit: i128,
+    limit: Integer,
     numbers: Vec<Bits>,
 }
 
@@ -31,7 +35,7 @@ fn change(operator: &Operator, number: u32) -> Result<Option<Change<'_>>, String
     match &value.factors[..] {
         _ if changes.next().is_some() => Err("an operator that changes a number twice is not covered".into()),
         [] => Ok(Some(Change::Assign(&value.quantity))),
-        [(own, 1)] if *own == number => Ok(Some(Change::Add(&value.quantity))),
+        _ if is_alone(value, number) => Ok(Some(Change::Add(&value.quantity))),
         _ => Err("a change by other numbers is not covered".into()),
     }
 }
@@ -44,9 +48,9 @@ fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
 
 /// How many bits a number needs for so many steps, and to be compared.
 fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, String> {
-    let initial = model.numbers[number as usize];
-    let (mut least, mut most) = (initial, initial);
-    let (mut falls, mut rises) = (0, 0);
+    let initial = &model.numbers[number as usize];
+    let (mut least, mut most) = (initial.clone(), initial.clone());
+    let (mut falls, mut rises) = (Integer::ZERO, Integer::ZERO);
     for operator in &model.operators {
         match change(operator, number)? {
             Some(Change::Assign(value)) => {
@@ -60,42 +64,46 @@ fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, Strin
             None => {}
         }
     }
-    let large = || "numbers that may become too large are not covered".to_owned();
-    let after = |end: i128, each: i128| end.checked_add(each.checked_mul(steps as i128)?);
-    least = after(least, falls).ok_or_else(large)?;
-    most = after(most, rises).ok_or_else(large)?;
+    let steps = Integer::from(steps as i128);
+    least = &least + &(&falls * &steps);
+    most = &most + &(&rises * &steps);
     let own = comparisons(model).filter(|linear| linear.factors.iter().any(|(own, _)| *own == number));
     let sizes = own.map(|linear| {
         let quantity = &linear.quantity;
-        model.least(quantity).abs().max(model.most(quantity).abs()) + 1
+        &(-&model.least(quantity)).max(model.most(quantity)) + &Integer::from(1)
     });
-    let beside = sizes.max().unwrap_or(0);
-    let ends = least.checked_sub(beside).zip(most.checked_add(beside));
-    ends.map(|(least, most)| width(least, most)).ok_or_else(large)
+    let beside = sizes.max().unwrap_or_default();
+    Ok(width(&(&least - &beside), &(&most + &beside)))
 }
 
 impl Sums {
     pub(super) fn new(
         model: &Model,
         formula: &mut Formula,
-        cost: i128,
+        cost: &Integer,
         steps: usize,
     ) -> Result<Self, String> {
-        let limit = cost.checked_sub(1).ok_or("a cost that is too small is not covered")?;
-        let dearest = model.operators.iter().map(|operator| model.most(&operator.cost)).max().unwrap_or(0);
-        if model.operators.iter().any(|operator| model.least(&operator.cost) < 0) {
+        let limit = cost - &Integer::from(1);
+        let dearest = model.operators.iter().map(|operator| model.most(&operator.cost)).max();
+        if model.operators.iter().any(|operator| model.least(&operator.cost).is_negative()) {
             return Err("operators that cost less than nothing are not covered".into());
         }
-        let spent = formula.constant(
-            0,
-            width(0, limit.checked_add(dearest).ok_or("costs that are too large are not covered")?),
-        );
+        let most = &limit + &dearest.unwrap_or_default();
+        let spent = formula.constant(&Integer::ZERO, width(&Integer::ZERO, &most));
         let mut numbers = Vec::new();
         for (number, initial) in (0..).zip(&model.numbers) {
-            let width = number_width(model, number, steps)?;
-            numbers.push(formula.constant(*initial, width));
+            numbers.push(formula.constant(initial, number_width(model, number, steps)?));
         }
-        Ok(Self { spent, limit, numbers })
+        let sums = Self { spent, limit, numbers };
+        if sums.widest() > WIDTH_LIMIT {
+            return Err(format!("numbers of more than {WIDTH_LIMIT} bits are not covered"));
+        }
+        Ok(sums)
+    }
+
+    /// How many bits the longest number has.
+    pub(super) fn widest(&self) -> usize {
+        self.numbers.iter().chain([&self.spent]).map(Vec::len).max().unwrap_or(0)
     }
 
     pub(super) fn advance(
@@ -108,22 +116,23 @@ impl Sums {
         let mut adder = Adder { model, timeline, step: step + 1 };
         let costs: Vec<_> = model.operators.iter().map(|operator| Some(&operator.cost)).collect();
         self.spent = adder.sum(formula, &self.spent, &costs, "what is spent");
-        formula.at_most(&[], &self.spent, self.limit);
+        formula.at_most(&[], &self.spent, &self.limit);
         let before = self.numbers.clone();
         for (number, bits) in (0..).zip(&mut self.numbers) {
             *bits = adder.change(formula, bits, number)?;
         }
         for (operator, own) in model.operators.iter().zip(&timeline.operators) {
             for linear in &operator.condition.comparisons {
-                let [(number, factor)] = linear.factors[..] else {
+                let [(number, factor)] = &linear.factors[..] else {
                     return Err("a comparison of several numbers, or of none, is not covered".into());
                 };
-                if operator.changes.contains(&(number, linear.clone())) {
-                    let after = &self.numbers[number as usize];
+                if operator.changes.iter().any(|(own, value)| own == number && value == linear) {
+                    let after = &self.numbers[*number as usize];
                     formula.clause(&[-own, -after[after.len() - 1]]);
                 } else if linear.quantity.tables.is_empty() {
-                    compare(formula, &[*own], &before[number as usize], factor, linear.quantity.constant);
-                } else if factor != 1 {
+                    let own = (&[*own][..], &before[*number as usize]);
+                    compare(formula, own, factor, &linear.quantity.constant);
+                } else if !is_alone(linear, *number) {
                     return Err("a comparison of a multiple with designs is not covered".into());
                 }
             }
@@ -134,9 +143,10 @@ impl Sums {
 
     pub(super) fn goal(&self, model: &Model, formula: &mut Formula) -> Result<(), String> {
         for linear in &model.goal.comparisons {
-            match linear.factors[..] {
+            match &linear.factors[..] {
                 [(number, factor)] if linear.quantity.tables.is_empty() => {
-                    compare(formula, &[], &self.numbers[number as usize], factor, linear.quantity.constant);
+                    let own = (&[][..], &self.numbers[*number as usize]);
+                    compare(formula, own, factor, &linear.quantity.constant);
                 }
                 _ => return Err("a goal about several numbers is not covered".into()),
             }
@@ -146,13 +156,18 @@ impl Sums {
 }
 
 /// Where a condition holds, a multiple of a number plus a constant is at least 0.
-fn compare(formula: &mut Formula, condition: &[Var], number: &Bits, factor: Int, constant: Int) {
-    let (factor, constant) = (factor, constant);
-    match factor {
-        0 if constant >= 0 => {}
-        0 => formula.clause(&condition.iter().map(|literal| -literal).collect::<Vec<_>>()),
-        1.. => formula.at_least(condition, number, -constant.div_euclid(factor)),
-        _ => formula.at_most(condition, number, constant.div_euclid(-factor)),
+fn compare(
+    formula: &mut Formula,
+    (condition, number): (&[Var], &Bits),
+    factor: &Integer,
+    constant: &Integer,
+) {
+    if factor.is_positive() {
+        formula.at_least(condition, number, &-&constant.div_floor(factor));
+    } else if factor.is_negative() {
+        formula.at_most(condition, number, &constant.div_floor(&-factor));
+    } else if constant.is_negative() {
+        formula.clause(&condition.iter().map(|literal| -literal).collect::<Vec<_>>());
     }
 }
 
@@ -200,9 +215,9 @@ impl Adder<'_> {
     fn tests(&mut self, formula: &mut Formula, before: &[Bits]) {
         let asked = |operator: &Operator, number: u32| -> Vec<Linear> {
             let own = operator.condition.comparisons.iter().filter(|linear| {
-                linear.factors == [(number, 1)]
+                is_alone(linear, number)
                     && !linear.quantity.tables.is_empty()
-                    && !operator.changes.contains(&(number, (*linear).clone()))
+                    && !operator.changes.iter().any(|(own, value)| *own == number && value == *linear)
             });
             own.cloned().collect()
         };
@@ -225,14 +240,14 @@ impl Adder<'_> {
     /// A number plus what each operator adds to it.
     fn sum(&mut self, formula: &mut Formula, base: &Bits, parts: &[Option<&Quantity>], name: &str) -> Bits {
         let step = self.step;
-        let constants = parts.iter().map(|part| part.map_or(0, |quantity| quantity.constant));
-        let mut kinds: BTreeMap<i128, Vec<Var>> = BTreeMap::new();
+        let constants = parts.iter().map(|part| part.map_or(&Integer::ZERO, |quantity| &quantity.constant));
+        let mut kinds: BTreeMap<&Integer, Vec<Var>> = BTreeMap::new();
         for (own, constant) in self.timeline.operators.iter().zip(constants) {
             kinds.entry(constant).or_default().push(*own);
         }
         let mut sum = base.clone();
-        if kinds.keys().any(|constant| *constant != 0) {
-            kinds.entry(0).or_default().push(self.timeline.idle);
+        if kinds.keys().any(|constant| !constant.is_zero()) {
+            kinds.entry(&Integer::ZERO).or_default().push(self.timeline.idle);
             let added = formula.bits(base.len(), &format!("the constant added to {name} at step {step}"));
             for (constant, operators) in kinds {
                 let kind = formula.variable(|| format!("{constant} is added to {name} at step {step}"));
@@ -240,7 +255,7 @@ impl Adder<'_> {
                     formula.clause(&[-own, kind]);
                 }
                 for (position, own) in added.iter().enumerate() {
-                    formula.clause(&[-kind, if bit(constant, position) { *own } else { -own }]);
+                    formula.clause(&[-kind, if constant.bit(position) { *own } else { -own }]);
                 }
             }
             sum = formula.add(&sum, &added, &format!("{name} with the constant of step {step}"));
@@ -293,7 +308,7 @@ impl Adder<'_> {
                     rest /= size;
                 }
                 for (position, own) in added.iter().enumerate() {
-                    let literal = if bit(*value, position) { *own } else { -own };
+                    let literal = if value.bit(position) { *own } else { -own };
                     formula.clause(&[&condition[..], &[literal]].concat());
                 }
             }

@@ -4,17 +4,19 @@
 use std::collections::BTreeSet;
 
 use num_rational::BigRational;
-use num_traits::Zero;
+use num_traits::{One, Zero};
 use rustc_hash::FxHashMap;
 
 use crate::certificate::faithful::effects::{self, Made};
 use crate::certificate::faithful::formula::{Formula, Known};
+use crate::certificate::faithful::lengths::Length;
 use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::meaning::Case;
 use crate::certificate::faithful::reader::{Reader, TOTAL_TIME};
-use crate::certificate::faithful::translation::{Translation, integer};
+use crate::certificate::faithful::timeline::{self, stands_for};
+use crate::certificate::faithful::translation::Translation;
 use crate::certificate::faithful::verdict::{Cause, Difference, Obstacle};
-use crate::certificate::faithful::world::Key;
+use crate::certificate::faithful::world::{Key, PHASE};
 use crate::certificate::model::{Argument, Operator};
 use pddl::ast::{Action, Direction};
 
@@ -30,11 +32,15 @@ pub(super) struct Comparison<'c> {
     pub(super) task: &'c Translation<'c>,
     objects: FxHashMap<String, u32>,
     operators: Calls,
+    /// Those that wait for the next event.
+    waits: Vec<usize>,
     /// Which arguments of an action are slots.
     masks: FxHashMap<String, BTreeSet<Vec<bool>>>,
-    /// None if plans are measured by time or length.
+    /// What is to be as little as possible; none if plans are measured by time or length.
     metric: Option<Linear>,
     timed: bool,
+    /// Times of events and durations are multiples of this.
+    unit: BigRational,
 }
 
 /// An instance as messages name it, and what it adds to the metric.
@@ -44,8 +50,8 @@ struct Instance<'i> {
 }
 
 impl<'c> Comparison<'c> {
-    /// `timed` says what plans are measured by where there is no metric.
-    pub(super) fn new(task: &'c Translation<'c>, timed: bool) -> Result<Self> {
+    /// `timed` says what plans are measured by where there is no metric; times of events and durations are multiples of `unit`.
+    pub(super) fn new(task: &'c Translation<'c>, timed: bool, unit: BigRational) -> Result<Self> {
         let model = task.model;
         let folded = |name: &String| name.to_ascii_lowercase();
         let mut objects = FxHashMap::default();
@@ -55,10 +61,12 @@ impl<'c> Comparison<'c> {
             }
         }
         let mut operators: Calls = FxHashMap::default();
+        let mut waits = Vec::new();
         let mut masks: FxHashMap<_, BTreeSet<Vec<bool>>> = FxHashMap::default();
         for (position, operator) in model.operators.iter().enumerate() {
             if operator.wait.is_some() {
-                return Err(Cause::unsupported("operators that wait").into());
+                waits.push(position);
+                continue;
             }
             let Some(schema) = model.schemas.get(operator.schema as usize).map(folded) else {
                 return Err(Difference::Form { reason: "an operator of no action".into() }.into());
@@ -72,22 +80,21 @@ impl<'c> Comparison<'c> {
             masks.entry(schema.clone()).or_default().insert(mask);
             operators.entry((schema, arguments)).or_default().push(position);
         }
-        if model.objective.maximize {
-            return Err(Cause::unsupported("metrics to be maximized").into());
-        }
         let metric = match &task.world.problem.metric {
-            Some(metric) if metric.direction == Direction::Maximize => {
-                return Err(Cause::unsupported("metrics to be maximized").into());
-            }
             Some(metric) => {
                 let mut reader = Reader::new(task.world, task.invariant, task.axioms);
                 reader.is_metric = true;
                 let value = reader.expression(&metric.expression)?;
-                Some(value.ok_or_else(|| Cause::unsupported("a metric without a value"))?)
+                let value = value.ok_or_else(|| Cause::unsupported("a metric without a value"))?;
+                Some(if metric.direction == Direction::Maximize { value.negated() } else { value })
             }
             None => None,
         };
-        Ok(Self { task, objects, operators, masks, metric, timed })
+        let direction = task.world.problem.metric.as_ref().map(|metric| metric.direction);
+        if model.objective.maximize != (direction == Some(Direction::Maximize)) {
+            return Err(Difference::Initial { what: "the metric".into() }.into());
+        }
+        Ok(Self { task, objects, operators, waits, masks, metric, timed, unit })
     }
 
     fn initial_value(&self, key: &Key) -> Result<BigRational> {
@@ -121,7 +128,7 @@ impl<'c> Comparison<'c> {
             }
         }
         for (key, number) in names.fluents.iter().zip(&model.numbers) {
-            if integer(*number) != self.initial_value(key)? * integer(model.number_scale) {
+            if number.to_rational() != self.initial_value(key)? * model.number_scale.to_rational() {
                 return Err(Difference::Initial { what: self.task.world.show(key) }.into());
             }
         }
@@ -132,7 +139,7 @@ impl<'c> Comparison<'c> {
                 offset += factor * self.initial_value(key)?;
             }
         }
-        if integer(model.objective.offset) != offset * integer(model.objective.scale) {
+        if model.objective.offset.to_rational() != offset * model.objective.scale.to_rational() {
             return Err(Difference::Initial { what: "the metric".into() }.into());
         }
         Ok(())
@@ -143,7 +150,11 @@ impl<'c> Comparison<'c> {
         let mut reader = Reader::new(self.task.world, self.task.invariant, self.task.axioms);
         let goal = reader.formula(&self.task.world.problem.goal, true)?;
         let wanted = self.task.condition(&self.task.model.goal, &[], &[]);
-        for known in Known::default().assume(&self.task.names.structure, &goal)? {
+        // No plan ends with a wait.
+        let rest = Formula::Atom(timeline::waited(), false);
+        for known in
+            Known::default().assume(&self.task.names.structure, &Formula::junction([goal, rest], true))?
+        {
             if !self.follows(known, &wanted, &|_| true) {
                 return Err(Difference::Goal.into());
             }
@@ -205,13 +216,36 @@ impl<'c> Comparison<'c> {
             format!("({})", words.join(" "))
         };
         let instance = Instance { cost: self.cost(case)?, name: &name };
-        let structure = &self.task.names.structure;
         if instance.cost >= BigRational::zero()
             && effects::compare(self.task, case, &case.known, None).is_ok()
         {
             return Ok(false);
         }
-        let candidates = self.candidates(action, arguments);
+        self.find(&self.candidates(action, arguments), case, &instance).map(|()| true)
+    }
+
+    /// Looks for the wait that leads to an event.
+    pub(super) fn wait(&self, case: &Case) -> Result<()> {
+        let name = || {
+            let phases = case.truths.iter().filter(|(key, holds)| key.0 == PHASE && **holds);
+            let phases: Vec<String> = phases.map(|(key, _)| self.task.world.show(key)).collect();
+            format!("the wait until {}", phases.join(", "))
+        };
+        let instance = Instance { cost: BigRational::zero(), name: &name };
+        if effects::compare(self.task, case, &case.known, None).is_ok() {
+            return Ok(());
+        }
+        let operators = self.waits.iter().map(|position| &self.task.model.operators[*position]);
+        let waits: Vec<(&Operator, Vec<u32>)> = operators
+            .filter(|operator| self.task.model.uses[operator.uses as usize].is_empty())
+            .map(|operator| (operator, Vec::new()))
+            .collect();
+        self.find(&waits, case, &instance)
+    }
+
+    /// Looks among operators for those that do what a case does, wherever it can be executed.
+    fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
+        let structure = &self.task.names.structure;
         let conditions: Vec<Formula> = candidates
             .iter()
             .map(|(operator, choice)| {
@@ -220,12 +254,12 @@ impl<'c> Comparison<'c> {
             .collect();
         let mut open = vec![case.known.clone()];
         for _ in 0..SPLIT_LIMIT {
-            let Some(known) = open.pop() else { return Ok(true) };
+            let Some(known) = open.pop() else { return Ok(()) };
             let mut reason = Difference::NoOperatorFor { instance: String::new() };
             let mut done = false;
             for ((operator, choice), condition) in candidates.iter().zip(&conditions) {
                 let found = match known.decide(structure, condition) {
-                    Some(true) => self.simulates((operator, choice), case, &known, &instance),
+                    Some(true) => self.simulates((operator, choice), case, &known, instance),
                     _ => Err(Difference::WrongCondition { instance: String::new() }),
                 };
                 match found {
@@ -243,13 +277,13 @@ impl<'c> Comparison<'c> {
                 continue;
             }
             let leaf = conditions.iter().find_map(|condition| known.open(structure, condition, &|_| true));
-            let Some(leaf) = leaf else { return Err(named(reason, &name()).into()) };
+            let Some(leaf) = leaf else { return Err(named(reason, &(instance.name)()).into()) };
             open.extend(known.split(structure, std::iter::once(leaf))?);
         }
         if open.is_empty() {
-            return Ok(true);
+            return Ok(());
         }
-        Err(Cause::TooMany { what: format!("cases of {}", name()), limit: SPLIT_LIMIT }.into())
+        Err(Cause::TooMany { what: format!("cases of {}", (instance.name)()), limit: SPLIT_LIMIT }.into())
     }
 
     fn simulates(
@@ -262,25 +296,50 @@ impl<'c> Comparison<'c> {
         let made = Made { operator, choice };
         effects::compare(self.task, case, known, Some(made))
             .map_err(|what| Difference::WrongEffect { instance: (instance.name)(), what })?;
+        if !self.keeps_time((operator, choice), case) {
+            let what = self.task.world.show(&timeline::clock());
+            return Err(Difference::WrongEffect { instance: (instance.name)(), what });
+        }
         let model = self.task.model;
         let own = model.quantity(&operator.cost, choice, &model.sizes(operator));
-        if integer(own) > &instance.cost * integer(model.objective.scale) {
+        if own.to_rational() > &instance.cost * model.objective.scale.to_rational() {
             let cost = instance.cost.to_string();
             return Err(Difference::WrongCost { instance: (instance.name)(), cost });
         }
         Ok(())
     }
 
-    /// What a case adds to the metric.
+    /// Whether the clock stands for the time at the end of a case if it stands for the time at its start.
+    fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
+        let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
+        // Time does not go back, so that the clock may stand still.
+        let Some((_, value)) = operator.changes.iter().find(|(own, _)| own == number) else { return true };
+        let value = self.task.value(value, choice, &self.task.model.sizes(operator));
+        let passed = value.clone().minus(&Linear::fluent(timeline::clock()));
+        match (passed.value(), value.value()) {
+            (Some(passed), _) => {
+                let length = case.length.as_ref().and_then(Length::fixed);
+                *passed == length.cloned().unwrap_or_default()
+            }
+            (None, Some(set)) => stands_for(set, &case.passage.end, &self.unit),
+            (None, None) => false,
+        }
+    }
+
+    /// The least that a case adds to the metric.
     fn cost(&self, case: &Case) -> Result<BigRational> {
-        let duration = case.duration.clone().unwrap_or_else(BigRational::zero);
+        let one = BigRational::one();
+        let time = |factor: &BigRational| match &case.length {
+            Some(length) => length.least_times(factor),
+            None => Ok(BigRational::zero()),
+        };
         let Some(metric) = &self.metric else {
-            return Ok(if self.timed { duration } else { integer(1) });
+            return Ok(if self.timed { time(&one)? } else { one });
         };
         let mut sum = Linear::constant(BigRational::zero());
         for (key, factor) in &metric.factors {
             if *key == TOTAL_TIME {
-                sum.constant += &duration * factor;
+                sum.constant += time(factor)?;
             } else if let Some(after) = case.changes.get(key) {
                 let growth = after.clone().minus(&Linear::fluent(key.clone()));
                 sum = sum.plus(&growth, factor);

@@ -16,7 +16,7 @@ use crate::certificate::faithful::formula::{Formula, Known, Structure};
 use crate::certificate::faithful::linear::{Interval, Linear};
 use crate::certificate::faithful::meaning::Case;
 use crate::certificate::faithful::verdict::{Cause, Difference};
-use crate::certificate::faithful::world::{Key, World};
+use crate::certificate::faithful::world::{CLOCK, Key, World};
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 
@@ -46,7 +46,8 @@ impl Invariant {
     /// What holds at first.
     pub(super) fn initial(world: &World<'_>) -> Self {
         let atoms = world.initial_atoms().filter(|key| world.changes(key.0)).collect();
-        let values = world.initial_values();
+        // Nothing is known of the clock.
+        let values = world.initial_values().filter(|(key, _)| key.0 != CLOCK);
         let numbers = values.map(|(key, value)| (key.clone(), Interval::point(value))).collect();
         Self { atoms, numbers }
     }

@@ -1,21 +1,25 @@
 //! What an instance of an action requires and does, case by case, in terms of the state before it. A durative action is one step:
 //! its start effects take place before the conditions of its middle and end are looked at, and before its end effects. One without
-//! duration is one happening.
+//! duration is one happening. Where there are events, there are cases for each passage.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use num_rational::BigRational;
-use num_traits::{Signed, Zero};
+use num_traits::Zero;
 
 use crate::certificate::faithful::formula::{Formula, Known, Structure};
 use crate::certificate::faithful::happening;
+use crate::certificate::faithful::lengths::Length;
 use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::reader::{Applied, Reader};
+use crate::certificate::faithful::reads::Reads;
+use crate::certificate::faithful::timeline::{self, Event, Passage, Timeline};
 use crate::certificate::faithful::verdict::Cause;
 use crate::certificate::faithful::world::Key;
 use pddl::ast::{
-    Action, ActionBody, Assignment, Comparison, Condition, ConditionTime, DurationConstraint, Effect,
-    EffectTime,
+    Action, ActionBody, Assignment, Condition, ConditionTime, DurationConstraint, Effect, EffectTime,
+    Expression,
 };
 
 /// One way in which the conditions of an instance can turn out. Cases may overlap; together they are all.
@@ -29,7 +33,32 @@ pub(super) struct Case {
     pub(super) effects: Vec<(Formula, Key, bool)>,
     /// Fluents that have these values afterwards.
     pub(super) changes: BTreeMap<Key, Linear>,
-    pub(super) duration: Option<BigRational>,
+    /// None for an instantaneous action, and for a wait.
+    pub(super) length: Option<Length>,
+    pub(super) passage: Passage,
+}
+
+/// What happens when nothing is done until the next event, for each event.
+pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Case>, Cause> {
+    let mut all = Vec::new();
+    for (before, event) in timeline.events.iter().enumerate().skip(timeline.begun) {
+        let passage = Passage::wait(before + 1, &event.time);
+        let mut truths = event.truths.clone();
+        truths.extend(passage.truths(timeline));
+        truths.extend([(timeline::phase(before), false), (timeline::waited(), true)]);
+        for known in Known::default().assume(structure, &Formula::Atom(timeline::phase(before), true))? {
+            let (truths, passage) = (truths.clone(), passage.clone());
+            all.push(Case {
+                known,
+                truths,
+                effects: Vec::new(),
+                changes: Changes::new(),
+                length: None,
+                passage,
+            });
+        }
+    }
+    Ok(all)
 }
 
 /// What fluents become.
@@ -49,7 +78,6 @@ pub(super) fn cases<'r>(
     structure: &Structure,
     action: &'r Action,
 ) -> Result<Vec<Case>, Cause> {
-    let known = Known::default();
     match &action.body {
         ActionBody::Instantaneous { precondition, effect } => {
             let condition = reader.formula(precondition, true)?;
@@ -58,25 +86,41 @@ pub(super) fn cases<'r>(
                 return Ok(all);
             }
             let moment = reader.moment([effect])?;
-            for known in known.assume(structure, &condition)? {
-                all.extend(moment.last(structure, known, &Applied::default(), None)?);
+            let timeline = &reader.world.timeline;
+            for passage in timeline.passages(&BigRational::zero()) {
+                let event = passage.at_start(timeline);
+                let reads = || reader.reads(vec![precondition], vec![effect], Vec::new());
+                if event.is_some_and(|event| reads().event(event)) {
+                    continue;
+                }
+                let own = all_of(&condition, [passage.condition(timeline), moment.leaves(event)]);
+                let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
+                for known in Known::default().assume(structure, &own)? {
+                    all.extend(moment.last(structure, known, &applied, (&passage, None))?);
+                }
             }
             Ok(all)
         }
         ActionBody::Durative { duration, conditions, effects } => {
-            let Some(length) = reader.length(duration)? else { return Ok(Vec::new()) };
-            if length.is_negative() {
-                return Ok(Vec::new());
-            }
-            let at_once = length.is_zero();
-            reader.duration = Some(length);
-            let durative = Durative { conditions, effects };
+            let Some(length) = reader.lengths(duration)? else { return Ok(Vec::new()) };
+            let at_once = length.least.is_zero();
+            reader.length = Some(length);
+            let durative = Durative { duration, conditions, effects };
             if at_once { durative.at_once(reader, structure) } else { durative.cases(reader, structure) }
         }
     }
 }
 
+/// A condition, and others, most of which say nothing.
+fn all_of(condition: &Formula, others: [Formula; 2]) -> Cow<'_, Formula> {
+    if others.iter().all(|other| other.is(true)) {
+        return Cow::Borrowed(condition);
+    }
+    Cow::Owned(Formula::junction(std::iter::once(condition.clone()).chain(others), true))
+}
+
 struct Durative<'r> {
+    duration: &'r [DurationConstraint],
     conditions: &'r [(ConditionTime, Condition)],
     effects: &'r [(EffectTime, Effect)],
 }
@@ -92,6 +136,21 @@ impl<'r> Durative<'r> {
         self.effects.iter().filter(move |(time, _)| *time == wanted).map(|(_, effect)| effect)
     }
 
+    /// What the start or the end reads.
+    fn reads(&self, reader: &Reader<'r>, wanted: EffectTime) -> Reads<'r> {
+        let time = match wanted {
+            EffectTime::AtStart => ConditionTime::AtStart,
+            EffectTime::AtEnd => ConditionTime::AtEnd,
+        };
+        let conditions = self.conditions.iter().filter(|(own, _)| *own == time);
+        let durations = self.duration.iter().filter(|constraint| constraint.time == wanted);
+        reader.reads(
+            conditions.map(|(_, condition)| condition).collect(),
+            self.effects(wanted).collect(),
+            durations.map(|constraint| &constraint.expression).collect(),
+        )
+    }
+
     /// Without duration, start and end are one happening, and nothing lies between them.
     fn at_once(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
         let mut ends = Vec::new();
@@ -105,17 +164,25 @@ impl<'r> Durative<'r> {
             ends.push((condition, reader.moment(self.effects(effect))?));
         }
         let [(condition, start), (at_end, end)] = &ends[..] else { return Ok(Vec::new()) };
-        if happening::interfere((condition, start), (at_end, end)) {
-            return Ok(Vec::new());
-        }
-        let condition = Formula::junction([condition.clone(), at_end.clone()], true);
+        let reads = [EffectTime::AtStart, EffectTime::AtEnd].map(|half| self.reads(&reader, half));
+        let apart = happening::apart((&reads[0], start), (&reads[1], end));
         let both = Moment {
             atoms: [&start.atoms[..], &end.atoms[..]].concat(),
             numbers: [&start.numbers[..], &end.numbers[..]].concat(),
         };
         let mut all = Vec::new();
-        for known in Known::default().assume(structure, &condition)? {
-            all.extend(both.last(structure, known, &Applied::default(), reader.duration.as_ref())?);
+        let timeline = &reader.world.timeline;
+        for passage in timeline.passages(&BigRational::zero()) {
+            let event = passage.at_start(timeline);
+            if event.is_some_and(|event| reads.iter().any(|half| half.event(event))) {
+                continue;
+            }
+            let own = [condition, at_end, &apart, &passage.condition(timeline), &both.leaves(event)];
+            let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
+            let own = Formula::junction(own.into_iter().cloned(), true);
+            for known in Known::default().assume(structure, &own)? {
+                all.extend(both.last(structure, known, &applied, (&passage, reader.length.as_ref()))?);
+            }
         }
         Ok(all)
     }
@@ -127,42 +194,75 @@ impl<'r> Durative<'r> {
             return Ok(all);
         }
         let start = reader.moment(self.effects(EffectTime::AtStart))?;
-        for known in Known::default().assume(structure, &condition)? {
-            let guards = start.atoms.iter().map(|(guard, ..)| guard);
-            let guards = guards.chain(start.numbers.iter().map(|(guard, ..)| guard));
-            for known in known.split(structure, guards)? {
-                let truths = start.truths(structure, &known);
-                for (known, changes) in start.numbers(structure, &known, &Applied::default())? {
-                    reader.applied = Applied { truths: truths.clone(), changes };
-                    let later =
-                        self.condition(&mut reader, &[ConditionTime::OverAll, ConditionTime::AtEnd])?;
-                    if later.is(false) {
-                        continue;
-                    }
-                    let end = reader.moment(self.effects(EffectTime::AtEnd))?;
-                    for known in known.assume(structure, &later)? {
-                        all.extend(end.last(structure, known, &reader.applied, reader.duration.as_ref())?);
-                    }
-                }
-                reader.applied = Applied::default();
+        let timeline = &reader.world.timeline;
+        let least = reader.length.as_ref().map(|length| length.least.clone()).unwrap_or_default();
+        for passage in timeline.passages(&least) {
+            let event = passage.at_start(timeline);
+            if event.is_some_and(|event| self.reads(&reader, EffectTime::AtStart).event(event)) {
+                continue;
             }
+            let own = all_of(&condition, [passage.condition(timeline), start.leaves(event)]);
+            for known in Known::default().assume(structure, &own)? {
+                let guards = start.atoms.iter().map(|(guard, ..)| guard);
+                let guards = guards.chain(start.numbers.iter().map(|(guard, ..)| guard));
+                for known in known.split(structure, guards)? {
+                    let truths = start.truths(structure, &known);
+                    for (known, changes) in start.numbers(structure, &known, &Applied::default())? {
+                        reader.applied = Applied { truths: truths.clone(), changes };
+                        all.extend(self.after_start(&mut reader, structure, &known, &passage)?);
+                    }
+                    reader.applied = Applied::default();
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    /// The cases once the start has taken place: the events in between, what holds over all, and the end.
+    fn after_start(
+        &self,
+        reader: &mut Reader<'r>,
+        structure: &Structure,
+        known: &Known,
+        passage: &Passage,
+    ) -> Result<Vec<Case>, Cause> {
+        let timeline = &reader.world.timeline;
+        let event = passage.at_end(timeline);
+        if event.is_some_and(|event| self.reads(reader, EffectTime::AtEnd).event(event)) {
+            return Ok(Vec::new());
+        }
+        let mut later = vec![self.condition(reader, &[ConditionTime::OverAll])?];
+        for event in passage.between(timeline) {
+            reader.applied.truths.extend(event.truths.clone());
+            later.push(self.condition(reader, &[ConditionTime::OverAll])?);
+        }
+        later.push(self.condition(reader, &[ConditionTime::AtEnd])?);
+        let mut all = Vec::new();
+        if later.iter().any(|condition| condition.is(false)) {
+            return Ok(all);
+        }
+        let end = reader.moment(self.effects(EffectTime::AtEnd))?;
+        later.push(end.leaves(event));
+        let mut applied = reader.applied.clone();
+        applied.truths.extend(event.into_iter().flat_map(|event| event.truths.clone()));
+        applied.truths.extend(passage.truths(timeline));
+        for known in known.assume(structure, &Formula::junction(later, true))? {
+            all.extend(end.last(structure, known, &applied, (passage, reader.length.as_ref()))?);
         }
         Ok(all)
     }
 }
 
 impl<'r> Reader<'r> {
-    /// The duration; none if it has no value.
-    fn length(&mut self, duration: &'r [DurationConstraint]) -> Result<Option<BigRational>, Cause> {
-        let [constraint] = duration else { return Err(Cause::unsupported("durations that are chosen")) };
-        if constraint.operator != Comparison::Equal {
-            return Err(Cause::unsupported("durations that are chosen"));
-        }
-        let Some(length) = self.expression(&constraint.expression)? else { return Ok(None) };
-        match length.value() {
-            Some(length) => Ok(Some(length.clone())),
-            None => Err(Cause::unsupported("durations that depend on the state")),
-        }
+    /// What a happening with these conditions and effects reads.
+    fn reads(
+        &self,
+        conditions: Vec<&'r Condition>,
+        effects: Vec<&'r Effect>,
+        durations: Vec<&'r Expression>,
+    ) -> Reads<'r> {
+        let (world, axioms, binding) = (self.world, self.axioms, self.binding.clone());
+        Reads { world, axioms, binding, conditions, effects, durations }
     }
 
     fn moment(&mut self, effects: impl IntoIterator<Item = &'r Effect>) -> Result<Moment, Cause> {
@@ -202,6 +302,13 @@ impl<'r> Reader<'r> {
 }
 
 impl Moment {
+    /// That no effect sets an atom to another value than an event of the same time.
+    fn leaves(&self, event: Option<&Event>) -> Formula {
+        let Some(event) = event else { return Formula::truth(true) };
+        let opposite = self.atoms.iter().filter(|(_, key, holds)| event.truths.get(key) == Some(&!holds));
+        Formula::junction(opposite.map(|(guard, ..)| guard.negated()), true)
+    }
+
     /// What becomes of atoms where all conditions are decided.
     fn truths(&self, structure: &Structure, known: &Known) -> BTreeMap<Key, bool> {
         let active = |guard: &Formula| known.decide(structure, guard) == Some(true);
@@ -221,7 +328,7 @@ impl Moment {
         structure: &Structure,
         known: Known,
         applied: &Applied,
-        duration: Option<&BigRational>,
+        (passage, length): (&Passage, Option<&Length>),
     ) -> Result<Vec<Case>, Cause> {
         let mut all = Vec::new();
         for known in known.split(structure, self.numbers.iter().map(|(guard, ..)| guard))? {
@@ -229,7 +336,8 @@ impl Moment {
                 let mut changes = applied.changes.clone();
                 changes.extend(own);
                 let (truths, effects) = (applied.truths.clone(), self.atoms.clone());
-                all.push(Case { known, truths, effects, changes, duration: duration.cloned() });
+                let (passage, length) = (passage.clone(), length.cloned());
+                all.push(Case { known, truths, effects, changes, length, passage });
             }
         }
         Ok(all)

@@ -14,8 +14,8 @@
 //! that no instance leaves it is checked together with the rest.
 //!
 //! Covered are conditions of all kinds; conditional and universal effects; linear numbers; derived predicates, also recursive ones
-//! that are variables of the task with the same rules; actions with and without a fixed duration, one after another; metrics to be
-//! minimized. Of everything else this says that it is not covered. Shared with grounding is the syntax tree and nothing else.
+//! that are variables of the task with the same rules; actions with and without duration, one after another; timed initial
+//! literals (`timeline`); metrics of both directions. Of everything else this says that it is not covered. Shared with grounding is the syntax tree and nothing else.
 //!
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
 
@@ -26,13 +26,19 @@ mod formula;
 mod happening;
 mod instances;
 mod invariant;
+mod lengths;
 mod linear;
 mod meaning;
 mod reader;
+mod reads;
+mod timeline;
 mod translation;
 mod verdict;
 mod world;
 
+use std::collections::BTreeSet;
+
+use num_rational::BigRational;
 use num_traits::Zero;
 
 use crate::certificate::model::Model;
@@ -92,11 +98,11 @@ fn verdict(obstacle: Obstacle) -> Faithful {
 
 fn read(task: &str) -> Result<Model> {
     let form = |reason: String| Obstacle::Differs(Difference::Form { reason });
-    let mut model: Model = serde_json::from_str(task).map_err(|error| form(error.to_string()))?;
+    let model: Model = serde_json::from_str(task).map_err(|error| form(error.to_string()))?;
     if model.format != TASK_FORMAT {
         return Err(form(format!("format `{}`, where `{TASK_FORMAT}` is expected", model.format)));
     }
-    shape::task(&mut model).map_err(form)?;
+    shape::task(&model).map_err(form)?;
     Ok(model)
 }
 
@@ -154,7 +160,9 @@ impl<'f> Files<'f> {
 
     fn witness(&self) -> Result<String> {
         let mut widening = Widening::new(&self.world);
-        let plain: Vec<bool> = self.domain.actions.iter().map(is_plain).collect();
+        let untimed = self.world.timeline.is_empty();
+        let plain: Vec<bool> = self.domain.actions.iter().map(|action| untimed && is_plain(action)).collect();
+        let waits = meaning::waits(&self.world.timeline, &self.names.structure)?;
         // An instance that always does the same need not be looked at again.
         let mut open: Vec<&Instance> = self.instances.iter().collect();
         for _ in 0..ROUND_LIMIT {
@@ -162,6 +170,9 @@ impl<'f> Files<'f> {
             // What is known of derived atoms is about the invariant as it is now.
             let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
             let (mut news, mut next) = (false, Vec::new());
+            for case in &waits {
+                news |= widening.include(&self.names.structure, case);
+            }
             for instance in open {
                 let invariant = frozen.as_ref().unwrap_or(&widening.invariant);
                 let cases = self.cases(instance, invariant, &axioms)?;
@@ -185,10 +196,15 @@ impl<'f> Files<'f> {
         let axioms = Axioms::new(&self.world, &invariant, &self.names.linked)?;
         let task = Translation::new(&self.world, self.model, &self.names, &invariant, &axioms)?;
         let timed = self.world.problem.metric.is_none() && self.takes_time(&invariant, &axioms)?;
-        let comparison = Comparison::new(&task, timed)?;
+        let unit = self.unit(&invariant, &axioms)?;
+        let comparison = Comparison::new(&task, timed, unit)?;
         comparison.initial()?;
         comparison.goal()?;
         comparison.rules()?;
+        for case in meaning::waits(&self.world.timeline, &self.names.structure)? {
+            invariant.admits(&self.world, &self.names.structure, &case)?;
+            comparison.wait(&case)?;
+        }
         let (mut instances, mut idle) = (0, 0);
         for instance in &self.instances {
             let cases = self.cases(instance, &invariant, &axioms)?;
@@ -204,12 +220,26 @@ impl<'f> Files<'f> {
         Ok(Faithful::Yes { instances, idle, timed })
     }
 
+    /// What the times of events and all durations are multiples of.
+    fn unit(&self, invariant: &Invariant, axioms: &Axioms) -> Result<BigRational> {
+        let mut durations = BTreeSet::new();
+        if !self.world.timeline.is_empty() {
+            for instance in &self.instances {
+                let cases = self.cases(instance, invariant, axioms)?;
+                let lengths = cases.into_iter().filter_map(|case| case.length);
+                durations.extend(lengths.map(|length| length.least));
+            }
+        }
+        Ok(self.world.timeline.unit(durations.iter()))
+    }
+
     /// Whether an instance that can be executed has a duration other than 0.
     fn takes_time(&self, invariant: &Invariant, axioms: &Axioms) -> Result<bool> {
         for instance in &self.instances {
             if matches!(self.domain.actions[instance.action].body, ActionBody::Durative { .. }) {
                 let cases = self.cases(instance, invariant, axioms)?;
-                if cases.iter().any(|case| case.duration.as_ref().is_some_and(|length| !length.is_zero())) {
+                if cases.iter().any(|case| case.length.as_ref().is_some_and(|length| !length.least.is_zero()))
+                {
                     return Ok(true);
                 }
             }

@@ -10,6 +10,7 @@ use rustc_hash::FxHashMap;
 use crate::certificate::faithful::axioms::Axioms;
 use crate::certificate::faithful::formula::Formula;
 use crate::certificate::faithful::invariant::Invariant;
+use crate::certificate::faithful::lengths::Length;
 use crate::certificate::faithful::linear::Linear;
 use crate::certificate::faithful::verdict::Cause;
 use crate::certificate::faithful::world::{Key, World};
@@ -34,7 +35,8 @@ pub(super) struct Reader<'r> {
     pub(super) axioms: &'r Axioms,
     pub(super) binding: FxHashMap<&'r Name, u32>,
     pub(super) applied: Applied,
-    pub(super) duration: Option<BigRational>,
+    /// How long the instance takes.
+    pub(super) length: Option<Length>,
     pub(super) is_metric: bool,
     /// Inside `when`, a comparison without a value has no agreed meaning.
     pub(super) in_when: bool,
@@ -52,7 +54,7 @@ impl<'r> Reader<'r> {
             axioms,
             binding: FxHashMap::default(),
             applied: Applied::default(),
-            duration: None,
+            length: None,
             is_metric: false,
             in_when: false,
             opaque: false,
@@ -280,7 +282,13 @@ impl<'r> Reader<'r> {
         Ok(match expression {
             Expression::Number(number, _) => Some(Linear::constant(number.clone())),
             Expression::Fluent(atom) => self.fluent(atom)?,
-            Expression::Duration(_) => self.duration.clone().map(Linear::constant),
+            Expression::Duration(_) => match &self.length {
+                None => None,
+                Some(length) => {
+                    let open = || Cause::unsupported("what depends on a duration that is chosen");
+                    Some(Linear::constant(length.fixed().ok_or_else(open)?.clone()))
+                }
+            },
             Expression::TotalTime(_) if self.is_metric => Some(Linear::fluent(TOTAL_TIME)),
             Expression::TotalTime(_) => return Err(Cause::unsupported("total-time outside of the metric")),
             Expression::Operation(operation, parts, _) => {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use num_rational::BigRational;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::certificate::faithful::axioms::Axioms;
@@ -21,10 +20,6 @@ const SIZE_LIMIT: usize = 200_000;
 const DEPTH_LIMIT: usize = 200;
 
 type Result<T> = std::result::Result<T, Obstacle>;
-
-pub(super) fn integer(number: impl Into<i128>) -> BigRational {
-    BigRational::from_integer(number.into().into())
-}
 
 /// What the names of the task stand for.
 pub(super) struct Names {
@@ -84,7 +79,7 @@ impl Names {
             keys.push(None);
             names.keys.push(keys);
         }
-        let scale = integer(model.number_scale);
+        let scale = model.number_scale.to_rational();
         for (number, text) in (0..).zip(&model.fluents) {
             let Some(key) = world.written(text) else {
                 return form(format!("{text} is no fluent of the files"));
@@ -243,18 +238,18 @@ impl<'t> Translation<'t> {
 
     /// Numbers times factors plus a quantity, over fluents.
     fn linear(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
-        let scale = integer(self.model.number_scale);
-        let mut sum = Linear::constant(integer(self.model.quantity(&linear.quantity, choice, sizes)));
+        let scale = self.model.number_scale.to_rational();
+        let mut sum = Linear::constant(self.model.quantity(&linear.quantity, choice, sizes).to_rational());
         for (number, factor) in &linear.factors {
             let fluent = Linear::fluent(self.names.fluents[*number as usize].clone());
-            sum = sum.plus(&fluent, &(integer(*factor) * &scale));
+            sum = sum.plus(&fluent, &(factor.to_rational() * &scale));
         }
         sum
     }
 
     /// What a fluent becomes where a number becomes this.
     pub(super) fn value(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
-        let value = self.linear(linear, choice, sizes).times(&integer(self.model.number_scale).recip());
+        let value = self.linear(linear, choice, sizes).times(&self.model.number_scale.to_rational().recip());
         self.invariant.settled(&value)
     }
 }

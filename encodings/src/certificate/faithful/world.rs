@@ -1,8 +1,10 @@
 //! Objects, what holds at first, what never changes, and what follows from the rest.
 
 use num_rational::BigRational;
+use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::certificate::faithful::timeline::{self, Timeline};
 use crate::certificate::faithful::verdict::Cause;
 use pddl::TypeHierarchy;
 use pddl::ast::{
@@ -11,6 +13,13 @@ use pddl::ast::{
 
 /// A predicate or function with objects, both by number.
 pub(super) type Key = (u32, Vec<u32>);
+
+/// `(the phase phase N)`, with N in place of objects: so many events have taken place.
+pub(super) const PHASE: u32 = u32::MAX - 1;
+/// `(has waited)`: since the last event nothing has been done.
+pub(super) const WAITED: u32 = u32::MAX - 2;
+/// `(the clock)`, in the time unit of the files.
+pub(super) const CLOCK: u32 = u32::MAX - 3;
 
 pub(super) struct World<'w> {
     pub(super) problem: &'w Problem,
@@ -27,6 +36,7 @@ pub(super) struct World<'w> {
     values: FxHashMap<Key, BigRational>,
     /// Predicates and functions that some action changes.
     changing: FxHashSet<u32>,
+    pub(super) timeline: Timeline,
     /// The rules of derived predicates.
     rules: FxHashMap<u32, Vec<&'w Derived>>,
 }
@@ -45,10 +55,18 @@ impl<'w> World<'w> {
             rows_with: FxHashMap::default(),
             values: FxHashMap::default(),
             changing: FxHashSet::default(),
+            timeline: Timeline::default(),
             rules: FxHashMap::default(),
         };
         for declaration in domain.predicates.iter().chain(&domain.functions) {
             world.intern(&declaration.identifier.name);
+        }
+        let is_function = |name: &Name| domain.functions.iter().any(|own| own.identifier.name == *name);
+        if !domain.derived.is_empty() && domain.predicates.iter().any(|own| is_function(&own.identifier.name))
+        {
+            return Err(Cause::unsupported(
+                "derived predicates beside a predicate and a function of one name",
+            ));
         }
         world.intern(&Name::new("total-cost"));
         for entry in domain.constants.iter().chain(&problem.objects) {
@@ -74,8 +92,10 @@ impl<'w> World<'w> {
         for element in &problem.init {
             world.state(element)?;
         }
-        if world.facts.iter().any(|fact| world.rules.contains_key(&fact.0)) {
-            return Err(Cause::unsupported("derived predicates that hold at first by themselves"));
+        world.begin();
+        let timed = world.timeline.events.iter().flat_map(|event| event.truths.keys());
+        if world.facts.iter().chain(timed).any(|fact| world.rules.contains_key(&fact.0)) {
+            return Err(Cause::unsupported("derived predicates that hold by themselves"));
         }
         Ok(world)
     }
@@ -119,9 +139,32 @@ impl<'w> World<'w> {
                 let key = self.key(atom, &FxHashMap::default())?;
                 self.values.insert(key, value.clone());
             }
-            InitialElement::Timed(..) => return Err(Cause::unsupported("timed initial literals")),
+            InitialElement::Timed(time, atom, holds, _) => {
+                let key = self.key(atom, &FxHashMap::default())?;
+                self.changing.insert(key.0);
+                self.timeline.add(time, key, *holds);
+            }
         }
         Ok(())
+    }
+
+    /// What is so at time 0 because of the events.
+    fn begin(&mut self) {
+        if self.timeline.is_empty() {
+            return;
+        }
+        for event in &self.timeline.events[..self.timeline.begun] {
+            for (key, holds) in &event.truths {
+                if *holds {
+                    self.facts.insert(key.clone())
+                } else {
+                    self.facts.remove(key)
+                };
+            }
+        }
+        self.facts.insert(timeline::phase(self.timeline.begun));
+        self.values.insert(timeline::clock(), BigRational::zero());
+        self.changing.extend([PHASE, WAITED, CLOCK]);
     }
 
     pub(super) fn symbol(&self, name: &Name) -> Result<u32, Cause> {
@@ -149,6 +192,12 @@ impl<'w> World<'w> {
 
     /// An atom or fluent as it is written, in small letters.
     pub(super) fn show(&self, key: &Key) -> String {
+        match (key.0, &key.1[..]) {
+            (PHASE, [number]) => return format!("(the phase phase {number})"),
+            (WAITED, _) => return "(has waited)".to_owned(),
+            (CLOCK, _) => return "(the clock)".to_owned(),
+            _ => {}
+        }
         let words = std::iter::once(&key.0).chain(&key.1);
         let words: Vec<String> = words.map(|symbol| self.name(*symbol).to_ascii_lowercase()).collect();
         format!("({})", words.join(" "))
@@ -158,8 +207,15 @@ impl<'w> World<'w> {
         self.names.get(symbol as usize).map_or("?", Name::as_str)
     }
 
-    /// The atom or fluent that is written so; none if no symbols of the files are.
+    /// The atom or fluent that is written so, those of the timeline among them; none if no symbols of the files are.
     pub(super) fn written(&self, text: &str) -> Option<Key> {
+        let phases = 0..=self.timeline.events.len();
+        let own = phases.map(timeline::phase).chain([timeline::waited(), timeline::clock()]);
+        let mut own = own.filter(|key| !self.timeline.is_empty() && self.show(key) == text);
+        own.next().or_else(|| self.of_files(text))
+    }
+
+    fn of_files(&self, text: &str) -> Option<Key> {
         let inner = text.strip_prefix('(')?.strip_suffix(')')?;
         let mut words =
             inner.split_ascii_whitespace().map(|word| self.symbols.get(&Name::new(word)).copied());
