@@ -10,9 +10,9 @@ use encodings::{
 };
 use num_rational::BigRational;
 use num_traits::Zero;
+use pddl::Source;
 use pddl::ast::{ActionBody, Comparison, Domain, InitialElement, Name, Problem};
 use pddl::validate::{Options, PlanText, validate};
-use pddl::Source;
 
 use super::files::{read, text};
 use super::{

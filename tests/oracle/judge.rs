@@ -8,16 +8,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use encodings::{Config, Exact, ExactTask, Limits, Plan, Solution, Status, Task, Unbounded};
-use metaplan::certificate::{self, Contents, Ground};
+use encodings::{Config, Exact, Limits, Plan, Solution, Status, Unbounded};
 use metaplan::measure::measure;
 use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission};
 use num_rational::BigRational;
 use num_traits::Zero as _;
 use pddl::Source;
-use pddl::ast::{InitialElement, Name, Problem};
+use pddl::ast::{Name, Problem};
 use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
+
+use crate::certify::{self, Planned};
 
 /// One action of a plan, with its exact times.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -95,12 +96,6 @@ pub struct Tally {
 enum Answer {
     Refused(String),
     Solved(Box<Solved>),
-}
-
-#[derive(Debug)]
-enum Planned {
-    Integers(Box<Task>),
-    Exact(Box<ExactTask>),
 }
 
 #[derive(Debug)]
@@ -286,7 +281,7 @@ impl Tally {
 }
 
 /// Which value is better: less than 0 if the first is.
-fn compare(maximize: bool, left: &BigRational, right: &BigRational) -> std::cmp::Ordering {
+pub fn compare(maximize: bool, left: &BigRational, right: &BigRational) -> std::cmp::Ordering {
     if maximize { right.cmp(left) } else { left.cmp(right) }
 }
 
@@ -342,7 +337,7 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
             }
             if let (true, Some(task)) = (case.certify, &solved.task) {
                 let started = Instant::now();
-                check_certificate(case, (&mission, &problem), task, &solved.solution, tally);
+                certify::check(case, (&mission, &problem), task, &solved.solution, tally);
                 tally.certificates += started.elapsed();
             }
         }
@@ -403,6 +398,9 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     if let Some(kind) = kind {
         tally.fail(case, kind, &claim);
     }
+    if let Some(contradiction) = &solution.statistics.contradiction {
+        tally.fail(case, "the planner contradicts itself", contradiction);
+    }
     let (Truth::Best(found, _) | Truth::Open(Some((found, _))) | Truth::NoBest(found, _)) = &case.truth
     else {
         return;
@@ -441,71 +439,6 @@ fn check_plan(
         );
     } else if value.as_ref() != Some(&cost) {
         tally.fail(case, "the validator measures otherwise", &format!("{value:?}; {}", show()));
-    }
-}
-
-/// A message without what stands in parentheses.
-fn without_names(message: &str) -> String {
-    let mut depth = 0_usize;
-    let mut kept = String::new();
-    for character in message.chars() {
-        match character {
-            '(' => depth += 1,
-            ')' => depth = depth.saturating_sub(1),
-            _ if depth == 0 => kept.push(character),
-            _ => {}
-        }
-    }
-    kept
-}
-
-/// What is claimed is certified, and the certificate has to be verified if the claim is true, and only then.
-fn check_certificate(
-    case: &Case,
-    (mission, problem): (&Mission, &Problem),
-    task: &Planned,
-    solution: &Solution,
-    tally: &mut Tally,
-) {
-    if !matches!(solution.status, Status::Optimal | Status::Unsolvable) {
-        return;
-    }
-    let parent = tempfile::tempdir().expect("a temporary directory");
-    let directory = parent.path().join("certificate");
-    let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_lines(&steps_of(plan)));
-    let task = match task {
-        Planned::Integers(task) => Ground::Integers(task),
-        Planned::Exact(task) => Ground::Exact(task),
-    };
-    let contents = Contents { mission, problem, task, solution, plan: &plan };
-    let limits = || Limits::none().with_time(case.limit);
-    if let Err(message) = certificate::write(&directory, &contents, &limits()) {
-        // Without what is said of one task alone.
-        return tally.count(format!("{}: {:.120}", message.code, without_names(&message.message)));
-    }
-    let report = certificate::verify(&directory, None, &limits());
-    let refuted = match (&case.truth, &solution.plan) {
-        (Truth::Best(best, _), Some(plan)) => rational(&plan.cost) != *best,
-        (Truth::Open(Some((found, _))), Some(plan)) => {
-            compare(case.maximize, found, &rational(&plan.cost)).is_lt()
-        }
-        (Truth::NoPlan, None) | (Truth::Open(None), _) => false,
-        (Truth::NoPlan, Some(_)) | (Truth::NoBest(..), _) | (Truth::Best(..) | Truth::Open(_), None) => true,
-    };
-    let wrong = report.parts.iter().find_map(|part| Some((part.part, part.result.as_ref().err()?)));
-    match (wrong, refuted) {
-        (None, true) => tally.fail(case, "A FALSE CLAIM IS VERIFIED", &format!("{:?}", report.claim)),
-        (None, false) => {
-            let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
-            tally.count(if is_timed { "certificate: verified, timed" } else { "certificate: verified" });
-        }
-        (Some((part, reason)), true) => {
-            tally.count(format!("certificate of a false claim fails: {part}: {reason:.40}"));
-        }
-        (Some(("limits", _)), false) => tally.count("certificate: limit"),
-        (Some((part, reason)), false) => {
-            tally.fail(case, "a true claim is not verified", &format!("{part}: {reason}"));
-        }
     }
 }
 

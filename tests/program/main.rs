@@ -1,6 +1,7 @@
 //! The whole, end to end: the program run as its users run it.
 
 mod certificate;
+mod certificate_numbers;
 mod check;
 mod cli;
 mod client;

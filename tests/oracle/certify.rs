@@ -1,0 +1,80 @@
+//! Certifies what the planner claims, and has the certificate verified.
+
+use encodings::{ExactTask, Limits, Solution, Status, Task};
+use metaplan::certificate::{self, Contents, Ground};
+use metaplan::mission::Mission;
+use pddl::ast::{InitialElement, Problem};
+
+use crate::judge::{Case, Tally, Truth, compare, plan_lines, rational, steps_of};
+
+/// What was planned.
+#[derive(Debug)]
+pub enum Planned {
+    Integers(Box<Task>),
+    Exact(Box<ExactTask>),
+}
+
+/// A message without what stands in parentheses.
+fn without_names(message: &str) -> String {
+    let mut depth = 0_usize;
+    let mut kept = String::new();
+    for character in message.chars() {
+        match character {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ if depth == 0 => kept.push(character),
+            _ => {}
+        }
+    }
+    kept
+}
+
+/// What is claimed is certified, and the certificate has to be verified if the claim is true, and only then.
+pub fn check(
+    case: &Case,
+    (mission, problem): (&Mission, &Problem),
+    task: &Planned,
+    solution: &Solution,
+    tally: &mut Tally,
+) {
+    if !matches!(solution.status, Status::Optimal | Status::Unsolvable) {
+        return;
+    }
+    let parent = tempfile::tempdir().expect("a temporary directory");
+    let directory = parent.path().join("certificate");
+    let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_lines(&steps_of(plan)));
+    let task = match task {
+        Planned::Integers(task) => Ground::Integers(task),
+        Planned::Exact(task) => Ground::Exact(task),
+    };
+    let contents = Contents { mission, problem, task, solution, plan: &plan };
+    let limits = || Limits::none().with_time(case.limit);
+    if let Err(message) = certificate::write(&directory, &contents, &limits()) {
+        // Without what is said of one task alone.
+        return tally.count(format!("{}: {:.120}", message.code, without_names(&message.message)));
+    }
+    let report = certificate::verify(&directory, None, &limits());
+    let refuted = match (&case.truth, &solution.plan) {
+        (Truth::Best(best, _), Some(plan)) => rational(&plan.cost) != *best,
+        (Truth::Open(Some((found, _))), Some(plan)) => {
+            compare(case.maximize, found, &rational(&plan.cost)).is_lt()
+        }
+        (Truth::NoPlan, None) | (Truth::Open(None), _) => false,
+        (Truth::NoPlan, Some(_)) | (Truth::NoBest(..), _) | (Truth::Best(..) | Truth::Open(_), None) => true,
+    };
+    let wrong = report.parts.iter().find_map(|part| Some((part.part, part.result.as_ref().err()?)));
+    match (wrong, refuted) {
+        (None, true) => tally.fail(case, "A FALSE CLAIM IS VERIFIED", &format!("{:?}", report.claim)),
+        (None, false) => {
+            let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
+            tally.count(if is_timed { "certificate: verified, timed" } else { "certificate: verified" });
+        }
+        (Some((part, reason)), true) => {
+            tally.count(format!("certificate of a false claim fails: {part}: {reason:.40}"));
+        }
+        (Some(("limits", _)), false) => tally.count("certificate: limit"),
+        (Some((part, reason)), false) => {
+            tally.fail(case, "a true claim is not verified", &format!("{part}: {reason}"));
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Certificates of plans found in fractions, and of formulas that say one thing twice.
+
+use crate::certificate::change;
+use crate::common::metaplan_in;
+
+/// Numbers whose products fit no machine integer, and one that halves: planned in fractions.
+#[test]
+fn plans_found_in_fractions_have_certificates() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let domain = |effect: &str| {
+        format!(
+            "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (long ?a ?b) (rate) (share) (charge) (total-cost))
+              (:action go :parameters (?a ?b)
+                :precondition (and (at ?a) (way ?a ?b) (> (charge) (* (long ?a ?b) (rate) (share))))
+                :effect (and (at ?b) (not (at ?a)) (decrease (charge) (* (long ?a ?b) (rate) (share)))
+                  (increase (total-cost) (* (long ?a ?b) (rate) (share)))))
+              (:action rest :parameters () :precondition (< (charge) 1)
+                :effect (and {effect} (increase (total-cost) 0.1234567890123457))))"
+        )
+    };
+    let problem = "(define (problem p) (:domain d) (:objects a b c)
+      (:init (at a) (way a b) (way b c) (way a c) (= (long a b) 0.1234567890123451) (= (long b c) 0.2345678901234512)
+        (= (long a c) 0.5678901234512345) (= (rate) 1.234567890123456) (= (share) 0.9876543210987654)
+        (= (charge) 0.2000000000000001) (= (total-cost) 0))
+      (:goal (at c)) (:metric minimize (total-cost)))";
+    std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
+    for (name, effect, covered) in
+        [("c", "(assign (charge) 0.7777777777777777)", true), ("h", "(scale-up (charge) 1.5)", false)]
+    {
+        std::fs::write(directory.path().join("d.pddl"), domain(effect)).expect("a file");
+        let arguments = ["plan", "-v", "d.pddl", "p.pddl", "--certificate", name];
+        let planned = metaplan_in(directory.path(), &arguments, "");
+        assert!(planned.stderr.contains("in exact numbers"), "{planned:#?}");
+        assert!(planned.stdout.contains("optimal, proved"), "{planned:#?}");
+        if !covered {
+            assert_eq!(planned.status, 3, "{planned:#?}");
+            assert!(planned.stderr.contains("numbers that are multiplied by fractions"), "{planned:#?}");
+            continue;
+        }
+        assert_eq!(planned.status, 0, "{planned:#?}");
+        let outcome = metaplan_in(directory.path(), &["verify", name], "");
+        assert_eq!(outcome.status, 0, "{outcome:#?}");
+        // What no machine integer holds is told apart to the last digit.
+        let target = directory.path().join(name).display().to_string();
+        change(&target, "task.json", &|text| {
+            let mut numbers = text.split(|own: char| !own.is_ascii_digit());
+            let long = numbers.find(|digits| digits.len() > 39).expect("a long number");
+            let last = if long.ends_with('5') { "6" } else { "5" };
+            text.replacen(long, &format!("{}{last}", &long[..long.len() - 1]), 1)
+        });
+        assert_eq!(metaplan_in(directory.path(), &["verify", name], "").status, 30);
+    }
+}
+
+/// A goal that says one thing twice makes a clause with a literal twice.
+#[test]
+fn what_is_said_twice_is_proved_once() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let domain = "(define (domain d) (:predicates (p) (seen ?a))
+      (:derived (seen ?a) (p))
+      (:action look :parameters () :precondition (or (p) (not (p))) :effect (p)))";
+    let problem = "(define (problem p) (:domain d) (:objects a b) (:init) (:goal (exists (?a) (seen ?a))))";
+    std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+    std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
+    let planned = metaplan_in(directory.path(), &["plan", "d.pddl", "p.pddl", "--certificate", "c"], "");
+    assert_eq!(planned.status, 0, "{planned:#?}");
+    let formula = std::fs::read_to_string(directory.path().join("c/formula.cnf")).expect("a formula");
+    assert!(formula.contains("\n2 2 0\n"), "{formula}");
+    let outcome = metaplan_in(directory.path(), &["verify", "c"], "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+}
