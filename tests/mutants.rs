@@ -1,8 +1,8 @@
 //! Whether the oracles notice when the planner is wrong.
 //!
 //! `tests/oracle/mutants.toml` names faults. They are put into a copy of the workspace, all into one program, which is asked once for each
-//! fault with that one switched on. A fault that no oracle notices is a hole in the oracles, or no fault at all. `MUTANTS_FROM` is the number
-//! of the first.
+//! fault with that one switched on. A fault that no oracle notices is a hole in the oracles, or no fault at all. `MUTANTS` has the numbers of
+//! those that are tried, if not all are.
 
 #![expect(
     clippy::print_stdout,
@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 13] = [
+const PARTS: [&str; 14] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -25,6 +25,7 @@ const PARTS: [&str; 13] = [
     "ontology",
     "rules",
     "encodings",
+    "pddl",
     "probabilistic",
     "tests",
     "benches",
@@ -144,7 +145,8 @@ fn compiled(home: &Path) -> PathBuf {
     let text = String::from_utf8_lossy(&output.stdout);
     let last = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
     let programs = last.filter(|line| line["target"]["name"] == "oracle");
-    let program = programs.filter_map(|line| line["executable"].as_str().map(PathBuf::from)).last();
+    let mut programs = programs.filter_map(|line| line["executable"].as_str().map(PathBuf::from));
+    let program = programs.next_back();
     program.expect("a program")
 }
 
@@ -182,8 +184,11 @@ fn every_fault_is_noticed() {
         assert!(is_content(&program, &home, 0, oracle), "{} fails without a fault", oracle.0);
     }
     let mut missed = Vec::new();
-    let from = std::env::var("MUTANTS_FROM").ok().map_or(1, |text| text.parse().expect("a number"));
-    for (mutant, number) in mutants.iter().zip(1..).filter(|(_, number)| *number >= from) {
+    let chosen: Option<Vec<usize>> = std::env::var("MUTANTS")
+        .ok()
+        .map(|text| text.split(',').map(|number| number.parse().expect("a number")).collect());
+    let is_chosen = |number: &usize| chosen.as_ref().is_none_or(|chosen| chosen.contains(number));
+    for (mutant, number) in mutants.iter().zip(1..).filter(|(_, number)| is_chosen(number)) {
         let started = Instant::now();
         let noticed = ORACLES.iter().find(|oracle| !is_content(&program, &home, number, **oracle));
         let by = noticed.map_or("NOBODY", |(test, _)| test);

@@ -171,7 +171,6 @@ pub(crate) type ClosedLabel<N> = (Vec<u32>, Vec<N>, N);
 
 /// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
 /// nothing left; none if there is a cheaper plan, or if a limit comes first.
-#[expect(clippy::arithmetic_side_effects, reason = "what was paid, and estimates, are at most GROWTH_LIMIT")]
 pub(crate) fn closed_labels<N: TaskNumber>(
     task: &Task<N>,
     bounds: &impl Estimate<N>,
