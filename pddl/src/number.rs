@@ -108,6 +108,11 @@ pub fn to_decimal(value: &BigRational) -> Option<String> {
     Some(format!("{sign}{whole}{point}{fraction}"))
 }
 
+/// An index as a number of 32 bits: of bytes, names or parameters, of which there are fewer than fit into memory.
+pub(crate) fn dense(index: usize) -> u32 {
+    u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,9 +155,4 @@ mod tests {
     fn a_third_has_no_decimal() {
         assert_eq!(to_decimal(&BigRational::new(1.into(), 3.into())), None);
     }
-}
-
-/// An index as a number of 32 bits: of bytes, names or parameters, of which there are fewer than fit into memory.
-pub(crate) fn dense(index: usize) -> u32 {
-    u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }
