@@ -10,7 +10,7 @@ mod university;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use metaplan_ontology::{ReadOptions, lower, ntriples, read_files};
+use ontology::{ReadOptions, lower, ntriples, read_files};
 use metaplan_rules::{Engine, Symbols};
 
 /// Xorshift; the same numbers in each run.
