@@ -10,8 +10,8 @@ mod university;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use metaplan_ontology::{ReadOptions, lower, ntriples, read_files};
 use metaplan_rules::{Engine, Symbols};
+use ontology::{ReadOptions, lower, ntriples, read_files};
 
 /// Xorshift; the same numbers in each run.
 pub struct Random(pub u64);
@@ -61,8 +61,7 @@ fn usage() -> (f64, u64) {
     let ticks: f64 = after.split(' ').nth(11).and_then(|ticks| ticks.parse().ok()).unwrap_or(0.0);
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    let kilobytes: u64 =
-        peak.and_then(|peak| peak.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(0);
+    let kilobytes: u64 = peak.and_then(|peak| peak.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(0);
     (ticks / 100.0, kilobytes / 1024)
 }
 
@@ -136,6 +135,10 @@ fn compare() {
         );
     }
     ratios.sort_by(f64::total_cmp);
-    println!("median of {}: {:.1}", ratios.len(), (ratios[(ratios.len() - 1) / 2] + ratios[ratios.len() / 2]) / 2.0);
+    println!(
+        "median of {}: {:.1}",
+        ratios.len(),
+        (ratios[(ratios.len() - 1) / 2] + ratios[ratios.len() / 2]) / 2.0
+    );
     let _ = std::fs::remove_dir_all(&directory);
 }

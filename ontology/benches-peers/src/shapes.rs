@@ -70,7 +70,10 @@ fn equivalent(text: &mut String, random: &mut Random) {
 fn intersections(text: &mut String, random: &mut Random) {
     for class in 0..200 {
         let [first, second] = [random.below(20), random.below(20)];
-        line!(text, ":D{class} a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :C{first} :C{second} ) ] .");
+        line!(
+            text,
+            ":D{class} a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :C{first} :C{second} ) ] ."
+        );
     }
     for individual in 0..10_000 {
         line!(text, ":i{individual} a :C{} , :C{} .", random.below(20), random.below(20));
@@ -80,7 +83,10 @@ fn intersections(text: &mut String, random: &mut Random) {
 fn unions(text: &mut String, random: &mut Random) {
     for class in 0..200 {
         let [first, second] = [random.below(100), random.below(100)];
-        line!(text, ":D{class} a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:unionOf ( :C{first} :C{second} ) ] .");
+        line!(
+            text,
+            ":D{class} a owl:Class ; owl:equivalentClass [ a owl:Class ; owl:unionOf ( :C{first} :C{second} ) ] ."
+        );
     }
     for individual in 0..10_000 {
         line!(text, ":i{individual} a :C{} .", random.below(100));
@@ -90,8 +96,14 @@ fn unions(text: &mut String, random: &mut Random) {
 fn values(text: &mut String, random: &mut Random) {
     for property in 0..20 {
         line!(text, ":p{property} a owl:ObjectProperty .");
-        line!(text, ":S{property} a owl:Class ; owl:equivalentClass [ a owl:Restriction ; owl:onProperty :p{property} ; owl:someValuesFrom :C{property} ] .");
-        line!(text, ":A{property} a owl:Class ; rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p{property} ; owl:allValuesFrom :D{property} ] .");
+        line!(
+            text,
+            ":S{property} a owl:Class ; owl:equivalentClass [ a owl:Restriction ; owl:onProperty :p{property} ; owl:someValuesFrom :C{property} ] ."
+        );
+        line!(
+            text,
+            ":A{property} a owl:Class ; rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p{property} ; owl:allValuesFrom :D{property} ] ."
+        );
     }
     for individual in 0..10_000 {
         let [property, class, other] = [random.below(20), random.below(20), random.below(10_000)];
@@ -101,7 +113,10 @@ fn values(text: &mut String, random: &mut Random) {
 
 fn fixed(text: &mut String, random: &mut Random) {
     for class in 0..100 {
-        line!(text, ":p{class} a owl:ObjectProperty . :H{class} a owl:Class ; owl:equivalentClass [ a owl:Restriction ; owl:onProperty :p{class} ; owl:hasValue :v{class} ] .");
+        line!(
+            text,
+            ":p{class} a owl:ObjectProperty . :H{class} a owl:Class ; owl:equivalentClass [ a owl:Restriction ; owl:onProperty :p{class} ; owl:hasValue :v{class} ] ."
+        );
     }
     for individual in 0..20_000 {
         let class = random.below(100);
@@ -115,7 +130,12 @@ fn fixed(text: &mut String, random: &mut Random) {
 
 fn disjoint(text: &mut String, random: &mut Random) {
     for class in 0..200 {
-        line!(text, ":C{class} a owl:Class ; rdfs:subClassOf :P{} ; owl:disjointWith :C{} .", class / 10, (class + 1) % 200);
+        line!(
+            text,
+            ":C{class} a owl:Class ; rdfs:subClassOf :P{} ; owl:disjointWith :C{} .",
+            class / 10,
+            (class + 1) % 200
+        );
     }
     for individual in 0..20_000 {
         line!(text, ":i{individual} a :C{} .", random.below(200));
@@ -134,7 +154,10 @@ fn properties(text: &mut String, random: &mut Random) {
 
 fn inverses(text: &mut String, random: &mut Random) {
     for property in 0..10 {
-        line!(text, ":p{property} a owl:ObjectProperty ; owl:inverseOf :q{property} . :s{property} a owl:SymmetricProperty , owl:ObjectProperty .");
+        line!(
+            text,
+            ":p{property} a owl:ObjectProperty ; owl:inverseOf :q{property} . :s{property} a owl:SymmetricProperty , owl:ObjectProperty ."
+        );
     }
     for _ in 0..15_000 {
         let [from, property, to] = [random.below(5_000), random.below(10), random.below(5_000)];
@@ -151,7 +174,10 @@ fn tree(text: &mut String, _: &mut Random) {
 
 fn domains(text: &mut String, random: &mut Random) {
     for property in 0..50 {
-        line!(text, ":p{property} a owl:ObjectProperty ; rdfs:domain :D{property} ; rdfs:range :R{property} .");
+        line!(
+            text,
+            ":p{property} a owl:ObjectProperty ; rdfs:domain :D{property} ; rdfs:range :R{property} ."
+        );
     }
     for _ in 0..20_000 {
         let [from, property, to] = [random.below(5_000), random.below(50), random.below(5_000)];
@@ -162,14 +188,23 @@ fn domains(text: &mut String, random: &mut Random) {
 fn functional(text: &mut String, random: &mut Random) {
     line!(text, ":of a owl:FunctionalProperty , owl:ObjectProperty .");
     for individual in 0..4_000 {
-        line!(text, ":i{individual} :of :a{individual} , :b{individual} . :a{individual} a :A . :b{individual} :near :i{} .", random.below(4_000));
+        line!(
+            text,
+            ":i{individual} :of :a{individual} , :b{individual} . :a{individual} a :A . :b{individual} :near :i{} .",
+            random.below(4_000)
+        );
     }
 }
 
 fn enumerations(text: &mut String, random: &mut Random) {
     for class in 0..100 {
         let members: Vec<String> = (0..20).map(|_| format!(":i{}", random.below(5_000))).collect();
-        line!(text, ":E{class} a owl:Class ; owl:oneOf ( {} ) ; rdfs:subClassOf :C{} .", members.join(" "), class % 10);
+        line!(
+            text,
+            ":E{class} a owl:Class ; owl:oneOf ( {} ) ; rdfs:subClassOf :C{} .",
+            members.join(" "),
+            class % 10
+        );
     }
     for individual in 0..5_000 {
         line!(text, ":i{individual} :near :i{} .", random.below(5_000));

@@ -340,7 +340,8 @@ pub fn rdf_xml(triples: &[Triple]) -> String {
             None => format!("rdf:about=\"{subject}\""),
         };
         let short = [("rdf", RDF), ("rdfs", RDFS), ("owl", OWL), ("u", NS)];
-        let name = short.iter().find_map(|(prefix, iri)| Some(format!("{prefix}:{}", predicate.strip_prefix(iri)?)));
+        let name =
+            short.iter().find_map(|(prefix, iri)| Some(format!("{prefix}:{}", predicate.strip_prefix(iri)?)));
         let name = name.unwrap_or_default();
         let content = match object {
             Object::Iri(iri) => format!("<{name} rdf:resource=\"{iri}\"/>"),

@@ -16,7 +16,9 @@
 mod foreign;
 mod lexer;
 mod parser;
+mod prefixes;
 mod printer;
 
-pub use parser::{Prefixes, Syntax, parse_rules, parse_rules_as, parse_rules_together};
+pub use parser::{Syntax, parse_rules, parse_rules_as, parse_rules_together};
+pub use prefixes::Prefixes;
 pub use printer::print_rules;

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use super::parser::Prefixes;
+use super::prefixes::Prefixes;
 use crate::builtin::{BuiltIn, SWRLB};
 use crate::literal::Literal;
 use crate::rule::{Atom, Program, Rule, Term, Variable};
