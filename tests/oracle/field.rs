@@ -314,6 +314,41 @@ fn exactly_between_events() {
     check("between-disturbed", (domain, &problem("(q)")), vec![(sequential(), Truth::NoPlan)]);
 }
 
+/// A number that one action changes when another one reads it.
+#[test]
+fn a_number_is_read_after_it_has_changed() {
+    let domain = "(define (domain d) (:requirements :fluents :durative-actions) (:predicates (g)) (:functions (x))
+     (:durative-action a :parameters () :duration (= ?duration 2) :condition () :effect (at end (increase (x) 1)))
+     (:durative-action b :parameters () :duration (= ?duration 3) :condition (at start (>= (x) 1)) :effect (at end (g))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (x) 0)) (:goal (g)))";
+    let cases = vec![
+        (sequential(), best("5", "0: (a) [2], 2: (b) [3]")),
+        (overlapping(), best("5.001", "0: (a) [2], 2.001: (b) [3]")),
+    ];
+    check("number-read", (domain, problem), cases);
+}
+
+/// A function has one design at a time: what PDDL alone would let overlap does not.
+#[test]
+fn a_function_has_one_design_at_a_time() {
+    let domain = "(define (domain d) (:requirements :typing :durative-actions) (:types function functiondesign)
+     (:predicates (fd_solve_f ?d - functiondesign ?f - function) (first ?d - functiondesign) (second ?d - functiondesign) (p) (q))
+     (:durative-action a :parameters (?f - function ?d - functiondesign) :duration (= ?duration 5)
+      :condition (and (at start (fd_solve_f ?d ?f)) (at start (first ?d))) :effect (at end (p)))
+     (:durative-action b :parameters (?f - function ?d - functiondesign) :duration (= ?duration 5)
+      :condition (and (at start (fd_solve_f ?d ?f)) (at start (second ?d))) :effect (at end (q))))";
+    let problem = |second: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:objects f - function d1 d2 - functiondesign)
+             (:init (fd_solve_f d1 f) (fd_solve_f d2 f) (first d1) (second {second})) (:goal (and (p) (q))))"
+        )
+    };
+    let apart = vec![(overlapping(), best("10", "0: (a f d1) [5], 5: (b f d2) [5]"))];
+    check("designs-apart", (domain, &problem("d2")), apart);
+    let together = vec![(overlapping(), best("5", "0: (a f d1) [5], 0: (b f d1) [5]"))];
+    check("designs-together", (domain, &problem("d1")), together);
+}
+
 /// Large coefficients.
 #[test]
 fn n2_coefficients() {

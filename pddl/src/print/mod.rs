@@ -7,9 +7,11 @@ mod tree;
 
 use crate::ast::{
     Action, ActionBody, Condition, Declaration, Direction, Domain, Identifier, InitialElement, Problem,
-    TypeExpression, TypedName,
+    TypedName,
 };
 use layout::{Doc, layout, list, text};
+pub(crate) use tree::type_text;
+use tree::typed;
 
 /// A domain as text.
 pub fn print_domain(domain: &Domain) -> String {
@@ -58,36 +60,6 @@ pub(crate) fn signature(declaration: &Declaration) -> String {
     let parameters = typed("?", &declaration.parameters);
     let space = if parameters.is_empty() { "" } else { " " };
     format!("({}{space}{})", declaration.identifier.name, parameters.join(" "))
-}
-
-/// The type of a typed list, without its dash.
-pub(crate) fn type_text(r#type: &TypeExpression) -> String {
-    let names: Vec<_> = r#type.alternatives.iter().map(|name| name.name.as_str()).collect();
-    match names.as_slice() {
-        [] => "object".to_owned(),
-        [one] => (*one).to_owned(),
-        several => format!("(either {})", several.join(" ")),
-    }
-}
-
-/// A typed list in groups of one type, each name with `prefix`. Untyped names can stand bare only at the end.
-#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
-fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
-    let bare_from =
-        entries.iter().rposition(|entry| !entry.r#type.alternatives.is_empty()).map_or(0, |last| last + 1);
-    let group_of = |entry: &TypedName| type_text(&entry.r#type);
-    let (typed, bare) = entries.split_at(bare_from);
-    let names = |group: &[TypedName]| -> String {
-        let names: Vec<_> = group.iter().map(|entry| format!("{prefix}{}", entry.identifier.name)).collect();
-        names.join(" ")
-    };
-    let groups = typed.chunk_by(|left, right| group_of(left) == group_of(right));
-    let mut lines: Vec<_> =
-        groups.map(|group| format!("{} - {}", names(group), group_of(&group[0]))).collect();
-    if !bare.is_empty() {
-        lines.push(names(bare));
-    }
-    lines
 }
 
 fn requirements(flags: &[Identifier]) -> Option<Doc> {

@@ -4,12 +4,11 @@ use num_rational::BigRational;
 
 use crate::ast::{
     Arithmetic, Assignment, Atom, Comparison, Condition, ConditionTime, DurationConstraint, Effect,
-    EffectTime, Expression, Term, TypedName,
+    EffectTime, Expression, Term, TypeExpression, TypedName,
 };
 use crate::number::to_decimal;
 
 use super::layout::{Doc, list, text};
-use super::typed;
 
 pub(super) fn term(term: &Term) -> Doc {
     match term {
@@ -134,5 +133,35 @@ pub(super) fn duration(constraints: &[DurationConstraint]) -> Doc {
         [] => text("()"),
         [one] => constraint(one),
         several => list("and", 1, several.iter().map(constraint)),
+    }
+}
+
+/// A typed list in groups of one type, each name with `prefix`. Untyped names can stand bare only at the end.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+pub(super) fn typed(prefix: &str, entries: &[TypedName]) -> Vec<String> {
+    let bare_from =
+        entries.iter().rposition(|entry| !entry.r#type.alternatives.is_empty()).map_or(0, |last| last + 1);
+    let group_of = |entry: &TypedName| type_text(&entry.r#type);
+    let (typed, bare) = entries.split_at(bare_from);
+    let names = |group: &[TypedName]| -> String {
+        let names: Vec<_> = group.iter().map(|entry| format!("{prefix}{}", entry.identifier.name)).collect();
+        names.join(" ")
+    };
+    let groups = typed.chunk_by(|left, right| group_of(left) == group_of(right));
+    let mut lines: Vec<_> =
+        groups.map(|group| format!("{} - {}", names(group), group_of(&group[0]))).collect();
+    if !bare.is_empty() {
+        lines.push(names(bare));
+    }
+    lines
+}
+
+/// The type of a typed list, without its dash.
+pub(crate) fn type_text(r#type: &TypeExpression) -> String {
+    let names: Vec<_> = r#type.alternatives.iter().map(|name| name.name.as_str()).collect();
+    match names.as_slice() {
+        [] => "object".to_owned(),
+        [one] => (*one).to_owned(),
+        several => format!("(either {})", several.join(" ")),
     }
 }
