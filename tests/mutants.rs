@@ -88,14 +88,17 @@ fn copy(from: &Path, to: &Path, faulty: &BTreeMap<PathBuf, String>) {
     }
 }
 
-/// A copy of the workspace with all faults, each behind its switch.
-fn mutated(mutants: &[Mutant]) -> PathBuf {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mutants");
-    let original = |file: &str| std::fs::read_to_string(root.join(file)).expect("a file");
-    let mut faulty: BTreeMap<PathBuf, String> = BTreeMap::new();
+fn mutants() -> Vec<Mutant> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracle/mutants.toml");
+    let text = std::fs::read_to_string(path).expect("the faults");
+    toml::from_str::<Mutants>(&text).expect("faults").mutant
+}
+
+/// The files below the workspace that have faults, with all of them, each behind its switch.
+fn faulty(mutants: &[Mutant]) -> BTreeMap<String, String> {
+    let mut files: BTreeMap<String, String> = BTreeMap::new();
     for (mutant, number) in mutants.iter().zip(1..) {
-        let text = faulty.entry(home.join(&mutant.file)).or_insert_with(|| original(&mutant.file));
+        let text = files.entry(mutant.file.clone()).or_insert_with(|| original(&mutant.file));
         assert_eq!(
             text.matches(&mutant.before).count(),
             1,
@@ -106,6 +109,19 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
         let after = mutant.after.replace("IS_ON", &format!("crate::is_mutant({number})"));
         *text = text.replace(&mutant.before, &after);
     }
+    files
+}
+
+fn original(file: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).expect("a file")
+}
+
+/// A copy of the workspace with all faults.
+fn mutated(mutants: &[Mutant]) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mutants");
+    let files = faulty(mutants).into_iter().map(|(file, text)| (home.join(file), text));
+    let mut faulty: BTreeMap<PathBuf, String> = files.collect();
     let question = format!(
         "pub(crate) fn is_mutant(number: u32) -> bool {{ \
          static ON: std::sync::OnceLock<u32> = std::sync::OnceLock::new(); \
@@ -173,11 +189,14 @@ fn is_content(program: &Path, home: &Path, fault: usize, (test, tasks): (&str, u
 }
 
 #[test]
+fn every_fault_has_its_place() {
+    assert!(faulty(&mutants()).len() > 10);
+}
+
+#[test]
 #[ignore = "takes an hour: compiles the planner again, and judges thousands of tasks for each fault"]
 fn every_fault_is_noticed() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracle/mutants.toml");
-    let text = std::fs::read_to_string(path).expect("the faults");
-    let Mutants { mutant: mutants } = toml::from_str(&text).expect("faults");
+    let mutants = mutants();
     let home = mutated(&mutants);
     let program = compiled(&home);
     for oracle in ORACLES {

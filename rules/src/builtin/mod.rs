@@ -166,7 +166,7 @@ built_ins! {
     Tokenize "tokenize" 3..=4 Choice,
     /// URI of scheme, host, port, path, query and fragment, each empty where there is none.
     AnyUri "anyURI" 7..=7 Parts,
-    /// The reference in the second relative to the base in the third ([3], section 5.2).
+    /// The reference in the second relative to the base in the third (\[3\], section 5.2).
     ResolveUri "resolveURI" 3..=3 Function,
     /// Duration of so many years and months.
     YearMonthDuration "yearMonthDuration" 3..=3 Parts,
