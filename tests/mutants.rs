@@ -74,6 +74,19 @@ fn write(path: &Path, bytes: &[u8]) {
     }
 }
 
+/// Removes what the workspace does not have any more.
+fn prune(from: &Path, to: &Path) {
+    if !from.exists() {
+        let removed = if to.is_dir() { std::fs::remove_dir_all(to) } else { std::fs::remove_file(to) };
+        removed.expect("it can be removed");
+    } else if to.is_dir() {
+        for entry in std::fs::read_dir(to).expect("a directory") {
+            let name = entry.expect("an entry").file_name();
+            prune(&from.join(&name), &to.join(&name));
+        }
+    }
+}
+
 /// Copies what has no faults.
 fn copy(from: &Path, to: &Path, faulty: &BTreeMap<PathBuf, String>) {
     if from.is_dir() {
@@ -130,6 +143,7 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
     );
     *faulty.entry(home.join(LIBRARY)).or_insert_with(|| original(LIBRARY)) += &question;
     for part in PARTS {
+        prune(&root.join(part), &home.join(part));
         copy(&root.join(part), &home.join(part), &faulty);
     }
     for (path, text) in faulty {
