@@ -314,6 +314,23 @@ fn exactly_between_events() {
     check("between-disturbed", (domain, &problem("(q)")), vec![(sequential(), Truth::NoPlan)]);
 }
 
+/// As before, with a second action that has to end exactly at the second event: the first one has to start exactly at the first.
+#[test]
+fn two_exactly_between_events() {
+    let domain = "(define (domain d) (:requirements :adl :durative-actions :timed-initial-literals) (:predicates (e) (w) (q) (h) (g))
+     (:durative-action a :parameters () :duration (= ?duration 5) :condition (over all (e))
+      :effect (and (when (at start (q)) (at start (not (e)))) (at end (h))))
+     (:durative-action b :parameters () :duration (= ?duration 10) :condition (and (at start (h)) (over all (w)))
+      :effect (at end (g)))
+     (:action disturb :parameters () :precondition (and) :effect (q)))";
+    let problem = |end: &str| {
+        format!("(define (problem p) (:domain d) (:init (w) (at 5 (e)) (at {end} (not (w)))) (:goal (g)))")
+    };
+    let plan = best("15", "5: (a) [5], 10: (b) [10]");
+    check("two-between", (domain, &problem("20")), vec![(sequential(), plan)]);
+    check("two-too-late", (domain, &problem("19.999")), vec![(sequential(), Truth::NoPlan)]);
+}
+
 /// A number that one action changes when another one reads it.
 #[test]
 fn a_number_is_read_after_it_has_changed() {
