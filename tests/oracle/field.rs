@@ -314,6 +314,18 @@ fn exactly_between_events() {
     check("between-disturbed", (domain, &problem("(q)")), vec![(sequential(), Truth::NoPlan)]);
 }
 
+/// A design that takes longer reaches over an event that a quicker one does not.
+#[test]
+fn a_slow_design_reaches_over_events() {
+    let domain = "(define (domain d) (:requirements :typing :fluents :durative-actions :timed-initial-literals)
+     (:types function functiondesign) (:predicates (fd_solve_f ?d - functiondesign ?f - function) (p) (q) (g)) (:functions (time ?d - functiondesign))
+     (:durative-action a :parameters (?f - function ?d - functiondesign) :duration (= ?duration (time ?d))
+      :condition (and (at start (fd_solve_f ?d ?f)) (at start (p)) (at end (q))) :effect (at end (g))))";
+    let problem = "(define (problem x) (:domain d) (:objects f - function d1 d2 - functiondesign)
+     (:init (fd_solve_f d1 f) (fd_solve_f d2 f) (= (time d1) 1) (= (time d2) 4) (p) (at 2 (not (p))) (at 5 (q))) (:goal (g)))";
+    check("slow-design", (domain, problem), vec![(sequential(), best("4", "1.001: (a f d2) [4]"))]);
+}
+
 /// As before, with a second action that has to end exactly at the second event: the first one has to start exactly at the first.
 #[test]
 fn two_exactly_between_events() {
