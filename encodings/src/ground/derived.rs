@@ -96,12 +96,10 @@ pub(crate) fn simplify(task: &mut GroundTask<'_>, limits: &Limits) -> Result<(),
             kept.push(axiom);
         }
     }
-    let mut pulse = limits.pulse();
-    retain(&mut task.operators, |operator| {
-        pulse.beat()?;
+    retain(&mut task.operators, limits, |operator| {
         let conditions = operator.conditional.iter_mut().flat_map(|effect| &mut effect.condition);
         conditions.for_each(|literal| rename(literal, &bodies));
-        Ok(inline(&mut operator.condition, &bodies))
+        inline(&mut operator.condition, &bodies)
     })?;
     if task.goal.as_mut().is_some_and(|goal| !inline(goal, &bodies)) {
         task.goal = None;
@@ -110,21 +108,18 @@ pub(crate) fn simplify(task: &mut GroundTask<'_>, limits: &Limits) -> Result<(),
     Ok(())
 }
 
-/// Keeps the items that a function says are to be kept, unless it fails.
+/// Keeps the items that a function says are to be kept, as long as no limit is reached.
 fn retain<T>(
     items: &mut Vec<T>,
-    mut keep: impl FnMut(&mut T) -> Result<bool, Interrupted>,
+    limits: &Limits,
+    mut keep: impl FnMut(&mut T) -> bool,
 ) -> Result<(), Interrupted> {
-    let mut interrupted = Ok(());
-    items.retain_mut(|item| match (interrupted, interrupted.and_then(|()| keep(item))) {
-        (Err(_), _) => true,
-        (Ok(()), Ok(is_kept)) => is_kept,
-        (Ok(()), Err(error)) => {
-            interrupted = Err(error);
-            true
-        }
+    let (mut pulse, mut outcome) = (limits.pulse(), Ok(()));
+    items.retain_mut(|item| {
+        outcome = outcome.and_then(|()| pulse.beat());
+        outcome.is_err() || keep(item)
     });
-    interrupted
+    outcome
 }
 
 /// Whether each derived atom is known to be true or false, as long as that leads to more.
@@ -155,11 +150,9 @@ fn fold(
         }
         axioms.retain_mut(|axiom| !known.contains_key(&axiom.head) && substitute(&mut axiom.body, &known));
     }
-    let mut pulse = limits.pulse();
-    retain(&mut task.operators, |operator| {
-        pulse.beat()?;
+    retain(&mut task.operators, limits, |operator| {
         operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &known));
-        Ok(substitute(&mut operator.condition, &known))
+        substitute(&mut operator.condition, &known)
     })?;
     if task.goal.as_mut().is_some_and(|goal| !substitute(goal, &known)) {
         task.goal = None;
