@@ -34,12 +34,6 @@ mod task;
 
 mod alternatives;
 mod bounds;
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::arithmetic_side_effects,
-    reason = "positions in lists that are held in memory, and DIMACS variables of formulas below a size limit"
-)]
 mod certificate;
 mod concurrent;
 mod earliest;

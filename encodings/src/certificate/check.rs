@@ -232,6 +232,7 @@ impl Checker<'_> {
 /// For each operator the combinations that no other one makes superfluous: one that costs no more, and with which every condition
 /// holds as soon and every number ends as high (exactly so where more may hurt). What covers the successor by the
 /// latter covers the successor by the former.
+#[expect(clippy::arithmetic_side_effects, reason = "choices are held in memory")]
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut known: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
     let mut count = 0;

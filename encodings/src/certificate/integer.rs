@@ -71,6 +71,10 @@ impl Integer {
     }
 
     /// How many bits two's complement needs, the sign included.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "at most 128 leading zeros, and bits that are held in memory"
+    )]
     pub(super) fn width(&self) -> usize {
         match &self.0 {
             Small(small) => {

@@ -1,5 +1,7 @@
 //! What a written task means: states, operators and what they cost. Slow and plain; all arithmetic is exact.
 
+use std::ops::Range;
+
 use crate::certificate::integer::Integer;
 use crate::certificate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
 
@@ -11,6 +13,28 @@ pub(super) struct State {
 }
 
 impl Model {
+    /// The variables that are not derived.
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `shape`")]
+    pub(super) fn basic_variables(&self) -> Range<u32> {
+        0..self.basic as u32
+    }
+
+    /// The variables that are derived.
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `shape`")]
+    pub(super) fn derived_variables(&self) -> Range<u32> {
+        self.basic as u32..self.variables.len() as u32
+    }
+
+    /// The value of a variable that holds where none of its atoms does.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::arithmetic_side_effects,
+        reason = "a variable has a value, and fewer than 2^32, see `shape`"
+    )]
+    pub(super) fn none(&self, variable: u32) -> u32 {
+        self.variables[variable as usize].len() as u32 - 1
+    }
+
     /// A state with these basic values; the derived ones follow.
     pub(super) fn state(&self, basic: &[u32], numbers: &[Integer]) -> State {
         let mut values = basic.to_vec();
@@ -26,8 +50,8 @@ impl Model {
 
     /// Gives derived variables their values: the least fixpoint of the rules, layer by layer.
     fn derive(&self, state: &mut State) {
-        for variable in self.basic..self.variables.len() {
-            state.values[variable] = self.variables[variable].len() as u32 - 1;
+        for variable in self.derived_variables() {
+            state.values[variable as usize] = self.none(variable);
         }
         for layer in &self.axioms {
             loop {
@@ -51,6 +75,7 @@ impl Model {
     }
 
     /// All combinations of designs that an operator admits.
+    #[expect(clippy::cast_possible_truncation, reason = "a slot has fewer designs, see `shape`")]
     pub(super) fn choices(&self, operator: &Operator) -> Vec<Vec<u32>> {
         let mut all: Vec<Vec<u32>> = vec![Vec::new()];
         for size in self.sizes(operator) {
@@ -70,6 +95,7 @@ impl Model {
     }
 
     /// The value of a quantity for a combination of designs.
+    #[expect(clippy::arithmetic_side_effects, reason = "a row is below the size of its table, see `shape`")]
     pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> Integer {
         let mut sum = quantity.constant.clone();
         for (slots, table) in &quantity.tables {

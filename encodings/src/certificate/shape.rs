@@ -34,6 +34,8 @@ pub(super) fn task(model: &Model) -> Found {
     for fact in (0..).zip(model.values.iter().copied()) {
         model.check_fact(fact)?;
     }
+    let sizes = model.variables.iter().map(Vec::len).chain([count, model.numbers.len()]);
+    require(sizes.max() < Some(u32::MAX as usize), || "too many variables, values or numbers".into())?;
     require(model.fluents.len() == model.numbers.len(), || "not one fluent for each number".into())?;
     let scales = [&model.objective.scale, &model.time_scale, &model.number_scale];
     require(scales.iter().all(|scale| scale.is_positive()), || "a scale that is not positive".into())?;

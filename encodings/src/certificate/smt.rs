@@ -127,6 +127,10 @@ impl Writer<'_> {
     }
 
     /// One part for each entry of a table for which there is something to say.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a row and its parts are below the size of a table, see `shape`"
+    )]
     fn entries(
         &self,
         pattern: &[u32],
@@ -216,8 +220,8 @@ impl Writer<'_> {
                 ));
             }
         }
-        let values = (0..self.model.variables.len() as u32).map(|variable| value_after(operator, variable));
-        let numbers = (0..self.model.numbers.len() as u32).map(|own| {
+        let values = (0..).zip(&self.model.variables).map(|(variable, _)| value_after(operator, variable));
+        let numbers = (0..).zip(&self.model.numbers).map(|(own, _)| {
             let change = operator.changes.iter().find(|(changed, _)| *changed == own);
             change.map_or_else(|| format!("n{own}"), |(_, value)| self.linear(value, &sizes))
         });

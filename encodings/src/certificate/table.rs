@@ -34,6 +34,7 @@ impl<'t> Table<'t> {
     }
 
     /// The position of a combination of values.
+    #[expect(clippy::arithmetic_side_effects, reason = "a row is below the size of its table, see `shape`")]
     pub(super) fn row(&self, values: &[u32]) -> usize {
         self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize)
     }
@@ -54,6 +55,11 @@ impl<'t> Table<'t> {
     }
 
     /// Every combination that agrees with some facts.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        clippy::cast_possible_truncation,
+        reason = "a row is below the size of its table, see `shape`"
+    )]
     pub(super) fn matching(&self, facts: &[Fact]) -> Vec<Vec<u32>> {
         let mut all = vec![Vec::new()];
         for (variable, size) in self.pattern.iter().zip(&self.sizes) {

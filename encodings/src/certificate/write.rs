@@ -123,6 +123,7 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
         Self { positions: FxHashMap::default(), all: Vec::new() }
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "entries are held in memory")]
     fn position(&mut self, key: &K, value: impl FnOnce(&K) -> V) -> u32 {
         if let Some(position) = self.positions.get(key) {
             return *position;

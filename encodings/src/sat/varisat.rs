@@ -106,8 +106,8 @@ fn translate(literal: Lit) -> varisat::Lit {
 }
 
 /// Refutes clauses over variables numbered from 1, or finds that they have a model; the proof is in DRAT.
-pub(crate) fn refute_with_proof<'c>(
-    clauses: impl Iterator<Item = &'c [i32]>,
+pub(crate) fn refute_with_proof(
+    clauses: impl Iterator<Item = impl Iterator<Item = i32>>,
     proof: Box<dyn io::Write>,
     limits: &Limits,
     budget: u64,
@@ -117,7 +117,7 @@ pub(crate) fn refute_with_proof<'c>(
     solver.write_proof(sink, varisat::ProofFormat::Drat);
     for clause in clauses {
         let literals: Vec<varisat::Lit> =
-            clause.iter().map(|literal| varisat::Lit::from_dimacs(*literal as isize)).collect();
+            clause.map(|literal| varisat::Lit::from_dimacs(literal as isize)).collect();
         solver.add_clause(&literals);
     }
     let answer = solver.solve();

@@ -9,19 +9,17 @@ use std::fmt::Write as _;
 use std::io::{BufRead, Read, Write};
 
 use crate::certificate::clausal::lines;
+use crate::certificate::clausal::literal::Literal;
 use crate::certificate::clausal::sums::Sums;
 use crate::certificate::integer::Integer;
-use crate::certificate::model::{Argument, Fact, Literal, Model, Operator};
-
-/// A variable of the formula, or its negation.
-pub(super) type Var = i32;
+use crate::certificate::model::{self, Argument, Fact, Model, Operator};
 
 /// Clauses, and what their variables mean.
 pub(super) struct Formula {
-    /// Each ends with 0.
-    literals: Vec<Var>,
-    /// How many clauses there are.
-    count: usize,
+    /// Of all clauses, one after the other.
+    literals: Vec<Literal>,
+    /// Where each clause ends.
+    ends: Vec<usize>,
     names: Vec<String>,
     limit: usize,
     /// How many bits the longest of its numbers has.
@@ -40,7 +38,8 @@ impl Formula {
         if !cost.is_positive() {
             return Err("no plan costs less than nothing".into());
         }
-        let mut formula = Self { literals: Vec::new(), count: 0, names: Vec::new(), limit, widest: 0 };
+        let mut formula =
+            Self { literals: Vec::new(), ends: Vec::new(), names: Vec::new(), limit, widest: 0 };
         let truth = formula.variable(|| "true".to_owned());
         formula.clause(&[truth]);
         let mut timeline = Timeline::new(model, &mut formula);
@@ -58,50 +57,53 @@ impl Formula {
     }
 
     fn within_limit(&self) -> Result<(), String> {
-        if self.literals.len() > self.limit {
+        if self.literals.len() > self.limit || self.names.len() >= self.limit {
             return Err(format!("the formula has more than {} literals", self.limit));
         }
         Ok(())
     }
 
     /// A new variable.
-    pub(super) fn variable(&mut self, name: impl FnOnce() -> String) -> Var {
-        self.names.push(name());
-        self.names.len() as Var
+    pub(super) fn variable(&mut self, name: impl FnOnce() -> String) -> Literal {
+        // What is beyond the limit is refused in any case.
+        if self.names.len() < self.limit {
+            self.names.push(name());
+        }
+        Literal::of_variable(self.names.len()).unwrap_or(Literal::FIRST)
     }
 
     /// The variable that is true.
     #[allow(clippy::unused_self, reason = "part of the formula")]
-    pub(super) fn truth(&self) -> Var {
-        1
+    pub(super) fn truth(&self) -> Literal {
+        Literal::FIRST
     }
 
-    pub(super) fn clause(&mut self, clause: &[Var]) {
+    pub(super) fn clause(&mut self, clause: &[Literal]) {
         // What is beyond the limit is refused in any case.
         if self.literals.len() <= self.limit {
             self.literals.extend(clause);
-            self.literals.push(0);
-            self.count += 1;
+            self.ends.push(self.literals.len());
         }
     }
 
     /// At most one of some variables: with "one of the first so many" where there are many.
-    pub(super) fn at_most_one(&mut self, variables: &[Var], name: &str) {
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+    pub(super) fn at_most_one(&mut self, variables: &[Literal], name: &str) {
         if variables.len() <= 5 {
             for (position, first) in variables.iter().enumerate() {
                 for second in &variables[position + 1..] {
-                    self.clause(&[-first, -second]);
+                    self.clause(&[-*first, -*second]);
                 }
             }
             return;
         }
-        let mut before: Option<Var> = None;
+        let mut before: Option<Literal> = None;
         for (position, variable) in variables.iter().enumerate() {
             let some = self.variable(|| format!("one of the first {} of {name}", position + 1));
-            self.clause(&[-variable, some]);
+            self.clause(&[-*variable, some]);
             if let Some(before) = before {
                 self.clause(&[-before, some]);
-                self.clause(&[-before, -variable]);
+                self.clause(&[-before, -*variable]);
             }
             before = Some(some);
         }
@@ -111,9 +113,9 @@ impl Formula {
         self.names.len()
     }
 
-    pub(super) fn clauses(&self) -> impl Iterator<Item = &[Var]> {
-        // The last clause ends with 0, too.
-        self.literals.split(|literal| *literal == 0).take(self.count)
+    pub(super) fn clauses(&self) -> impl Iterator<Item = &[Literal]> {
+        let begins = std::iter::once(0).chain(self.ends.iter().copied());
+        begins.zip(&self.ends).map(|(begin, end)| &self.literals[begin..*end])
     }
 
     pub(super) fn widest(&self) -> usize {
@@ -121,7 +123,7 @@ impl Formula {
     }
 
     pub(super) fn count(&self) -> usize {
-        self.count
+        self.ends.len()
     }
 
     pub(super) fn write_dimacs(&self, output: &mut dyn Write) -> std::io::Result<()> {
@@ -136,10 +138,10 @@ impl Formula {
 
     /// Calls `visit` with each line of the formula.
     fn dimacs<E>(&self, visit: &mut dyn FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
-        visit(format!("p cnf {} {}\n", self.variables(), self.count).as_bytes())?;
+        visit(format!("p cnf {} {}\n", self.variables(), self.count()).as_bytes())?;
         let mut line = Vec::new();
         self.clauses().try_for_each(|clause| {
-            lines::format(&mut line, clause);
+            lines::format(&mut line, clause.iter().map(|literal| literal.number()));
             visit(&line)
         })
     }
@@ -175,6 +177,7 @@ struct Written<'w> {
 }
 
 impl Written<'_> {
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn compare(&mut self, expected: &[u8]) -> Result<(), String> {
         self.number += 1;
         self.line.clear();
@@ -202,12 +205,12 @@ impl Written<'_> {
 /// States and what leads from one to the next.
 pub(super) struct Timeline {
     /// For each variable and value, after the latest step.
-    values: Vec<Vec<Var>>,
+    values: Vec<Vec<Literal>>,
     /// At the latest step.
-    pub(super) operators: Vec<Var>,
-    pub(super) idle: Var,
+    pub(super) operators: Vec<Literal>,
+    pub(super) idle: Option<Literal>,
     /// For each slot and design.
-    pub(super) chosen: Vec<Vec<Var>>,
+    pub(super) chosen: Vec<Vec<Literal>>,
 }
 
 impl Timeline {
@@ -216,13 +219,13 @@ impl Timeline {
         for (variable, value) in model.values.iter().enumerate() {
             formula.clause(&[values[variable][*value as usize]]);
         }
-        Self { values, operators: Vec::new(), idle: 0, chosen: Vec::new() }
+        Self { values, operators: Vec::new(), idle: None, chosen: Vec::new() }
     }
 
-    fn state(model: &Model, formula: &mut Formula, time: usize) -> Vec<Vec<Var>> {
+    fn state(model: &Model, formula: &mut Formula, time: usize) -> Vec<Vec<Literal>> {
         let all = model.variables.iter().enumerate().map(|(variable, values)| {
             let name = |value: &String| format!("{value} (variable {variable}) after step {time}");
-            let own: Vec<Var> = values.iter().map(|value| formula.variable(|| name(value))).collect();
+            let own: Vec<Literal> = values.iter().map(|value| formula.variable(|| name(value))).collect();
             formula.clause(&own);
             formula.at_most_one(&own, &format!("the values of variable {variable} after step {time}"));
             own
@@ -230,39 +233,39 @@ impl Timeline {
         all.collect()
     }
 
-    fn fact(values: &[Vec<Var>], (variable, value): Fact) -> Var {
+    fn fact(values: &[Vec<Literal>], (variable, value): Fact) -> Literal {
         values[variable as usize][value as usize]
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn advance(&mut self, model: &Model, formula: &mut Formula, step: usize) {
         let number = step + 1;
         let name = |operator: &Operator| format!("{} at step {number}", show(model, operator));
-        let operators: Vec<Var> =
+        let operators: Vec<Literal> =
             model.operators.iter().map(|operator| formula.variable(|| name(operator))).collect();
         let idle = formula.variable(|| format!("nothing from step {number} on"));
-        if self.idle != 0 {
-            formula.clause(&[-self.idle, idle]);
+        if let Some(before) = self.idle.replace(idle) {
+            formula.clause(&[-before, idle]);
         }
         let one = [&operators[..], &[idle]].concat();
         formula.clause(&one);
         formula.at_most_one(&one, &format!("the operators at step {number}"));
         self.operators = operators;
-        self.idle = idle;
         self.choose(model, formula, number);
         let next = Self::state(model, formula, number);
-        let mut makers: BTreeMap<Fact, Vec<Var>> = BTreeMap::new();
+        let mut makers: BTreeMap<Fact, Vec<Literal>> = BTreeMap::new();
         for (operator, own) in model.operators.iter().zip(&self.operators) {
             for fact in &operator.condition.facts {
-                formula.clause(&[-own, Self::fact(&self.values, *fact)]);
+                formula.clause(&[-*own, Self::fact(&self.values, *fact)]);
             }
             for clause in &operator.condition.clauses {
                 let literals = clause.iter().map(|literal| Self::literal(&self.values, literal));
-                formula.clause(&std::iter::once(-own).chain(literals).collect::<Vec<_>>());
+                formula.clause(&std::iter::once(-*own).chain(literals).collect::<Vec<_>>());
             }
             // Later effects prevail.
             let last: BTreeMap<u32, u32> = operator.effects.iter().copied().collect();
             for fact in last {
-                formula.clause(&[-own, Self::fact(&next, fact)]);
+                formula.clause(&[-*own, Self::fact(&next, fact)]);
                 makers.entry(fact).or_default().push(*own);
             }
         }
@@ -270,13 +273,13 @@ impl Timeline {
             for (value, after) in (0..).zip(values) {
                 let before = Self::fact(&self.values, (variable, value));
                 let made = makers.get(&(variable, value)).into_iter().flatten().copied();
-                formula.clause(&[-after, before].into_iter().chain(made).collect::<Vec<_>>());
+                formula.clause(&[-*after, before].into_iter().chain(made).collect::<Vec<_>>());
             }
         }
         self.values = next;
     }
 
-    fn literal(values: &[Vec<Var>], (fact, positive): &Literal) -> Var {
+    fn literal(values: &[Vec<Literal>], (fact, positive): &model::Literal) -> Literal {
         let own = Self::fact(values, *fact);
         if *positive { own } else { -own }
     }
@@ -286,11 +289,11 @@ impl Timeline {
         self.chosen = Vec::new();
         for (slot, designs) in model.slots.iter().enumerate() {
             let name = |design: &u32| format!("{} in slot {slot} at step {number}", object(model, *design));
-            let own: Vec<Var> = designs.iter().map(|design| formula.variable(|| name(design))).collect();
+            let own: Vec<Literal> = designs.iter().map(|design| formula.variable(|| name(design))).collect();
             formula.at_most_one(&own, &format!("the designs of slot {slot} at step {number}"));
             self.chosen.push(own);
         }
-        let mut kinds: BTreeMap<(u32, u32), Vec<Var>> = BTreeMap::new();
+        let mut kinds: BTreeMap<(u32, u32), Vec<Literal>> = BTreeMap::new();
         for (operator, own) in model.operators.iter().zip(&self.operators) {
             kinds.entry((operator.uses, operator.exclusions)).or_default().push(*own);
         }
@@ -316,7 +319,7 @@ impl Timeline {
     }
 
     /// A design by its position among those that suit a slot of an operator.
-    pub(super) fn design(&self, uses: &[(u32, Vec<u32>)], slot: u32, design: u32) -> Var {
+    pub(super) fn design(&self, uses: &[(u32, Vec<u32>)], slot: u32, design: u32) -> Literal {
         let (slot, suited) = &uses[slot as usize];
         self.chosen[*slot as usize][suited[design as usize] as usize]
     }
@@ -326,7 +329,7 @@ impl Timeline {
             formula.clause(&[Self::fact(&self.values, *fact)]);
         }
         for clause in &model.goal.clauses {
-            let literals: Vec<Var> =
+            let literals: Vec<Literal> =
                 clause.iter().map(|literal| Self::literal(&self.values, literal)).collect();
             formula.clause(&literals);
         }

@@ -2,6 +2,8 @@
 
 use std::io::{BufRead, Read};
 
+use crate::certificate::clausal::literal::Literal;
+
 /// A line is not longer than this, in bytes.
 const LINE_LIMIT: u64 = 1 << 22;
 
@@ -12,50 +14,53 @@ pub(super) fn read<'l>(input: &mut dyn BufRead, line: &'l mut Vec<u8>) -> std::i
     Ok((!line.is_empty()).then(|| line.trim_ascii_end()))
 }
 
-/// The numbers of a line without the 0 that ends it; none if there are other words, or numbers that are not within the limit.
-pub(super) fn numbers(line: &[u8], limit: usize, numbers: &mut Vec<i32>) -> Option<()> {
-    numbers.clear();
+/// The literals of a line, over so many variables; none if something else is there.
+pub(super) fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> Option<()> {
+    literals.clear();
+    numbers(line, variables, &mut |negative, variable| {
+        let literal = Literal::of_variable(variable)?;
+        literals.push(if negative { -literal } else { literal });
+        Some(())
+    })
+}
+
+/// The places in a list of so many clauses that a line names by numbers from 1; none if something else is there.
+pub(super) fn places(line: &[u8], clauses: usize, places: &mut Vec<usize>) -> Option<()> {
+    places.clear();
+    numbers(line, clauses, &mut |negative, number| {
+        places.push(number.checked_sub(1).filter(|_| !negative)?);
+        Some(())
+    })
+}
+
+/// Visits the numbers of a line without the 0 that ends it; none if there are other words, or numbers beyond the limit.
+fn numbers(line: &[u8], limit: usize, visit: &mut dyn FnMut(bool, usize) -> Option<()>) -> Option<()> {
     let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     loop {
         let word = words.next()?;
         let (digits, negative) = word.strip_prefix(b"-").map_or((word, false), |rest| (rest, true));
-        let digit = |number: i128, digit: &u8| {
-            let number = number * 10 + i128::from(digit.is_ascii_digit().then(|| digit - b'0')?);
-            (number <= limit as i128).then_some(number)
+        let digit = |number: usize, digit: &u8| {
+            let digit = char::from(*digit).to_digit(10)?;
+            let number = number.checked_mul(10)?.checked_add(digit as usize)?;
+            (number <= limit).then_some(number)
         };
-        let number = digits.iter().try_fold(0, digit)? as i32;
+        let number = digits.iter().try_fold(0, digit)?;
         if digits.is_empty() {
             return None;
         }
         if number == 0 {
             return (!negative && words.next().is_none()).then_some(());
         }
-        numbers.push(if negative { -number } else { number });
+        visit(negative, number)?;
     }
-}
-
-/// Appends a number in decimals.
-fn push(line: &mut Vec<u8>, number: i32) {
-    if number < 0 {
-        line.push(b'-');
-    }
-    let start = line.len();
-    let mut rest = number.unsigned_abs();
-    loop {
-        line.push(b'0' + (rest % 10) as u8);
-        rest /= 10;
-        if rest == 0 {
-            break;
-        }
-    }
-    line[start..].reverse();
 }
 
 /// Makes a line of numbers, with its end.
-pub(super) fn format(line: &mut Vec<u8>, numbers: &[i32]) {
+pub(super) fn format(line: &mut Vec<u8>, numbers: impl Iterator<Item = i32>) {
     line.clear();
+    let mut digits = itoa::Buffer::new();
     for number in numbers {
-        push(line, *number);
+        line.extend(digits.format(number).as_bytes());
         line.push(b' ');
     }
     line.extend(b"0\n");

@@ -14,6 +14,7 @@
 mod binary;
 mod formula;
 mod lines;
+mod literal;
 mod proof;
 mod steps;
 mod sums;
@@ -80,6 +81,7 @@ pub enum StepBound {
 ///
 /// # Errors
 /// Why there is none: a construct that the formula does not cover, no bound on the number of steps, a limit.
+#[expect(clippy::arithmetic_side_effects, reason = "two constants, divided by a number that is not 0")]
 pub fn refute(
     (task, argument): (&str, &str),
     claim: Option<&BigRational>,
@@ -95,7 +97,8 @@ pub fn refute(
     formula.write_dimacs(outputs.formula).map_err(failed)?;
     formula.write_legend(outputs.legend).map_err(failed)?;
     let conflicts = CONFLICT_LIMIT * NARROW as u64 / formula.widest().max(NARROW) as u64;
-    match refute_with_proof(formula.clauses(), outputs.draft, limits, conflicts) {
+    let numbers = formula.clauses().map(|clause| clause.iter().map(|literal| literal.number()));
+    match refute_with_proof(numbers, outputs.draft, limits, conflicts) {
         Answer::Unsatisfiable => {}
         Answer::Satisfiable => return Err("the formula has a model".to_owned()),
         Answer::Interrupted => {

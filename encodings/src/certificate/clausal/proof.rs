@@ -6,8 +6,10 @@
 //! once. The formula's clauses are numbered from 1, those of the proof go on from there.
 
 use std::io::BufRead;
+use std::ops::Range;
 
 use crate::certificate::clausal::lines;
+use crate::certificate::clausal::literal::Literal;
 
 /// All clauses together have at most so many literals.
 const LITERAL_LIMIT: usize = 1 << 26;
@@ -17,15 +19,15 @@ const LITERAL_LIMIT: usize = 1 << 26;
 /// # Errors
 /// The first line that does not follow, or that the proof ends too early.
 pub(super) fn check<'c>(
-    clauses: impl Iterator<Item = &'c [i32]>,
+    clauses: impl Iterator<Item = &'c [Literal]>,
     variables: usize,
     proof: &mut dyn BufRead,
     hints: &mut dyn BufRead,
 ) -> Result<usize, String> {
     let mut checker = Checker {
         literals: Vec::new(),
-        ends: vec![0],
-        is_true: vec![false; 2 * variables + 2],
+        places: Vec::new(),
+        is_true: vec![false; Literal::places(variables)],
         settled: Vec::new(),
     };
     clauses.for_each(|clause| checker.add(clause));
@@ -35,10 +37,10 @@ pub(super) fn check<'c>(
         let unreadable = |error: std::io::Error| wrong(&format!("cannot be read: {error}"));
         let text = lines::read(proof, &mut line).map_err(unreadable)?;
         let text = text.ok_or("the proof ends before the empty clause")?;
-        lines::numbers(text, variables, &mut clause)
+        lines::literals(text, variables, &mut clause)
             .ok_or_else(|| wrong("is no clause of the formula's variables"))?;
         let text = lines::read(hints, &mut line).map_err(unreadable)?.unwrap_or_default();
-        lines::numbers(text, checker.ends.len() - 1, &mut named)
+        lines::places(text, checker.places.len(), &mut named)
             .ok_or_else(|| wrong("has hints that name no clauses before it"))?;
         if !checker.follows(&clause, &named) {
             return Err(wrong("does not follow by its hints"));
@@ -54,52 +56,46 @@ pub(super) fn check<'c>(
     Err("the proof does not end".to_owned())
 }
 
-/// The place of a literal in lists.
-fn index(literal: i32) -> usize {
-    2 * literal.unsigned_abs() as usize + usize::from(literal < 0)
-}
-
 struct Checker {
     /// Of all clauses, one after the other.
-    literals: Vec<i32>,
-    /// Where each clause begins, and the last one ends.
-    ends: Vec<usize>,
+    literals: Vec<Literal>,
+    /// Where each clause stands.
+    places: Vec<Range<usize>>,
     /// Whether a literal is true.
     is_true: Vec<bool>,
     /// Literals that are true.
-    settled: Vec<i32>,
+    settled: Vec<Literal>,
 }
 
 impl Checker {
-    fn add(&mut self, clause: &[i32]) {
+    fn add(&mut self, clause: &[Literal]) {
+        let begin = self.literals.len();
         self.literals.extend(clause);
-        self.ends.push(self.literals.len());
+        self.places.push(begin..self.literals.len());
     }
 
-    fn settle(&mut self, literal: i32) {
-        self.is_true[index(literal)] = true;
+    fn settle(&mut self, literal: Literal) {
+        self.is_true[literal.index()] = true;
         self.settled.push(literal);
     }
 
     /// Whether the hints lead from the negation of a clause to a contradiction.
-    fn follows(&mut self, clause: &[i32], hints: &[i32]) -> bool {
+    fn follows(&mut self, clause: &[Literal], hints: &[usize]) -> bool {
         for literal in clause {
-            self.settle(-literal);
+            self.settle(-*literal);
         }
         let contradiction = self.contradiction(hints);
         for literal in self.settled.drain(..) {
-            self.is_true[index(literal)] = false;
+            self.is_true[literal.index()] = false;
         }
         contradiction
     }
 
-    fn contradiction(&mut self, hints: &[i32]) -> bool {
+    fn contradiction(&mut self, hints: &[usize]) -> bool {
         for hint in hints {
-            let Some(number) = hint.checked_sub(1).and_then(|number| usize::try_from(number).ok()) else {
-                return false;
-            };
-            let clause = &self.literals[self.ends[number]..self.ends[number + 1]];
-            let mut open = clause.iter().filter(|literal| !self.is_true[index(-**literal)]);
+            let Some(place) = self.places.get(*hint) else { return false };
+            let clause = &self.literals[place.clone()];
+            let mut open = clause.iter().filter(|literal| !self.is_true[(-**literal).index()]);
             match open.next().copied() {
                 None => return true,
                 // A literal may stand in a clause twice.
@@ -115,6 +111,7 @@ impl Checker {
 mod tests {
     use super::check;
     use crate::certificate::clausal::lines;
+    use crate::certificate::clausal::literal::Literal;
 
     /// Numbers, the same in every run.
     struct Random(u64);
@@ -125,17 +122,18 @@ mod tests {
             (self.0 >> 33) % limit
         }
 
-        fn clause(&mut self) -> Vec<i32> {
+        fn clause(&mut self) -> Vec<Literal> {
             let literal = |random: &mut Self| {
-                let variable = random.below(4) as i32 + 1;
+                let variable = Literal::of_variable(random.below(4) as usize + 1).expect("a variable");
                 if random.below(2) == 0 { variable } else { -variable }
             };
             (0..=self.below(3)).map(|_| literal(self)).collect()
         }
     }
 
-    fn has_a_model(clauses: &[Vec<i32>]) -> bool {
-        let holds = |model: u32, literal: &i32| (model >> literal.unsigned_abs() & 1 == 1) == (*literal > 0);
+    fn has_a_model(clauses: &[Vec<Literal>]) -> bool {
+        let holds =
+            |model: u32, literal: &Literal| (model >> literal.variable() & 1 == 1) == (literal.number() > 0);
         (0..32).any(|model| clauses.iter().all(|clause| clause.iter().any(|own| holds(model, own))))
     }
 
@@ -143,7 +141,7 @@ mod tests {
         let mut text = Vec::new();
         let mut line = Vec::new();
         for numbers in all {
-            lines::format(&mut line, numbers);
+            lines::format(&mut line, numbers.iter().copied());
             text.extend(&line);
         }
         text
@@ -152,7 +150,9 @@ mod tests {
     /// A clause is a set, however often a literal is written.
     #[test]
     fn a_literal_may_stand_in_a_clause_twice() {
-        let clauses = [vec![1, 1], vec![-1, 2, -1, 2], vec![-2, -2]];
+        let literal = |number: &i32| Literal::new(*number).expect("a literal");
+        let clauses = [&[1, 1][..], &[-1, 2, -1, 2], &[-2, -2]];
+        let clauses = clauses.map(|clause| clause.iter().map(literal).collect::<Vec<_>>());
         let (proof, hints) = (text(&[Vec::new()]), text(&[vec![1, 2, 3]]));
         let borrowed = clauses.iter().map(Vec::as_slice);
         assert_eq!(check(borrowed, 2, &mut proof.as_slice(), &mut hints.as_slice()), Ok(1));
@@ -165,9 +165,11 @@ mod tests {
         for seed in 0..20_000 {
             let mut random = Random(seed);
             let count = 6 + random.below(10);
-            let clauses: Vec<Vec<i32>> = (0..count).map(|_| random.clause()).collect();
+            let clauses: Vec<Vec<Literal>> = (0..count).map(|_| random.clause()).collect();
             let length = random.below(3);
-            let mut proof: Vec<Vec<i32>> = (0..length).map(|_| random.clause()).collect();
+            let mut proof: Vec<Vec<i32>> = (0..length)
+                .map(|_| random.clause().iter().map(|literal| literal.number()).collect())
+                .collect();
             proof.push(Vec::new());
             let hints = |line: u64, random: &mut Random| {
                 (0..=random.below(8)).map(|_| 1 + random.below(count + line) as i32).collect()

@@ -6,8 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::certificate::clausal::binary::{Bits, width};
-use crate::certificate::clausal::formula::{Formula, Timeline, Var};
+use crate::certificate::clausal::binary::{Bits, sign, width};
+use crate::certificate::clausal::formula::{Formula, Timeline};
+use crate::certificate::clausal::literal::Literal;
 use crate::certificate::integer::Integer;
 use crate::certificate::model::{Linear, Model, Operator, Quantity};
 use crate::certificate::table::is_alone;
@@ -106,6 +107,10 @@ impl Sums {
         self.numbers.iter().chain([&self.spent]).map(Vec::len).max().unwrap_or(0)
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a row and its parts are below the size of a table, see `shape`"
+    )]
     pub(super) fn advance(
         &mut self,
         model: &Model,
@@ -128,7 +133,7 @@ impl Sums {
                 };
                 if operator.changes.iter().any(|(own, value)| own == number && value == linear) {
                     let after = &self.numbers[*number as usize];
-                    formula.clause(&[-own, -after[after.len() - 1]]);
+                    formula.clause(&[-*own, -sign(after)]);
                 } else if linear.quantity.tables.is_empty() {
                     let own = (&[*own][..], &before[*number as usize]);
                     compare(formula, own, factor, &linear.quantity.constant);
@@ -158,7 +163,7 @@ impl Sums {
 /// Where a condition holds, a multiple of a number plus a constant is at least 0.
 fn compare(
     formula: &mut Formula,
-    (condition, number): (&[Var], &Bits),
+    (condition, number): (&[Literal], &Bits),
     factor: &Integer,
     constant: &Integer,
 ) {
@@ -167,7 +172,7 @@ fn compare(
     } else if factor.is_negative() {
         formula.at_most(condition, number, &constant.div_floor(&-factor));
     } else if constant.is_negative() {
-        formula.clause(&condition.iter().map(|literal| -literal).collect::<Vec<_>>());
+        formula.clause(&condition.iter().map(|literal| -*literal).collect::<Vec<_>>());
     }
 }
 
@@ -191,14 +196,16 @@ impl Adder<'_> {
             let assigned = formula.variable(|| format!("{name} is assigned at step {}", self.step));
             for (own, change) in self.timeline.operators.iter().zip(&changes) {
                 let assigns = matches!(change, Some(Change::Assign(_)));
-                formula.clause(&[-own, if assigns { assigned } else { -assigned }]);
+                formula.clause(&[-*own, if assigns { assigned } else { -assigned }]);
             }
-            formula.clause(&[-self.timeline.idle, -assigned]);
+            if let Some(idle) = self.timeline.idle {
+                formula.clause(&[-idle, -assigned]);
+            }
             base = formula.bits(before.len(), &format!("what is kept of {name} at step {}", self.step));
             for (kept, bit) in base.iter().zip(before) {
-                formula.clause(&[-assigned, -kept]);
-                formula.clause(&[assigned, -kept, *bit]);
-                formula.clause(&[assigned, *kept, -bit]);
+                formula.clause(&[-assigned, -*kept]);
+                formula.clause(&[assigned, -*kept, *bit]);
+                formula.clause(&[assigned, *kept, -*bit]);
             }
         }
         let parts: Vec<Option<&Quantity>> = changes
@@ -231,7 +238,7 @@ impl Adder<'_> {
                 let sum = self.sum(formula, bits, &parts, &format!("comparison {place} of number {number}"));
                 for (own, _) in self.timeline.operators.iter().zip(&parts).filter(|(_, part)| part.is_some())
                 {
-                    formula.clause(&[-own, -sum[sum.len() - 1]]);
+                    formula.clause(&[-*own, -sign(&sum)]);
                 }
             }
         }
@@ -241,13 +248,13 @@ impl Adder<'_> {
     fn sum(&mut self, formula: &mut Formula, base: &Bits, parts: &[Option<&Quantity>], name: &str) -> Bits {
         let step = self.step;
         let constants = parts.iter().map(|part| part.map_or(&Integer::ZERO, |quantity| &quantity.constant));
-        let mut kinds: BTreeMap<&Integer, Vec<Var>> = BTreeMap::new();
+        let mut kinds: BTreeMap<&Integer, Vec<Literal>> = BTreeMap::new();
         for (own, constant) in self.timeline.operators.iter().zip(constants) {
             kinds.entry(constant).or_default().push(*own);
         }
         let mut sum = base.clone();
         if kinds.keys().any(|constant| !constant.is_zero()) {
-            kinds.entry(&Integer::ZERO).or_default().push(self.timeline.idle);
+            kinds.entry(&Integer::ZERO).or_default().extend(self.timeline.idle);
             let added = formula.bits(base.len(), &format!("the constant added to {name} at step {step}"));
             for (constant, operators) in kinds {
                 let kind = formula.variable(|| format!("{constant} is added to {name} at step {step}"));
@@ -255,7 +262,7 @@ impl Adder<'_> {
                     formula.clause(&[-own, kind]);
                 }
                 for (position, own) in added.iter().enumerate() {
-                    formula.clause(&[-kind, if constant.bit(position) { *own } else { -own }]);
+                    formula.clause(&[-kind, if constant.bit(position) { *own } else { -*own }]);
                 }
             }
             sum = formula.add(&sum, &added, &format!("{name} with the constant of step {step}"));
@@ -269,6 +276,11 @@ impl Adder<'_> {
     }
 
     /// The entry of one of the operator's tables.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        clippy::cast_possible_truncation,
+        reason = "a row and its parts are below the size of a table, see `shape`"
+    )]
     fn table(
         &mut self,
         formula: &mut Formula,
@@ -278,18 +290,18 @@ impl Adder<'_> {
     ) -> Bits {
         let step = self.step;
         let added = formula.bits(width, &format!("table {place} added to {name} at step {step}"));
-        let mut kinds: BTreeMap<Option<Kind<'_>>, Vec<Var>> = BTreeMap::new();
+        let mut kinds: BTreeMap<Option<Kind<'_>>, Vec<Literal>> = BTreeMap::new();
         for ((operator, own), part) in self.model.operators.iter().zip(&self.timeline.operators).zip(parts) {
             let table = part.and_then(|quantity| quantity.tables.get(place));
             let kind = table.map(|(slots, table)| (operator.uses, slots.as_slice(), *table));
             kinds.entry(kind).or_default().push(*own);
         }
-        kinds.entry(None).or_default().push(self.timeline.idle);
+        kinds.entry(None).or_default().extend(self.timeline.idle);
         for (kind, operators) in kinds {
             let Some((uses, slots, table)) = kind else {
                 for own in operators {
                     for bit in &added {
-                        formula.clause(&[-own, -bit]);
+                        formula.clause(&[-own, -*bit]);
                     }
                 }
                 continue;
@@ -308,7 +320,7 @@ impl Adder<'_> {
                     rest /= size;
                 }
                 for (position, own) in added.iter().enumerate() {
-                    let literal = if value.bit(position) { *own } else { -own };
+                    let literal = if value.bit(position) { *own } else { -*own };
                     formula.clause(&[&condition[..], &[literal]].concat());
                 }
             }

@@ -13,6 +13,7 @@ use std::io::{BufRead, Write};
 use rustc_hash::FxHashMap;
 
 use crate::certificate::clausal::lines;
+use crate::certificate::clausal::literal::Literal;
 use crate::limits::Limits;
 
 /// All clauses together have at most so many literals.
@@ -24,8 +25,9 @@ const NONE: u32 = u32::MAX;
 ///
 /// # Errors
 /// The draft is no proof, a limit, or a file that cannot be written.
+#[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
 pub(super) fn trim<'c>(
-    clauses: impl Iterator<Item = &'c [i32]>,
+    clauses: impl Iterator<Item = &'c [Literal]>,
     variables: usize,
     draft: &mut dyn BufRead,
     (proof, hints): (&mut dyn Write, &mut dyn Write),
@@ -44,7 +46,7 @@ pub(super) fn trim<'c>(
         let text = lines::read(draft, &mut line).map_err(failed)?;
         let text = text.ok_or("the solver's proof ends before the empty clause")?;
         let (deletes, text) = text.strip_prefix(b"d ").map_or((false, text), |rest| (true, rest));
-        lines::numbers(text, variables, &mut clause).ok_or("the solver's proof has no clause in a line")?;
+        lines::literals(text, variables, &mut clause).ok_or("the solver's proof has no clause in a line")?;
         clause.sort_unstable();
         clause.dedup();
         if deletes {
@@ -59,18 +61,9 @@ pub(super) fn trim<'c>(
     trimmer.write(proof, hints).map_err(|error| format!("the proof cannot be written: {error}"))
 }
 
-/// The place of a literal in lists.
-fn index(literal: i32) -> usize {
-    2 * literal.unsigned_abs() as usize + usize::from(literal < 0)
-}
-
-fn variable(literal: i32) -> usize {
-    literal.unsigned_abs() as usize
-}
-
 struct Trimmer {
     /// The first two literals of each are watched.
-    clauses: Vec<Vec<i32>>,
+    clauses: Vec<Vec<Literal>>,
     /// So many of them are the formula's.
     given: usize,
     /// For each of the others.
@@ -79,11 +72,11 @@ struct Trimmer {
     is_gone: Vec<bool>,
     watches: Vec<Vec<u32>>,
     /// Clauses that are not deleted, by sorted literals.
-    positions: FxHashMap<Vec<i32>, Vec<u32>>,
+    positions: FxHashMap<Vec<Literal>, Vec<u32>>,
     /// Whether a literal is true.
     is_true: Vec<bool>,
     /// Literals that are true, in the order in which they became so.
-    trail: Vec<i32>,
+    trail: Vec<Literal>,
     /// How many of them have been propagated.
     done: usize,
     /// By variable: the clause that settles it, for now.
@@ -100,6 +93,7 @@ struct Trimmer {
 }
 
 impl Trimmer {
+    #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn new(variables: usize) -> Self {
         let size = variables + 1;
         Self {
@@ -107,9 +101,9 @@ impl Trimmer {
             given: 0,
             hints: Vec::new(),
             is_gone: Vec::new(),
-            watches: vec![Vec::new(); 2 * size],
+            watches: vec![Vec::new(); Literal::places(variables)],
             positions: FxHashMap::default(),
-            is_true: vec![false; 2 * size],
+            is_true: vec![false; Literal::places(variables)],
             trail: Vec::new(),
             done: 0,
             reasons: vec![NONE; size],
@@ -121,27 +115,32 @@ impl Trimmer {
         }
     }
 
-    fn is_false(&self, literal: i32) -> bool {
-        self.is_true[index(-literal)]
+    fn is_false(&self, literal: Literal) -> bool {
+        self.is_true[(-literal).index()]
     }
 
-    fn push(&mut self, clause: Vec<i32>) -> u32 {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        clippy::cast_possible_truncation,
+        reason = "clauses, none of them empty but the last, have little more than 2^26 literals in all"
+    )]
+    fn push(&mut self, clause: Vec<Literal>) -> u32 {
         self.size += clause.len();
         self.clauses.push(clause);
         self.is_gone.push(false);
         self.clauses.len() as u32 - 1
     }
 
-    fn push_concluded(&mut self, clause: Vec<i32>, hints: Vec<u32>) -> u32 {
+    fn push_concluded(&mut self, clause: Vec<Literal>, hints: Vec<u32>) -> u32 {
         self.is_done |= clause.is_empty();
         self.hints.push(hints);
         self.push(clause)
     }
 
-    fn settle(&mut self, literal: i32, reason: u32) {
-        if !self.is_true[index(literal)] {
-            self.is_true[index(literal)] = true;
-            self.reasons[variable(literal)] = reason;
+    fn settle(&mut self, literal: Literal, reason: u32) {
+        if !self.is_true[literal.index()] {
+            self.is_true[literal.index()] = true;
+            self.reasons[literal.variable()] = reason;
             self.trail.push(literal);
         }
     }
@@ -152,12 +151,12 @@ impl Trimmer {
         clause.sort_unstable();
         clause.dedup();
         self.positions.entry(clause.clone()).or_default().push(position);
-        let tautology = clause.iter().any(|literal| clause.binary_search(&-literal).is_ok());
+        let tautology = clause.iter().any(|literal| clause.binary_search(&-*literal).is_ok());
         clause.sort_by_key(|literal| self.is_false(*literal));
         if !tautology {
             if clause.len() >= 2 {
                 for literal in &clause[..2] {
-                    self.watches[index(*literal)].push(position);
+                    self.watches[literal.index()].push(position);
                 }
             }
             match clause.iter().filter(|literal| !self.is_false(**literal)).count() {
@@ -173,7 +172,7 @@ impl Trimmer {
     fn settle_all(&mut self) {
         let conflict = self.conflict.or_else(|| self.propagate());
         for at in 0..self.trail.len() {
-            let own = variable(self.trail[at]);
+            let own = self.trail[at].variable();
             if self.units[own] == NONE {
                 let reason = self.reasons[own];
                 self.units[own] = if self.clauses[reason as usize].len() == 1 {
@@ -192,14 +191,14 @@ impl Trimmer {
 
     /// The clauses by which all literals of a clause but one are false for good, and the clause.
     fn by_units(&self, position: u32, except: usize) -> Vec<u32> {
-        let others = self.clauses[position as usize].iter().map(|literal| variable(*literal));
+        let others = self.clauses[position as usize].iter().map(|literal| literal.variable());
         let units = others.filter(|own| *own != except).map(|own| self.units[own]);
         units.chain([position]).collect()
     }
 
     /// Adds a clause of the solver, with its hints.
-    fn conclude(&mut self, clause: &[i32]) -> Result<(), String> {
-        if clause.iter().any(|literal| clause.binary_search(&-literal).is_ok()) {
+    fn conclude(&mut self, clause: &[Literal]) -> Result<(), String> {
+        if clause.iter().any(|literal| clause.binary_search(&-*literal).is_ok()) {
             return Ok(());
         }
         let hints = self.follows(clause).ok_or("a clause of the solver's proof does not follow")?;
@@ -212,7 +211,7 @@ impl Trimmer {
     }
 
     /// Takes a clause away, if it is there. What it has settled stays so.
-    fn forget(&mut self, clause: &[i32]) {
+    fn forget(&mut self, clause: &[Literal]) {
         let Some(positions) = self.positions.get_mut(clause) else { return };
         if let Some(position) = positions.pop() {
             self.is_gone[position as usize] = true;
@@ -223,18 +222,18 @@ impl Trimmer {
     }
 
     /// The clauses by which another one follows, in the order in which they are gone through; none if it does not follow.
-    fn follows(&mut self, clause: &[i32]) -> Option<Vec<u32>> {
-        if let Some(literal) = clause.iter().find(|literal| self.is_true[index(**literal)]) {
-            return Some(vec![self.units[variable(*literal)]]);
+    fn follows(&mut self, clause: &[Literal]) -> Option<Vec<u32>> {
+        if let Some(literal) = clause.iter().find(|literal| self.is_true[literal.index()]) {
+            return Some(vec![self.units[literal.variable()]]);
         }
         let (settled, done) = (self.trail.len(), self.done);
         for literal in clause {
-            self.settle(-literal, NONE);
+            self.settle(-*literal, NONE);
         }
         let conflict = self.propagate();
         let hints = conflict.map(|conflict| self.antecedents(conflict, settled));
         for literal in self.trail.drain(settled..) {
-            self.is_true[index(literal)] = false;
+            self.is_true[literal.index()] = false;
         }
         self.done = done;
         hints
@@ -247,7 +246,7 @@ impl Trimmer {
         let mut seen = Vec::new();
         let mut look = |position: u32, is_seen: &mut Vec<bool>| {
             for literal in &self.clauses[position as usize] {
-                let own = variable(*literal);
+                let own = literal.variable();
                 if !std::mem::replace(&mut is_seen[own], true) {
                     seen.push(own);
                     units.extend((self.units[own] != NONE).then_some(self.units[own]));
@@ -256,8 +255,8 @@ impl Trimmer {
         };
         look(conflict, &mut self.is_seen);
         for literal in self.trail[settled..].iter().rev() {
-            let reason = self.reasons[variable(*literal)];
-            if self.is_seen[variable(*literal)] && reason != NONE {
+            let reason = self.reasons[literal.variable()];
+            if self.is_seen[literal.variable()] && reason != NONE {
                 hints.push(reason);
                 look(reason, &mut self.is_seen);
             }
@@ -271,14 +270,15 @@ impl Trimmer {
     }
 
     /// The clause in which a contradiction is met.
+    #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn propagate(&mut self) -> Option<u32> {
         while let Some(literal) = self.trail.get(self.done).copied() {
             self.done += 1;
             let falsified = -literal;
-            let mut watching = std::mem::take(&mut self.watches[index(falsified)]);
+            let mut watching = std::mem::take(&mut self.watches[falsified.index()]);
             let mut conflict = None;
             watching.retain(|position| conflict.is_some() || self.visit(*position, falsified, &mut conflict));
-            self.watches[index(falsified)] = watching;
+            self.watches[falsified.index()] = watching;
             if conflict.is_some() {
                 return conflict;
             }
@@ -287,7 +287,7 @@ impl Trimmer {
     }
 
     /// Looks at a clause one of whose watched literals has become false; whether that stays watched.
-    fn visit(&mut self, position: u32, falsified: i32, conflict: &mut Option<u32>) -> bool {
+    fn visit(&mut self, position: u32, falsified: Literal, conflict: &mut Option<u32>) -> bool {
         if self.is_gone[position as usize] {
             return false;
         }
@@ -295,15 +295,15 @@ impl Trimmer {
         if clause[0] == falsified {
             clause.swap(0, 1);
         }
-        if self.is_true[index(clause[0])] {
+        if self.is_true[clause[0].index()] {
             return true;
         }
-        if let Some(at) = (2..clause.len()).find(|at| !self.is_true[index(-clause[*at])]) {
+        if let Some(at) = (2..clause.len()).find(|at| !self.is_true[(-clause[*at]).index()]) {
             clause.swap(1, at);
-            self.watches[index(clause[1])].push(position);
+            self.watches[clause[1].index()].push(position);
             return false;
         }
-        if self.is_true[index(-clause[0])] {
+        if self.is_true[(-clause[0]).index()] {
             *conflict = Some(position);
         } else {
             let first = clause[0];
@@ -313,6 +313,7 @@ impl Trimmer {
     }
 
     /// Writes what the empty clause, which is the last, rests on.
+    #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn write(&self, proof: &mut dyn Write, hints: &mut dyn Write) -> std::io::Result<()> {
         let mut is_needed = vec![false; self.clauses.len()];
         is_needed[self.clauses.len() - 1] = true;
@@ -324,18 +325,17 @@ impl Trimmer {
             }
         }
         // Of those that are needed.
-        let mut numbers: Vec<i32> = (1..=self.given as i32).collect();
-        let mut last = self.given as i32;
+        let mut numbers = 1..;
+        let mut places: Vec<i32> = numbers.by_ref().take(self.given).collect();
         let mut line = Vec::new();
         let concluded = self.clauses.iter().zip(is_needed).skip(self.given);
         for ((clause, is_needed), hints_of) in concluded.zip(&self.hints) {
-            last += i32::from(is_needed);
-            numbers.push(last);
+            let number = if is_needed { numbers.next() } else { None };
+            places.push(number.unwrap_or(0));
             if is_needed {
-                lines::format(&mut line, clause);
+                lines::format(&mut line, clause.iter().map(|literal| literal.number()));
                 proof.write_all(&line)?;
-                let own = hints_of.iter().map(|hint| numbers[*hint as usize]);
-                lines::format(&mut line, &own.collect::<Vec<_>>());
+                lines::format(&mut line, hints_of.iter().map(|hint| places[*hint as usize]));
                 hints.write_all(&line)?;
             }
         }

@@ -111,7 +111,7 @@ impl<'c> Comparison<'c> {
 
     pub(super) fn initial(&self) -> Result<()> {
         let (model, names) = (self.task.model, self.task.names);
-        for variable in 0..model.basic as u32 {
+        for variable in model.basic_variables() {
             let own = &model.variables[variable as usize];
             let holding: Vec<u32> = names
                 .atoms(variable)
@@ -119,7 +119,7 @@ impl<'c> Comparison<'c> {
                 .map(|(value, _)| value)
                 .collect();
             let expected = match holding[..] {
-                [] => own.len() as u32 - 1,
+                [] => model.none(variable),
                 [value] => value,
                 _ => u32::MAX,
             };

@@ -156,7 +156,7 @@ impl<'v> Variable<'v> {
         let structure = &self.task.names.structure;
         let mut atoms = self.task.names.atoms(self.own).filter(|(_, key)| self.may_hold(known, key));
         match atoms.next() {
-            None => Some(self.task.model.variables[self.own as usize].len() as u32 - 1),
+            None => Some(self.task.model.none(self.own)),
             Some((value, key)) if known.atom(structure, key) == Some(true) => Some(value),
             // Where one is known to hold, the others are known not to.
             Some(_) => None,
@@ -175,7 +175,7 @@ impl<'v> Variable<'v> {
                 None => self.case.truths.get(key).copied(),
             }
         };
-        let none = self.task.model.variables[self.own as usize].len() as u32 - 1;
+        let none = self.task.model.none(self.own);
         let (mut added, mut remaining, mut deleted) = (Vec::new(), Vec::new(), None);
         for (value, key) in self.task.names.atoms(self.own) {
             match after(key) {

@@ -208,6 +208,7 @@ impl Widening {
     }
 
     /// Takes in what a case of an instance leads to; `true` if that is new.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer moves than passes over the task")]
     pub(super) fn include(&mut self, structure: &Structure, case: &Case) -> bool {
         let mut news = false;
         for key in Invariant::added(structure, case) {

@@ -39,6 +39,7 @@ pub(super) struct Case {
 }
 
 /// What happens when nothing is done until the next event, for each event.
+#[expect(clippy::arithmetic_side_effects, reason = "the place of an event that is held in memory")]
 pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Case>, Cause> {
     let mut all = Vec::new();
     for (before, event) in timeline.events.iter().enumerate().skip(timeline.begun) {

@@ -191,6 +191,7 @@ impl<'f> Files<'f> {
         Err(invariant::too_many_rounds(ROUND_LIMIT).into())
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "instances are held in memory")]
     fn compare(&self, witness: &str) -> Result<Faithful> {
         let invariant = Invariant::read(&self.world, witness)?;
         let axioms = Axioms::new(&self.world, &invariant, &self.names.linked)?;

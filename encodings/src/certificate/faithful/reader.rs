@@ -90,6 +90,7 @@ impl<'r> Reader<'r> {
         }
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "SIZE_LIMIT is far below")]
     fn count(&mut self) -> Result<(), Cause> {
         self.size += 1;
         if self.size <= SIZE_LIMIT {

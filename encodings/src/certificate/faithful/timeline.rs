@@ -69,6 +69,10 @@ pub(super) fn clock() -> Key {
 
 impl Timeline {
     /// Adds a timed initial literal; of two about one atom at one time the later one counts.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
     pub(super) fn add(&mut self, time: &BigRational, key: Key, holds: bool) {
         let place = self.events.partition_point(|event| event.time < *time);
         if self.events.get(place).is_none_or(|event| event.time != *time) {
@@ -82,6 +86,10 @@ impl Timeline {
         self.events.is_empty()
     }
 
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
     fn time(&self, number: usize) -> &BigRational {
         &self.events[number - 1].time
     }
@@ -193,16 +201,28 @@ impl Passage {
     }
 
     /// The event at the time of the start.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
     pub(super) fn at_start<'t>(&self, timeline: &'t Timeline) -> Option<&'t Event> {
         self.at_start.then(|| &timeline.events[self.from - 1])
     }
 
     /// The events strictly between start and end.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
     pub(super) fn between<'t>(&self, timeline: &'t Timeline) -> &'t [Event] {
         &timeline.events[self.from..self.to - usize::from(self.at_end && self.to > self.from)]
     }
 
     /// The event at the time of the end, if the action takes time.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
     pub(super) fn at_end<'t>(&self, timeline: &'t Timeline) -> Option<&'t Event> {
         (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
     }

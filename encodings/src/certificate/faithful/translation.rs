@@ -57,7 +57,8 @@ impl Names {
                 return form("a derived variable that has not two values");
             }
             let mut keys = Vec::new();
-            for (value, text) in (0..).zip(&values[..values.len() - 1]) {
+            let atoms = values.split_last().map_or(&[][..], |(_, atoms)| atoms);
+            for (value, text) in (0..).zip(atoms) {
                 let key = world.written(text);
                 let is_derived = |key: &Key| world.rules(key.0).is_some();
                 if is_basic && key.as_ref().is_none_or(is_derived) {
@@ -152,7 +153,7 @@ impl<'t> Translation<'t> {
         axioms: &'t Axioms,
     ) -> Result<Self> {
         let mut own = Self { world, model, names, invariant, axioms, unfolded: BTreeMap::new() };
-        for variable in model.basic as u32..model.variables.len() as u32 {
+        for variable in model.derived_variables() {
             own.unfold(variable, &mut Vec::new())?;
         }
         Ok(own)
@@ -201,7 +202,7 @@ impl<'t> Translation<'t> {
     }
 
     fn fact(&self, (variable, value): Fact) -> Formula {
-        let none = self.model.variables[variable as usize].len() as u32 - 1;
+        let none = self.model.none(variable);
         if value == none {
             let others = (0..none).map(|value| self.fact((variable, value)).negated());
             return Formula::junction(others, true);

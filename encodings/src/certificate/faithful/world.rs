@@ -100,6 +100,7 @@ impl<'w> World<'w> {
         Ok(world)
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "names are held in memory")]
     fn intern(&mut self, name: &Name) -> u32 {
         if let Some(symbol) = self.symbols.get(name) {
             return *symbol;
