@@ -1,6 +1,6 @@
 //! What a case of an instance makes of the variables and numbers of the task, against what an operator makes of them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::certificate::faithful::formula::{Formula, Known};
 use crate::certificate::faithful::linear::Linear;
@@ -67,6 +67,8 @@ struct Variable<'v> {
     case: &'v Case,
     /// What the end of the case does to its atoms.
     effects: Vec<&'v (Formula, Key, bool)>,
+    /// Its atoms that the case may change.
+    touched: BTreeMap<u32, &'v Key>,
     /// What the operator makes of it, and under which conditions, in order.
     certain: Option<u32>,
     conditional: Vec<(Formula, u32)>,
@@ -86,8 +88,10 @@ type Value = Option<u32>;
 
 impl<'v> Variable<'v> {
     fn new(task: &'v Translation<'v>, case: &'v Case, operator: Option<&'v Operator>, variable: u32) -> Self {
-        let is_own = |key: &Key| task.names.fact(key).is_some_and(|fact| fact.0 == variable);
-        let effects = case.effects.iter().filter(|(_, key, _)| is_own(key)).collect();
+        let value = |key: &Key| task.names.fact(key).filter(|fact| fact.0 == variable).map(|fact| fact.1);
+        let effects: Vec<_> = case.effects.iter().filter(|(_, key, _)| value(key).is_some()).collect();
+        let touched = case.truths.keys().chain(effects.iter().map(|(_, key, _)| key));
+        let touched = touched.filter_map(|key| Some((value(key)?, key))).collect();
         let own =
             |facts: &[(u32, u32)]| facts.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
         let conditional = operator.into_iter().flat_map(|operator| &operator.conditional);
@@ -95,7 +99,7 @@ impl<'v> Variable<'v> {
             .filter_map(|effect| Some((task.literals(&effect.condition, true), own(&effect.effects)?)))
             .collect();
         let certain = operator.and_then(|operator| own(&operator.effects));
-        Self { task, own: variable, case, effects, certain, conditional }
+        Self { task, own: variable, case, effects, touched, certain, conditional }
     }
 
     /// Whether both make the same of it wherever this is known.
@@ -140,25 +144,29 @@ impl<'v> Variable<'v> {
             let same = expected.unwrap_or(current) == found.unwrap_or(current);
             return if same { Outcome::Same } else { Outcome::Other };
         }
-        self.task
-            .names
-            .atoms(self.own)
-            .find(|(_, key)| self.may_hold(known, key))
-            .map_or(Outcome::Other, |(_, key)| Outcome::Open(Formula::Atom(key.clone(), true)))
+        let mut possible = self.possible(known);
+        possible.next().map_or(Outcome::Other, |(_, key)| Outcome::Open(Formula::Atom(key.clone(), true)))
     }
 
     fn may_hold(&self, known: &Known, key: &Key) -> bool {
         self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
     }
 
+    /// Its atoms that may hold before.
+    fn possible(&self, known: &'v Known) -> impl Iterator<Item = (u32, &'v Key)> {
+        // Where one is known to hold, the others are known not to.
+        let holding = known.holding(self.own);
+        let own = holding.and_then(|key| Some((self.task.names.fact(key)?.1, key)));
+        let all = if holding.is_some() { None } else { Some(self.task.possible(self.own)) };
+        all.into_iter().flatten().chain(own).filter(|(_, key)| self.may_hold(known, key))
+    }
+
     /// The value before, if it is known.
     fn current(&self, known: &Known) -> Value {
         let structure = &self.task.names.structure;
-        let mut atoms = self.task.names.atoms(self.own).filter(|(_, key)| self.may_hold(known, key));
-        match atoms.next() {
+        match self.possible(known).next() {
             None => Some(self.task.model.none(self.own)),
             Some((value, key)) if known.atom(structure, key) == Some(true) => Some(value),
-            // Where one is known to hold, the others are known not to.
             Some(_) => None,
         }
     }
@@ -176,24 +184,25 @@ impl<'v> Variable<'v> {
             }
         };
         let none = self.task.model.none(self.own);
-        let (mut added, mut remaining, mut deleted) = (Vec::new(), Vec::new(), None);
-        for (value, key) in self.task.names.atoms(self.own) {
+        let (mut added, mut deleted) = (Vec::new(), None);
+        let mut remains = self.possible(known).any(|(value, _)| !self.touched.contains_key(&value));
+        for (value, key) in &self.touched {
             match after(key) {
-                Some(true) => added.push(value),
-                Some(false) if self.may_hold(known, key) => deleted = Some(key),
-                None if self.may_hold(known, key) => remaining.push(value),
+                Some(true) => added.push(*value),
+                Some(false) if self.may_hold(known, key) => deleted = Some(*key),
+                None if self.may_hold(known, key) => remains = true,
                 _ => {}
             }
         }
-        match (&added[..], &remaining[..]) {
-            ([], []) => Ok(Some(none)),
-            ([], _) if deleted.is_none() => Ok(None),
-            ([], _) => match (current, deleted) {
+        match (&added[..], remains) {
+            ([], false) => Ok(Some(none)),
+            ([], true) if deleted.is_none() => Ok(None),
+            ([], true) => match (current, deleted) {
                 (None, Some(key)) => Err(Outcome::Open(Formula::Atom(key.clone(), true))),
                 // It is one that is not deleted.
                 _ => Ok(None),
             },
-            ([value], []) => Ok(Some(*value)),
+            ([value], false) => Ok(Some(*value)),
             _ => Err(Outcome::Other),
         }
     }

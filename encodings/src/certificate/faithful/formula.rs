@@ -92,6 +92,11 @@ pub(super) struct Known {
 }
 
 impl Known {
+    /// The atom that is known to hold of a group.
+    pub(super) fn holding(&self, group: u32) -> Option<&Key> {
+        self.holding.get(&group)
+    }
+
     pub(super) fn atom(&self, structure: &Structure, key: &Key) -> Option<bool> {
         if let Some(holds) = self.atoms.get(key) {
             return Some(*holds);

@@ -85,7 +85,7 @@ fn extend<'b>(
     longer: &mut Vec<Binding<'b>>,
 ) -> Result<(), Cause> {
     let predicate = world.symbol(&atom.predicate.name)?;
-    let known = |term: &Term| world.object(term, binding).ok();
+    let known = |term: &Term| world.bound(term, binding);
     let place = atom.arguments.iter().enumerate().find_map(|(place, term)| Some((place, known(term)?)));
     'rows: for row in world.rows(predicate, place) {
         if row.len() != atom.arguments.len() {
@@ -93,9 +93,9 @@ fn extend<'b>(
         }
         let mut next = binding.clone();
         for (term, object) in atom.arguments.iter().zip(row) {
-            match (world.object(term, &next), term) {
-                (Ok(own), _) if own == *object => {}
-                (Err(_), Term::Variable(identifier)) => {
+            match (world.bound(term, &next), term) {
+                (Some(own), _) if own == *object => {}
+                (None, Term::Variable(identifier)) => {
                     next.insert(&identifier.name, *object);
                 }
                 _ => continue 'rows,

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use num_traits::{One, Zero};
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 use crate::certificate::faithful::axioms::Axioms;
 use crate::certificate::faithful::formula::Formula;
@@ -20,7 +21,7 @@ use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term,
 const SIZE_LIMIT: usize = 200_000;
 
 /// Stands for `total-time` in metrics.
-pub(super) const TOTAL_TIME: Key = (u32::MAX, Vec::new());
+pub(super) const TOTAL_TIME: Key = (u32::MAX, SmallVec::new_const());
 
 /// What the start of an action has made of the state before it.
 #[derive(Debug, Clone, Default)]

@@ -15,6 +15,7 @@ use num_bigint::BigInt;
 use num_integer::Integer as _;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
+use smallvec::{SmallVec, smallvec};
 
 use crate::certificate::faithful::formula::Formula;
 use crate::certificate::faithful::linear::Linear;
@@ -56,15 +57,15 @@ pub(super) struct Passage {
 }
 
 pub(super) fn phase(number: usize) -> Key {
-    (PHASE, vec![u32::try_from(number).unwrap_or(u32::MAX)])
+    (PHASE, smallvec![u32::try_from(number).unwrap_or(u32::MAX)])
 }
 
 pub(super) fn waited() -> Key {
-    (WAITED, Vec::new())
+    (WAITED, SmallVec::new())
 }
 
 pub(super) fn clock() -> Key {
-    (CLOCK, Vec::new())
+    (CLOCK, SmallVec::new())
 }
 
 impl Timeline {

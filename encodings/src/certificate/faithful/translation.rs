@@ -140,6 +140,8 @@ pub(super) struct Translation<'t> {
     pub(super) names: &'t Names,
     pub(super) invariant: &'t Invariant,
     pub(super) axioms: &'t Axioms,
+    /// The atoms of each variable that may ever hold, with their values.
+    possible: Vec<Vec<(u32, &'t Key)>>,
     /// What derived variables stand for that the files do not have, or whose value is known.
     unfolded: BTreeMap<u32, Formula>,
 }
@@ -152,11 +154,19 @@ impl<'t> Translation<'t> {
         invariant: &'t Invariant,
         axioms: &'t Axioms,
     ) -> Result<Self> {
-        let mut own = Self { world, model, names, invariant, axioms, unfolded: BTreeMap::new() };
+        let possible =
+            |(variable, _)| names.atoms(variable).filter(|(_, key)| invariant.may_hold(key)).collect();
+        let possible = (0..).zip(&model.variables).map(possible).collect();
+        let mut own = Self { world, model, names, invariant, axioms, possible, unfolded: BTreeMap::new() };
         for variable in model.derived_variables() {
             own.unfold(variable, &mut Vec::new())?;
         }
         Ok(own)
+    }
+
+    /// The atoms of a variable that may ever hold, with their values.
+    pub(super) fn possible(&self, variable: u32) -> impl Iterator<Item = (u32, &'t Key)> {
+        self.possible[variable as usize].iter().copied()
     }
 
     fn is_linked(&self, variable: u32) -> bool {

@@ -3,6 +3,7 @@
 use num_rational::BigRational;
 use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 
 use crate::certificate::faithful::timeline::{self, Timeline};
 use crate::certificate::faithful::verdict::Cause;
@@ -12,7 +13,7 @@ use pddl::ast::{
 };
 
 /// A predicate or function with objects, both by number.
-pub(super) type Key = (u32, Vec<u32>);
+pub(super) type Key = (u32, SmallVec<[u32; 4]>);
 
 /// `(the phase phase N)`, with N in place of objects: so many events have taken place.
 pub(super) const PHASE: u32 = u32::MAX - 1;
@@ -39,6 +40,10 @@ pub(super) struct World<'w> {
     pub(super) timeline: Timeline,
     /// The rules of derived predicates.
     rules: FxHashMap<u32, Vec<&'w Derived>>,
+}
+
+fn undeclared(name: &Name) -> Cause {
+    Cause::unsupported(format!("{name}, which is declared nowhere"))
 }
 
 impl<'w> World<'w> {
@@ -132,7 +137,7 @@ impl<'w> World<'w> {
                     for (place, object) in key.1.iter().enumerate() {
                         self.rows_with.entry((key.0, place, *object)).or_default().push(rows.len());
                     }
-                    rows.push(key.1);
+                    rows.push(key.1.to_vec());
                 }
             }
             InitialElement::NegatedFact(_) => {}
@@ -169,20 +174,22 @@ impl<'w> World<'w> {
     }
 
     pub(super) fn symbol(&self, name: &Name) -> Result<u32, Cause> {
-        self.symbols
-            .get(name)
-            .copied()
-            .ok_or_else(|| Cause::unsupported(format!("{name}, which is declared nowhere")))
+        self.symbols.get(name).copied().ok_or_else(|| undeclared(name))
     }
 
     /// The object that a term stands for.
     pub(super) fn object(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Result<u32, Cause> {
+        self.bound(term, binding).ok_or_else(|| match term {
+            Term::Variable(identifier) => Cause::unsupported(format!("{}, which is free", identifier.name)),
+            Term::Constant(identifier) => undeclared(&identifier.name),
+        })
+    }
+
+    /// The object that a term stands for, if that is known.
+    pub(super) fn bound(&self, term: &Term, binding: &FxHashMap<&Name, u32>) -> Option<u32> {
         match term {
-            Term::Variable(identifier) => binding
-                .get(&identifier.name)
-                .copied()
-                .ok_or_else(|| Cause::unsupported(format!("{}, which is free", identifier.name))),
-            Term::Constant(identifier) => self.symbol(&identifier.name),
+            Term::Variable(identifier) => binding.get(&identifier.name).copied(),
+            Term::Constant(identifier) => self.symbols.get(&identifier.name).copied(),
         }
     }
 
