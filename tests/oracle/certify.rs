@@ -53,7 +53,8 @@ pub fn check(
         // Without what is said of one task alone.
         return tally.count(format!("{}: {:.120}", message.code, without_names(&message.message)));
     }
-    let report = certificate::verify(&directory, None, &limits());
+    // That it is too slow on a busy machine is not what is asked.
+    let report = certificate::verify(&directory, None, &Limits::none().with_time(30 * case.limit));
     let refuted = match (&case.truth, &solution.plan) {
         (Truth::Best(best, _), Some(plan)) => rational(&plan.cost) != *best,
         (Truth::Open(Some((found, _))), Some(plan)) => {

@@ -69,3 +69,53 @@ fn what_is_said_twice_is_proved_once() {
     let outcome = metaplan_in(directory.path(), &["verify", "c"], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
+
+/// A start that is off by less than the tolerance is put off, and judged where it then is.
+#[test]
+fn the_tolerance_moves_no_plan_into_a_window() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals :fluents)
+      (:predicates (ready) (open) (over)) (:functions (total-cost))
+      (:durative-action prepare :parameters () :duration (= ?duration 5)
+        :condition (and) :effect (and (at end (ready)) (at end (increase (total-cost) 1))))
+      (:durative-action cross :parameters () :duration (= ?duration 1)
+        :condition (and (at start (ready)) (at start (open)))
+        :effect (and (at end (over)) (at end (increase (total-cost) 1))))
+      (:durative-action swim :parameters () :duration (= ?duration 2)
+        :condition (and) :effect (and (at end (over)) (at end (increase (total-cost) 9)))))";
+    let problem = |init: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:init (= (total-cost) 0) {init}) (:goal (over)) (:metric minimize (total-cost)))"
+        )
+    };
+    std::fs::write(directory.path().join("d.pddl"), domain).expect("a file");
+    let cases = [
+        (
+            "(at 7 (open)) (at 9 (not (open)))",
+            &["6.9995", "7.000", "9.0005", "9.001"][..],
+            &["7.001", "8.500"][..],
+        ),
+        // Nothing but `prepare` may end before 5, and from then on the way is closed.
+        ("(open) (at 4.9998 (not (open)))", &["4.9995", "4.9998", "5.000"], &[]),
+        ("(open) (at 5.5 (not (open)))", &["4.9985", "5.5005"], &["4.9995", "5.000", "5.200"]),
+    ];
+    for (init, refused, admitted) in cases {
+        std::fs::write(directory.path().join("p.pddl"), problem(init)).expect("a file");
+        let starts = refused.iter().map(|start| (start, false));
+        for (start, valid) in starts.chain(admitted.iter().map(|start| (start, true))) {
+            let _ = std::fs::remove_dir_all(directory.path().join("c"));
+            let planned =
+                metaplan_in(directory.path(), &["plan", "d.pddl", "p.pddl", "--certificate", "c"], "");
+            assert_eq!(planned.status, 0, "{planned:#?}");
+            let target = directory.path().join("c").display().to_string();
+            change(&target, "plan.txt", &|_| format!("0.000: (prepare) [5.000]\n{start}: (cross) [1.000]\n"));
+            let outcome = metaplan_in(directory.path(), &["verify", "c"], "");
+            assert_eq!(
+                outcome.stdout.contains("plan        failed"),
+                !valid,
+                "{init}, {start}: {outcome:#?}"
+            );
+            assert_eq!(outcome.status, if valid { 0 } else { 30 }, "{init}, {start}: {outcome:#?}");
+        }
+    }
+}

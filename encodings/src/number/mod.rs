@@ -3,6 +3,8 @@
 //! Nothing here rounds, wraps or saturates. A rational that no longer fits two machine integers goes on with big ones; an integer
 //! of a task that may outgrow its type is computed by the checked operations, whose users say what happens then.
 
+mod decimal;
+
 use std::cmp::Ordering;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
@@ -12,6 +14,7 @@ use num_rational::{BigRational, Ratio};
 use num_traits::{CheckedAdd, CheckedDiv, CheckedMul, CheckedSub, One, Signed, ToPrimitive, Zero};
 
 use crate::quantity::{Number, Quantity, Table};
+use decimal::Decimal;
 
 /// A number of a ground task, scaled to an integer.
 ///
@@ -35,10 +38,11 @@ const FEW: usize = 32;
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Rational(Repr);
 
-/// A number is `Small` whenever it fits, so that equal numbers are equal representations.
+/// A number is `Small` whenever it fits, then `Decimal`, so that equal numbers are equal representations.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Repr {
     Small(Ratio<i128>),
+    Decimal(Decimal),
     Big(Box<BigRational>),
 }
 
@@ -61,7 +65,20 @@ impl Rational {
             (Some(numerator), Some(denominator)) if numerator > i128::MIN => {
                 Self(Repr::Small(Ratio::new_raw(numerator, denominator)))
             }
-            _ => Self(Repr::Big(Box::new(big))),
+            _ => Self(Decimal::from_big(&big).map_or_else(|| Repr::Big(Box::new(big)), Repr::Decimal)),
+        }
+    }
+
+    fn from_decimal(decimal: Decimal) -> Self {
+        Self(decimal.to_small().map_or(Repr::Decimal(decimal), Repr::Small))
+    }
+
+    /// None if it is not a decimal, or has too many digits.
+    fn to_decimal(&self) -> Option<Decimal> {
+        match &self.0 {
+            Repr::Small(small) => Decimal::from_small(small),
+            Repr::Decimal(decimal) => Some(*decimal),
+            Repr::Big(_) => None,
         }
     }
 
@@ -70,6 +87,7 @@ impl Rational {
             Repr::Small(small) => {
                 BigRational::new_raw(BigInt::from(*small.numer()), BigInt::from(*small.denom()))
             }
+            Repr::Decimal(decimal) => decimal.to_big(),
             Repr::Big(big) => (**big).clone(),
         }
     }
@@ -77,6 +95,7 @@ impl Rational {
     pub(crate) fn is_integer(&self) -> bool {
         match &self.0 {
             Repr::Small(small) => small.is_integer(),
+            Repr::Decimal(decimal) => decimal.is_integer(),
             Repr::Big(big) => big.is_integer(),
         }
     }
@@ -85,6 +104,7 @@ impl Rational {
     pub(crate) fn denominator(&self) -> Option<Int> {
         match &self.0 {
             Repr::Small(small) => Some(*small.denom()),
+            Repr::Decimal(decimal) => decimal.to_big().denom().to_i128(),
             Repr::Big(big) => big.denom().to_i128(),
         }
     }
@@ -93,7 +113,7 @@ impl Rational {
     pub(crate) fn to_int(&self) -> Option<Int> {
         match &self.0 {
             Repr::Small(small) => small.is_integer().then(|| *small.numer()),
-            Repr::Big(_) => None,
+            Repr::Decimal(_) | Repr::Big(_) => None,
         }
     }
 
@@ -105,6 +125,7 @@ impl Rational {
     pub(crate) fn is_positive(&self) -> bool {
         match &self.0 {
             Repr::Small(small) => small.is_positive(),
+            Repr::Decimal(decimal) => decimal.is_positive(),
             Repr::Big(big) => big.is_positive(),
         }
     }
@@ -122,9 +143,15 @@ impl Rational {
     fn combine(
         &self,
         other: &Self,
+        decimal: impl Fn(Decimal, Decimal) -> Option<Decimal>,
         small: impl Fn(&Ratio<i128>, &Ratio<i128>) -> Option<Ratio<i128>>,
         big: impl Fn(BigRational, BigRational) -> BigRational,
     ) -> Self {
+        if let (Some(a), Some(b)) = (self.to_decimal(), other.to_decimal())
+            && let Some(result) = decimal(a, b)
+        {
+            return Self::from_decimal(result);
+        }
         if let (Repr::Small(a), Repr::Small(b)) = (&self.0, &other.0)
             && let Some(result) = small(a, b)
             && *result.numer() > i128::MIN
@@ -286,7 +313,7 @@ impl TaskNumber for Rational {
 
     fn is_moderate(&self) -> bool {
         match &self.0 {
-            Repr::Small(_) => true,
+            Repr::Small(_) | Repr::Decimal(_) => true,
             Repr::Big(big) => big.numer().bits().max(big.denom().bits()) <= BIT_LIMIT,
         }
     }
@@ -310,7 +337,7 @@ impl Add<&Self> for Rational {
 
     fn add(self, other: &Self) -> Self {
         self.integers(other, i128::checked_add)
-            .unwrap_or_else(|| self.combine(other, CheckedAdd::checked_add, |a, b| a + b))
+            .unwrap_or_else(|| self.combine(other, Decimal::plus, CheckedAdd::checked_add, |a, b| a + b))
     }
 }
 
@@ -333,7 +360,7 @@ impl Sub<&Self> for Rational {
 
     fn sub(self, other: &Self) -> Self {
         self.integers(other, i128::checked_sub)
-            .unwrap_or_else(|| self.combine(other, CheckedSub::checked_sub, |a, b| a - b))
+            .unwrap_or_else(|| self.combine(other, Decimal::minus, CheckedSub::checked_sub, |a, b| a - b))
     }
 }
 
@@ -350,7 +377,7 @@ impl Mul<&Self> for Rational {
 
     fn mul(self, other: &Self) -> Self {
         self.integers(other, i128::checked_mul)
-            .unwrap_or_else(|| self.combine(other, CheckedMul::checked_mul, |a, b| a * b))
+            .unwrap_or_else(|| self.combine(other, Decimal::times, CheckedMul::checked_mul, |a, b| a * b))
     }
 }
 
@@ -367,7 +394,7 @@ impl Div for Rational {
     type Output = Self;
 
     fn div(self, other: Self) -> Self {
-        self.combine(&other, CheckedDiv::checked_div, |a, b| a / b)
+        self.combine(&other, |_, _| None, CheckedDiv::checked_div, |a, b| a / b)
     }
 }
 
@@ -377,6 +404,7 @@ impl Neg for Rational {
     fn neg(self) -> Self {
         match self.0 {
             Repr::Small(small) => Self(Repr::Small(-small)),
+            Repr::Decimal(_) => Self::zero() - self,
             Repr::Big(big) => Self::from_big(-*big),
         }
     }
@@ -398,8 +426,14 @@ impl Ord for Rational {
     fn cmp(&self, other: &Self) -> Ordering {
         match (&self.0, &other.0) {
             (Repr::Small(a), Repr::Small(b)) if a.denom() == b.denom() => a.numer().cmp(b.numer()),
-            (Repr::Small(a), Repr::Small(b)) => a.cmp(b),
-            _ => self.to_big().cmp(&other.to_big()),
+            _ => {
+                let decimals = self.to_decimal().zip(other.to_decimal());
+                let compared = decimals.and_then(|(a, b)| a.compare(b));
+                compared.unwrap_or_else(|| match (&self.0, &other.0) {
+                    (Repr::Small(a), Repr::Small(b)) => a.cmp(b),
+                    _ => self.to_big().cmp(&other.to_big()),
+                })
+            }
         }
     }
 }
@@ -427,13 +461,21 @@ mod tests {
             (-2_i128..=2).prop_map(|offset| BigInt::from(i128::MIN) + offset),
             any::<(i128, i128)>().prop_map(|(a, b)| BigInt::from(a) * b),
         ];
-        (integer.clone(), integer).prop_map(|(numerator, denominator)| {
+        let ten = (0_u32..80).prop_map(|places| BigInt::from(10).pow(places));
+        let two = (0_u32..130).prop_map(|places| BigInt::from(2).pow(places));
+        let five = (0_u32..60).prop_map(|places| BigInt::from(5).pow(places));
+        let near = (0_u32..260, -2_i8..=2).prop_map(|(bits, offset)| BigInt::from(2).pow(bits) + offset);
+        let numerator = prop_oneof![integer.clone(), near, ten.clone(), five.clone()];
+        let signed = (numerator, any::<bool>()).prop_map(|(own, negative)| if negative { -own } else { own });
+        (signed, prop_oneof![integer, ten, two, five]).prop_map(|(numerator, denominator)| {
             let denominator = if denominator.is_zero() { BigInt::from(1) } else { denominator };
             BigRational::new(numerator, denominator)
         })
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2_000))]
+
         #[test]
         fn arithmetic_is_that_of_big_rationals(a in number(), b in number()) {
             let (x, y) = (Rational::from_big(a.clone()), Rational::from_big(b.clone()));
@@ -441,6 +483,12 @@ mod tests {
             prop_assert_eq!((x.clone() - &y).to_big(), &a - &b);
             prop_assert_eq!((x.clone() * &y).to_big(), &a * &b);
             prop_assert_eq!((-x.clone()).to_big(), -a.clone());
+            prop_assert_eq!(x.to_big(), a.clone());
+            // Equal numbers are equal however they came about.
+            prop_assert_eq!(x.clone() + &y, Rational::from_big(&a + &b));
+            prop_assert_eq!(x.clone() - &y, Rational::from_big(&a - &b));
+            prop_assert_eq!(x.clone() * &y, Rational::from_big(&a * &b));
+            prop_assert_eq!((x.clone() + &y) - &y, x.clone());
             prop_assert_eq!(x.cmp(&y), a.cmp(&b));
             prop_assert_eq!(x.is_positive(), a.is_positive());
             prop_assert_eq!(x.is_integer(), a.is_integer());
