@@ -14,6 +14,7 @@ use num_traits::{One, ToPrimitive, Zero};
 use crate::bounds::Bounds;
 use crate::error::Error;
 use crate::ground::{Config as GroundConfig, Generality, ground_for};
+use crate::integral::Integral;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, Rational, dense};
 use crate::optimize::Config;
@@ -154,7 +155,12 @@ enum Explored {
 }
 
 fn explore(task: &Task<Rational>, limits: &Limits) -> Explored {
-    let Ok(bounds) = RoundedBounds::new(task, limits) else {
+    let Ok(Integral { task, cost_scale }) = Integral::of(task, limits) else {
+        return Explored::Unknown(None, Rational::zero());
+    };
+    let unscaled = |cost: Rational| cost / cost_scale.clone();
+    let original = |plan: GroundPlan<Rational>| GroundPlan { cost: unscaled(plan.cost), ..plan };
+    let Ok(bounds) = RoundedBounds::new(&task, limits) else {
         return Explored::Unknown(None, Rational::zero());
     };
     let none = |proof| Explored::Known(Box::new(answer(Status::Unsolvable, None, Some(proof))));
@@ -162,10 +168,10 @@ fn explore(task: &Task<Rational>, limits: &Limits) -> Explored {
         let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
         return none(Proof::Relaxation(reason.into()));
     };
-    match search_states(task, &bounds, STATE_LIMIT, limits) {
-        Found::Optimal(plan) => Explored::Optimal(plan),
+    match search_states(&task, &bounds, STATE_LIMIT, limits) {
+        Found::Optimal(plan) => Explored::Optimal(original(plan)),
         Found::None => none(Proof::Search),
-        Found::Unknown(plan) => Explored::Unknown(plan, lower),
+        Found::Unknown(plan) => Explored::Unknown(plan.map(original), unscaled(lower)),
     }
 }
 

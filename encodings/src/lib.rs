@@ -38,6 +38,7 @@ mod certificate;
 mod concurrent;
 mod earliest;
 mod encode;
+mod integral;
 mod limits;
 mod objectives;
 mod optimize;
