@@ -112,7 +112,7 @@ impl Stated {
 }
 
 /// Something that the knowledge contradicts.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Contradiction {
     /// The axiom or rule that is violated.
     pub violated: String,

@@ -83,7 +83,8 @@ impl Message {
             }
             None => (None, None, None),
         };
-        let _ = writeln!(text, "{severity}[{code}]: {message}");
+        let _ = write!(text, "{severity}[{code}]: {message}");
+        let text = one_line(&text);
         Self(Box::new(Details {
             severity,
             code: code.to_owned(),
@@ -163,7 +164,7 @@ impl Message {
             (Some(file), Some(line), Some(column)) => (Some(file.to_owned()), Some(line), Some(column)),
             _ => ((!place.is_empty()).then(|| place.to_owned()), None, None),
         };
-        let (code, message, text) = (code.to_owned(), message.to_owned(), format!("{text}\n"));
+        let (code, message, text) = (code.to_owned(), message.to_owned(), one_line(text));
         Self(Box::new(Details { severity, code, message, file, line, column, help: None, text }))
     }
 
@@ -176,6 +177,11 @@ impl Message {
     pub fn text(&self) -> &str {
         &self.text
     }
+}
+
+/// A message as one line: a name or a value with a line break in it must not look like another message.
+fn one_line(text: &str) -> String {
+    text.replace('\r', "\\r").replace('\n', "\\n") + "\n"
 }
 
 /// `; did you mean ...?` with the known name that is most like what was written, or nothing.

@@ -286,14 +286,12 @@ impl Engine {
         relation.into_iter().flat_map(move |relation| {
             let pattern = pattern.clone();
             let bound = (0..pattern.len()).filter(|&c| pattern[c].is_some()).fold(0, |mask, c| mask | 1 << c);
-            let rows: Box<dyn Iterator<Item = u32>> = match relation.best_index(bound) {
-                Some((index, mask)) => {
-                    let key: SmallVec<[Symbol; 4]> =
-                        columns(mask).filter_map(|column| pattern[column]).collect();
-                    Box::new(relation.lookup(index, &key))
-                }
-                None => Box::new(relation.scan()),
-            };
+            let found = relation.best_index(bound).map(|(index, mask)| {
+                let key: SmallVec<[Symbol; 4]> = columns(mask).filter_map(|column| pattern[column]).collect();
+                relation.lookup(index, &key)
+            });
+            let scanned = found.is_none().then(|| relation.scan());
+            let rows = found.into_iter().flatten().chain(scanned.into_iter().flatten());
             rows.map(|row| relation.row(row))
                 .filter(move |row| row.iter().zip(&pattern).all(|(&v, wanted)| wanted.is_none_or(|w| w == v)))
         })

@@ -5,7 +5,9 @@
 //! the program sees by reference. `Head` is a block of complete matches. Evaluation is set-at-a-time: crepe's tuples
 //! name blocks of matches, so its own bookkeeping costs nothing per match, and the store is never copied.
 //!
-//! A block is handed over, not shared: it is consumed by the one rule that extends it.
+//! A block is handed over, not shared: it is consumed by the one rule that extends it. A small block passes all steps of
+//! its plan in that one rule: an update by one report starts some plans on one or two matches each, where bookkeeping for
+//! each step would take longer than the steps.
 
 use std::cell::RefCell;
 use std::hash::{BuildHasherDefault, Hash, Hasher};
@@ -45,6 +47,9 @@ pub(crate) enum Start {
 /// Partial matches that one step of one block may produce before the rest of the block is put off.
 const BLOCK_MATCHES: usize = 1 << 16;
 
+/// A block of so many partial matches is small.
+const SMALL_MATCHES: usize = 64;
+
 /// Complete matches of a plan, side by side.
 #[derive(Debug)]
 pub(crate) struct Matches {
@@ -82,16 +87,16 @@ mod program {
         @input
         pub struct Reads<'a>(pub Handle<'a>);
         @input
-        pub struct Delta(pub u32, pub PlanId, pub u32);
+        pub struct Delta(pub u32, pub PlanId);
 
         struct Match(PlanId, u32, BlockId);
 
         @output
         pub struct Head(pub PlanId, pub BlockId);
 
-        Match(plan, step, block) <- Delta(seed, plan, step), Reads(round), let Some(block) = round.seed(seed);
-        Match(plan, step + 1, longer) <-
-            Match(plan, step, block), Reads(round), let Some(longer) = round.extend(plan, step, block);
+        Match(plan, step, block) <- Delta(seed, plan), Reads(round), let Some((step, block)) = round.seed(seed);
+        Match(plan, next, longer) <-
+            Match(plan, step, block), Reads(round), let Some((next, longer)) = round.extend(plan, step, block);
         Head(plan, block) <- Match(plan, step, block), Reads(round), (round.is_complete(plan, step));
     }
 }
@@ -101,8 +106,8 @@ mod program {
 pub(crate) struct Handle<'a>(&'a dyn Evaluate);
 
 trait Evaluate {
-    fn seed(&self, seed: u32) -> Option<BlockId>;
-    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId>;
+    fn seed(&self, seed: u32) -> Option<(u32, BlockId)>;
+    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)>;
     fn is_complete(&self, plan: PlanId, step: u32) -> bool;
 }
 
@@ -111,11 +116,11 @@ impl Handle<'_> {
         std::ptr::from_ref(self.0).cast()
     }
 
-    fn seed(&self, seed: u32) -> Option<BlockId> {
+    fn seed(&self, seed: u32) -> Option<(u32, BlockId)> {
         self.0.seed(seed)
     }
 
-    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId> {
+    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)> {
         self.0.extend(plan, step, block)
     }
 
@@ -143,9 +148,7 @@ pub(crate) fn run(round: &Round, seeds: &[Seed]) -> Vec<Matches> {
     let seeded = Seeded { round, seeds };
     let mut runtime = program::Crepe::new();
     runtime.extend([program::Reads(Handle(&seeded))]);
-    let first = |seed: &Seed| if let Start::Matches { step, .. } = seed.start { step } else { 0 };
-    let delta = |(number, seed): (usize, &Seed)| program::Delta(number as u32, seed.plan, first(seed));
-    runtime.extend(seeds.iter().enumerate().map(delta));
+    runtime.extend((0..).zip(seeds).map(|(number, seed)| program::Delta(number, seed.plan)));
     let (heads,) = runtime.run_with_hasher::<BuildHasherDefault<FxHasher>>();
     let mut heads: Vec<(PlanId, BlockId)> = heads.into_iter().map(|head| (head.0, head.1)).collect();
     heads.sort_unstable();
@@ -159,12 +162,18 @@ struct Seeded<'r, 'a> {
 }
 
 impl Evaluate for Seeded<'_, '_> {
-    fn seed(&self, seed: u32) -> Option<BlockId> {
-        self.round.seed(&self.seeds[seed as usize])
+    fn seed(&self, seed: u32) -> Option<(u32, BlockId)> {
+        let seed = &self.seeds[seed as usize];
+        let first = if let Start::Matches { step, .. } = seed.start { step } else { 0 };
+        self.round.pass(seed.plan, first, self.round.seed(seed))
     }
 
-    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId> {
-        self.round.extend(plan, step, block)
+    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<(u32, BlockId)> {
+        if self.is_complete(plan, step) {
+            return None;
+        }
+        let block = self.round.take(block);
+        self.round.pass(plan, step + 1, self.round.extend(plan, step, block)?)
     }
 
     fn is_complete(&self, plan: PlanId, step: u32) -> bool {
@@ -177,25 +186,32 @@ impl Round<'_> {
         std::mem::take(&mut self.blocks.borrow_mut()[block as usize])
     }
 
-    fn put(&self, block: Vec<Symbol>) -> Option<BlockId> {
+    /// Hands a block over to the program, before a step of its plan. What is small passes the steps up to there at once, since
+    /// the program's bookkeeping would take longer than the steps.
+    fn pass(&self, plan: PlanId, mut step: u32, mut block: Vec<Symbol>) -> Option<(u32, BlockId)> {
+        let (steps, width) = (self.plans[plan as usize].steps.len(), self.width(&self.plans[plan as usize]));
+        while (step as usize) < steps && !block.is_empty() && block.len() <= SMALL_MATCHES * width {
+            block = self.extend(plan, step, block)?;
+            step += 1;
+        }
         if block.is_empty() {
             return None;
         }
         let mut blocks = self.blocks.borrow_mut();
         blocks.push(block);
-        Some(blocks.len() as BlockId - 1)
+        Some((step, blocks.len() as BlockId - 1))
     }
 
     fn width(&self, plan: &Plan) -> usize {
         self.widths[plan.rule as usize]
     }
 
-    fn seed(&self, seed: &Seed) -> Option<BlockId> {
+    fn seed(&self, seed: &Seed) -> Vec<Symbol> {
         let plan = &self.plans[seed.plan as usize];
         let empty = vec![Symbol(0); self.width(plan)];
         match &seed.start {
-            Start::Nothing => self.put(empty),
-            Start::Matches { bindings, .. } => self.put(bindings.clone()),
+            Start::Nothing => empty,
+            Start::Matches { bindings, .. } => bindings.clone(),
             Start::Rows { relation, from, to } => {
                 let relation = self.store.get(*relation);
                 let mut block = Vec::with_capacity(self.width(plan) * (to - from) as usize);
@@ -205,21 +221,21 @@ impl Round<'_> {
                     }
                     extend_match(&mut block, &empty, relation.row(row), &plan.seed);
                 }
-                self.put(block)
+                block
             }
         }
     }
 
-    fn extend(&self, plan: PlanId, step: u32, block: BlockId) -> Option<BlockId> {
+    /// The matches that pass a step; none where there is no such step, or where evaluation has to stop.
+    fn extend(&self, plan: PlanId, step: u32, block: Vec<Symbol>) -> Option<Vec<Symbol>> {
         let (id, number) = (plan, step);
         let plan = &self.plans[id as usize];
         let step = plan.steps.get(number as usize)?;
-        let block = self.take(block);
         let width = self.width(plan);
         if !self.budget.spend((block.len() / width) as u64, plan.rule) {
             return None;
         }
-        self.put(match step {
+        Some(match step {
             Step::Join { relation, skip, index, key, pattern, is_link } => {
                 let (relation, index) = (self.store.get(*relation), *index);
                 let lookup = Lookup { relation, skip: *skip, index, key, pattern, is_link: *is_link };

@@ -157,7 +157,8 @@ impl<'a> Maintenance<'a> {
         let network = Arc::clone(&self.network);
         for (number, stratum) in network.strata.iter().enumerate() {
             let is_new = |plan: PlanId| new_rules.contains(&network.plans[plan as usize].rule);
-            let new: Vec<_> = stratum.initial.iter().copied().filter(|&(_, plan)| is_new(plan)).collect();
+            let initial = stratum.initial.iter().filter(|_| !new_rules.is_empty());
+            let new: Vec<_> = initial.copied().filter(|&(_, plan)| is_new(plan)).collect();
             if self.touched[number] || !new.is_empty() {
                 self.over_delete(stratum)?;
                 self.rederive(stratum)?;
@@ -206,9 +207,7 @@ impl<'a> Maintenance<'a> {
     }
 
     fn touch(&mut self, relation: RelationId) {
-        for &stratum in self.network.readers.get(relation.0 as usize).into_iter().flatten() {
-            self.touched[stratum as usize] = true;
-        }
+        touch(&mut self.touched, &self.network, relation);
     }
 
     fn over_delete(&mut self, stratum: &Stratum) -> Result<(), Error> {
@@ -306,10 +305,13 @@ impl<'a> Maintenance<'a> {
         plans: impl Fn(RelationId) -> Option<&'p [PlanId]>,
         retracting: bool,
     ) -> Result<(), Error> {
-        let starts = |&(relation, row): &(RelationId, Row)| {
-            plans(relation).unwrap_or(&[]).iter().map(move |&plan| (plan, relation, row))
-        };
-        let mut starts: Vec<(PlanId, RelationId, Row)> = rows.iter().flat_map(starts).collect();
+        let mut starts: Vec<(PlanId, RelationId, Row)> = Vec::new();
+        for &(relation, row) in rows {
+            let values = self.engine.store.get(relation).row(row);
+            let started = plans(relation).unwrap_or(&[]).iter().copied();
+            let started = started.filter(|&plan| self.network.plans[plan as usize].seed.may_fit(values));
+            starts.extend(started.map(|plan| (plan, relation, row)));
+        }
         starts.sort_by_key(|&(plan, ..)| plan);
         for chunk in starts.chunks(CHUNK) {
             let rows: Vec<Row> = chunk.iter().map(|&(.., row)| row).collect();
@@ -389,6 +391,7 @@ impl<'a> Maintenance<'a> {
                         let row = relation.insert(&arguments, state::PENDING | state::NEW, record);
                         self.added.push((head.relation, row));
                         self.pending.push((head.relation, row));
+                        touch(&mut self.touched, &network, head.relation);
                     }
                     Some(row) if relation.state(row) & state::DOOMED != 0 => {
                         records.remove(relation.record(row));
@@ -396,13 +399,11 @@ impl<'a> Maintenance<'a> {
                         relation.clear(row, state::DOOMED);
                         relation.set(row, state::PENDING);
                         self.pending.push((head.relation, row));
+                        touch(&mut self.touched, &network, head.relation);
                     }
                     Some(_) => {}
                 }
             }
-        }
-        for head in &rule.heads {
-            self.touch(head.relation);
         }
     }
 
@@ -427,15 +428,20 @@ impl<'a> Maintenance<'a> {
                 if bits & state::ASSERTED == 0 {
                     relation.set(row, state::DOOMED);
                     self.doomed.push((head.relation, row));
+                    touch(&mut self.touched, &network, head.relation);
                 } else {
                     records.remove(record);
                     relation.set_record(row, Record::NONE);
                 }
             }
         }
-        for head in &rule.heads {
-            self.touch(head.relation);
-        }
+    }
+}
+
+/// Notes the strata that a change of a relation concerns.
+fn touch(touched: &mut [bool], network: &Network, relation: RelationId) {
+    for &stratum in network.readers.get(relation.0 as usize).into_iter().flatten() {
+        touched[stratum as usize] = true;
     }
 }
 

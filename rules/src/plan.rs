@@ -30,6 +30,16 @@ pub(crate) struct Pattern {
     pub checks: Vec<(usize, Source)>,
 }
 
+impl Pattern {
+    /// Whether a row may start a match: it has the constants where they have to be.
+    pub fn may_fit(&self, row: &[Symbol]) -> bool {
+        self.checks.iter().all(|&(column, source)| match source {
+            Source::Constant(symbol) => row[column] == symbol,
+            Source::Variable(_) => true,
+        })
+    }
+}
+
 /// One extension of a partial match.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {

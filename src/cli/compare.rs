@@ -12,18 +12,16 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use metaplan::probabilistic::{
-    Action, Coadaptation, Comparison, Config, Failure as Unfinished, Planned, Risk, Roles, Situation, Stages,
-    Tasked, compare,
+    Action, Candidate, Coadaptation, Comparison, Config, Costs, Failure as Unfinished, Planned, Report, Risk,
+    Roles, Situation, Stages, Tasked, compare,
 };
 use pddl::ast::Problem;
-use serde_json::{Value, json};
 
 use crate::cli::check::failure as process_failure;
-use crate::cli::compare_table::{
-    Pair, Row, as_json, as_text, csv, memory_since, published_rows, row_json, rows,
-};
+use crate::cli::compare_so_far::{Begun, Shared};
+use crate::cli::compare_table::{Pair, memory_since, published_rows};
 use crate::cli::plan::seconds;
-use crate::cli::{Common, Exit, Failure, Format, Situation as Given, limits, output};
+use crate::cli::{Common, Exit, Failure, Situation as Given, output};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -51,7 +49,7 @@ pub struct Arguments {
     /// Stop beyond so many states.
     #[arg(long, value_name = "N", default_value_t = 20_000_000)]
     state_limit: usize,
-    /// Give up after this many seconds.
+    /// After this many seconds, show what has been compared and stop.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     time_limit: Option<Duration>,
     /// Compare for pairs of start and goal in place of the mission's: so many, spread evenly over all pairs.
@@ -86,8 +84,9 @@ fn penalty(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let so_far = Shared::new();
     if let Some(time) = arguments.time_limit {
-        limits::end_after(time, "the time limit was reached before everything was compared", common);
+        so_far.show_after(time, common);
     }
     let mission = arguments.situation.mission(&arguments.inputs)?;
     let mut roles = mission.roles().clone();
@@ -116,35 +115,29 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = format!("no configuration needs a component `{}` that could be lost", loss.component);
         return Err(Failure::usage(Message::error("M125", text)));
     }
-    let mut added = match &arguments.published {
+    let added = match &arguments.published {
         Some(path) => published_rows(path)?,
         None => Vec::new(),
     };
-    let mut comparisons = Vec::new();
     let missions = missions(arguments, &mission, coadaptation, &roles)?;
+    so_far.change(|own| {
+        (own.of, own.added, own.csv) = (Some(missions.len()), added, arguments.csv.clone());
+    });
     let progress = Progress::new(missions.len(), common);
-    for (pair, mission, coadaptation) in missions {
-        comparisons.push((pair, one(arguments, &mission, &coadaptation, &roles, tasked.as_ref())?));
-        progress.done(comparisons.len());
+    for (number, (pair, mission, coadaptation)) in missions.into_iter().enumerate() {
+        let mut report = |candidates: &[Candidate], costs: &Costs| {
+            let (pair, candidates, costs) = (pair.clone(), candidates.to_vec(), costs.clone());
+            so_far.change(|own| own.begun = Some(Begun { pair, candidates, costs }));
+        };
+        let comparison = one(arguments, &mission, &coadaptation, &roles, tasked.as_ref(), &mut report)?;
+        so_far.change(|own| {
+            own.begun = None;
+            own.done.push((pair, comparison));
+        });
+        progress.done(number + 1);
     }
     progress.end();
-    let mut rows: Vec<Row> =
-        comparisons.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison)).collect();
-    rows.append(&mut added);
-    if let Some(path) = &arguments.csv {
-        output::write_file(path, &csv(&rows))?;
-    }
-    match common.format {
-        Format::Json => {
-            let all: Vec<Value> = comparisons.iter().map(|(pair, c)| as_json(pair.as_ref(), c)).collect();
-            let more: Vec<Value> = rows.iter().filter(|row| row.kind == "+").map(row_json).collect();
-            output::json_answer(
-                &json!({ "format": "metaplan-compare/1", "comparisons": all, "published": more }),
-            );
-        }
-        _ => output::answer(&as_text(&rows, &comparisons)),
-    }
-    Ok(Exit::Done)
+    so_far.end(common)
 }
 
 /// How far the comparison is: a bar on a terminal, and otherwise a line now and then.
@@ -228,6 +221,7 @@ fn one(
     coadaptation: &Coadaptation,
     roles: &Roles,
     tasked: Option<&Tasked>,
+    report: &mut Report<'_>,
 ) -> Result<Comparison, Failure> {
     let mut risk = Risk::all(coadaptation);
     risk.battery &= !arguments.no_battery;
@@ -246,7 +240,7 @@ fn one(
         ),
         None => plan(mission, coadaptation, roles, risk, *situation),
     };
-    compare(coadaptation, &config, &mut planner).map_err(|error| match error {
+    compare(coadaptation, &config, &mut planner, report).map_err(|error| match error {
         Unfinished::Process(error) => process_failure(error, &mission.name),
         Unfinished::Planner(messages) => messages.into(),
     })

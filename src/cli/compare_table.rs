@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use metaplan::message::Message;
 use metaplan::mission::source;
-use metaplan::probabilistic::{Comparison, Costs, Measures, Stages};
+use metaplan::probabilistic::{Candidate, Comparison, Costs, Measures, Stages};
 use serde_json::{Map, Value, json};
 
 use crate::cli::{Failure, output};
@@ -47,6 +47,7 @@ fn values(measures: &Measures) -> [Option<f64>; 12] {
 }
 
 /// A row of the table.
+#[derive(Debug, Clone)]
 pub struct Row {
     pair: Option<(String, String)>,
     pub kind: String,
@@ -54,20 +55,20 @@ pub struct Row {
     values: Vec<Option<f64>>,
 }
 
-pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
-    let row = |kind: &str, name: &str, values: Vec<Option<f64>>| Row {
-        pair: pair.cloned(),
-        kind: kind.to_owned(),
-        name: name.to_owned(),
-        values,
-    };
-    let mut rows: Vec<Row> = comparison
-        .candidates
+fn row(pair: Option<&Pair>, kind: char, name: &str, values: Vec<Option<f64>>) -> Row {
+    Row { pair: pair.cloned(), kind: kind.to_string(), name: name.to_owned(), values }
+}
+
+/// The rows of the candidates that have been measured.
+pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
+    let measured = candidates
         .iter()
-        .map(|candidate| {
-            row(&candidate.kind.to_string(), &candidate.name, values(&candidate.measures).to_vec())
-        })
-        .collect();
+        .map(|candidate| row(pair, candidate.kind, &candidate.name, values(&candidate.measures).to_vec()));
+    measured.collect()
+}
+
+pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
+    let mut rows = begun_rows(pair, &comparison.candidates);
     let [time, energy] = comparison.hindsight;
     let bound = |measure: &str| match measure {
         "time" | "penalised_time" => time.expected,
@@ -76,7 +77,8 @@ pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
         "energy_if_successful" => energy.least,
         _ => None,
     };
-    rows.push(row("f", "hindsight bound, for the goal reached", MEASURES.iter().map(|m| bound(m)).collect()));
+    let bounds = MEASURES.iter().map(|measure| bound(measure)).collect();
+    rows.push(row(pair, 'f', "hindsight bound, for the goal reached", bounds));
     rows
 }
 
@@ -171,7 +173,7 @@ pub fn as_text(rows: &[Row], comparisons: &[(Option<Pair>, Comparison)]) -> Stri
     text
 }
 
-fn costs_text(k: &Costs) -> String {
+pub fn costs_text(k: &Costs) -> String {
     let stages = |times: &Stages| {
         let seconds = [times.build, times.solve, times.extract].map(|time| time.as_secs_f64());
         format!(
@@ -231,7 +233,6 @@ pub fn row_json(row: &Row) -> Value {
 }
 
 pub fn as_json(pair: Option<&Pair>, c: &Comparison) -> Value {
-    let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
     let loss = c.loss.as_ref().map(|loss| {
         let steps = loss.steps.iter().map(|step| {
             json!({
@@ -255,26 +256,43 @@ pub fn as_json(pair: Option<&Pair>, c: &Comparison) -> Value {
         "price_of_open_loop": c.price_of_open_loop(),
         "value_of_replanning": c.value_of_replanning(),
         "loss": loss,
-        "costs": {
-            "states": c.costs.states,
-            "transitions": c.costs.transitions,
-            "plans": c.costs.plans,
-            "variables": c.costs.variables,
-            "clauses": c.costs.clauses,
-            "decisions": c.costs.decisions,
-            "milliseconds": {
-                "build": milliseconds(c.costs.process.build),
-                "solve": milliseconds(c.costs.process.solve),
-                "extract": milliseconds(c.costs.process.extract),
-                "first_plan": milliseconds(c.costs.first_plan.total()),
-                "first_plan_build": milliseconds(c.costs.first_plan.build),
-                "first_plan_solve": milliseconds(c.costs.first_plan.solve),
-                "first_plan_extract": milliseconds(c.costs.first_plan.extract),
-                "more_plans": milliseconds(c.costs.more_plans),
-            },
-            "peak_memory_mb": c.costs.process_memory.max(c.costs.plan_memory),
-            "process_memory_mb": c.costs.process_memory,
-            "first_plan_memory_mb": c.costs.plan_memory,
+        "complete": true,
+        "costs": costs_json(&c.costs),
+    })
+}
+
+/// A comparison that is not done.
+pub fn begun_json(pair: Option<&Pair>, candidates: &[Candidate], costs: &Costs) -> Value {
+    json!({
+        "start": pair.map(|(start, _)| start),
+        "goal": pair.map(|(_, goal)| goal),
+        "candidates": begun_rows(pair, candidates).iter().map(row_json).collect::<Vec<_>>(),
+        "complete": false,
+        "costs": costs_json(costs),
+    })
+}
+
+fn costs_json(costs: &Costs) -> Value {
+    let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
+    json!({
+        "states": costs.states,
+        "transitions": costs.transitions,
+        "plans": costs.plans,
+        "variables": costs.variables,
+        "clauses": costs.clauses,
+        "decisions": costs.decisions,
+        "milliseconds": {
+            "build": milliseconds(costs.process.build),
+            "solve": milliseconds(costs.process.solve),
+            "extract": milliseconds(costs.process.extract),
+            "first_plan": milliseconds(costs.first_plan.total()),
+            "first_plan_build": milliseconds(costs.first_plan.build),
+            "first_plan_solve": milliseconds(costs.first_plan.solve),
+            "first_plan_extract": milliseconds(costs.first_plan.extract),
+            "more_plans": milliseconds(costs.more_plans),
         },
+        "peak_memory_mb": costs.process_memory.max(costs.plan_memory),
+        "process_memory_mb": costs.process_memory,
+        "first_plan_memory_mb": costs.plan_memory,
     })
 }

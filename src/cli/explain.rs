@@ -153,7 +153,7 @@ fn answer_json(answer: &Answer) -> Value {
     json!({
         "cost": answer.cost.as_ref().map(output::decimal_number),
         "proved": answer.proved,
-        "steps": answer.steps.iter().map(metaplan::mapek::PlannedStep::to_json).collect::<Vec<_>>(),
+        "steps": answer.steps,
     })
 }
 

@@ -62,18 +62,6 @@ impl Guard {
     }
 }
 
-/// Ends the program with a message when time is up: for commands that have no answer before they are done.
-pub(super) fn end_after(time: Duration, why: &'static str, common: &Common) {
-    let (limits, common) = (Limits::none().with_time(time), common.clone());
-    std::thread::spawn(move || {
-        while !limits.reached() {
-            std::thread::sleep(INTERVAL);
-        }
-        output::failure(&common, &[Message::error("M130", why)]);
-        std::process::exit(Exit::NothingFound as i32);
-    });
-}
-
 /// Reading does not look at the limits.
 fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, common: Common) {
     std::thread::spawn(move || {

@@ -3,6 +3,7 @@
 mod alternatives;
 mod check;
 mod compare;
+mod compare_so_far;
 mod compare_table;
 mod concurrent;
 mod convert;

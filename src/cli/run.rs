@@ -1,5 +1,6 @@
 //! `metaplan run`: lines of events to lines of adaptations.
 
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -11,7 +12,8 @@ use clap::{Args, ValueEnum};
 use metaplan::journal::{Journal, Policy, Sync};
 use metaplan::mapek::{Answer, Clock as _, FORMAT, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
 use metaplan::message::Message;
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::json;
 
 use crate::cli::{Common, Exit, Failure, Situation, output};
 
@@ -156,18 +158,23 @@ fn heartbeat(watch: Watch, line: Arc<AtomicU64>) {
     });
 }
 
+/// An answer with the number of the line that it is about.
+#[derive(Serialize)]
+struct Numbered<'a> {
+    #[serde(flatten)]
+    answer: &'a Answer,
+    line: u64,
+}
+
 /// Writes the answers to a line, each with the line's number, and that it was handled.
-fn write(stdout: &mut impl io::Write, number: u64, answers: &[Answer], read: Instant) -> io::Result<()> {
+fn write(stdout: &mut impl io::Write, line: u64, answers: &[Answer], read: Instant) -> io::Result<()> {
     let mut text = String::new();
     for answer in answers {
-        let mut object = answer.to_json();
-        object["line"] = Value::from(number);
-        text += &object.to_string();
+        text += &serde_json::to_string(&Numbered { answer, line })?;
         text.push('\n');
     }
-    let micros = u64::try_from(read.elapsed().as_micros()).unwrap_or(u64::MAX);
-    text += &json!({ "answer": "handled", "line": number, "microseconds": micros }).to_string();
-    text.push('\n');
+    let micros = read.elapsed().as_micros();
+    let _ = writeln!(text, r#"{{"answer":"handled","line":{line},"microseconds":{micros}}}"#);
     // At once, so that no other thread's line comes in between.
     stdout.write_all(output::visible_json(&text).as_bytes())?;
     stdout.flush()

@@ -202,15 +202,18 @@ fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     }
 }
 
+/// What is to be said of a segment that an older version has written.
+pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/1`, which this version does not read; let the version that \
+                                     wrote it bring its mission to an end, or begin the mission anew with a journal in another \
+                                     directory";
+
 /// Why a file whose first line is no header is none of ours.
 fn no_journal(first: &[u8]) -> String {
     let text = String::from_utf8_lossy(first);
     let old = text.contains("metaplan-journal/1");
     let damaged = text.contains("metaplan-journal/");
     match (old, damaged) {
-        (true, _) => "is of the format `metaplan-journal/1`, which this version does not read; let the version that wrote it \
-                      bring its mission to an end, or begin the mission anew with a journal in another directory"
-            .to_owned(),
+        (true, _) => OLD_FORMAT.to_owned(),
         (false, true) => "is damaged in its first line".to_owned(),
         (false, false) => "is no journal; it was left as it is".to_owned(),
     }

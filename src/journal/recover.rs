@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::Recovery;
-use super::directory::{Contents, End, Segment, broken, closing, open_private, path};
+use super::directory::{Contents, End, OLD_FORMAT, Segment, broken, closing, open_private, path};
 use super::record::{Link, Record};
 use crate::mapek::{Answer, Loop, Observation};
 use crate::message::Message;
@@ -55,6 +55,10 @@ pub(super) fn usable<'a>(
     }
     problems.sort();
     problems.dedup();
+    // What is not damaged need not be restored, and has its own way out.
+    if let Some(old) = problems.iter().find(|text| text.ends_with(OLD_FORMAT)) {
+        return Err(format!("{old}; nothing was changed"));
+    }
     let way_out = "nothing was changed; `metaplan journal show` lists what is sound; restore what is damaged from a copy, or \
                    take another directory";
     Err(format!("{}; {way_out}", problems.join(", ")))

@@ -96,11 +96,12 @@ impl Catalogue {
     fn follow_fact(&mut self, fact: &Fact, engine: &Engine) -> bool {
         let name = |symbol: Symbol| engine.symbols().value(symbol).as_name().unwrap_or_default();
         let property = name(fact.predicate);
-        let subject = fact.arguments.first().map_or("", |&subject| name(subject));
+        let Some(&individual) = fact.arguments.first() else { return false };
+        let subject = name(individual);
         if AVAILABILITY.contains(&property) {
             if let Ok(place) = self.designs.binary_search_by(|own| own.individual.iri.as_str().cmp(subject)) {
                 let is_false = |property: &&str| {
-                    values(engine, subject, property).any(|value| *value == Literal::Boolean(false))
+                    values(engine, individual, property).any(|value| *value == Literal::Boolean(false))
                 };
                 self.designs[place].available = !AVAILABILITY.iter().any(is_false);
             }
@@ -109,15 +110,15 @@ impl Catalogue {
         if VALUES.contains(&property) {
             let is_estimation = |property: &&str| {
                 let found = engine.symbols().find_name(property);
-                found.is_some_and(|found| {
-                    engine.matching(found, &[None, Some(fact.arguments[0])]).next().is_some()
-                })
+                found.is_some_and(|found| engine.matching(found, &[None, Some(individual)]).next().is_some())
             };
             let place = self.measurements.binary_search_by(|own| own.individual.iri.as_str().cmp(subject));
             let (Ok(place), false) = (place, ESTIMATIONS.iter().any(is_estimation)) else { return false };
             let mut found: Vec<&Literal> =
-                VALUES.iter().flat_map(|property| values(engine, subject, property)).collect();
-            found.sort_by_cached_key(ToString::to_string);
+                VALUES.iter().flat_map(|property| values(engine, individual, property)).collect();
+            if found.len() > 1 {
+                found.sort_by_cached_key(ToString::to_string);
+            }
             self.measurements[place].value = found.into_iter().find_map(Literal::as_rational);
             return true;
         }
@@ -129,11 +130,10 @@ impl Catalogue {
     }
 }
 
-/// The literals that are values of a property of an individual, both by IRI.
-fn values<'a>(engine: &'a Engine, subject: &str, property: &str) -> impl Iterator<Item = &'a Literal> {
+/// The literals that are values of a property of an individual.
+fn values<'a>(engine: &'a Engine, subject: Symbol, property: &str) -> impl Iterator<Item = &'a Literal> {
     let symbols = engine.symbols();
-    let found = symbols.find_name(subject).zip(symbols.find_name(property));
-    let rows: Vec<Symbol> = found.map_or_else(Vec::new, |(subject, property)| {
+    let rows: Vec<Symbol> = symbols.find_name(property).map_or_else(Vec::new, |property| {
         engine.matching(property, &[Some(subject), None]).map(|row| row[1]).collect()
     });
     rows.into_iter().filter_map(|symbol| symbols.value(symbol).as_literal())

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rules::{Fact, Literal, Reason};
+use rules::{Fact, Literal, Reason, Symbols, Value};
 
 use super::Loop;
 use super::answer::{Answer, DesignChange, ObjectiveChange};
@@ -149,10 +149,24 @@ fn reasons(knowledge: &Knowledge, derivation: &rules::Derivation) -> Vec<String>
     }
     for step in &derivation.steps {
         if matches!(step.reason, Reason::Asserted) {
-            lines.push(local(&step.fact.display(symbols).to_string()));
+            lines.push(said(&step.fact, symbols));
         }
     }
     lines
+}
+
+/// A fact as text with local names in place of IRIs.
+fn said(fact: &Fact, symbols: &Symbols) -> String {
+    let mut text = String::with_capacity(64);
+    for (position, &symbol) in std::iter::once(&fact.predicate).chain(&fact.arguments).enumerate() {
+        text += ["", "(", ", "][position.min(2)];
+        match symbols.value(symbol) {
+            Value::Name(name) => text += ontology::vocab::local_name(name),
+            Value::Literal(literal) => text += &local(&literal.to_string()),
+        }
+    }
+    text += if fact.arguments.is_empty() { "()" } else { ")" };
+    text
 }
 
 /// A fact with local names in place of IRIs.

@@ -1,7 +1,8 @@
 //! What the loop answers: conclusions, plans and effects, one JSON object each, in the format `metaplan-events/1`.
 
 use num_rational::BigRational;
-use serde_json::{Map, Value, json};
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde_json::Value;
 
 use super::number;
 use super::step::PlannedStep;
@@ -84,7 +85,7 @@ pub enum Answer {
 }
 
 /// A design that has become available, or is available no more.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct DesignChange {
     /// Its local name.
     pub design: String,
@@ -95,7 +96,7 @@ pub struct DesignChange {
 }
 
 /// An objective whose status has changed.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct ObjectiveChange {
     /// Its local name.
     pub objective: String,
@@ -153,6 +154,17 @@ pub enum Command {
 }
 
 impl Command {
+    /// The word for it among the answers.
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Reconfigure { .. } => "reconfigure",
+            Self::Request { .. } => "request_action",
+            Self::Cancel { .. } => "cancel_action",
+            Self::Suspend { .. } => "suspend_action",
+            Self::Resume => "resume_action",
+        }
+    }
+
     /// Whether this command makes another one, about the same action, pointless.
     pub(super) fn replaces(&self, other: &Self, same_action: bool) -> bool {
         match (self, other) {
@@ -170,50 +182,84 @@ impl Command {
     }
 }
 
+/// The answer as an object of the format.
+impl Serialize for Answer {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_map(None)?;
+        if let Self::Effect(effect) = self {
+            effect.fields(&mut object)?;
+        } else {
+            object.serialize_entry("answer", self.kind())?;
+            self.fields(&mut object)?;
+        }
+        object.end()
+    }
+}
+
 impl Answer {
     /// The answer as an object of the format.
     pub fn to_json(&self) -> Value {
+        // Texts, numbers and lists of them are always data.
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// The word for what it is.
+    fn kind(&self) -> &'static str {
         match self {
-            Self::Inferred { designs, objectives } => json!({
-                "answer": "inferred",
-                "designs": designs.iter().map(DesignChange::to_json).collect::<Vec<_>>(),
-                "objectives": objectives.iter().map(ObjectiveChange::to_json).collect::<Vec<_>>(),
-            }),
+            Self::Inferred { .. } => "inferred",
+            Self::Unconcluded { .. } => "unconcluded",
+            Self::Contradicted { .. } => "contradicted",
+            Self::PlanRequested { .. } => "plan_requested",
+            Self::PlanFound { .. } => "plan_found",
+            Self::PlanKept { .. } => "plan_kept",
+            Self::PlanNone { .. } => "plan_none",
+            Self::Effect(effect) => effect.command.kind(),
+            Self::GoalReached => "goal_reached",
+            Self::Duplicate { .. } => "duplicate",
+            Self::Stale { .. } => "stale",
+            Self::Error { .. } => "error",
+        }
+    }
+
+    /// Writes what stands behind the kind of an answer that is no effect.
+    fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
+        match self {
+            Self::Inferred { designs, objectives } => {
+                object.serialize_entry("designs", designs)?;
+                object.serialize_entry("objectives", objectives)
+            }
             Self::Unconcluded { fault } => {
                 let part = |part: fn(&Fault) -> &String| fault.as_ref().map(part);
-                json!({
-                    "answer": "unconcluded",
-                    "code": part(|fault| &fault.code),
-                    "message": part(|fault| &fault.message),
-                    "rule": part(|fault| &fault.rule),
-                })
+                object.serialize_entry("code", &part(|fault| &fault.code))?;
+                object.serialize_entry("message", &part(|fault| &fault.message))?;
+                object.serialize_entry("rule", &part(|fault| &fault.rule))
             }
-            Self::Contradicted { contradictions } => {
-                let object = |own: &Contradiction| json!({ "violated": own.violated, "facts": own.facts });
-                let contradictions: Vec<Value> = contradictions.iter().map(object).collect();
-                json!({ "answer": "contradicted", "contradictions": contradictions })
+            Self::Contradicted { contradictions } => object.serialize_entry("contradictions", contradictions),
+            Self::PlanRequested { because } => object.serialize_entry("because", because),
+            Self::PlanFound { cost, optimal, steps } => {
+                object.serialize_entry("cost", &number::to_json(cost))?;
+                object.serialize_entry("optimal", optimal)?;
+                object.serialize_entry("steps", steps)
             }
-            Self::PlanRequested { because } => json!({ "answer": "plan_requested", "because": because }),
-            Self::PlanFound { cost, optimal, steps } => json!({
-                "answer": "plan_found",
-                "cost": number::to_json(cost),
-                "optimal": optimal,
-                "steps": steps.iter().map(PlannedStep::to_json).collect::<Vec<_>>(),
-            }),
-            Self::PlanKept { because } => json!({ "answer": "plan_kept", "because": because }),
+            Self::PlanKept { because } => object.serialize_entry("because", because),
             Self::PlanNone { status, because, blocking } => {
-                json!({ "answer": "plan_none", "status": status, "because": because, "blocking": blocking })
+                object.serialize_entry("status", status)?;
+                object.serialize_entry("because", because)?;
+                object.serialize_entry("blocking", blocking)
             }
-            Self::Effect(effect) => effect.to_json(),
-            Self::GoalReached => json!({ "answer": "goal_reached" }),
-            Self::Duplicate { sequence } => json!({ "answer": "duplicate", "seq": sequence }),
+            Self::Effect(_) | Self::GoalReached => Ok(()),
+            Self::Duplicate { sequence } => object.serialize_entry("seq", sequence),
             Self::Stale { sequence, mark } => {
                 let because = format!(
                     "too many numbers are missing: of those up to {mark} it is not known any more which were seen"
                 );
-                json!({ "answer": "stale", "seq": sequence, "because": because })
+                object.serialize_entry("seq", sequence)?;
+                object.serialize_entry("because", &because)
             }
-            Self::Error { code, message } => json!({ "answer": "error", "code": code, "message": message }),
+            Self::Error { code, message } => {
+                object.serialize_entry("code", code)?;
+                object.serialize_entry("message", message)
+            }
         }
     }
 
@@ -226,47 +272,36 @@ impl Answer {
     }
 }
 
-impl DesignChange {
-    fn to_json(&self) -> Value {
-        json!({ "design": self.design, "available": self.available, "because": self.because })
-    }
-}
-
-impl ObjectiveChange {
-    fn to_json(&self) -> Value {
-        json!({ "objective": self.objective, "statuses": self.statuses, "because": self.because })
-    }
-}
-
 impl Effect {
-    /// The effect as an object of the format.
-    pub fn to_json(&self) -> Value {
-        let mut object = match &self.command {
-            Command::Reconfigure { function, from, to } => {
-                json!({ "answer": "reconfigure", "function": function, "from": from, "to": to })
+    /// Writes the effect as an object of the format.
+    fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
+        object.serialize_entry("answer", self.command.kind())?;
+        if let Command::Request { step } = &self.command {
+            // The number of the action stands where its name stands in a step.
+            object.serialize_entry("action", &self.action)?;
+            step.fields(object)?;
+            object.serialize_entry("name", &step.action)?;
+        } else {
+            match &self.command {
+                Command::Reconfigure { function, from, to } => {
+                    object.serialize_entry("function", function)?;
+                    object.serialize_entry("from", from)?;
+                    object.serialize_entry("to", to)?;
+                }
+                Command::Cancel { because } | Command::Suspend { because } => {
+                    object.serialize_entry("because", because)?;
+                }
+                Command::Request { .. } | Command::Resume => {}
             }
-            Command::Request { step } => {
-                let mut object = step.to_json();
-                object["answer"] = json!("request_action");
-                let name = object["action"].take();
-                object["name"] = name;
-                object
-            }
-            Command::Cancel { because } => json!({ "answer": "cancel_action", "because": because }),
-            Command::Suspend { because } => json!({ "answer": "suspend_action", "because": because }),
-            Command::Resume => json!({ "answer": "resume_action" }),
-        };
-        object["action"] = json!(self.action);
-        object["effect"] = json!(self.number);
+            object.serialize_entry("action", &self.action)?;
+        }
+        object.serialize_entry("effect", &self.number)?;
         if self.repeated {
-            object["repeated"] = json!(true);
+            object.serialize_entry("repeated", &true)?;
         }
         if !self.supersedes.is_empty() {
-            object["supersedes"] = json!(self.supersedes);
+            object.serialize_entry("supersedes", &self.supersedes)?;
         }
-        // The kind of the answer comes first.
-        let fields = object.as_object_mut().map(std::mem::take).unwrap_or_default();
-        let (kind, rest): (Map<_, _>, Map<_, _>) = fields.into_iter().partition(|(name, _)| name == "answer");
-        Value::Object(kind.into_iter().chain(rest).collect())
+        Ok(())
     }
 }

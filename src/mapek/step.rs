@@ -3,6 +3,7 @@
 use num_rational::BigRational;
 use pddl::ast::Name;
 use pddl::validate::{PlanStep, PlanText};
+use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::number;
@@ -23,6 +24,16 @@ pub struct PlannedStep {
     pub duration: BigRational,
     /// What it adds to the metric.
     pub cost: BigRational,
+}
+
+/// The step as an object of the format.
+impl Serialize for PlannedStep {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_map(None)?;
+        object.serialize_entry("action", &self.action)?;
+        self.fields(&mut object)?;
+        object.end()
+    }
 }
 
 impl PlannedStep {
@@ -87,17 +98,15 @@ impl PlannedStep {
         }
     }
 
-    /// The step as an object of the format.
-    pub fn to_json(&self) -> Value {
+    /// Writes what stands behind the name of the step as an object of the format.
+    pub(crate) fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         let configuration: Map<String, Value> =
             self.configuration.iter().map(|(function, design)| (function.clone(), json!(design))).collect();
-        json!({
-            "action": self.action,
-            "arguments": self.arguments.get(..self.written).unwrap_or(&self.arguments),
-            "configuration": configuration,
-            "duration": number::to_json(&self.duration),
-            "cost": number::to_json(&self.cost),
-        })
+        let written = self.arguments.get(..self.written).unwrap_or(&self.arguments);
+        object.serialize_entry("arguments", written)?;
+        object.serialize_entry("configuration", &configuration)?;
+        object.serialize_entry("duration", &number::to_json(&self.duration))?;
+        object.serialize_entry("cost", &number::to_json(&self.cost))
     }
 
     /// Everything, for the journal.

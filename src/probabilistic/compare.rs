@@ -52,6 +52,9 @@ impl Stages {
 /// Finds plans; asked once for each situation.
 pub type Planner<'a> = dyn FnMut(&Situation) -> Result<Planned, Vec<Message>> + 'a;
 
+/// Hears of the candidates that have been measured, and of what was taken until then.
+pub type Report<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
+
 /// How a comparison is made.
 #[derive(Clone)]
 pub struct Config<'a> {
@@ -146,7 +149,8 @@ impl Comparison {
     }
 }
 
-/// Compares all candidates. The planner is asked for the plan at the start, and wherever re-planning is needed.
+/// Compares all candidates. The planner is asked for the plan at the start, and wherever re-planning is needed. What is there
+/// is reported whenever there is more.
 ///
 /// # Errors
 /// The planner's, or a limit on states.
@@ -154,12 +158,14 @@ pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,
     planner: &mut Planner<'_>,
+    report: &mut Report<'_>,
 ) -> Result<Comparison, Failure> {
     // The planner comes first, so that its memory can be told from that of the process.
     (config.memory)();
     let mut memo = Memo { planner, plans: BTreeMap::new(), costs: Costs::default() };
     let first = memo.plan(&Situation::start(mission, config.risk))?;
     memo.costs.plan_memory = (config.memory)();
+    report(&[], &memo.costs);
     let started = Instant::now();
     let process = Process::<f64>::new(mission, config.risk, &REWARDS);
     let bounds = Bounds { states: config.states, ..Bounds::default() };
@@ -167,6 +173,7 @@ pub fn compare(
     memo.costs.process.build = started.elapsed();
     memo.costs.states = explored.mdp.states();
     memo.costs.transitions = explored.mdp.transition_count();
+    report(&[], &memo.costs);
     let fastest = first.as_ref().map(|plan| time_of(mission, plan));
     let penalty = config.penalty.unwrap_or_else(|| 10.0 * fastest.unwrap_or(1000.0).max(1.0));
     let referee = Referee { mission, risk: config.risk, penalty, process, explored };
@@ -184,17 +191,21 @@ pub fn compare(
     for (name, policy) in policies.into_iter().chain(vertices) {
         let measures = referee.play_policy(&policy)?;
         candidates.push(Candidate { kind: 'a', name, measures });
+        report(&candidates, &memo.costs);
         anticipating.get_or_insert(policy);
     }
     if let Some(plan) = &first {
         let measures = referee.play_plan(plan)?;
         candidates.push(Candidate { kind: 'b', name: "our plan, open loop".to_owned(), measures });
+        report(&candidates, &memo.costs);
         let measures = memo.play(&referee)?;
         candidates.push(Candidate { kind: 'c', name: "our plan, re-planning".to_owned(), measures });
+        report(&candidates, &memo.costs);
     }
     if let Some(found) = published(mission, config.priority) {
         let measures = referee.play_plan(&found.actions(mission))?;
         candidates.push(Candidate { kind: 'd', name: "published procedure".to_owned(), measures });
+        report(&candidates, &memo.costs);
     }
     if let Some(route) = shortest_routes(mission, 1).first()
         && let Some(plan) = best_on_route(mission, route)
@@ -202,6 +213,7 @@ pub fn compare(
         let measures = referee.play_plan(&plan)?;
         let name = "fixed shortest route, best configurations".to_owned();
         candidates.push(Candidate { kind: 'e', name, measures });
+        report(&candidates, &memo.costs);
     }
     let loss = match &first {
         Some(plan) if mission.loss.is_some() => {

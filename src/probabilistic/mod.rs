@@ -18,7 +18,7 @@ mod single_way;
 mod task;
 
 pub use coadaptation::{Arc, Battery, Coadaptation, Configuration, Loss, Roles, Switch, Traversal};
-pub use compare::{Candidate, Comparison, Config, Costs, Failure, Planned, Planner, Stages, compare};
+pub use compare::{Candidate, Comparison, Config, Costs, Failure, Planned, Planner, Report, Stages, compare};
 pub use import::{Files, MapOptions, import_map};
 pub use loss::{Hindsight, LossAt, LossReport};
 pub use play::Measures;

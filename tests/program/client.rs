@@ -99,3 +99,38 @@ fn ready_comes_first_and_planning_says_that_it_goes_on() {
     assert_eq!(answers[end]["line"], 0);
     assert!(kinds[..end].contains(&"plan_requested"), "{kinds:?}");
 }
+
+/// A domain of which a few objects make hundreds of thousands of operators.
+const WIDE: &str = "(define (domain wide) (:predicates (p ?a ?b) (q ?a ?b ?c ?d) (done))
+    (:action a :parameters (?a ?b ?c ?d) :precondition (and (p ?a ?b) (p ?c ?d)) :effect (q ?a ?b ?c ?d))
+    (:action b :parameters (?a ?b ?c ?d) :precondition (q ?a ?b ?c ?d) :effect (done)))";
+
+#[test]
+fn planning_says_that_it_goes_on_while_it_grounds() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let names: Vec<String> = (0..20).map(|number| format!("o{number}")).collect();
+    let mut problem = format!("(define (problem p) (:domain wide) (:objects {}) (:init", names.join(" "));
+    for (a, b) in names.iter().flat_map(|a| names.iter().map(move |b| (a, b))) {
+        let _ = write!(problem, " (p {a} {b})");
+    }
+    problem += ") (:goal (done)))";
+    let manifest = "name = \"wide\"\n[knowledge]\nfiles = [\"kb.ttl\"]\n[planning]\ndomain = \"d.pddl\"\nproblem = \"p.pddl\"\n\
+        [adaptation]\ntime_limit = 2.6\n";
+    let knowledge = "<http://example.org/m> a <http://www.w3.org/2002/07/owl#Ontology> .\n";
+    for (name, text) in [("m.toml", manifest), ("kb.ttl", knowledge), ("d.pddl", WIDE), ("p.pddl", &problem)]
+    {
+        std::fs::write(directory.path().join(name), text).expect("a file");
+    }
+    let outcome = metaplan_in(directory.path(), &["run", "m.toml"], "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    let answers: Vec<Value> =
+        outcome.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let none = answers.iter().find(|answer| answer["answer"] == "plan_none").expect("there is no time");
+    assert_eq!(none["because"], "a limit was reached while grounding", "{outcome:#?}");
+    let planning: Vec<&Value> = answers.iter().filter(|answer| answer["answer"] == "planning").collect();
+    assert!(planning.len() >= 2, "{outcome:#?}");
+    for (number, answer) in (1..).zip(planning) {
+        assert_eq!(answer["seconds"], number, "{outcome:#?}");
+        assert!(answer["cost"].is_null() && answer["lower_bound"].is_null(), "{outcome:#?}");
+    }
+}

@@ -4,7 +4,7 @@
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::certificate::{certificate, change};
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
@@ -72,11 +72,56 @@ fn the_time_limit_covers_reading() {
     assert_eq!(status.code(), Some(12));
 }
 
+/// What was compared is shown, and that it is not all.
 #[test]
-fn a_comparison_is_given_up_in_time() {
-    let outcome = metaplan(&["compare", "missions/camara_like.toml", "--time-limit", "0.05"]);
+fn a_comparison_shows_what_it_has_when_time_is_up() {
+    let outcome = metaplan(&["compare", "missions/camara_like.toml", "--time-limit", "0"]);
     assert_eq!(outcome.status, 12, "{outcome:#?}");
     assert!(outcome.stderr.contains("M130") && outcome.stdout.is_empty(), "{outcome:#?}");
+    let directory = tempfile::tempdir().expect("a directory");
+    let table = directory.path().join("table.csv").display().to_string();
+    let arguments = ["compare", "missions/camara_like.toml", "--no-battery", "--format", "json"];
+    let whole = metaplan(&[&arguments[..], &["--pairs", "2"]].concat());
+    let whole: Value = serde_json::from_str(&whole.stdout).expect("JSON");
+    assert_eq!((&whole["complete"], &whole["messages"]), (&json!(true), &json!([])));
+    let mut rows = 0;
+    // More pairs than can be compared in any of these times.
+    for time in ["4", "16", "64"] {
+        let more = ["--pairs", "1000", "--time-limit", time, "--csv", &table];
+        let outcome = metaplan(&[&arguments[..], &more].concat());
+        assert_eq!(outcome.status, 12, "{outcome:#?}");
+        let answer: Value = serde_json::from_str(&outcome.stdout).expect("JSON");
+        let text = answer["messages"][0]["message"].as_str().expect("a sentence");
+        assert!(answer["messages"][0]["code"] == "M130" && text.contains("before"), "{answer:#}");
+        assert!(answer["format"] == "metaplan-error/1" || answer["complete"] == false, "{answer:#}");
+        let Some(all) = answer["comparisons"].as_array() else { continue };
+        for comparison in &all[..all.len().saturating_sub(1)] {
+            assert_eq!(comparison["complete"], true);
+        }
+        rows = all.iter().map(|own| own["candidates"].as_array().map_or(0, Vec::len)).sum();
+        if rows > 0 {
+            let written = std::fs::read_to_string(&table).expect("the table");
+            assert_eq!(written.lines().count(), rows + 1, "{written}");
+            break;
+        }
+    }
+    assert!(rows > 0, "nothing was ever shown");
+}
+
+#[test]
+fn a_comparison_says_in_text_that_it_is_incomplete() {
+    for time in ["8", "32", "128"] {
+        let arguments = ["compare", "missions/camara_like.toml", "--no-battery"];
+        let outcome = metaplan(&[&arguments[..], &["--pairs", "1000", "--time-limit", time]].concat());
+        assert_eq!(outcome.status, 12, "{outcome:#?}");
+        assert!(outcome.stderr.contains("M130"), "{outcome:#?}");
+        if !outcome.stdout.is_empty() {
+            assert!(outcome.stderr.contains("what is shown is incomplete"), "{outcome:#?}");
+            assert!(outcome.stdout.contains("best policy by penalised time"), "{outcome:#?}");
+            return;
+        }
+    }
+    panic!("nothing was ever shown");
 }
 
 #[test]

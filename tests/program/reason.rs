@@ -232,3 +232,32 @@ fn what_cannot_be_read_is_bad_input() {
     check(&run(&["convert", "model.ttl", "--to", "klingon"], ""), 2, &["functional"]);
     check(&run(&["convert", "absent.ttl", "--to", "turtle"], ""), 3, &["O101"]);
 }
+
+/// Nothing of a file gets to the terminal that the terminal would obey, or that would look like another message.
+#[test]
+fn what_a_hostile_rule_file_says_is_shown_and_not_obeyed() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let hostile = "a(?x) \u{1b}[2J\u{202e}\u{200b}\u{e0041} \"x\nerror[M999]: forged\" -> b(?x)\n\
+                   [label \u{1b}]0;t\u{7}] a(?x) -> b(?y)\n";
+    std::fs::write(directory.path().join("r.swrl"), hostile).expect("a file");
+    std::fs::write(directory.path().join("label.swrl"), "[a\u{9b}\u{2028}b] a(?x) -> b(?y)\n")
+        .expect("a file");
+    let knowledge = "<http://example.org/m> a <http://www.w3.org/2002/07/owl#Ontology> .\n";
+    std::fs::write(directory.path().join("kb.ttl"), knowledge).expect("a file");
+    for rules in ["r.swrl", "label.swrl"] {
+        for format in ["text", "json"] {
+            let outcome = metaplan_in(
+                directory.path(),
+                &["reason", "kb.ttl", "--rules", rules, "--format", format],
+                "",
+            );
+            assert_eq!(outcome.status, 3, "{outcome:#?}");
+            let shown = outcome.stdout + &outcome.stderr;
+            let is_odd =
+                |c: char| (c.is_control() && c != '\n') || "\u{202e}\u{200b}\u{2028}\u{e0041}".contains(c);
+            assert!(!shown.contains(is_odd), "{shown:?}");
+            assert!(!shown.lines().any(|line| line.starts_with("error[M999]")), "{shown:?}");
+            assert!(shown.contains(if rules == "r.swrl" { "R101" } else { "R202" }), "{shown:?}");
+        }
+    }
+}

@@ -46,6 +46,9 @@ impl Equality {
     pub fn why(&self, engine: &Engine, fact: &Fact) -> Derivation {
         let own = Builder::new(engine, self).prove(fact);
         let edges = self.edges_in(engine, &own);
+        if edges.is_empty() {
+            return Derivation { steps: own };
+        }
         let mut grounds: FxHashMap<Fact, Ground> = FxHashMap::default();
         let stated = Reason::Asserted;
         let is_edge = |step: &Step| step.reason == Reason::Asserted && self.is_edge(engine, &step.fact);

@@ -93,6 +93,11 @@ impl Equality {
             |row: &Arguments| row.iter().zip(pattern).all(|(&v, wanted)| wanted.is_none_or(|w| w == v));
         let mut found = Vec::new();
         for row in engine.matching_rows(predicate, &normal) {
+            if predicate != self.same && row.iter().all(|&symbol| self.names(symbol).is_none()) {
+                let row = Arguments::from_slice(row);
+                found.extend(Some(row).filter(&fits));
+                continue;
+            }
             let row = Fact::new(predicate, row.iter().copied());
             let facts = self.facts_of(&row, &|symbol| self.names(symbol));
             found.extend(facts.into_iter().map(|fact| fact.arguments).filter(&fits));

@@ -1,0 +1,154 @@
+//! What a comparison has come to: all of it, or as much as was there when time was up.
+//!
+//! Comparing does not look at the clock. So a thread of its own waits for the time limit, shows what is there by then, and ends
+//! the program.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use encodings::Limits;
+use metaplan::message::Message;
+use metaplan::probabilistic::{Candidate, Comparison, Costs};
+use serde_json::{Value, json};
+
+use crate::cli::compare_table::{
+    Pair, Row, as_json, as_text, begun_json, begun_rows, costs_text, csv, row_json, rows,
+};
+use crate::cli::{Common, Exit, Failure, Format, output};
+
+/// How often the clock is looked at.
+const INTERVAL: Duration = Duration::from_millis(10);
+
+/// The comparisons that are done, and the one that is not.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SoFar {
+    /// How many there will be; none while files are read.
+    pub of: Option<usize>,
+    pub done: Vec<(Option<Pair>, Comparison)>,
+    pub begun: Option<Begun>,
+    /// Rows that the user adds.
+    pub added: Vec<Row>,
+    /// Where the table is to go as CSV.
+    pub csv: Option<PathBuf>,
+}
+
+/// A comparison that is not done.
+#[derive(Debug, Clone)]
+pub(super) struct Begun {
+    pub pair: Option<Pair>,
+    pub candidates: Vec<Candidate>,
+    pub costs: Costs,
+}
+
+/// What is shared with the thread that waits; none once somebody shows it.
+#[derive(Debug, Clone)]
+pub(super) struct Shared(Arc<Mutex<Option<SoFar>>>);
+
+impl Shared {
+    pub fn new() -> Self {
+        Self(Arc::new(Mutex::new(Some(SoFar::default()))))
+    }
+
+    /// Changes what is there; nothing is, once time is up, since the program ends.
+    pub fn change(&self, change: impl FnOnce(&mut SoFar)) {
+        if let Some(so_far) = &mut *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
+            change(so_far);
+        }
+    }
+
+    fn take(&self) -> Option<SoFar> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// Shows what is there by then, with a message, and ends the program.
+    pub fn show_after(&self, time: Duration, common: &Common) {
+        let (limits, common, shared) = (Limits::none().with_time(time), common.clone(), self.clone());
+        std::thread::spawn(move || {
+            while !limits.reached() {
+                std::thread::sleep(INTERVAL);
+            }
+            let Some(so_far) = shared.take() else { return };
+            let message = so_far.message();
+            if so_far.of.is_none() {
+                output::failure(&common, &[message]);
+            } else if let Err(failure) = so_far.show(&common, Some(message)) {
+                output::failure(&common, &failure.messages);
+                std::process::exit(failure.exit as i32);
+            }
+            std::process::exit(Exit::NothingFound as i32);
+        });
+    }
+
+    /// Shows all of it.
+    ///
+    /// # Errors
+    /// The table cannot be written.
+    pub fn end(&self, common: &Common) -> Result<Exit, Failure> {
+        let Some(so_far) = self.take() else {
+            // The other thread has begun to show what is there, and ends the program.
+            loop {
+                std::thread::park();
+            }
+        };
+        so_far.show(common, None)?;
+        Ok(Exit::Done)
+    }
+}
+
+impl SoFar {
+    /// That time was up, and how much there is.
+    fn message(&self) -> Message {
+        let Some(of) = self.of else {
+            return Message::error("M130", "the time limit was reached before anything was compared");
+        };
+        let measured = self.begun.as_ref().map_or(0, |begun| begun.candidates.len());
+        let text = format!(
+            "the time limit was reached before everything was compared; what is shown is incomplete: {} of {of} \
+             comparisons, and {measured} candidates of the next",
+            self.done.len()
+        );
+        Message::error("M130", text)
+    }
+
+    /// Writes the answer; with a message if it is not all.
+    fn show(mut self, common: &Common, message: Option<Message>) -> Result<(), Failure> {
+        let done = self.done.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison));
+        let begun = self.begun.iter().flat_map(|own| begun_rows(own.pair.as_ref(), &own.candidates));
+        let measured: Vec<Row> = done.chain(begun).collect();
+        let is_empty = measured.is_empty();
+        let added = std::mem::take(&mut self.added);
+        let more: Vec<Value> = added.iter().map(row_json).collect();
+        let rows: Vec<Row> = measured.into_iter().chain(added).collect();
+        if let Some(path) = self.csv.as_ref().filter(|_| !is_empty) {
+            output::write_file(path, &csv(&rows))?;
+        }
+        if common.format == Format::Json {
+            let done = self.done.iter().map(|(pair, comparison)| as_json(pair.as_ref(), comparison));
+            let begun =
+                self.begun.iter().map(|own| begun_json(own.pair.as_ref(), &own.candidates, &own.costs));
+            output::json_answer(&json!({
+                "format": "metaplan-compare/1",
+                "complete": message.is_none(),
+                "comparisons": done.chain(begun).collect::<Vec<_>>(),
+                "published": more,
+                "messages": message.iter().collect::<Vec<_>>(),
+            }));
+            return Ok(());
+        }
+        if !is_empty {
+            let mut text = as_text(&rows, &self.done);
+            if let Some(begun) = &self.begun {
+                let of = begun.pair.as_ref().map(|(start, goal)| format!("{start}-{goal}: "));
+                let (of, costs) = (of.unwrap_or_default(), costs_text(&begun.costs));
+                let _ = writeln!(text, "\n{of}incomplete\n{costs}");
+            }
+            output::answer(&text);
+        }
+        if let Some(message) = message {
+            output::failure(common, &[message]);
+        }
+        Ok(())
+    }
+}
