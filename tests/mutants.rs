@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 14] = [
+const PARTS: [&str; 15] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -26,6 +26,7 @@ const PARTS: [&str; 14] = [
     "rules",
     "encodings",
     "pddl",
+    "certificate",
     "probabilistic",
     "tests",
     "benches",

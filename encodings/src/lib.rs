@@ -54,12 +54,8 @@ mod transitions;
 #[cfg(test)]
 mod tests;
 
+pub use self::certificate::{Certificate, Outputs as RefutationOutputs, certify, certify_exact, refute};
 pub use alternatives::{Alternatives, Forced, alternatives};
-pub use certificate::{
-    Cause as ComparisonCause, Certificate, Checked, Difference, Faithful, Fault, Inputs as RefutationInputs,
-    Outputs as RefutationOutputs, StepBound, certify, certify_exact, check as check_certificate,
-    check_refutation, faithful, refute, verification_conditions, witness,
-};
 pub use concurrent::{Concurrent, ground_concurrent, optimize_concurrent};
 pub use encode::Semantics;
 pub use error::{Error, File, Place};

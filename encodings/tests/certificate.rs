@@ -4,10 +4,8 @@
 mod missions;
 mod random;
 
-use metaplan_encodings::{
-    Certificate, Config, Faithful, GroundConfig, Limits, Status, certify, check_certificate, faithful,
-    ground, optimize, verification_conditions, witness,
-};
+use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
+use metaplan_encodings::{Certificate, Config, GroundConfig, Limits, Status, certify, ground, optimize};
 use missions::Mission;
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
@@ -45,8 +43,8 @@ fn false_claims(cost: &BigRational) -> [Option<BigRational>; 2] {
 
 /// What the comparison of a written task with the files of a mission says.
 fn compared((domain, problem): &(Domain, Problem), task: &str) -> Faithful {
-    match witness(domain, problem, task, &Limits::none()) {
-        Ok(witness) => faithful(domain, problem, task, &witness, &Limits::none()),
+    match witness(domain, problem, task, &|| false) {
+        Ok(witness) => faithful(domain, problem, task, &witness, &|| false),
         Err(verdict) => verdict,
     }
 }
@@ -54,12 +52,12 @@ fn compared((domain, problem): &(Domain, Problem), task: &str) -> Faithful {
 fn check(seed: u64) {
     let (certificate, cost) = certified(seed);
     let Certificate { task: written, argument } = &certificate;
-    let accepted = check_certificate(written, argument, cost.as_ref());
+    let accepted = check_argument(written, argument, cost.as_ref());
     assert!(accepted.is_ok(), "seed {seed}: {accepted:?}");
     let found = compared(&files(seed), written);
     assert!(matches!(found, Faithful::Yes { .. }), "seed {seed}: {found:?}");
     for claim in cost.iter().flat_map(false_claims) {
-        let accepted = check_certificate(written, argument, claim.as_ref());
+        let accepted = check_argument(written, argument, claim.as_ref());
         assert!(accepted.is_err(), "seed {seed}: {claim:?} is accepted");
     }
 }
@@ -111,7 +109,7 @@ fn withstands(seed: u64, mutants: usize) {
             mutate(&mut mutant, &mut random);
         }
         for claim in cost.iter().flat_map(false_claims) {
-            let accepted = check_certificate(&certificate.task, &mutant.to_string(), claim.as_ref());
+            let accepted = check_argument(&certificate.task, &mutant.to_string(), claim.as_ref());
             assert!(accepted.is_err(), "seed {seed}, mutant {number}: {claim:?} is accepted\n{mutant}");
         }
         let mut mutant = written.clone();
@@ -120,7 +118,7 @@ fn withstands(seed: u64, mutants: usize) {
         let written = mutant.to_string();
         let stands = matches!(compared(&files, &written), Faithful::Yes { .. });
         for claim in cost.iter().flat_map(false_claims).chain([cost.clone()]) {
-            let accepted = check_certificate(&written, &certificate.argument, claim.as_ref()).is_ok();
+            let accepted = check_argument(&written, &certificate.argument, claim.as_ref()).is_ok();
             assert!(
                 !(accepted && stands) || claim == cost,
                 "seed {seed}, mutant {number}: {claim:?}\n{written}"
@@ -143,7 +141,7 @@ fn tasks_that_can_be_read_in_two_ways_are_refused() {
         let written = task.to_string();
         let found = compared(&files(seed), &written);
         assert!(matches!(found, Faithful::No(_)), "seed {seed}: {written}");
-        let accepted = check_certificate(&written, &certificate.argument, Some(cost));
+        let accepted = check_argument(&written, &certificate.argument, Some(cost));
         assert!(accepted.is_err(), "seed {seed}: {written}");
     };
     for seed in 0..20 {

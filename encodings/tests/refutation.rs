@@ -9,9 +9,9 @@ use std::cell::RefCell;
 use std::io::Write;
 use std::rc::Rc;
 
+use certificate::{Inputs, StepBound, check_refutation};
 use metaplan_encodings::{
-    Certificate, Config, GroundConfig, Limits, RefutationInputs, RefutationOutputs, StepBound, certify,
-    check_refutation, ground, optimize, refute,
+    Certificate, Config, GroundConfig, Limits, RefutationOutputs, certify, ground, optimize, refute,
 };
 use missions::Mission;
 use num_rational::BigRational;
@@ -82,7 +82,7 @@ fn verdicts(
     [formula, legend, proof, hints]: &Files,
 ) -> [Result<String, String>; 3] {
     let documents = (certificate.task.as_str(), certificate.argument.as_str());
-    let inputs = RefutationInputs {
+    let inputs = Inputs {
         formula: &mut formula.as_bytes(),
         legend: &mut legend.as_bytes(),
         proof: &mut proof.as_bytes(),

@@ -21,9 +21,9 @@ use std::fs;
 use std::io::{BufRead, BufReader, BufWriter};
 use std::path::Path;
 
+use certificate::{Faithful, StepBound, check, witness};
 use encodings::{
-    Certificate, ExactTask, Faithful, Limits, RefutationOutputs, Solution, Status, StepBound, Task, certify,
-    certify_exact, check_certificate, refute, witness,
+    Certificate, ExactTask, Limits, RefutationOutputs, Solution, Status, Task, certify, certify_exact, refute,
 };
 use num_rational::BigRational;
 use pddl::ast::Problem;
@@ -222,8 +222,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     let whole = tempfile::tempdir_in(parent).map_err(failed)?;
     let metric = contents.metric().map_err(|reason| wrong(&reason))?;
     // What `verify` would refuse is not written.
-    check_certificate(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref())
-        .map_err(|fault| wrong(&fault))?;
+    check(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref()).map_err(|fault| wrong(&fault))?;
     let refutation =
         refutation(whole.path(), (text(&files, TASK), text(&files, ARGUMENT)), metric.as_ref(), limits)
             .map_err(failed)?;
@@ -247,11 +246,12 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
 /// Makes the witness, and compares the task with the files as `verify` will: what cannot be compared gets no certificate.
 fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
     let (domain, problem) = verify::read_pddl(domain, problem)?;
-    let witness = witness(&domain, &problem, task, limits).map_err(|verdict| match verdict {
-        Faithful::No(difference) => difference.to_string(),
-        Faithful::Undecided(cause) => cause.to_string(),
-        Faithful::Yes { .. } => "no witness".to_owned(),
-    })?;
+    let witness =
+        witness(&domain, &problem, task, &|| limits.reached()).map_err(|verdict| match verdict {
+            Faithful::No(difference) => difference.to_string(),
+            Faithful::Undecided(cause) => cause.to_string(),
+            Faithful::Yes { .. } => "no witness".to_owned(),
+        })?;
     verify::same_task(&domain, &problem, (task, &witness), limits)?;
     Ok(witness)
 }

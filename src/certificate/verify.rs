@@ -4,10 +4,8 @@ use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 
-use encodings::{
-    Checked, Exact, Faithful, Limits, RefutationInputs, check_certificate, check_refutation, faithful,
-    verification_conditions,
-};
+use certificate::{Checked, Faithful, Inputs, check, check_refutation, faithful, verification_conditions};
+use encodings::{Exact, Limits};
 use num_rational::BigRational;
 use num_traits::Zero;
 use pddl::Source;
@@ -100,7 +98,7 @@ fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)], l
             Some(value)
         }
     };
-    let checked = check_certificate(text(TASK), text(ARGUMENT), metric.as_ref());
+    let checked = check(text(TASK), text(ARGUMENT), metric.as_ref());
     let result = checked.map_err(|fault| fault.to_string()).map(|Checked { labels, potentials, needs }| {
         format!("no plan is better: induction over {labels} labels, with {potentials} potentials and {needs} needs")
     });
@@ -138,8 +136,7 @@ fn refuted(
     let [Ok(mut formula), Ok(mut legend), Ok(mut proof), Ok(mut hints)] = opened else {
         return vec![Part { part: "formula", result: Err("it cannot be read".to_owned()) }];
     };
-    let inputs =
-        RefutationInputs { formula: &mut formula, legend: &mut legend, proof: &mut proof, hints: &mut hints };
+    let inputs = Inputs { formula: &mut formula, legend: &mut legend, proof: &mut proof, hints: &mut hints };
     let checked = check_refutation(documents, metric, steps, inputs).into_iter();
     checked.map(|(part, result)| Part { part, result }).collect()
 }
@@ -207,7 +204,7 @@ pub(super) fn same_task(
     (task, witness): (&str, &str),
     limits: &Limits,
 ) -> Result<(String, bool), String> {
-    match faithful(domain, problem, task, witness, limits) {
+    match faithful(domain, problem, task, witness, &|| limits.reached()) {
         Faithful::Yes { instances, idle, timed } => {
             let said = format!(
                 "it stands for the files: {instances} instances of actions can be executed, {idle} of which change nothing \

@@ -1,10 +1,10 @@
 //! By what the numbers of a ground task become integers, where they are not yet.
 
+use certificate::format::Integer;
 use num_bigint::BigInt;
 use num_integer::Integer as _;
 use num_traits::{One, Signed};
 
-use crate::certificate::integer::Integer;
 use crate::number::{Rational, TaskNumber};
 use crate::quantity::{Linear, Quantity};
 use crate::task::Task;

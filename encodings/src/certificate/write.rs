@@ -3,16 +3,14 @@
 use std::hash::Hash;
 use std::sync::Arc;
 
+use certificate::format::{
+    ARGUMENT_FORMAT, Argument, Condition, Conditional, Exclusion, Integer, Label, Layer, Linear, Model, Need,
+    Objective, Operator, Parameter, Potential, Quantity, TASK_FORMAT,
+};
 use num_traits::One;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::{Bounds, Projection};
-use crate::certificate::argument::{Argument, Label, Need, Potential};
-use crate::certificate::integer::Integer;
-use crate::certificate::model::{
-    Argument as Parameter, Condition, Conditional, Exclusion, Layer, Linear, Model, Objective, Operator,
-    Quantity,
-};
 use crate::certificate::scales::{Scales, scaled, whole};
 use crate::exact::{ExactTask, RoundedBounds};
 use crate::limits::Limits;
@@ -21,9 +19,6 @@ use crate::quantity::NumericId;
 use crate::search::{Estimate, closed_labels};
 use crate::solution::{Solution, Status};
 use crate::task::{self, Task};
-
-pub(super) const TASK_FORMAT: &str = "metaplan-task/1";
-pub(super) const ARGUMENT_FORMAT: &str = "metaplan-argument/1";
 
 /// A certificate of an optimal plan, or of there being none: two JSON documents.
 #[derive(Debug, Clone)]

@@ -7,10 +7,8 @@
 mod search;
 mod tasks;
 
-use metaplan_encodings::{
-    Certificate, ComparisonCause, Config, Difference, Faithful, GroundConfig, Limits, certify,
-    check_certificate, faithful, ground, optimize, witness,
-};
+use certificate::{Cause, Difference, Faithful, check, faithful, witness};
+use metaplan_encodings::{Certificate, Config, GroundConfig, Limits, certify, ground, optimize};
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 use pddl::{Source, read};
@@ -45,7 +43,7 @@ fn certified(example: &Example) -> (Certificate, String) {
     assert_eq!(cost, example.optimum.map(fraction), "{}", example.name);
     let certificate = certify(&task, &solution, &Limits::none())
         .unwrap_or_else(|| panic!("{}: no certificate", example.name));
-    let made = witness(&domain, &problem, &certificate.task, &Limits::none())
+    let made = witness(&domain, &problem, &certificate.task, &|| false)
         .unwrap_or_else(|verdict| panic!("{}: {verdict:?}\n{}", example.name, certificate.task));
     (certificate, made)
 }
@@ -55,7 +53,7 @@ fn compared(example: &Example, task: &str, witness: &str) -> Faithful {
 }
 
 fn compared_with((domain, problem): &(Domain, Problem), task: &str, witness: &str) -> Faithful {
-    faithful(domain, problem, task, witness, &Limits::none())
+    faithful(domain, problem, task, witness, &|| false)
 }
 
 #[test]
@@ -66,7 +64,7 @@ fn true_certificates_are_accepted() {
         let context = format!("{}\n{}\n{witness}", example.name, certificate.task);
         assert!(matches!(found, Faithful::Yes { .. }), "{found:?} {context}");
         let claim = example.optimum.map(fraction);
-        let checked = check_certificate(&certificate.task, &certificate.argument, claim.as_ref());
+        let checked = check(&certificate.task, &certificate.argument, claim.as_ref());
         assert!(checked.is_ok(), "{checked:?} {context}");
         let best = claim.map_or(Best::NoPlan, Best::Cost);
         assert_eq!(optimum(&certificate.task), Some(best), "{context}");
@@ -311,9 +309,9 @@ fn what_grounders_have_lost_is_missed() {
                 task["goal"]["clauses"] = goal;
             }
             let written = task.to_string();
-            let made = witness(&domain, &problem, &written, &Limits::none());
+            let made = witness(&domain, &problem, &written, &|| false);
             let found = match made {
-                Ok(witness) => faithful(&domain, &problem, &written, &witness, &Limits::none()),
+                Ok(witness) => faithful(&domain, &problem, &written, &witness, &|| false),
                 Err(verdict) => verdict,
             };
             let expected = Difference::NoOperatorFor { instance: format!("({action})") };
@@ -359,9 +357,9 @@ fn what_is_not_covered_is_named() {
     let task = ground(&files, &problem, &GroundConfig::default()).expect("a task");
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     let certificate = certify(&task, &solution, &Limits::none()).expect("a certificate");
-    let found = witness(&files, &problem, &certificate.task, &Limits::none());
+    let found = witness(&files, &problem, &certificate.task, &|| false);
     let construct = "derived predicates beside a predicate and a function of one name".to_owned();
-    assert_eq!(found, Err(Faithful::Undecided(ComparisonCause::Unsupported { construct })));
+    assert_eq!(found, Err(Faithful::Undecided(Cause::Unsupported { construct })));
 }
 
 /// Whatever numbers a certificate has, the checker neither panics nor takes one for another.
@@ -394,7 +392,7 @@ fn hostile_numbers_prove_nothing() {
                         _ => (&certificate.task, &mutant),
                     };
                     let stands = matches!(compared_with(&files, task, &witness), Faithful::Yes { .. });
-                    let proves = check_certificate(task, argument, dearer.as_ref()).is_ok();
+                    let proves = check(task, argument, dearer.as_ref()).is_ok();
                     assert!(!(stands && proves), "{}: {path} {number}", example.name);
                     tried += 1;
                 }

@@ -1,0 +1,330 @@
+//! What is spent and what is left after each step, in binary.
+//!
+//! An operator adds a constant and entries of tables over its slots, all in two's complement; the bits of a summand are what
+//! the chosen operator and designs make them. Nothing overflows: what is spent never exceeds the limit, and numbers
+//! are as wide as they can get in so many steps.
+
+use std::collections::BTreeMap;
+
+use crate::clausal::binary::{Bits, sign, width};
+use crate::clausal::formula::{Formula, Timeline};
+use crate::clausal::literal::Literal;
+use crate::integer::Integer;
+use crate::model::{Linear, Model, Operator, Quantity};
+use crate::table::is_alone;
+
+/// Numbers of more bits make no formula.
+const WIDTH_LIMIT: usize = 4_096;
+
+/// The sums after the latest step.
+pub(super) struct Sums {
+    spent: Bits,
+    /// What may be spent at most.
+    limit: Integer,
+    numbers: Vec<Bits>,
+}
+
+/// What an operator does to a number.
+enum Change<'c> {
+    Add(&'c Quantity),
+    Assign(&'c Quantity),
+}
+
+fn change(operator: &Operator, number: u32) -> Result<Option<Change<'_>>, String> {
+    let mut changes = operator.changes.iter().filter(|(own, _)| *own == number);
+    let Some((_, value)) = changes.next() else { return Ok(None) };
+    match &value.factors[..] {
+        _ if changes.next().is_some() => Err("an operator that changes a number twice is not covered".into()),
+        [] => Ok(Some(Change::Assign(&value.quantity))),
+        _ if is_alone(value, number) => Ok(Some(Change::Add(&value.quantity))),
+        _ => Err("a change by other numbers is not covered".into()),
+    }
+}
+
+/// All comparisons of a task.
+fn comparisons(model: &Model) -> impl Iterator<Item = &Linear> {
+    let conditions = model.operators.iter().map(|operator| &operator.condition).chain([&model.goal]);
+    conditions.flat_map(|condition| &condition.comparisons)
+}
+
+/// How many bits a number needs for so many steps, and to be compared.
+fn number_width(model: &Model, number: u32, steps: usize) -> Result<usize, String> {
+    let initial = &model.numbers[number as usize];
+    let (mut least, mut most) = (initial.clone(), initial.clone());
+    let (mut falls, mut rises) = (Integer::ZERO, Integer::ZERO);
+    for operator in &model.operators {
+        match change(operator, number)? {
+            Some(Change::Assign(value)) => {
+                least = least.min(model.least(value));
+                most = most.max(model.most(value));
+            }
+            Some(Change::Add(value)) => {
+                falls = falls.min(model.least(value));
+                rises = rises.max(model.most(value));
+            }
+            None => {}
+        }
+    }
+    let steps = Integer::from(steps as i128);
+    least = &least + &(&falls * &steps);
+    most = &most + &(&rises * &steps);
+    let own = comparisons(model).filter(|linear| linear.factors.iter().any(|(own, _)| *own == number));
+    let sizes = own.map(|linear| {
+        let quantity = &linear.quantity;
+        &(-&model.least(quantity)).max(model.most(quantity)) + &Integer::from(1)
+    });
+    let beside = sizes.max().unwrap_or_default();
+    Ok(width(&(&least - &beside), &(&most + &beside)))
+}
+
+impl Sums {
+    pub(super) fn new(
+        model: &Model,
+        formula: &mut Formula,
+        cost: &Integer,
+        steps: usize,
+    ) -> Result<Self, String> {
+        let limit = cost - &Integer::from(1);
+        let dearest = model.operators.iter().map(|operator| model.most(&operator.cost)).max();
+        if model.operators.iter().any(|operator| model.least(&operator.cost).is_negative()) {
+            return Err("operators that cost less than nothing are not covered".into());
+        }
+        let most = &limit + &dearest.unwrap_or_default();
+        let spent = formula.constant(&Integer::ZERO, width(&Integer::ZERO, &most));
+        let mut numbers = Vec::new();
+        for (number, initial) in (0..).zip(&model.numbers) {
+            numbers.push(formula.constant(initial, number_width(model, number, steps)?));
+        }
+        let sums = Self { spent, limit, numbers };
+        if sums.widest() > WIDTH_LIMIT {
+            return Err(format!("numbers of more than {WIDTH_LIMIT} bits are not covered"));
+        }
+        Ok(sums)
+    }
+
+    /// How many bits the longest number has.
+    pub(super) fn widest(&self) -> usize {
+        self.numbers.iter().chain([&self.spent]).map(Vec::len).max().unwrap_or(0)
+    }
+
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a row and its parts are below the size of a table, see `shape`"
+    )]
+    pub(super) fn advance(
+        &mut self,
+        model: &Model,
+        formula: &mut Formula,
+        timeline: &Timeline,
+        step: usize,
+    ) -> Result<(), String> {
+        let mut adder = Adder { model, timeline, step: step + 1 };
+        let costs: Vec<_> = model.operators.iter().map(|operator| Some(&operator.cost)).collect();
+        self.spent = adder.sum(formula, &self.spent, &costs, "what is spent");
+        formula.at_most(&[], &self.spent, &self.limit);
+        let before = self.numbers.clone();
+        for (number, bits) in (0..).zip(&mut self.numbers) {
+            *bits = adder.change(formula, bits, number)?;
+        }
+        for (operator, own) in model.operators.iter().zip(&timeline.operators) {
+            for linear in &operator.condition.comparisons {
+                let [(number, factor)] = &linear.factors[..] else {
+                    return Err("a comparison of several numbers, or of none, is not covered".into());
+                };
+                if operator.changes.iter().any(|(own, value)| own == number && value == linear) {
+                    let after = &self.numbers[*number as usize];
+                    formula.clause(&[-*own, -sign(after)]);
+                } else if linear.quantity.tables.is_empty() {
+                    let own = (&[*own][..], &before[*number as usize]);
+                    compare(formula, own, factor, &linear.quantity.constant);
+                } else if !is_alone(linear, *number) {
+                    return Err("a comparison of a multiple with designs is not covered".into());
+                }
+            }
+        }
+        adder.tests(formula, &before);
+        Ok(())
+    }
+
+    pub(super) fn goal(&self, model: &Model, formula: &mut Formula) -> Result<(), String> {
+        for linear in &model.goal.comparisons {
+            match &linear.factors[..] {
+                [(number, factor)] if linear.quantity.tables.is_empty() => {
+                    let own = (&[][..], &self.numbers[*number as usize]);
+                    compare(formula, own, factor, &linear.quantity.constant);
+                }
+                _ => return Err("a goal about several numbers is not covered".into()),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where a condition holds, a multiple of a number plus a constant is at least 0.
+fn compare(
+    formula: &mut Formula,
+    (condition, number): (&[Literal], &Bits),
+    factor: &Integer,
+    constant: &Integer,
+) {
+    if factor.is_positive() {
+        formula.at_least(condition, number, &-&constant.div_floor(factor));
+    } else if factor.is_negative() {
+        formula.at_most(condition, number, &constant.div_floor(&-factor));
+    } else if constant.is_negative() {
+        formula.clause(&condition.iter().map(|literal| -*literal).collect::<Vec<_>>());
+    }
+}
+
+/// What an operator fills, the slots that a table is over, and the table.
+type Kind<'k> = (u32, &'k [u32], u32);
+
+struct Adder<'a> {
+    model: &'a Model,
+    timeline: &'a Timeline,
+    step: usize,
+}
+
+impl Adder<'_> {
+    /// A number after the step.
+    fn change(&mut self, formula: &mut Formula, before: &Bits, number: u32) -> Result<Bits, String> {
+        let changes: Vec<Option<Change<'_>>> =
+            self.model.operators.iter().map(|operator| change(operator, number)).collect::<Result<_, _>>()?;
+        let name = format!("number {number}");
+        let mut base = before.clone();
+        if changes.iter().flatten().any(|change| matches!(change, Change::Assign(_))) {
+            let assigned = formula.variable(|| format!("{name} is assigned at step {}", self.step));
+            for (own, change) in self.timeline.operators.iter().zip(&changes) {
+                let assigns = matches!(change, Some(Change::Assign(_)));
+                formula.clause(&[-*own, if assigns { assigned } else { -assigned }]);
+            }
+            if let Some(idle) = self.timeline.idle {
+                formula.clause(&[-idle, -assigned]);
+            }
+            base = formula.bits(before.len(), &format!("what is kept of {name} at step {}", self.step));
+            for (kept, bit) in base.iter().zip(before) {
+                formula.clause(&[-assigned, -*kept]);
+                formula.clause(&[assigned, -*kept, *bit]);
+                formula.clause(&[assigned, *kept, -*bit]);
+            }
+        }
+        let parts: Vec<Option<&Quantity>> = changes
+            .iter()
+            .map(|change| match change {
+                Some(Change::Add(value) | Change::Assign(value)) => Some(*value),
+                None => None,
+            })
+            .collect();
+        Ok(self.sum(formula, &base, &parts, &name))
+    }
+
+    /// Comparisons with tables: sums of their own, which may not be negative.
+    fn tests(&mut self, formula: &mut Formula, before: &[Bits]) {
+        let asked = |operator: &Operator, number: u32| -> Vec<Linear> {
+            let own = operator.condition.comparisons.iter().filter(|linear| {
+                is_alone(linear, number)
+                    && !linear.quantity.tables.is_empty()
+                    && !operator.changes.iter().any(|(own, value)| *own == number && value == *linear)
+            });
+            own.cloned().collect()
+        };
+        for (number, bits) in (0..).zip(before) {
+            let all: Vec<Vec<Linear>> =
+                self.model.operators.iter().map(|operator| asked(operator, number)).collect();
+            let most = all.iter().map(Vec::len).max().unwrap_or(0);
+            for place in 0..most {
+                let parts: Vec<Option<&Quantity>> =
+                    all.iter().map(|own| own.get(place).map(|linear| &linear.quantity)).collect();
+                let sum = self.sum(formula, bits, &parts, &format!("comparison {place} of number {number}"));
+                for (own, _) in self.timeline.operators.iter().zip(&parts).filter(|(_, part)| part.is_some())
+                {
+                    formula.clause(&[-*own, -sign(&sum)]);
+                }
+            }
+        }
+    }
+
+    /// A number plus what each operator adds to it.
+    fn sum(&mut self, formula: &mut Formula, base: &Bits, parts: &[Option<&Quantity>], name: &str) -> Bits {
+        let step = self.step;
+        let constants = parts.iter().map(|part| part.map_or(&Integer::ZERO, |quantity| &quantity.constant));
+        let mut kinds: BTreeMap<&Integer, Vec<Literal>> = BTreeMap::new();
+        for (own, constant) in self.timeline.operators.iter().zip(constants) {
+            kinds.entry(constant).or_default().push(*own);
+        }
+        let mut sum = base.clone();
+        if kinds.keys().any(|constant| !constant.is_zero()) {
+            kinds.entry(&Integer::ZERO).or_default().extend(self.timeline.idle);
+            let added = formula.bits(base.len(), &format!("the constant added to {name} at step {step}"));
+            for (constant, operators) in kinds {
+                let kind = formula.variable(|| format!("{constant} is added to {name} at step {step}"));
+                for own in operators {
+                    formula.clause(&[-own, kind]);
+                }
+                for (position, own) in added.iter().enumerate() {
+                    formula.clause(&[-kind, if constant.bit(position) { *own } else { -*own }]);
+                }
+            }
+            sum = formula.add(&sum, &added, &format!("{name} with the constant of step {step}"));
+        }
+        let most = parts.iter().flatten().map(|quantity| quantity.tables.len()).max().unwrap_or(0);
+        for place in 0..most {
+            let added = self.table(formula, parts, place, (base.len(), name));
+            sum = formula.add(&sum, &added, &format!("{name} with table {place} of step {step}"));
+        }
+        sum
+    }
+
+    /// The entry of one of the operator's tables.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        clippy::cast_possible_truncation,
+        reason = "a row and its parts are below the size of a table, see `shape`"
+    )]
+    fn table(
+        &mut self,
+        formula: &mut Formula,
+        parts: &[Option<&Quantity>],
+        place: usize,
+        (width, name): (usize, &str),
+    ) -> Bits {
+        let step = self.step;
+        let added = formula.bits(width, &format!("table {place} added to {name} at step {step}"));
+        let mut kinds: BTreeMap<Option<Kind<'_>>, Vec<Literal>> = BTreeMap::new();
+        for ((operator, own), part) in self.model.operators.iter().zip(&self.timeline.operators).zip(parts) {
+            let table = part.and_then(|quantity| quantity.tables.get(place));
+            let kind = table.map(|(slots, table)| (operator.uses, slots.as_slice(), *table));
+            kinds.entry(kind).or_default().push(*own);
+        }
+        kinds.entry(None).or_default().extend(self.timeline.idle);
+        for (kind, operators) in kinds {
+            let Some((uses, slots, table)) = kind else {
+                for own in operators {
+                    for bit in &added {
+                        formula.clause(&[-own, -*bit]);
+                    }
+                }
+                continue;
+            };
+            let chosen = formula.variable(|| format!("table {table} is added to {name} at step {step}"));
+            for own in operators {
+                formula.clause(&[-own, chosen]);
+            }
+            let uses = &self.model.uses[uses as usize];
+            for (row, value) in self.model.tables[table as usize].iter().enumerate() {
+                let mut rest = row;
+                let mut condition = vec![-chosen];
+                for slot in slots.iter().rev() {
+                    let size = uses[*slot as usize].1.len();
+                    condition.push(-self.timeline.design(uses, *slot, (rest % size) as u32));
+                    rest /= size;
+                }
+                for (position, own) in added.iter().enumerate() {
+                    let literal = if value.bit(position) { *own } else { -*own };
+                    formula.clause(&[&condition[..], &[literal]].concat());
+                }
+            }
+        }
+        added
+    }
+}

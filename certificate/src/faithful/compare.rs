@@ -1,0 +1,407 @@
+//! What the files say against what the task says: initial states, goals, rules, and each case of each instance of an action
+//! against the operator that stands for it.
+
+use std::collections::BTreeSet;
+
+use num_rational::BigRational;
+use num_traits::{One, Zero};
+use rustc_hash::FxHashMap;
+
+use crate::faithful::effects::{self, Made};
+use crate::faithful::formula::{Formula, Known};
+use crate::faithful::lengths::Length;
+use crate::faithful::linear::Linear;
+use crate::faithful::meaning::Case;
+use crate::faithful::reader::{Reader, TOTAL_TIME};
+use crate::faithful::timeline::{self, stands_for};
+use crate::faithful::translation::Translation;
+use crate::faithful::verdict::{Cause, Difference, Obstacle};
+use crate::faithful::world::{Key, PHASE};
+use crate::model::{Argument, Operator};
+use pddl::ast::{Action, Direction};
+
+type Result<T> = std::result::Result<T, Obstacle>;
+
+/// A condition is looked at in at most so many cases beyond those of the files.
+const SPLIT_LIMIT: usize = 256;
+
+/// By name and arguments; none for a slot.
+type Calls = FxHashMap<(String, Vec<Option<u32>>), Vec<usize>>;
+
+pub(super) struct Comparison<'c> {
+    pub(super) task: &'c Translation<'c>,
+    objects: FxHashMap<String, u32>,
+    operators: Calls,
+    /// Those that wait for the next event.
+    waits: Vec<usize>,
+    /// Which arguments of an action are slots.
+    masks: FxHashMap<String, BTreeSet<Vec<bool>>>,
+    /// What is to be as little as possible; none if plans are measured by time or length.
+    metric: Option<Linear>,
+    timed: bool,
+    /// Times of events and durations are multiples of this.
+    unit: BigRational,
+}
+
+/// An instance as messages name it, and what it adds to the metric.
+struct Instance<'i> {
+    name: &'i dyn Fn() -> String,
+    cost: BigRational,
+}
+
+impl<'c> Comparison<'c> {
+    /// `timed` says what plans are measured by where there is no metric; times of events and durations are multiples of `unit`.
+    pub(super) fn new(task: &'c Translation<'c>, timed: bool, unit: BigRational) -> Result<Self> {
+        let model = task.model;
+        let folded = |name: &String| name.to_ascii_lowercase();
+        let mut objects = FxHashMap::default();
+        for (own, name) in (0..).zip(&model.objects) {
+            if objects.insert(folded(name), own).is_some() {
+                return Err(Difference::Form { reason: format!("{name} is two objects") }.into());
+            }
+        }
+        let mut operators: Calls = FxHashMap::default();
+        let mut waits = Vec::new();
+        let mut masks: FxHashMap<_, BTreeSet<Vec<bool>>> = FxHashMap::default();
+        for (position, operator) in model.operators.iter().enumerate() {
+            if operator.wait.is_some() {
+                waits.push(position);
+                continue;
+            }
+            let Some(schema) = model.schemas.get(operator.schema as usize).map(folded) else {
+                return Err(Difference::Form { reason: "an operator of no action".into() }.into());
+            };
+            let object = |argument: &Argument| match argument {
+                Argument::Object(object) => Some(*object),
+                Argument::Slot(_) => None,
+            };
+            let arguments: Vec<Option<u32>> = operator.arguments.iter().map(object).collect();
+            let mask = arguments.iter().map(Option::is_none).collect();
+            masks.entry(schema.clone()).or_default().insert(mask);
+            operators.entry((schema, arguments)).or_default().push(position);
+        }
+        let metric = match &task.world.problem.metric {
+            Some(metric) => {
+                let mut reader = Reader::new(task.world, task.invariant, task.axioms);
+                reader.is_metric = true;
+                let value = reader.expression(&metric.expression)?;
+                let value = value.ok_or_else(|| Cause::unsupported("a metric without a value"))?;
+                Some(if metric.direction == Direction::Maximize { value.negated() } else { value })
+            }
+            None => None,
+        };
+        let direction = task.world.problem.metric.as_ref().map(|metric| metric.direction);
+        if model.objective.maximize != (direction == Some(Direction::Maximize)) {
+            return Err(Difference::Initial { what: "the metric".into() }.into());
+        }
+        Ok(Self { task, objects, operators, waits, masks, metric, timed, unit })
+    }
+
+    fn initial_value(&self, key: &Key) -> Result<BigRational> {
+        let world = self.task.world;
+        match world.initial_value(key) {
+            Some(value) => Ok(value.clone()),
+            None if *key == TOTAL_TIME || world.name(key.0) == "total-cost" => Ok(BigRational::zero()),
+            None => {
+                let reason = format!("{}, which has no value at first", world.show(key));
+                Err(Cause::unsupported(reason).into())
+            }
+        }
+    }
+
+    pub(super) fn initial(&self) -> Result<()> {
+        let (model, names) = (self.task.model, self.task.names);
+        for variable in model.basic_variables() {
+            let own = &model.variables[variable as usize];
+            let holding: Vec<u32> = names
+                .atoms(variable)
+                .filter(|(_, key)| self.task.world.holds_initially(key))
+                .map(|(value, _)| value)
+                .collect();
+            let expected = match holding[..] {
+                [] => model.none(variable),
+                [value] => value,
+                _ => u32::MAX,
+            };
+            if model.values[variable as usize] != expected {
+                return Err(Difference::Initial { what: own.join(" or ") }.into());
+            }
+        }
+        for (key, number) in names.fluents.iter().zip(&model.numbers) {
+            if number.to_rational() != self.initial_value(key)? * model.number_scale.to_rational() {
+                return Err(Difference::Initial { what: self.task.world.show(key) }.into());
+            }
+        }
+        let mut offset = BigRational::zero();
+        if let Some(metric) = &self.metric {
+            offset += &metric.constant;
+            for (key, factor) in &metric.factors {
+                offset += factor * self.initial_value(key)?;
+            }
+        }
+        if model.objective.offset.to_rational() != offset * model.objective.scale.to_rational() {
+            return Err(Difference::Initial { what: "the metric".into() }.into());
+        }
+        Ok(())
+    }
+
+    /// The goal of the files implies that of the task.
+    pub(super) fn goal(&self) -> Result<()> {
+        let mut reader = Reader::new(self.task.world, self.task.invariant, self.task.axioms);
+        let goal = reader.formula(&self.task.world.problem.goal, true)?;
+        let wanted = self.task.condition(&self.task.model.goal, &[], &[]);
+        // No plan ends with a wait.
+        let rest = Formula::Atom(timeline::waited(), false);
+        for known in
+            Known::default().assume(&self.task.names.structure, &Formula::junction([goal, rest], true))?
+        {
+            if !self.follows(known, &wanted, &|_| true) {
+                return Err(Difference::Goal.into());
+            }
+        }
+        Ok(())
+    }
+
+    /// The rules of the task give each derived atom that both know the same value as those of the files: what holds by the ones
+    /// holds by the others.
+    pub(super) fn rules(&self) -> Result<()> {
+        let task = self.task;
+        let mut linked: Vec<&Key> = task.axioms.linked.iter().collect();
+        linked.sort_unstable();
+        for key in linked {
+            let Some((variable, _)) = task.names.fact(key) else { continue };
+            let files = Reader::new(task.world, task.invariant, task.axioms).unfold(key)?;
+            let own = task.rules(variable);
+            // A derivation must not rest on what is derived later, so that derived atoms are not looked at by cases.
+            let admits = |leaf: &Formula| match leaf {
+                Formula::Atom(key, _) => task.world.rules(key.0).is_none(),
+                _ => true,
+            };
+            for (left, right) in [(&files, &own), (&own, &files)] {
+                for known in Known::default().assume(&task.names.structure, left)? {
+                    if !self.follows(known, right, &admits) {
+                        return Err(Difference::WrongRules { atom: task.world.show(key) }.into());
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a condition holds wherever this is known, if need be by cases.
+    fn follows(&self, known: Known, wanted: &Formula, admits: &dyn Fn(&Formula) -> bool) -> bool {
+        let structure = &self.task.names.structure;
+        let mut open = vec![known];
+        for _ in 0..SPLIT_LIMIT {
+            let Some(known) = open.pop() else { return true };
+            match known.decide(structure, wanted) {
+                Some(true) => {}
+                Some(false) => return false,
+                None => {
+                    let Some(leaf) = known.open(structure, wanted, admits) else { return false };
+                    let Ok(cases) = known.split(structure, std::iter::once(leaf)) else { return false };
+                    open.extend(cases);
+                }
+            }
+        }
+        open.is_empty()
+    }
+
+    /// Looks for operators that do what a case of an instance does; `false` if none is needed because it changes nothing that
+    /// the task knows.
+    pub(super) fn case(&self, action: &Action, arguments: &[u32], case: &Case) -> Result<bool> {
+        let name = || {
+            let words = arguments.iter().map(|object| self.task.world.name(*object));
+            let words: Vec<&str> = std::iter::once(action.identifier.name.as_str()).chain(words).collect();
+            format!("({})", words.join(" "))
+        };
+        let instance = Instance { cost: self.cost(case)?, name: &name };
+        if instance.cost >= BigRational::zero()
+            && effects::compare(self.task, case, &case.known, None).is_ok()
+        {
+            return Ok(false);
+        }
+        self.find(&self.candidates(action, arguments), case, &instance).map(|()| true)
+    }
+
+    /// Looks for the wait that leads to an event.
+    pub(super) fn wait(&self, case: &Case) -> Result<()> {
+        let name = || {
+            let phases = case.truths.iter().filter(|(key, holds)| key.0 == PHASE && **holds);
+            let phases: Vec<String> = phases.map(|(key, _)| self.task.world.show(key)).collect();
+            format!("the wait until {}", phases.join(", "))
+        };
+        let instance = Instance { cost: BigRational::zero(), name: &name };
+        if effects::compare(self.task, case, &case.known, None).is_ok() {
+            return Ok(());
+        }
+        let operators = self.waits.iter().map(|position| &self.task.model.operators[*position]);
+        let waits: Vec<(&Operator, Vec<u32>)> = operators
+            .filter(|operator| self.task.model.uses[operator.uses as usize].is_empty())
+            .map(|operator| (operator, Vec::new()))
+            .collect();
+        self.find(&waits, case, &instance)
+    }
+
+    /// Looks among operators for those that do what a case does, wherever it can be executed.
+    fn find(&self, candidates: &[(&Operator, Vec<u32>)], case: &Case, instance: &Instance<'_>) -> Result<()> {
+        let structure = &self.task.names.structure;
+        let conditions: Vec<Formula> = candidates
+            .iter()
+            .map(|(operator, choice)| {
+                self.task.condition(&operator.condition, choice, &self.task.model.sizes(operator))
+            })
+            .collect();
+        let mut open = vec![case.known.clone()];
+        for _ in 0..SPLIT_LIMIT {
+            let Some(known) = open.pop() else { return Ok(()) };
+            let mut reason = Difference::NoOperatorFor { instance: String::new() };
+            let mut done = false;
+            for ((operator, choice), condition) in candidates.iter().zip(&conditions) {
+                let found = match known.decide(structure, condition) {
+                    Some(true) => self.simulates((operator, choice), case, &known, instance),
+                    _ => Err(Difference::WrongCondition { instance: String::new() }),
+                };
+                match found {
+                    Ok(()) => {
+                        done = true;
+                        break;
+                    }
+                    // What is nearest to an operator is said.
+                    Err(other) if !matches!(other, Difference::WrongCondition { .. }) => reason = other,
+                    Err(other) if matches!(reason, Difference::NoOperatorFor { .. }) => reason = other,
+                    Err(_) => {}
+                }
+            }
+            if done {
+                continue;
+            }
+            let leaf = conditions.iter().find_map(|condition| known.open(structure, condition, &|_| true));
+            let Some(leaf) = leaf else { return Err(named(reason, &(instance.name)()).into()) };
+            open.extend(known.split(structure, std::iter::once(leaf))?);
+        }
+        if open.is_empty() {
+            return Ok(());
+        }
+        Err(Cause::TooMany { what: format!("cases of {}", (instance.name)()), limit: SPLIT_LIMIT }.into())
+    }
+
+    fn simulates(
+        &self,
+        (operator, choice): (&Operator, &[u32]),
+        case: &Case,
+        known: &Known,
+        instance: &Instance<'_>,
+    ) -> std::result::Result<(), Difference> {
+        let made = Made { operator, choice };
+        effects::compare(self.task, case, known, Some(made))
+            .map_err(|what| Difference::WrongEffect { instance: (instance.name)(), what })?;
+        if !self.keeps_time((operator, choice), case) {
+            let what = self.task.world.show(&timeline::clock());
+            return Err(Difference::WrongEffect { instance: (instance.name)(), what });
+        }
+        let model = self.task.model;
+        let own = model.quantity(&operator.cost, choice, &model.sizes(operator));
+        if own.to_rational() > &instance.cost * model.objective.scale.to_rational() {
+            let cost = instance.cost.to_string();
+            return Err(Difference::WrongCost { instance: (instance.name)(), cost });
+        }
+        Ok(())
+    }
+
+    /// Whether the clock stands for the time at the end of a case if it stands for the time at its start.
+    fn keeps_time(&self, (operator, choice): (&Operator, &[u32]), case: &Case) -> bool {
+        let Some(number) = self.task.names.numbers.get(&timeline::clock()) else { return true };
+        // Time does not go back, so that the clock may stand still.
+        let Some((_, value)) = operator.changes.iter().find(|(own, _)| own == number) else { return true };
+        let value = self.task.value(value, choice, &self.task.model.sizes(operator));
+        let passed = value.clone().minus(&Linear::fluent(timeline::clock()));
+        match (passed.value(), value.value()) {
+            (Some(passed), _) => {
+                let length = case.length.as_ref().and_then(Length::fixed);
+                *passed == length.cloned().unwrap_or_default()
+            }
+            (None, Some(set)) => stands_for(set, &case.passage.end, &self.unit),
+            (None, None) => false,
+        }
+    }
+
+    /// The least that a case adds to the metric.
+    fn cost(&self, case: &Case) -> Result<BigRational> {
+        let one = BigRational::one();
+        let time = |factor: &BigRational| match &case.length {
+            Some(length) => length.least_times(factor),
+            None => Ok(BigRational::zero()),
+        };
+        let Some(metric) = &self.metric else {
+            return Ok(if self.timed { time(&one)? } else { one });
+        };
+        let mut sum = Linear::constant(BigRational::zero());
+        for (key, factor) in &metric.factors {
+            if *key == TOTAL_TIME {
+                sum.constant += time(factor)?;
+            } else if let Some(after) = case.changes.get(key) {
+                let growth = after.clone().minus(&Linear::fluent(key.clone()));
+                sum = sum.plus(&growth, factor);
+            }
+        }
+        match self.task.invariant.settled(&sum).value() {
+            Some(cost) => Ok(cost.clone()),
+            None => Err(Cause::unsupported("costs that depend on the state").into()),
+        }
+    }
+
+    /// Operators with a choice of designs that have these arguments.
+    fn candidates(&self, action: &Action, arguments: &[u32]) -> Vec<(&'c Operator, Vec<u32>)> {
+        let name = action.identifier.name.as_str().to_ascii_lowercase();
+        let world = self.task.world;
+        let object = |object: &u32| self.objects.get(&world.name(*object).to_ascii_lowercase()).copied();
+        let Some(objects) = arguments.iter().map(object).collect::<Option<Vec<u32>>>() else {
+            return Vec::new();
+        };
+        let mut found = Vec::new();
+        for mask in self.masks.get(&name).into_iter().flatten().filter(|mask| mask.len() == objects.len()) {
+            let pattern = objects.iter().zip(mask).map(|(object, open)| (!open).then_some(*object)).collect();
+            for position in self.operators.get(&(name.clone(), pattern)).into_iter().flatten() {
+                let operator = &self.task.model.operators[*position];
+                found.extend(self.choice(operator, &objects).map(|choice| (operator, choice)));
+            }
+        }
+        found
+    }
+
+    /// The choice of designs that gives an operator its arguments, if it admits that.
+    fn choice(&self, operator: &Operator, objects: &[u32]) -> Option<Vec<u32>> {
+        let model = self.task.model;
+        let uses = &model.uses[operator.uses as usize];
+        let mut choice: Vec<Option<u32>> = vec![None; uses.len()];
+        for (argument, object) in operator.arguments.iter().zip(objects) {
+            let Argument::Slot(place) = argument else { continue };
+            let (slot, designs) = uses.get(*place as usize)?;
+            let all = &model.slots[*slot as usize];
+            let position = designs.iter().position(|design| all[*design as usize] == *object)?;
+            let position = u32::try_from(position).ok()?;
+            let own = &mut choice[*place as usize];
+            if own.is_some_and(|other| other != position) {
+                return None;
+            }
+            *own = Some(position);
+        }
+        let choice: Vec<u32> = choice.into_iter().collect::<Option<_>>()?;
+        let excluded = model.exclusions[operator.exclusions as usize].iter().any(|exclusion| {
+            let chosen: Vec<u32> = exclusion.slots.iter().map(|slot| choice[*slot as usize]).collect();
+            exclusion.combinations.contains(&chosen)
+        });
+        (!excluded).then_some(choice)
+    }
+}
+
+/// A difference with the name of the instance.
+fn named(difference: Difference, instance: &str) -> Difference {
+    let instance = instance.to_owned();
+    match difference {
+        Difference::NoOperatorFor { .. } => Difference::NoOperatorFor { instance },
+        Difference::WrongCondition { .. } => Difference::WrongCondition { instance },
+        other => other,
+    }
+}

@@ -1,0 +1,209 @@
+//! What a case of an instance makes of the variables and numbers of the task, against what an operator makes of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::faithful::formula::{Formula, Known};
+use crate::faithful::linear::Linear;
+use crate::faithful::meaning::Case;
+use crate::faithful::translation::Translation;
+use crate::faithful::world::{CLOCK, Key};
+use crate::model::Operator;
+
+/// A variable is looked at in at most so many cases.
+const SPLIT_LIMIT: usize = 1_024;
+
+/// An operator with a choice of designs.
+#[derive(Clone, Copy)]
+pub(super) struct Made<'m> {
+    pub(super) operator: &'m Operator,
+    pub(super) choice: &'m [u32],
+}
+
+/// Compares a case with an operator, or with nothing that happens. An error is the first variable or number that differs.
+pub(super) fn compare(
+    task: &Translation<'_>,
+    case: &Case,
+    known: &Known,
+    made: Option<Made<'_>>,
+) -> Result<(), String> {
+    numbers(task, case, made)?;
+    let touched = case.truths.keys().chain(case.effects.iter().map(|(_, key, _)| key));
+    let touched = touched.filter_map(|key| Some(task.names.fact(key)?.0));
+    let mut variables: BTreeSet<u32> = touched.collect();
+    if let Some(Made { operator, .. }) = made {
+        let conditional = operator.conditional.iter().flat_map(|conditional| &conditional.effects);
+        variables.extend(operator.effects.iter().chain(conditional).map(|fact| fact.0));
+    }
+    for variable in variables {
+        let own = Variable::new(task, case, made.map(|made| made.operator), variable);
+        if !own.agrees(known) {
+            return Err(task.model.variables[variable as usize].join(" or "));
+        }
+    }
+    Ok(())
+}
+
+fn numbers(task: &Translation<'_>, case: &Case, made: Option<Made<'_>>) -> Result<(), String> {
+    let fluents = (0..).zip(&task.names.fluents);
+    // What becomes of the clock is a matter of the passage.
+    for (number, key) in fluents.filter(|(_, key)| key.0 != CLOCK) {
+        let same = || task.invariant.settled(&Linear::fluent(key.clone()));
+        let expected = case.changes.get(key).map_or_else(same, |after| task.invariant.settled(after));
+        let found = made.and_then(|Made { operator, choice }| {
+            let (_, value) = operator.changes.iter().find(|(own, _)| *own == number)?;
+            Some(task.value(value, choice, &task.model.sizes(operator)))
+        });
+        if found.unwrap_or_else(same) != expected {
+            return Err(task.world.show(key));
+        }
+    }
+    Ok(())
+}
+
+/// What becomes of one variable.
+struct Variable<'v> {
+    task: &'v Translation<'v>,
+    own: u32,
+    case: &'v Case,
+    /// What the end of the case does to its atoms.
+    effects: Vec<&'v (Formula, Key, bool)>,
+    /// Its atoms that the case may change.
+    touched: BTreeMap<u32, &'v Key>,
+    /// What the operator makes of it, and under which conditions, in order.
+    certain: Option<u32>,
+    conditional: Vec<(Formula, u32)>,
+}
+
+/// What is found where not everything is decided.
+enum Outcome<'o> {
+    Same,
+    Other,
+    /// It depends on this.
+    Open(Formula),
+    OpenPart(&'o Formula),
+}
+
+/// What a variable becomes; none if it stays what it is.
+type Value = Option<u32>;
+
+impl<'v> Variable<'v> {
+    fn new(task: &'v Translation<'v>, case: &'v Case, operator: Option<&'v Operator>, variable: u32) -> Self {
+        let value = |key: &Key| task.names.fact(key).filter(|fact| fact.0 == variable).map(|fact| fact.1);
+        let effects: Vec<_> = case.effects.iter().filter(|(_, key, _)| value(key).is_some()).collect();
+        let touched = case.truths.keys().chain(effects.iter().map(|(_, key, _)| key));
+        let touched = touched.filter_map(|key| Some((value(key)?, key))).collect();
+        let own =
+            |facts: &[(u32, u32)]| facts.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
+        let conditional = operator.into_iter().flat_map(|operator| &operator.conditional);
+        let conditional = conditional
+            .filter_map(|effect| Some((task.literals(&effect.condition, true), own(&effect.effects)?)))
+            .collect();
+        let certain = operator.and_then(|operator| own(&operator.effects));
+        Self { task, own: variable, case, effects, touched, certain, conditional }
+    }
+
+    /// Whether both make the same of it wherever this is known.
+    fn agrees(&self, known: &Known) -> bool {
+        let structure = &self.task.names.structure;
+        let mut open = vec![known.clone()];
+        for _ in 0..SPLIT_LIMIT {
+            let Some(known) = open.pop() else { return true };
+            let outcome = self.outcome(&known);
+            let leaf = match &outcome {
+                Outcome::Same => continue,
+                Outcome::Other => return false,
+                Outcome::Open(leaf) => leaf,
+                Outcome::OpenPart(leaf) => leaf,
+            };
+            let Ok(cases) = known.split(structure, std::iter::once(leaf)) else { return false };
+            open.extend(cases);
+        }
+        open.is_empty()
+    }
+
+    fn outcome(&self, known: &Known) -> Outcome<'_> {
+        let structure = &self.task.names.structure;
+        let guards = self.effects.iter().map(|(guard, ..)| guard);
+        for guard in guards.chain(self.conditional.iter().map(|(guard, _)| guard)) {
+            if let Some(leaf) = known.open(structure, guard, &|_| true) {
+                return Outcome::OpenPart(leaf);
+            }
+        }
+        let holds = |guard: &Formula| known.decide(structure, guard) == Some(true);
+        let last = self.conditional.iter().rev().find(|(guard, _)| holds(guard)).map(|(_, value)| *value);
+        let found: Value = last.or(self.certain);
+        let current = self.current(known);
+        let expected = match self.expected(known, current) {
+            Ok(expected) => expected,
+            Err(outcome) => return outcome,
+        };
+        if expected == found {
+            return Outcome::Same;
+        }
+        if let Some(current) = current {
+            let same = expected.unwrap_or(current) == found.unwrap_or(current);
+            return if same { Outcome::Same } else { Outcome::Other };
+        }
+        let mut possible = self.possible(known);
+        possible.next().map_or(Outcome::Other, |(_, key)| Outcome::Open(Formula::Atom(key.clone(), true)))
+    }
+
+    fn may_hold(&self, known: &Known, key: &Key) -> bool {
+        self.task.invariant.may_hold(key) && known.atom(&self.task.names.structure, key) != Some(false)
+    }
+
+    /// Its atoms that may hold before.
+    fn possible(&self, known: &'v Known) -> impl Iterator<Item = (u32, &'v Key)> {
+        // Where one is known to hold, the others are known not to.
+        let holding = known.holding(self.own);
+        let own = holding.and_then(|key| Some((self.task.names.fact(key)?.1, key)));
+        let all = if holding.is_some() { None } else { Some(self.task.possible(self.own)) };
+        all.into_iter().flatten().chain(own).filter(|(_, key)| self.may_hold(known, key))
+    }
+
+    /// The value before, if it is known.
+    fn current(&self, known: &Known) -> Value {
+        let structure = &self.task.names.structure;
+        match self.possible(known).next() {
+            None => Some(self.task.model.none(self.own)),
+            Some((value, key)) if known.atom(structure, key) == Some(true) => Some(value),
+            Some(_) => None,
+        }
+    }
+
+    /// What the files make of it; of its atoms at most one may hold then.
+    fn expected(&self, known: &Known, current: Value) -> Result<Value, Outcome<'_>> {
+        let structure = &self.task.names.structure;
+        let after = |key: &Key| {
+            let own = self.effects.iter().filter(|(_, own, _)| own == key);
+            let mut active =
+                own.filter(|(guard, ..)| known.decide(structure, guard) == Some(true)).peekable();
+            match active.peek() {
+                Some(_) => Some(active.any(|(_, _, holds)| *holds)),
+                None => self.case.truths.get(key).copied(),
+            }
+        };
+        let none = self.task.model.none(self.own);
+        let (mut added, mut deleted) = (Vec::new(), None);
+        let mut remains = self.possible(known).any(|(value, _)| !self.touched.contains_key(&value));
+        for (value, key) in &self.touched {
+            match after(key) {
+                Some(true) => added.push(*value),
+                Some(false) if self.may_hold(known, key) => deleted = Some(*key),
+                None if self.may_hold(known, key) => remains = true,
+                _ => {}
+            }
+        }
+        match (&added[..], remains) {
+            ([], false) => Ok(Some(none)),
+            ([], true) if deleted.is_none() => Ok(None),
+            ([], true) => match (current, deleted) {
+                (None, Some(key)) => Err(Outcome::Open(Formula::Atom(key.clone(), true))),
+                // It is one that is not deleted.
+                _ => Ok(None),
+            },
+            ([value], false) => Ok(Some(*value)),
+            _ => Err(Outcome::Other),
+        }
+    }
+}

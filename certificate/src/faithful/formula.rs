@@ -1,0 +1,274 @@
+//! Conditions of an instance over the state before it, and what follows from what is known of that state.
+
+use std::collections::BTreeMap;
+
+use num_rational::BigRational;
+use num_traits::{One, Signed, Zero};
+use rustc_hash::FxHashMap;
+
+use crate::faithful::linear::Linear;
+use crate::faithful::verdict::Cause;
+use crate::faithful::world::Key;
+
+/// A condition falls apart into at most so many cases.
+const CASE_LIMIT: usize = 4_096;
+
+/// A condition in negation normal form.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Formula {
+    All(Vec<Formula>),
+    Any(Vec<Formula>),
+    /// An atom, and whether it holds.
+    Atom(Key, bool),
+    /// The expression is at least 0, or more than 0 if strict.
+    Compare(Linear, bool),
+}
+
+impl Formula {
+    pub(super) fn truth(holds: bool) -> Self {
+        if holds { Self::All(Vec::new()) } else { Self::Any(Vec::new()) }
+    }
+
+    pub(super) fn is(&self, holds: bool) -> bool {
+        match self {
+            Self::All(parts) => holds && parts.is_empty(),
+            Self::Any(parts) => !holds && parts.is_empty(),
+            _ => false,
+        }
+    }
+
+    /// A conjunction (or disjunction) of parts, simplified.
+    pub(super) fn junction(parts: impl IntoIterator<Item = Self>, all: bool) -> Self {
+        let mut kept = Vec::new();
+        for part in parts {
+            match part {
+                part if part.is(!all) => return part,
+                Self::All(more) if all => kept.extend(more),
+                Self::Any(more) if !all => kept.extend(more),
+                part if part.is(all) => {}
+                part => kept.push(part),
+            }
+        }
+        match kept.len() {
+            1 => kept.swap_remove(0),
+            _ if all => Self::All(kept),
+            _ => Self::Any(kept),
+        }
+    }
+
+    /// How many atoms and comparisons it has.
+    pub(super) fn size(&self) -> usize {
+        match self {
+            Self::All(parts) | Self::Any(parts) => parts.iter().map(Self::size).sum(),
+            _ => 1,
+        }
+    }
+
+    pub(super) fn negated(&self) -> Self {
+        match self {
+            Self::All(parts) => Self::junction(parts.iter().map(Self::negated), false),
+            Self::Any(parts) => Self::junction(parts.iter().map(Self::negated), true),
+            Self::Atom(key, holds) => Self::Atom(key.clone(), !holds),
+            Self::Compare(linear, strict) => Self::Compare(linear.negated(), !strict),
+        }
+    }
+}
+
+/// What the task says of atoms and fluents: of which atoms at most one holds, and which fluents are integers once they are
+/// multiplied.
+#[derive(Debug, Default)]
+pub(super) struct Structure {
+    pub(super) groups: FxHashMap<Key, u32>,
+    pub(super) integers: FxHashMap<Key, BigRational>,
+}
+
+/// What is known of a state.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Known {
+    atoms: BTreeMap<Key, bool>,
+    /// The atom that holds of a group.
+    holding: BTreeMap<u32, Key>,
+    pub(super) comparisons: Vec<(Linear, bool)>,
+}
+
+impl Known {
+    /// The atom that is known to hold of a group.
+    pub(super) fn holding(&self, group: u32) -> Option<&Key> {
+        self.holding.get(&group)
+    }
+
+    pub(super) fn atom(&self, structure: &Structure, key: &Key) -> Option<bool> {
+        if let Some(holds) = self.atoms.get(key) {
+            return Some(*holds);
+        }
+        let other = structure.groups.get(key).and_then(|group| self.holding.get(group));
+        other.map(|_| false)
+    }
+
+    /// Whether a condition holds, if that follows.
+    pub(super) fn decide(&self, structure: &Structure, formula: &Formula) -> Option<bool> {
+        match formula {
+            Formula::All(parts) => self.junction(structure, parts, true),
+            Formula::Any(parts) => self.junction(structure, parts, false),
+            Formula::Atom(key, holds) => self.atom(structure, key).map(|known| known == *holds),
+            Formula::Compare(linear, strict) => {
+                let follows = |wanted: &Linear, strict: bool| {
+                    self.comparisons.iter().any(|known| implies(structure, known, wanted, strict))
+                };
+                if follows(linear, *strict) {
+                    Some(true)
+                } else if follows(&linear.negated(), !strict) {
+                    Some(false)
+                } else {
+                    None
+                }
+            }
+        }
+    }
+
+    fn junction(&self, structure: &Structure, parts: &[Formula], all: bool) -> Option<bool> {
+        let mut open = false;
+        for part in parts {
+            match self.decide(structure, part) {
+                Some(holds) if holds != all => return Some(!all),
+                Some(_) => {}
+                None => open = true,
+            }
+        }
+        (!open).then_some(all)
+    }
+
+    /// A part of a condition, an atom or a comparison, on which it depends whether it holds.
+    pub(super) fn open<'f>(
+        &self,
+        structure: &Structure,
+        formula: &'f Formula,
+        admits: &dyn Fn(&Formula) -> bool,
+    ) -> Option<&'f Formula> {
+        if self.decide(structure, formula).is_some() {
+            return None;
+        }
+        match formula {
+            Formula::All(parts) | Formula::Any(parts) => {
+                parts.iter().find_map(|part| self.open(structure, part, admits))
+            }
+            leaf => admits(leaf).then_some(leaf),
+        }
+    }
+
+    /// What is known in each case in which a condition holds; together they are all.
+    pub(super) fn assume(&self, structure: &Structure, formula: &Formula) -> Result<Vec<Self>, Cause> {
+        match self.decide(structure, formula) {
+            Some(true) => return Ok(vec![self.clone()]),
+            Some(false) => return Ok(Vec::new()),
+            None => {}
+        }
+        let mut known = self.clone();
+        match formula {
+            Formula::Atom(key, holds) => {
+                known.atoms.insert(key.clone(), *holds);
+                if *holds && let Some(group) = structure.groups.get(key) {
+                    known.holding.insert(*group, key.clone());
+                }
+                Ok(vec![known])
+            }
+            Formula::Compare(linear, strict) => {
+                known.comparisons.push((linear.clone(), *strict));
+                Ok(vec![known])
+            }
+            Formula::Any(parts) => {
+                let mut all = Vec::new();
+                for part in parts {
+                    all.extend(self.assume(structure, part)?);
+                    limited(all.len())?;
+                }
+                Ok(all)
+            }
+            Formula::All(parts) => {
+                let mut all = vec![known];
+                // What leaves no choice comes first, and narrows the choices.
+                let is_leaf = |part: &&Formula| matches!(part, Formula::Atom(..) | Formula::Compare(..));
+                let (leaves, others): (Vec<_>, Vec<_>) = parts.iter().partition(is_leaf);
+                for part in leaves.into_iter().chain(others) {
+                    let mut longer = Vec::new();
+                    for known in &all {
+                        longer.extend(known.assume(structure, part)?);
+                        limited(longer.len())?;
+                    }
+                    all = longer;
+                }
+                Ok(all)
+            }
+        }
+    }
+
+    /// The cases in which each of some conditions is decided.
+    pub(super) fn split<'f>(
+        self,
+        structure: &Structure,
+        formulas: impl Iterator<Item = &'f Formula>,
+    ) -> Result<Vec<Self>, Cause> {
+        let mut all = vec![self];
+        for formula in formulas {
+            let mut longer = Vec::new();
+            for known in all {
+                if known.decide(structure, formula).is_some() {
+                    longer.push(known);
+                } else {
+                    longer.extend(known.assume(structure, formula)?);
+                    longer.extend(known.assume(structure, &formula.negated())?);
+                }
+                limited(longer.len())?;
+            }
+            all = longer;
+        }
+        Ok(all)
+    }
+}
+
+fn limited(cases: usize) -> Result<(), Cause> {
+    if cases <= CASE_LIMIT {
+        return Ok(());
+    }
+    Err(Cause::TooMany { what: "cases of one instance of an action".into(), limit: CASE_LIMIT })
+}
+
+/// Whether a comparison that holds implies that an expression is at least 0, or more.
+fn implies(structure: &Structure, known: &(Linear, bool), wanted: &Linear, strict: bool) -> bool {
+    let Some(ratio) = wanted.ratio_to(&known.0).filter(Signed::is_positive) else { return false };
+    // The fluents' part of what is wanted is at least this, or more.
+    let mut least = -(&known.0.constant * ratio);
+    let mut more = known.1;
+    if let Some(unit) = unit(structure, wanted) {
+        // It is a multiple of the unit.
+        let multiple = &least / &unit;
+        let rounded = if more { multiple.floor() + BigRational::one() } else { multiple.ceil() };
+        (least, more) = (rounded * unit, false);
+    }
+    let least = least + &wanted.constant;
+    least.is_positive() || least.is_zero() && (more || !strict)
+}
+
+/// What a sum of fluents times factors is a multiple of, whatever the state.
+fn unit(structure: &Structure, linear: &Linear) -> Option<BigRational> {
+    let mut unit: Option<BigRational> = None;
+    for (key, factor) in &linear.factors {
+        // The fluent is a multiple of 1 / scale.
+        let own = (factor / structure.integers.get(key)?).abs();
+        unit = Some(match unit {
+            None => own,
+            Some(unit) => common(&unit, &own),
+        });
+    }
+    unit
+}
+
+/// The greatest common divisor of two positive fractions.
+fn common(left: &BigRational, right: &BigRational) -> BigRational {
+    let (mut left, mut right) = (left.clone(), right.clone());
+    while !right.is_zero() {
+        let rest = &left - (&left / &right).floor() * &right;
+        (left, right) = (right, rest);
+    }
+    left
+}

@@ -1,0 +1,49 @@
+//! Start and end of an action that takes no time are one happening: where they interfere, the action cannot be executed [1].
+//!
+//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, sections 7 and 8 (no moving targets).
+
+use crate::faithful::formula::Formula;
+use crate::faithful::meaning::Moment;
+use crate::faithful::reads::Reads;
+use pddl::ast::Assignment;
+
+/// Start or end of an action: what it reads, and what it does.
+type Half<'h> = (&'h Reads<'h>, &'h Moment);
+
+/// That two halves of an action do not interfere.
+pub(super) fn apart(left: Half<'_>, right: Half<'_>) -> Formula {
+    let mut clashes = Vec::new();
+    one_way(left.1, right, &mut clashes);
+    one_way(right.1, left, &mut clashes);
+    same_number(left.1, right.1, &mut clashes);
+    Formula::junction(clashes.iter().map(Formula::negated), true)
+}
+
+/// When one changes what the other reads, or adds what the other deletes.
+fn one_way(changing: &Moment, (reads, other): Half<'_>, clashes: &mut Vec<Formula>) {
+    for (guard, key, holds) in &changing.atoms {
+        if reads.atom(key) {
+            clashes.push(guard.clone());
+        }
+        let deletes = other.atoms.iter().filter(|(_, own, kept)| *holds && !kept && own == key);
+        clashes.extend(deletes.map(|(own, ..)| Formula::junction([guard.clone(), own.clone()], true)));
+    }
+    let numbers = changing.numbers.iter().filter(|(_, _, key, _)| reads.fluent(key));
+    clashes.extend(numbers.map(|(guard, ..)| guard.clone()));
+}
+
+/// When both change a number otherwise than by adding to it, or by scaling it.
+fn same_number(left: &Moment, right: &Moment, clashes: &mut Vec<Formula>) {
+    let way = |kind: Assignment| match kind {
+        Assignment::Assign => None,
+        Assignment::Increase | Assignment::Decrease => Some(true),
+        Assignment::ScaleUp | Assignment::ScaleDown => Some(false),
+    };
+    for (guard, kind, key, _) in &left.numbers {
+        let others = right
+            .numbers
+            .iter()
+            .filter(|(_, other, own, _)| own == key && (way(*kind).is_none() || way(*kind) != way(*other)));
+        clashes.extend(others.map(|(own, ..)| Formula::junction([guard.clone(), own.clone()], true)));
+    }
+}

@@ -1,0 +1,243 @@
+//! The witness of what can become of a state: atoms that may hold, and intervals of numbers. It holds at first, and no instance
+//! leaves it, even if nothing is ever deleted [1], [2].
+//!
+//! It is made as a least fixpoint, whose intervals are widened after a while. Who checks it goes through all instances once,
+//! and does not rely on how it was made.
+//!
+//! [1] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003 (relaxed reachability with intervals).
+//! [2] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning, ICAPS 2017 (inductive sets).
+
+use num_rational::BigRational;
+use num_traits::{Signed, Zero};
+use rustc_hash::{FxHashMap, FxHashSet};
+use serde::{Deserialize, Serialize};
+
+use crate::faithful::formula::{Formula, Known, Structure};
+use crate::faithful::linear::{Interval, Linear};
+use crate::faithful::meaning::Case;
+use crate::faithful::verdict::{Cause, Difference};
+use crate::faithful::world::{CLOCK, Key, World};
+
+pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
+
+/// An end of an interval moves so often before it is taken to be unbounded.
+const MOVES: u32 = 8;
+
+/// A witness as it is written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    format: String,
+    /// All atoms that may ever hold, of predicates that actions change.
+    atoms: Vec<String>,
+    /// Fluents that actions change, each with the least and the greatest value that it can have; null where there is none.
+    /// What is not listed has no bounds.
+    numbers: Vec<(String, Option<String>, Option<String>)>,
+}
+
+#[derive(Debug, Clone, Default)]
+pub(super) struct Invariant {
+    atoms: FxHashSet<Key>,
+    /// Those of fluents that never change are points.
+    numbers: FxHashMap<Key, Interval>,
+}
+
+impl Invariant {
+    /// What holds at first.
+    pub(super) fn initial(world: &World<'_>) -> Self {
+        let atoms = world.initial_atoms().filter(|key| world.changes(key.0)).collect();
+        // Nothing is known of the clock.
+        let values = world.initial_values().filter(|(key, _)| key.0 != CLOCK);
+        let numbers = values.map(|(key, value)| (key.clone(), Interval::point(value))).collect();
+        Self { atoms, numbers }
+    }
+
+    pub(super) fn read(world: &World<'_>, text: &str) -> Result<Self, Difference> {
+        let form = |reason: String| Difference::WitnessForm { reason };
+        let written: Written = serde_json::from_str(text).map_err(|error| form(error.to_string()))?;
+        if written.format != WITNESS_FORMAT {
+            return Err(form(format!("format `{}`, where `{WITNESS_FORMAT}` is expected", written.format)));
+        }
+        let key = |text: &String| {
+            world.written(text).ok_or_else(|| form(format!("{text} is nothing of the files")))
+        };
+        let number = |text: Option<String>| {
+            let read = |text: String| {
+                let is_fraction = text.bytes().all(|byte| byte.is_ascii_digit() || b"-/".contains(&byte));
+                let parsed = if is_fraction { text.parse::<BigRational>().ok() } else { None };
+                parsed.ok_or_else(|| form(format!("{text} is no fraction")))
+            };
+            text.map(read).transpose()
+        };
+        let mut witness = Self::default();
+        for atom in &written.atoms {
+            witness.atoms.insert(key(atom)?);
+        }
+        for (fluent, low, high) in written.numbers {
+            let interval = Interval { low: number(low)?, high: number(high)? };
+            if witness.numbers.insert(key(&fluent)?, interval).is_some() {
+                return Err(form(format!("{fluent} has two intervals")));
+            }
+        }
+        let first = Self::initial(world);
+        let missing = first.atoms.iter().find(|key| !witness.atoms.contains(*key));
+        let outside = witness
+            .numbers
+            .iter()
+            .find(|(key, interval)| first.numbers.get(*key).is_none_or(|own| !interval.contains(own)))
+            .map(|(key, _)| key);
+        if let Some(key) = missing.or(outside) {
+            return Err(Difference::Witness { what: world.show(key) });
+        }
+        let constants = first.numbers.into_iter().filter(|(key, _)| !world.changes(key.0));
+        witness.numbers.extend(constants);
+        Ok(witness)
+    }
+
+    pub(super) fn write(&self, world: &World<'_>) -> String {
+        let mut atoms: Vec<String> = self.atoms.iter().map(|key| world.show(key)).collect();
+        atoms.sort_unstable();
+        let end = |end: &Option<BigRational>| end.as_ref().map(ToString::to_string);
+        let number = |(key, own): (&Key, &Interval)| (world.show(key), end(&own.low), end(&own.high));
+        let bounded = self
+            .numbers
+            .iter()
+            .filter(|(key, own)| world.changes(key.0) && (own.low.is_some() || own.high.is_some()));
+        let mut numbers: Vec<_> = bounded.map(number).collect();
+        numbers.sort_unstable();
+        let written = Written { format: WITNESS_FORMAT.to_owned(), atoms, numbers };
+        serde_json::to_string(&written).unwrap_or_default()
+    }
+
+    pub(super) fn may_hold(&self, key: &Key) -> bool {
+        self.atoms.contains(key)
+    }
+
+    /// A fluent, or the only value that it can have.
+    pub(super) fn fluent(&self, key: Key) -> Linear {
+        match self.numbers.get(&key).and_then(Interval::value) {
+            Some(value) => Linear::constant(value.clone()),
+            None => Linear::fluent(key),
+        }
+    }
+
+    /// An expression with the only values that fluents can have.
+    pub(super) fn settled(&self, linear: &Linear) -> Linear {
+        let mut sum = Linear::constant(linear.constant.clone());
+        for (key, factor) in &linear.factors {
+            sum = sum.plus(&self.fluent(key.clone()), factor);
+        }
+        sum
+    }
+
+    /// That an expression is at least 0, or more than 0 if strict; decided where intervals decide it.
+    pub(super) fn compare(&self, linear: &Linear, strict: bool) -> Formula {
+        let linear = self.settled(linear);
+        let range = linear.range(|key| self.numbers.get(key));
+        let fails = |number: &BigRational| number.is_negative() || strict && number.is_zero();
+        if range.high.as_ref().is_some_and(fails) {
+            Formula::truth(false)
+        } else if range.low.as_ref().is_some_and(|low| !fails(low)) {
+            Formula::truth(true)
+        } else {
+            Formula::Compare(linear, strict)
+        }
+    }
+
+    /// The values of an expression where something is known of the state.
+    fn range(&self, linear: &Linear, known: &Known) -> Interval {
+        let mut range = linear.range(|key| self.numbers.get(key));
+        for (own, _) in &known.comparisons {
+            let Some(ratio) = linear.ratio_to(own) else { continue };
+            let end = &linear.constant - &own.constant * &ratio;
+            if ratio.is_positive() {
+                if range.low.as_ref().is_none_or(|low| *low < end) {
+                    range.low = Some(end);
+                }
+            } else if range.high.as_ref().is_none_or(|high| *high > end) {
+                range.high = Some(end);
+            }
+        }
+        range
+    }
+
+    /// The atoms that an instance may make true.
+    fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
+        let at_end = case
+            .effects
+            .iter()
+            .filter(|(guard, _, holds)| *holds && case.known.decide(structure, guard) != Some(false));
+        let gone =
+            |key: &Key| case.effects.iter().any(|(guard, own, holds)| own == key && !holds && guard.is(true));
+        let at_start = case.truths.iter().filter(move |(key, holds)| **holds && !gone(key));
+        at_end.map(|(_, key, _)| key).chain(at_start.map(|(key, _)| key))
+    }
+
+    /// Checks that a case of an instance leads to nothing else.
+    pub(super) fn admits(
+        &self,
+        world: &World<'_>,
+        structure: &Structure,
+        case: &Case,
+    ) -> Result<(), Difference> {
+        let mut added = Self::added(structure, case);
+        let new = added.find(|key| !self.atoms.contains(*key));
+        let outside = || {
+            case.changes.iter().find_map(|(key, after)| {
+                let interval = self.numbers.get(key)?;
+                (!interval.contains(&self.range(after, &case.known))).then_some(key)
+            })
+        };
+        match new.or_else(outside) {
+            Some(key) => Err(Difference::Witness { what: world.show(key) }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A witness in the making.
+pub(super) struct Widening {
+    pub(super) invariant: Invariant,
+    /// How often an end of an interval has moved.
+    moves: FxHashMap<(Key, bool), u32>,
+}
+
+impl Widening {
+    pub(super) fn new(world: &World<'_>) -> Self {
+        Self { invariant: Invariant::initial(world), moves: FxHashMap::default() }
+    }
+
+    /// Takes in what a case of an instance leads to; `true` if that is new.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer moves than passes over the task")]
+    pub(super) fn include(&mut self, structure: &Structure, case: &Case) -> bool {
+        let mut news = false;
+        for key in Invariant::added(structure, case) {
+            if !self.invariant.atoms.contains(key) {
+                news |= self.invariant.atoms.insert(key.clone());
+            }
+        }
+        for (key, after) in &case.changes {
+            let range = self.invariant.range(after, &case.known);
+            let Some(own) = self.invariant.numbers.get_mut(key) else { continue };
+            let mut moved = |upper: bool, own: &mut Option<BigRational>, other: Option<BigRational>| {
+                let Some(end) = own.as_ref() else { return };
+                let outside =
+                    other.as_ref().is_none_or(|other| if upper { other > end } else { other < end });
+                if outside {
+                    let count = self.moves.entry((key.clone(), upper)).or_default();
+                    *count += 1;
+                    *own = other.filter(|_| *count < MOVES);
+                    news = true;
+                }
+            };
+            moved(false, &mut own.low, range.low);
+            moved(true, &mut own.high, range.high);
+        }
+        news
+    }
+}
+
+/// Says that a fixpoint took too long.
+pub(super) fn too_many_rounds(limit: usize) -> Cause {
+    Cause::TooMany { what: "rounds in search of a witness".into(), limit }
+}

@@ -1,0 +1,77 @@
+//! How long an instance may take.
+
+use num_rational::BigRational;
+use num_traits::{Signed, Zero};
+
+use crate::faithful::reader::Reader;
+use crate::faithful::verdict::Cause;
+use pddl::ast::{Comparison, DurationConstraint};
+
+/// The lengths that an instance may take: all between two, of which it need not reach either. Without end if there is no greatest.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Length {
+    pub(super) least: BigRational,
+    pub(super) most: Option<BigRational>,
+}
+
+/// The least or the greatest length, and whether it is left out.
+type End = (BigRational, bool);
+
+impl Length {
+    /// The only length, if there is one.
+    pub(super) fn fixed(&self) -> Option<&BigRational> {
+        self.most.as_ref().filter(|most| **most == self.least)
+    }
+
+    /// The least that an instance adds to a sum that counts each unit of time so often.
+    pub(super) fn least_times(&self, factor: &BigRational) -> Result<BigRational, Cause> {
+        if !factor.is_negative() {
+            return Ok(&self.least * factor);
+        }
+        let most =
+            self.most.as_ref().ok_or_else(|| Cause::unsupported("a metric that rewards time without end"))?;
+        Ok(most * factor)
+    }
+}
+
+impl<'r> Reader<'r> {
+    /// The lengths that all constraints admit; none if there is none, or if one of them has no value.
+    pub(super) fn lengths(&mut self, constraints: &'r [DurationConstraint]) -> Result<Option<Length>, Cause> {
+        // No action takes less than 0.
+        let mut low: End = (BigRational::zero(), false);
+        let mut high: Option<End> = None;
+        for constraint in constraints {
+            let Some(bound) = self.expression(&constraint.expression)? else { return Ok(None) };
+            let bound =
+                bound.value().ok_or_else(|| Cause::unsupported("durations that depend on the state"))?;
+            let (above, below, left_out) = match constraint.operator {
+                Comparison::Equal => (true, true, false),
+                Comparison::GreaterOrEqual => (true, false, false),
+                Comparison::Greater => (true, false, true),
+                Comparison::LessOrEqual => (false, true, false),
+                Comparison::Less => (false, true, true),
+            };
+            if above {
+                low = low.max((bound.clone(), left_out));
+            }
+            let is_less = |(own, own_left_out): &End| (bound, !left_out) < (own, !own_left_out);
+            if below && high.as_ref().is_none_or(is_less) {
+                high = Some((bound.clone(), left_out));
+            }
+        }
+        let is_empty = |(most, left_out): &End| low.0 > *most || low.0 == *most && (low.1 || *left_out);
+        if high.as_ref().is_some_and(is_empty) {
+            return Ok(None);
+        }
+        let length = Length { least: low.0, most: high.map(|(most, _)| most) };
+        if length.fixed().is_none() && length.least.is_zero() {
+            return Err(Cause::unsupported("durations that are chosen, and may be as short as one likes"));
+        }
+        if length.fixed().is_none() && !self.world.timeline.is_empty() {
+            return Err(Cause::unsupported(
+                "durations that are chosen where there are timed initial literals",
+            ));
+        }
+        Ok(Some(length))
+    }
+}

@@ -1,0 +1,103 @@
+//! Linear expressions over numeric fluents, with exact rationals.
+
+use std::collections::BTreeMap;
+
+use num_rational::BigRational;
+use num_traits::{One, Signed, Zero};
+
+use crate::faithful::world::Key;
+
+/// Fluents times factors (none of them 0), plus a constant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Linear {
+    pub(super) factors: BTreeMap<Key, BigRational>,
+    pub(super) constant: BigRational,
+}
+
+/// A range of numbers; an end that is missing is unbounded.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(super) struct Interval {
+    pub(super) low: Option<BigRational>,
+    pub(super) high: Option<BigRational>,
+}
+
+impl Interval {
+    pub(super) fn point(value: &BigRational) -> Self {
+        Self { low: Some(value.clone()), high: Some(value.clone()) }
+    }
+
+    /// The only number in it.
+    pub(super) fn value(&self) -> Option<&BigRational> {
+        self.low.as_ref().filter(|low| Some(*low) == self.high.as_ref())
+    }
+
+    pub(super) fn contains(&self, other: &Self) -> bool {
+        let low = self.low.as_ref().is_none_or(|own| other.low.as_ref().is_some_and(|low| own <= low));
+        let high = self.high.as_ref().is_none_or(|own| other.high.as_ref().is_some_and(|high| own >= high));
+        low && high
+    }
+}
+
+impl Linear {
+    pub(super) fn constant(constant: BigRational) -> Self {
+        Self { factors: BTreeMap::new(), constant }
+    }
+
+    pub(super) fn fluent(key: Key) -> Self {
+        Self { factors: BTreeMap::from([(key, BigRational::one())]), constant: BigRational::zero() }
+    }
+
+    /// This plus another one times a factor.
+    pub(super) fn plus(mut self, other: &Self, factor: &BigRational) -> Self {
+        self.constant += &other.constant * factor;
+        for (key, own) in &other.factors {
+            let sum = self.factors.remove(key).unwrap_or_else(BigRational::zero) + own * factor;
+            if !sum.is_zero() {
+                self.factors.insert(key.clone(), sum);
+            }
+        }
+        self
+    }
+
+    pub(super) fn minus(self, other: &Self) -> Self {
+        self.plus(other, &-BigRational::one())
+    }
+
+    pub(super) fn times(&self, factor: &BigRational) -> Self {
+        Self::constant(BigRational::zero()).plus(self, factor)
+    }
+
+    pub(super) fn negated(&self) -> Self {
+        self.times(&-BigRational::one())
+    }
+
+    /// The number that it is, if it depends on no fluent.
+    pub(super) fn value(&self) -> Option<&BigRational> {
+        self.factors.is_empty().then_some(&self.constant)
+    }
+
+    /// The factor by which the fluents of this one are those of another one.
+    pub(super) fn ratio_to(&self, other: &Self) -> Option<BigRational> {
+        let (key, own) = self.factors.first_key_value()?;
+        let ratio = own / other.factors.get(key)?;
+        let same = self.factors.len() == other.factors.len()
+            && self
+                .factors
+                .iter()
+                .all(|(key, own)| other.factors.get(key).is_some_and(|factor| factor * &ratio == *own));
+        same.then_some(ratio)
+    }
+
+    /// Its values where fluents have theirs in intervals.
+    pub(super) fn range<'i>(&self, interval: impl Fn(&Key) -> Option<&'i Interval>) -> Interval {
+        let mut range = Interval::point(&self.constant);
+        for (key, factor) in &self.factors {
+            let own = interval(key);
+            let (low, high) = (own.and_then(|own| own.low.as_ref()), own.and_then(|own| own.high.as_ref()));
+            let (low, high) = if factor.is_negative() { (high, low) } else { (low, high) };
+            let add = |sum: Option<BigRational>, end: Option<&BigRational>| Some(sum? + end? * factor);
+            range = Interval { low: add(range.low, low), high: add(range.high, high) };
+        }
+        range
+    }
+}

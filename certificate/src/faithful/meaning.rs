@@ -1,0 +1,422 @@
+//! What an instance of an action requires and does, case by case, in terms of the state before it. A durative action is one step:
+//! its start effects take place before the conditions of its middle and end are looked at, and before its end effects. One without
+//! duration is one happening. Where there are events, there are cases for each passage.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use crate::faithful::formula::{Formula, Known, Structure};
+use crate::faithful::happening;
+use crate::faithful::lengths::Length;
+use crate::faithful::linear::Linear;
+use crate::faithful::reader::{Applied, Reader};
+use crate::faithful::reads::Reads;
+use crate::faithful::timeline::{self, Event, Passage, Timeline};
+use crate::faithful::verdict::Cause;
+use crate::faithful::world::Key;
+use pddl::ast::{
+    Action, ActionBody, Assignment, Condition, ConditionTime, DurationConstraint, Effect, EffectTime,
+    Expression,
+};
+
+/// One way in which the conditions of an instance can turn out. Cases may overlap; together they are all.
+#[derive(Debug)]
+pub(super) struct Case {
+    /// What holds before.
+    pub(super) known: Known,
+    /// What has become of atoms at the start.
+    pub(super) truths: BTreeMap<Key, bool>,
+    /// What becomes of atoms at the end, each under a condition; what is both added and deleted holds.
+    pub(super) effects: Vec<(Formula, Key, bool)>,
+    /// Fluents that have these values afterwards.
+    pub(super) changes: BTreeMap<Key, Linear>,
+    /// None for an instantaneous action, and for a wait.
+    pub(super) length: Option<Length>,
+    pub(super) passage: Passage,
+}
+
+/// What happens when nothing is done until the next event, for each event.
+#[expect(clippy::arithmetic_side_effects, reason = "the place of an event that is held in memory")]
+pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Case>, Cause> {
+    let mut all = Vec::new();
+    for (before, event) in timeline.events.iter().enumerate().skip(timeline.begun) {
+        let passage = Passage::wait(before + 1, &event.time);
+        let mut truths = event.truths.clone();
+        truths.extend(passage.truths(timeline));
+        truths.extend([(timeline::phase(before), false), (timeline::waited(), true)]);
+        for known in Known::default().assume(structure, &Formula::Atom(timeline::phase(before), true))? {
+            let (truths, passage) = (truths.clone(), passage.clone());
+            all.push(Case {
+                known,
+                truths,
+                effects: Vec::new(),
+                changes: Changes::new(),
+                length: None,
+                passage,
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// What fluents become.
+type Changes = BTreeMap<Key, Linear>;
+
+/// Effects that take place at once, each under a condition.
+#[derive(Default)]
+pub(super) struct Moment {
+    pub(super) atoms: Vec<(Formula, Key, bool)>,
+    /// A value is missing where it is undefined.
+    pub(super) numbers: Vec<(Formula, Assignment, Key, Option<Linear>)>,
+}
+
+/// The cases in which an instance can be executed; the reader has its arguments.
+pub(super) fn cases<'r>(
+    mut reader: Reader<'r>,
+    structure: &Structure,
+    action: &'r Action,
+) -> Result<Vec<Case>, Cause> {
+    match &action.body {
+        ActionBody::Instantaneous { precondition, effect } => {
+            let condition = reader.formula(precondition, true)?;
+            let mut all = Vec::new();
+            if condition.is(false) {
+                return Ok(all);
+            }
+            let moment = reader.moment([effect])?;
+            let timeline = &reader.world.timeline;
+            for passage in timeline.passages(&BigRational::zero()) {
+                let event = passage.at_start(timeline);
+                let reads = || reader.reads(vec![precondition], vec![effect], Vec::new());
+                if event.is_some_and(|event| reads().event(event)) {
+                    continue;
+                }
+                let own = all_of(&condition, [passage.condition(timeline), moment.leaves(event)]);
+                let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
+                for known in Known::default().assume(structure, &own)? {
+                    all.extend(moment.last(structure, known, &applied, (&passage, None))?);
+                }
+            }
+            Ok(all)
+        }
+        ActionBody::Durative { duration, conditions, effects } => {
+            let Some(length) = reader.lengths(duration)? else { return Ok(Vec::new()) };
+            let at_once = length.least.is_zero();
+            reader.length = Some(length);
+            let durative = Durative { duration, conditions, effects };
+            if at_once { durative.at_once(reader, structure) } else { durative.cases(reader, structure) }
+        }
+    }
+}
+
+/// A condition, and others, most of which say nothing.
+fn all_of(condition: &Formula, others: [Formula; 2]) -> Cow<'_, Formula> {
+    if others.iter().all(|other| other.is(true)) {
+        return Cow::Borrowed(condition);
+    }
+    Cow::Owned(Formula::junction(std::iter::once(condition.clone()).chain(others), true))
+}
+
+struct Durative<'r> {
+    duration: &'r [DurationConstraint],
+    conditions: &'r [(ConditionTime, Condition)],
+    effects: &'r [(EffectTime, Effect)],
+}
+
+impl<'r> Durative<'r> {
+    fn condition(&self, reader: &mut Reader<'r>, times: &[ConditionTime]) -> Result<Formula, Cause> {
+        let own = self.conditions.iter().filter(|(time, _)| times.contains(time));
+        let own: Result<Vec<_>, _> = own.map(|(_, condition)| reader.formula(condition, true)).collect();
+        Ok(Formula::junction(own?, true))
+    }
+
+    fn effects(&self, wanted: EffectTime) -> impl Iterator<Item = &'r Effect> {
+        self.effects.iter().filter(move |(time, _)| *time == wanted).map(|(_, effect)| effect)
+    }
+
+    /// What the start or the end reads.
+    fn reads(&self, reader: &Reader<'r>, wanted: EffectTime) -> Reads<'r> {
+        let time = match wanted {
+            EffectTime::AtStart => ConditionTime::AtStart,
+            EffectTime::AtEnd => ConditionTime::AtEnd,
+        };
+        let conditions = self.conditions.iter().filter(|(own, _)| *own == time);
+        let durations = self.duration.iter().filter(|constraint| constraint.time == wanted);
+        reader.reads(
+            conditions.map(|(_, condition)| condition).collect(),
+            self.effects(wanted).collect(),
+            durations.map(|constraint| &constraint.expression).collect(),
+        )
+    }
+
+    /// Without duration, start and end are one happening, and nothing lies between them.
+    fn at_once(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
+        let mut ends = Vec::new();
+        for (condition, effect) in
+            [(ConditionTime::AtStart, EffectTime::AtStart), (ConditionTime::AtEnd, EffectTime::AtEnd)]
+        {
+            let condition = self.condition(&mut reader, &[condition])?;
+            if condition.is(false) {
+                return Ok(Vec::new());
+            }
+            ends.push((condition, reader.moment(self.effects(effect))?));
+        }
+        let [(condition, start), (at_end, end)] = &ends[..] else { return Ok(Vec::new()) };
+        let reads = [EffectTime::AtStart, EffectTime::AtEnd].map(|half| self.reads(&reader, half));
+        let apart = happening::apart((&reads[0], start), (&reads[1], end));
+        let both = Moment {
+            atoms: [&start.atoms[..], &end.atoms[..]].concat(),
+            numbers: [&start.numbers[..], &end.numbers[..]].concat(),
+        };
+        let mut all = Vec::new();
+        let timeline = &reader.world.timeline;
+        for passage in timeline.passages(&BigRational::zero()) {
+            let event = passage.at_start(timeline);
+            if event.is_some_and(|event| reads.iter().any(|half| half.event(event))) {
+                continue;
+            }
+            let own = [condition, at_end, &apart, &passage.condition(timeline), &both.leaves(event)];
+            let applied = Applied { truths: passage.truths(timeline), ..Applied::default() };
+            let own = Formula::junction(own.into_iter().cloned(), true);
+            for known in Known::default().assume(structure, &own)? {
+                all.extend(both.last(structure, known, &applied, (&passage, reader.length.as_ref()))?);
+            }
+        }
+        Ok(all)
+    }
+
+    fn cases(&self, mut reader: Reader<'r>, structure: &Structure) -> Result<Vec<Case>, Cause> {
+        let condition = self.condition(&mut reader, &[ConditionTime::AtStart])?;
+        let mut all = Vec::new();
+        if condition.is(false) {
+            return Ok(all);
+        }
+        let start = reader.moment(self.effects(EffectTime::AtStart))?;
+        let timeline = &reader.world.timeline;
+        let least = reader.length.as_ref().map(|length| length.least.clone()).unwrap_or_default();
+        for passage in timeline.passages(&least) {
+            let event = passage.at_start(timeline);
+            if event.is_some_and(|event| self.reads(&reader, EffectTime::AtStart).event(event)) {
+                continue;
+            }
+            let own = all_of(&condition, [passage.condition(timeline), start.leaves(event)]);
+            for known in Known::default().assume(structure, &own)? {
+                let guards = start.atoms.iter().map(|(guard, ..)| guard);
+                let guards = guards.chain(start.numbers.iter().map(|(guard, ..)| guard));
+                for known in known.split(structure, guards)? {
+                    let truths = start.truths(structure, &known);
+                    for (known, changes) in start.numbers(structure, &known, &Applied::default())? {
+                        reader.applied = Applied { truths: truths.clone(), changes };
+                        all.extend(self.after_start(&mut reader, structure, &known, &passage)?);
+                    }
+                    reader.applied = Applied::default();
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    /// The cases once the start has taken place: the events in between, what holds over all, and the end.
+    fn after_start(
+        &self,
+        reader: &mut Reader<'r>,
+        structure: &Structure,
+        known: &Known,
+        passage: &Passage,
+    ) -> Result<Vec<Case>, Cause> {
+        let timeline = &reader.world.timeline;
+        let event = passage.at_end(timeline);
+        if event.is_some_and(|event| self.reads(reader, EffectTime::AtEnd).event(event)) {
+            return Ok(Vec::new());
+        }
+        let mut later = vec![self.condition(reader, &[ConditionTime::OverAll])?];
+        for event in passage.between(timeline) {
+            reader.applied.truths.extend(event.truths.clone());
+            later.push(self.condition(reader, &[ConditionTime::OverAll])?);
+        }
+        later.push(self.condition(reader, &[ConditionTime::AtEnd])?);
+        let mut all = Vec::new();
+        if later.iter().any(|condition| condition.is(false)) {
+            return Ok(all);
+        }
+        let end = reader.moment(self.effects(EffectTime::AtEnd))?;
+        later.push(end.leaves(event));
+        let mut applied = reader.applied.clone();
+        applied.truths.extend(event.into_iter().flat_map(|event| event.truths.clone()));
+        applied.truths.extend(passage.truths(timeline));
+        for known in known.assume(structure, &Formula::junction(later, true))? {
+            all.extend(end.last(structure, known, &applied, (passage, reader.length.as_ref()))?);
+        }
+        Ok(all)
+    }
+}
+
+impl<'r> Reader<'r> {
+    /// What a happening with these conditions and effects reads.
+    fn reads(
+        &self,
+        conditions: Vec<&'r Condition>,
+        effects: Vec<&'r Effect>,
+        durations: Vec<&'r Expression>,
+    ) -> Reads<'r> {
+        let (world, axioms, binding) = (self.world, self.axioms, self.binding.clone());
+        Reads { world, axioms, binding, conditions, effects, durations }
+    }
+
+    fn moment(&mut self, effects: impl IntoIterator<Item = &'r Effect>) -> Result<Moment, Cause> {
+        let mut moment = Moment::default();
+        for effect in effects {
+            self.collect(effect, &Formula::truth(true), &mut moment)?;
+        }
+        Ok(moment)
+    }
+
+    fn collect(&mut self, effect: &'r Effect, guard: &Formula, moment: &mut Moment) -> Result<(), Cause> {
+        match effect {
+            Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, guard, moment)),
+            Effect::Add(atom) | Effect::Delete(atom) => {
+                let key = self.world.key(atom, &self.binding)?;
+                moment.atoms.push((guard.clone(), key, matches!(effect, Effect::Add(_))));
+                Ok(())
+            }
+            Effect::ForAll(bound, inner) => {
+                self.each(bound, &mut |own| own.collect(inner, guard, moment).map(|()| true)).map(|_| ())
+            }
+            Effect::When(condition, inner) => {
+                self.in_when = true;
+                let condition = self.formula(condition, true);
+                self.in_when = false;
+                let guard = Formula::junction([guard.clone(), condition?], true);
+                if guard.is(false) { Ok(()) } else { self.collect(inner, &guard, moment) }
+            }
+            Effect::Assign(kind, atom, expression, _) => {
+                let key = self.world.key(atom, &self.binding)?;
+                let value = self.expression(expression)?;
+                moment.numbers.push((guard.clone(), *kind, key, value));
+                Ok(())
+            }
+        }
+    }
+}
+
+impl Moment {
+    /// That no effect sets an atom to another value than an event of the same time.
+    fn leaves(&self, event: Option<&Event>) -> Formula {
+        let Some(event) = event else { return Formula::truth(true) };
+        let opposite = self.atoms.iter().filter(|(_, key, holds)| event.truths.get(key) == Some(&!holds));
+        Formula::junction(opposite.map(|(guard, ..)| guard.negated()), true)
+    }
+
+    /// What becomes of atoms where all conditions are decided.
+    fn truths(&self, structure: &Structure, known: &Known) -> BTreeMap<Key, bool> {
+        let active = |guard: &Formula| known.decide(structure, guard) == Some(true);
+        let mut truths = BTreeMap::new();
+        for (guard, key, holds) in &self.atoms {
+            if active(guard) {
+                let own = truths.entry(key.clone()).or_insert(*holds);
+                *own |= *holds;
+            }
+        }
+        truths
+    }
+
+    /// The cases of the end of an instance, after what its start has made.
+    fn last(
+        &self,
+        structure: &Structure,
+        known: Known,
+        applied: &Applied,
+        (passage, length): (&Passage, Option<&Length>),
+    ) -> Result<Vec<Case>, Cause> {
+        let mut all = Vec::new();
+        for known in known.split(structure, self.numbers.iter().map(|(guard, ..)| guard))? {
+            for (known, own) in self.numbers(structure, &known, applied)? {
+                let mut changes = applied.changes.clone();
+                changes.extend(own);
+                let (truths, effects) = (applied.truths.clone(), self.atoms.clone());
+                let (passage, length) = (passage.clone(), length.cloned());
+                all.push(Case { known, truths, effects, changes, length, passage });
+            }
+        }
+        Ok(all)
+    }
+
+    /// What numbers become where the conditions of all their effects are decided; nothing where active effects contradict each
+    /// other or have no value.
+    fn numbers(
+        &self,
+        structure: &Structure,
+        known: &Known,
+        applied: &Applied,
+    ) -> Result<Vec<(Known, Changes)>, Cause> {
+        let mut by_fluent: BTreeMap<&Key, Vec<(Assignment, &Linear)>> = BTreeMap::new();
+        for (guard, kind, key, value) in &self.numbers {
+            if known.decide(structure, guard) == Some(true) {
+                let Some(value) = value else { return Ok(Vec::new()) };
+                by_fluent.entry(key).or_default().push((*kind, value));
+            }
+        }
+        let mut changes = BTreeMap::new();
+        let mut equations = Vec::new();
+        for (key, effects) in by_fluent {
+            let before = applied.changes.get(key).cloned().unwrap_or_else(|| Linear::fluent(key.clone()));
+            match together(before, &effects, &mut equations)? {
+                Some(after) => changes.insert(key.clone(), after),
+                None => return Ok(Vec::new()),
+            };
+        }
+        let equations = known.assume(structure, &Formula::junction(equations, true))?;
+        Ok(equations.into_iter().map(|known| (known, changes.clone())).collect())
+    }
+}
+
+/// What effects at one time make of a number; none if they contradict each other. Different values that are assigned to it have to
+/// be equal.
+fn together(
+    before: Linear,
+    effects: &[(Assignment, &Linear)],
+    equations: &mut Vec<Formula>,
+) -> Result<Option<Linear>, Cause> {
+    let way = |kind: Assignment| match kind {
+        Assignment::Assign => 0,
+        Assignment::Increase | Assignment::Decrease => 1,
+        Assignment::ScaleUp | Assignment::ScaleDown => 2,
+    };
+    if effects.windows(2).any(|pair| way(pair[0].0) != way(pair[1].0)) {
+        return Ok(None);
+    }
+    let mut after = before;
+    for (position, (kind, value)) in effects.iter().enumerate() {
+        after = match kind {
+            Assignment::Increase => after.plus(value, &BigRational::from_integer(1.into())),
+            Assignment::Decrease => after.minus(value),
+            Assignment::Assign if position == 0 => (*value).clone(),
+            Assignment::Assign => {
+                let difference = after.clone().minus(value);
+                match difference.value() {
+                    Some(number) if number.is_zero() => {}
+                    Some(_) => return Ok(None),
+                    None => {
+                        equations.push(Formula::Compare(difference.clone(), false));
+                        equations.push(Formula::Compare(difference.negated(), false));
+                    }
+                }
+                after
+            }
+            Assignment::ScaleUp | Assignment::ScaleDown => {
+                let Some(factor) = value.value() else {
+                    return Err(Cause::unsupported("numbers that are scaled by numbers that change"));
+                };
+                match (kind, factor.is_zero()) {
+                    (Assignment::ScaleDown, true) => return Ok(None),
+                    (Assignment::ScaleDown, false) => after.times(&factor.recip()),
+                    _ => after.times(factor),
+                }
+            }
+        };
+    }
+    Ok(Some(after))
+}

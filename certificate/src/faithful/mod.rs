@@ -1,0 +1,299 @@
+//! Whether a written task stands for its PDDL files, checked without grounding them again.
+//!
+//! What is needed is a simulation [1]: the initial state of the files is that of the task, and whatever an action does
+//! in a state of the files, an operator with some choice of designs does in the task's, for no more cost; the goal of the files
+//! implies that of the task. Then no plan of the files is cheaper than what the argument says of plans of the task. The
+//! task may allow more than the files, and leave out what does not matter to it.
+//!
+//! All instances of all actions are gone through: `instances` enumerates them by joins over what never changes, `reader` and
+//! `meaning` say what each requires and does, case by case, and `compare` looks for the operator, `effects` at what it does.
+//! `translation` reads the task in terms of the files. A variable of the task stands for
+//! atoms of which at most one holds: that is true at first, and every instance keeps it so. An instance needs no operator if it
+//! changes nothing that the task knows, or if it can never be executed: its conditions contradict what never changes, each other,
+//! the variables, or the witness. The witness (`invariant`) says which atoms may ever hold and which values numbers may have;
+//! that no instance leaves it is checked together with the rest.
+//!
+//! Covered are conditions of all kinds; conditional and universal effects; linear numbers; derived predicates, also recursive ones
+//! that are variables of the task with the same rules; actions with and without duration, one after another; timed initial
+//! literals (`timeline`); metrics of both directions. Of everything else this says that it is not covered. Shared with grounding is the syntax tree and nothing else.
+//!
+//! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
+
+mod axioms;
+mod compare;
+mod effects;
+mod formula;
+mod happening;
+mod instances;
+mod invariant;
+mod lengths;
+mod linear;
+mod meaning;
+mod reader;
+mod reads;
+mod timeline;
+mod translation;
+mod verdict;
+mod world;
+
+use std::collections::BTreeSet;
+
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use crate::model::Model;
+use crate::model::TASK_FORMAT;
+use crate::shape;
+use axioms::Axioms;
+use compare::Comparison;
+use invariant::{Invariant, Widening};
+use meaning::Case;
+use pddl::ast::{Action, ActionBody, ConditionTime, Domain, Effect, Problem};
+use reader::Reader;
+use translation::{Names, Translation};
+use verdict::Obstacle;
+pub use verdict::{Cause, Difference, Faithful};
+use world::{Key, World};
+
+/// With more instances, nothing is checked.
+const INSTANCE_LIMIT: usize = 400_000;
+/// A witness is looked for in at most so many rounds.
+const ROUND_LIMIT: usize = 10_000;
+
+type Result<T> = std::result::Result<T, Obstacle>;
+
+/// Compares a written task with the files. The witness says what can become of their states.
+pub fn faithful(
+    domain: &Domain,
+    problem: &Problem,
+    task: &str,
+    witness: &str,
+    stop: &dyn Fn() -> bool,
+) -> Faithful {
+    let compared = read(task).and_then(|model| {
+        let files = Files::new(domain, problem, &model, stop)?;
+        files.compare(witness)
+    });
+    match compared {
+        Ok(verdict) => verdict,
+        Err(obstacle) => verdict(obstacle),
+    }
+}
+
+/// Makes the witness for a written task.
+///
+/// # Errors
+/// What [`faithful`] would say: that the task is none, or that something is not covered.
+pub fn witness(
+    domain: &Domain,
+    problem: &Problem,
+    task: &str,
+    stop: &dyn Fn() -> bool,
+) -> std::result::Result<String, Faithful> {
+    let made = read(task).and_then(|model| Files::new(domain, problem, &model, stop)?.witness());
+    made.map_err(verdict)
+}
+
+fn verdict(obstacle: Obstacle) -> Faithful {
+    match obstacle {
+        Obstacle::Differs(difference) => Faithful::No(difference),
+        Obstacle::Open(cause) => Faithful::Undecided(cause),
+    }
+}
+
+fn read(task: &str) -> Result<Model> {
+    let form = |reason: String| Obstacle::Differs(Difference::Form { reason });
+    let model: Model = serde_json::from_str(task).map_err(|error| form(error.to_string()))?;
+    if model.format != TASK_FORMAT {
+        return Err(form(format!("format `{}`, where `{TASK_FORMAT}` is expected", model.format)));
+    }
+    shape::task(&model).map_err(form)?;
+    Ok(model)
+}
+
+/// An instance: the action, and its arguments as objects.
+struct Instance {
+    action: usize,
+    arguments: Vec<u32>,
+    /// Atoms without which it cannot be executed.
+    requires: Vec<Key>,
+}
+
+/// The files, with the names that the task has for what is in them.
+struct Files<'f> {
+    domain: &'f Domain,
+    world: World<'f>,
+    model: &'f Model,
+    names: Names,
+    instances: Vec<Instance>,
+    stop: &'f dyn Fn() -> bool,
+}
+
+impl<'f> Files<'f> {
+    fn new(
+        domain: &'f Domain,
+        problem: &'f Problem,
+        model: &'f Model,
+        stop: &'f dyn Fn() -> bool,
+    ) -> Result<Self> {
+        let world = World::new(domain, problem)?;
+        let names = Names::new(&world, model)?;
+        let mut all = Vec::new();
+        for (action, schema) in domain.actions.iter().enumerate() {
+            for arguments in instances::of(&world, schema, stop)? {
+                let requires = requires(&world, schema, &arguments)?;
+                all.push(Instance { action, arguments, requires });
+            }
+            if all.len() > INSTANCE_LIMIT {
+                return Err(instances::too_many("actions").into());
+            }
+        }
+        Ok(Self { domain, world, model, names, instances: all, stop })
+    }
+
+    fn stopped(&self) -> std::result::Result<(), Cause> {
+        if (self.stop)() { Err(Cause::Stopped) } else { Ok(()) }
+    }
+
+    /// The cases in which an instance can be executed in states of the witness.
+    fn cases(&self, instance: &Instance, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Case>> {
+        self.stopped()?;
+        if instance.requires.iter().any(|key| !invariant.may_hold(key)) {
+            return Ok(Vec::new());
+        }
+        let schema = &self.domain.actions[instance.action];
+        let mut reader = Reader::new(&self.world, invariant, axioms);
+        let names = schema.parameters.iter().map(|parameter| &parameter.identifier.name);
+        reader.binding = names.zip(instance.arguments.iter().copied()).collect();
+        Ok(meaning::cases(reader, &self.names.structure, schema)?)
+    }
+
+    fn witness(&self) -> Result<String> {
+        let mut widening = Widening::new(&self.world);
+        let untimed = self.world.timeline.is_empty();
+        let plain: Vec<bool> = self.domain.actions.iter().map(|action| untimed && is_plain(action)).collect();
+        let waits = meaning::waits(&self.world.timeline, &self.names.structure)?;
+        // An instance that always does the same need not be looked at again.
+        let mut open: Vec<&Instance> = self.instances.iter().collect();
+        for _ in 0..ROUND_LIMIT {
+            let axioms = Axioms::new(&self.world, &widening.invariant, &self.names.linked)?;
+            // What is known of derived atoms is about the invariant as it is now.
+            let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
+            let (mut news, mut next) = (false, Vec::new());
+            for case in &waits {
+                news |= widening.include(&self.names.structure, case);
+            }
+            for instance in open {
+                let invariant = frozen.as_ref().unwrap_or(&widening.invariant);
+                let cases = self.cases(instance, invariant, &axioms)?;
+                for case in &cases {
+                    news |= widening.include(&self.names.structure, case);
+                }
+                if cases.is_empty() || !plain[instance.action] {
+                    next.push(instance);
+                }
+            }
+            open = next;
+            if !news {
+                return Ok(widening.invariant.write(&self.world));
+            }
+        }
+        Err(invariant::too_many_rounds(ROUND_LIMIT).into())
+    }
+
+    #[expect(clippy::arithmetic_side_effects, reason = "instances are held in memory")]
+    fn compare(&self, witness: &str) -> Result<Faithful> {
+        let invariant = Invariant::read(&self.world, witness)?;
+        let axioms = Axioms::new(&self.world, &invariant, &self.names.linked)?;
+        let task = Translation::new(&self.world, self.model, &self.names, &invariant, &axioms)?;
+        let timed = self.world.problem.metric.is_none() && self.takes_time(&invariant, &axioms)?;
+        let unit = self.unit(&invariant, &axioms)?;
+        let comparison = Comparison::new(&task, timed, unit)?;
+        comparison.initial()?;
+        comparison.goal()?;
+        comparison.rules()?;
+        for case in meaning::waits(&self.world.timeline, &self.names.structure)? {
+            invariant.admits(&self.world, &self.names.structure, &case)?;
+            comparison.wait(&case)?;
+        }
+        let (mut instances, mut idle) = (0, 0);
+        for instance in &self.instances {
+            let cases = self.cases(instance, &invariant, &axioms)?;
+            instances += usize::from(!cases.is_empty());
+            let mut changes = false;
+            for case in &cases {
+                invariant.admits(&self.world, &self.names.structure, case)?;
+                let schema = &self.domain.actions[instance.action];
+                changes |= comparison.case(schema, &instance.arguments, case)?;
+            }
+            idle += usize::from(!cases.is_empty() && !changes);
+        }
+        Ok(Faithful::Yes { instances, idle, timed })
+    }
+
+    /// What the times of events and all durations are multiples of.
+    fn unit(&self, invariant: &Invariant, axioms: &Axioms) -> Result<BigRational> {
+        let mut durations = BTreeSet::new();
+        if !self.world.timeline.is_empty() {
+            for instance in &self.instances {
+                let cases = self.cases(instance, invariant, axioms)?;
+                let lengths = cases.into_iter().filter_map(|case| case.length);
+                durations.extend(lengths.map(|length| length.least));
+            }
+        }
+        Ok(self.world.timeline.unit(durations.iter()))
+    }
+
+    /// Whether an instance that can be executed has a duration other than 0.
+    fn takes_time(&self, invariant: &Invariant, axioms: &Axioms) -> Result<bool> {
+        for instance in &self.instances {
+            if matches!(self.domain.actions[instance.action].body, ActionBody::Durative { .. }) {
+                let cases = self.cases(instance, invariant, axioms)?;
+                if cases.iter().any(|case| case.length.as_ref().is_some_and(|length| !length.least.is_zero()))
+                {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// Whether an action does the same wherever it can be executed.
+fn is_plain(action: &Action) -> bool {
+    fn plain(effect: &Effect) -> bool {
+        match effect {
+            Effect::And(parts) => parts.iter().all(plain),
+            Effect::ForAll(_, inner) => plain(inner),
+            Effect::Add(_) | Effect::Delete(_) => true,
+            Effect::When(..) | Effect::Assign(..) => false,
+        }
+    }
+    match &action.body {
+        ActionBody::Instantaneous { effect, .. } => plain(effect),
+        ActionBody::Durative { effects, .. } => effects.iter().all(|(_, effect)| plain(effect)),
+    }
+}
+
+/// The atoms among the conjuncts of what an instance requires at first, as far as actions change them.
+fn requires(world: &World<'_>, action: &Action, arguments: &[u32]) -> std::result::Result<Vec<Key>, Cause> {
+    let mut atoms = Vec::new();
+    match &action.body {
+        ActionBody::Instantaneous { precondition, .. } => instances::conjuncts(precondition, &mut atoms),
+        ActionBody::Durative { conditions, .. } => {
+            for (_, condition) in conditions.iter().filter(|(time, _)| *time == ConditionTime::AtStart) {
+                instances::conjuncts(condition, &mut atoms);
+            }
+        }
+    }
+    let names = action.parameters.iter().map(|parameter| &parameter.identifier.name);
+    let binding = names.zip(arguments.iter().copied()).collect();
+    let mut keys = Vec::new();
+    for atom in atoms {
+        let key = world.key(atom, &binding)?;
+        if world.changes(key.0) {
+            keys.push(key);
+        }
+    }
+    Ok(keys)
+}

@@ -1,0 +1,344 @@
+//! Conditions and expressions of the files for one instance, once everything static and everything that the witness rules out is
+//! decided.
+
+use std::collections::BTreeMap;
+
+use num_rational::BigRational;
+use num_traits::{One, Zero};
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+
+use crate::faithful::axioms::Axioms;
+use crate::faithful::formula::Formula;
+use crate::faithful::invariant::Invariant;
+use crate::faithful::lengths::Length;
+use crate::faithful::linear::Linear;
+use crate::faithful::verdict::Cause;
+use crate::faithful::world::{Key, World};
+use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
+
+/// The conditions of one instance have at most so many parts.
+const SIZE_LIMIT: usize = 200_000;
+
+/// Stands for `total-time` in metrics.
+pub(super) const TOTAL_TIME: Key = (u32::MAX, SmallVec::new_const());
+
+/// What the start of an action has made of the state before it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Applied {
+    pub(super) truths: BTreeMap<Key, bool>,
+    pub(super) changes: BTreeMap<Key, Linear>,
+}
+
+pub(super) struct Reader<'r> {
+    pub(super) world: &'r World<'r>,
+    pub(super) invariant: &'r Invariant,
+    pub(super) axioms: &'r Axioms,
+    pub(super) binding: FxHashMap<&'r Name, u32>,
+    pub(super) applied: Applied,
+    /// How long the instance takes.
+    pub(super) length: Option<Length>,
+    pub(super) is_metric: bool,
+    /// Inside `when`, a comparison without a value has no agreed meaning.
+    pub(super) in_when: bool,
+    /// Derived atoms stay as they are.
+    pub(super) opaque: bool,
+    unfolding: Vec<Key>,
+    size: usize,
+}
+
+impl<'r> Reader<'r> {
+    pub(super) fn new(world: &'r World<'r>, invariant: &'r Invariant, axioms: &'r Axioms) -> Self {
+        Self {
+            world,
+            invariant,
+            axioms,
+            binding: FxHashMap::default(),
+            applied: Applied::default(),
+            length: None,
+            is_metric: false,
+            in_when: false,
+            opaque: false,
+            unfolding: Vec::new(),
+            size: 0,
+        }
+    }
+
+    /// A condition (or its negation) on the state after what is applied, in terms of the state before.
+    pub(super) fn formula(&mut self, condition: &'r Condition, holds: bool) -> Result<Formula, Cause> {
+        match condition {
+            Condition::And(parts) => self.junction(parts.iter().map(|part| (part, holds)), holds),
+            Condition::Or(parts) => self.junction(parts.iter().map(|part| (part, holds)), !holds),
+            Condition::Not(inner) => self.formula(inner, !holds),
+            Condition::Imply(left, right) => {
+                self.junction([(&**left, !holds), (&**right, holds)].into_iter(), !holds)
+            }
+            Condition::Exists(bound, inner) => self.quantified(bound, inner, holds, !holds),
+            Condition::ForAll(bound, inner) => self.quantified(bound, inner, holds, holds),
+            Condition::Atom(atom) => {
+                let key = self.world.key(atom, &self.binding)?;
+                self.atom(key, holds)
+            }
+            Condition::Equal(left, right, _) => Ok(Formula::truth(self.equal(left, right)? == holds)),
+            Condition::Compare(operator, left, right, _) => {
+                let compared = self.compare(*operator, left, right)?;
+                Ok(match compared {
+                    Some(compared) if holds => compared,
+                    Some(compared) => compared.negated(),
+                    None => Formula::truth(false),
+                })
+            }
+        }
+    }
+
+    #[expect(clippy::arithmetic_side_effects, reason = "SIZE_LIMIT is far below")]
+    fn count(&mut self) -> Result<(), Cause> {
+        self.size += 1;
+        if self.size <= SIZE_LIMIT {
+            return Ok(());
+        }
+        Err(Cause::TooMany { what: "parts of the conditions of one instance".into(), limit: SIZE_LIMIT })
+    }
+
+    fn junction(
+        &mut self,
+        parts: impl Iterator<Item = (&'r Condition, bool)>,
+        all: bool,
+    ) -> Result<Formula, Cause> {
+        let mut kept = Vec::new();
+        // What is decided without unfolding derived atoms comes first.
+        let (later, sooner): (Vec<_>, Vec<_>) = parts.partition(|(part, _)| self.is_derived(part));
+        for (part, holds) in sooner.into_iter().chain(later) {
+            let part = self.formula(part, holds)?;
+            if part.is(!all) {
+                return Ok(part);
+            }
+            kept.push(part);
+        }
+        Ok(Formula::junction(kept, all))
+    }
+
+    /// Whether a condition mentions a derived predicate.
+    fn is_derived(&self, condition: &Condition) -> bool {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| self.is_derived(part)),
+            Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+                self.is_derived(inner)
+            }
+            Condition::Imply(left, right) => self.is_derived(left) || self.is_derived(right),
+            Condition::Atom(atom) => self.world.is_derived(atom),
+            Condition::Equal(..) | Condition::Compare(..) => false,
+        }
+    }
+
+    fn quantified(
+        &mut self,
+        bound: &'r [TypedName],
+        inner: &'r Condition,
+        holds: bool,
+        all: bool,
+    ) -> Result<Formula, Cause> {
+        let mut kept = Vec::new();
+        self.each(bound, &mut |own| {
+            let part = own.formula(inner, holds)?;
+            let decided = part.is(!all);
+            kept.push(part);
+            Ok(!decided)
+        })?;
+        Ok(Formula::junction(kept, all))
+    }
+
+    /// Calls `visit` with every binding of some variables, until it says `false`.
+    pub(super) fn each(
+        &mut self,
+        bound: &'r [TypedName],
+        visit: &mut dyn FnMut(&mut Self) -> Result<bool, Cause>,
+    ) -> Result<bool, Cause> {
+        self.count()?;
+        let Some((first, rest)) = bound.split_first() else { return visit(self) };
+        let name = &first.identifier.name;
+        let shadowed = self.binding.get(name).copied();
+        let mut goes_on = true;
+        for object in self.world.objects_of(&first.r#type) {
+            self.binding.insert(name, object);
+            if !self.each(rest, visit)? {
+                goes_on = false;
+                break;
+            }
+        }
+        match shadowed {
+            Some(object) => self.binding.insert(name, object),
+            None => self.binding.remove(name),
+        };
+        Ok(goes_on)
+    }
+
+    fn equal(&self, left: &Term, right: &Term) -> Result<bool, Cause> {
+        Ok(self.world.object(left, &self.binding)? == self.world.object(right, &self.binding)?)
+    }
+
+    fn atom(&mut self, key: Key, holds: bool) -> Result<Formula, Cause> {
+        self.count()?;
+        if let Some(known) = self.applied.truths.get(&key) {
+            return Ok(Formula::truth(*known == holds));
+        }
+        if self.world.rules(key.0).is_some() {
+            return self.derived(key, holds);
+        }
+        Ok(atom(self.world, self.invariant, key, holds))
+    }
+
+    fn derived(&mut self, key: Key, holds: bool) -> Result<Formula, Cause> {
+        if self.opaque {
+            return Ok(Formula::Atom(key, holds));
+        }
+        let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
+        if !self.axioms.depends(key.0, touched.map(|key| key.0)) {
+            if let Some(known) = self.axioms.known(&key) {
+                return Ok(Formula::truth(known == holds));
+            }
+            if self.axioms.linked.contains(&key) {
+                return Ok(Formula::Atom(key, holds));
+            }
+        }
+        let formula = self.unfold(&key)?;
+        Ok(if holds { formula } else { formula.negated() })
+    }
+
+    /// The condition under which a derived atom holds.
+    pub(super) fn unfold(&mut self, key: &Key) -> Result<Formula, Cause> {
+        if self.unfolding.contains(key) {
+            return Err(Cause::unsupported(format!(
+                "{}, which depends on itself and is no variable of the task, or on what the same action changes",
+                self.world.show(key)
+            )));
+        }
+        self.unfolding.push(key.clone());
+        let outer = std::mem::take(&mut self.binding);
+        let mut bodies = Vec::new();
+        for rule in self.world.rules(key.0).unwrap_or_default() {
+            let parameters = &rule.head.parameters;
+            let fits = parameters.len() == key.1.len()
+                && parameters.iter().zip(&key.1).all(|(own, object)| self.world.is_of(*object, &own.r#type));
+            if !fits {
+                continue;
+            }
+            let names = parameters.iter().map(|parameter| &parameter.identifier.name);
+            self.binding = names.zip(key.1.iter().copied()).collect();
+            bodies.push(self.formula(&rule.condition, true)?);
+        }
+        self.binding = outer;
+        self.unfolding.pop();
+        Ok(Formula::junction(bodies, false))
+    }
+
+    /// None if a side has no value.
+    fn compare(
+        &mut self,
+        operator: Comparison,
+        left: &'r Expression,
+        right: &'r Expression,
+    ) -> Result<Option<Formula>, Cause> {
+        self.count()?;
+        let (Some(left), Some(right)) = (self.expression(left)?, self.expression(right)?) else {
+            if self.in_when {
+                return Err(Cause::unsupported("a comparison without a value in `when`"));
+            }
+            return Ok(None);
+        };
+        let difference = left.minus(&right);
+        let at_least = |linear: Linear, strict: bool| self.invariant.compare(&linear, strict);
+        Ok(Some(match operator {
+            Comparison::GreaterOrEqual => at_least(difference, false),
+            Comparison::Greater => at_least(difference, true),
+            Comparison::LessOrEqual => at_least(difference.negated(), false),
+            Comparison::Less => at_least(difference.negated(), true),
+            Comparison::Equal => {
+                let opposite = difference.negated();
+                Formula::junction([at_least(difference, false), at_least(opposite, false)], true)
+            }
+        }))
+    }
+
+    fn fluent(&mut self, atom: &Atom) -> Result<Option<Linear>, Cause> {
+        let key = self.world.key(atom, &self.binding)?;
+        if let Some(known) = self.applied.changes.get(&key) {
+            return Ok(Some(known.clone()));
+        }
+        let initial = self.world.initial_value(&key);
+        if !self.world.changes(key.0) {
+            let zero = || (self.world.name(key.0) == "total-cost").then(BigRational::zero);
+            return Ok(initial.cloned().or_else(zero).map(Linear::constant));
+        }
+        if initial.is_none() && self.world.name(key.0) != "total-cost" {
+            return Err(Cause::unsupported(format!(
+                "{}, which changes and has no value at first",
+                self.world.show(&key)
+            )));
+        }
+        Ok(Some(self.invariant.fluent(key)))
+    }
+
+    /// The value of an expression after what is applied; none if it has none.
+    pub(super) fn expression(&mut self, expression: &'r Expression) -> Result<Option<Linear>, Cause> {
+        Ok(match expression {
+            Expression::Number(number, _) => Some(Linear::constant(number.clone())),
+            Expression::Fluent(atom) => self.fluent(atom)?,
+            Expression::Duration(_) => match &self.length {
+                None => None,
+                Some(length) => {
+                    let open = || Cause::unsupported("what depends on a duration that is chosen");
+                    Some(Linear::constant(length.fixed().ok_or_else(open)?.clone()))
+                }
+            },
+            Expression::TotalTime(_) if self.is_metric => Some(Linear::fluent(TOTAL_TIME)),
+            Expression::TotalTime(_) => return Err(Cause::unsupported("total-time outside of the metric")),
+            Expression::Operation(operation, parts, _) => {
+                let mut values = Vec::new();
+                for part in parts {
+                    let Some(value) = self.expression(part)? else { return Ok(None) };
+                    values.push(value);
+                }
+                combined(*operation, values)?
+            }
+        })
+    }
+}
+
+/// An atom that is not derived, in the state before.
+pub(super) fn atom(world: &World<'_>, invariant: &Invariant, key: Key, holds: bool) -> Formula {
+    if !world.changes(key.0) {
+        return Formula::truth(world.holds_initially(&key) == holds);
+    }
+    if !invariant.may_hold(&key) {
+        return Formula::truth(!holds);
+    }
+    Formula::Atom(key, holds)
+}
+
+fn combined(operation: Arithmetic, values: Vec<Linear>) -> Result<Option<Linear>, Cause> {
+    let mut values = values.into_iter();
+    let Some(mut result) = values.next() else {
+        return Err(Cause::unsupported("an operation without operands"));
+    };
+    if operation == Arithmetic::Subtract && values.len() == 0 {
+        return Ok(Some(result.negated()));
+    }
+    for next in values {
+        result = match operation {
+            Arithmetic::Add => result.plus(&next, &BigRational::one()),
+            Arithmetic::Subtract => result.minus(&next),
+            Arithmetic::Multiply => match (result.value().cloned(), next.value()) {
+                (_, Some(factor)) => result.times(factor),
+                (Some(factor), None) => next.times(&factor),
+                (None, None) => return Err(Cause::unsupported("products of numeric fluents that change")),
+            },
+            Arithmetic::Divide => match next.value() {
+                Some(divisor) if divisor.is_zero() => return Ok(None),
+                Some(divisor) => result.times(&divisor.recip()),
+                None => return Err(Cause::unsupported("division by numeric fluents that change")),
+            },
+        };
+    }
+    Ok(Some(result))
+}

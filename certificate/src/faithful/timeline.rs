@@ -1,0 +1,320 @@
+//! Timed initial literals while actions are executed one after another, by the definition (`validate/definition.md`).
+//!
+//! All of one time are one event. The events cut time into phases: phase i begins with event i (counted from 1), phase 0 with the plan.
+//! What an action meets depends on the phases of its start and its end, and on whether either is at the very time of an event: a
+//! *passage*. The plan may start it at any time in a passage, whatever is left of the time before.
+//!
+//! The task has its own clock. It stands for a time t of the plan if t is not before it; here the clock's *mark* counts, which
+//! is the greatest multiple of a unit that the clock has reached: t is at or after the mark, and after it if the clock is. All times
+//! of events and all durations are multiples of the unit, so that the clock may be ahead of t by a moment that no action can
+//! tell, and never by more.
+
+use std::collections::BTreeMap;
+
+use num_bigint::BigInt;
+use num_integer::Integer as _;
+use num_rational::BigRational;
+use num_traits::{One, Signed, Zero};
+use smallvec::{SmallVec, smallvec};
+
+use crate::faithful::formula::Formula;
+use crate::faithful::linear::Linear;
+use crate::faithful::world::{CLOCK, Key, PHASE, WAITED};
+
+/// What becomes of atoms.
+pub(super) type Truths = BTreeMap<Key, bool>;
+
+/// All timed initial literals of one time.
+#[derive(Debug, Clone)]
+pub(super) struct Event {
+    pub(super) time: BigRational,
+    pub(super) truths: Truths,
+}
+
+/// The least or the greatest time of a range, and whether it is left out.
+type End = (BigRational, bool);
+
+/// The events, in order.
+#[derive(Debug, Default)]
+pub(super) struct Timeline {
+    pub(super) events: Vec<Event>,
+    /// How many of them are at time 0.
+    pub(super) begun: usize,
+}
+
+/// Where an action lies among the events.
+#[derive(Debug, Clone)]
+pub(super) struct Passage {
+    from: usize,
+    to: usize,
+    /// Whether it starts, and ends, at the very time of the event that begins the phase.
+    at_start: bool,
+    at_end: bool,
+    /// Its start is not later; none if there is no limit.
+    latest: Option<End>,
+    /// Its end is not earlier.
+    pub(super) end: End,
+}
+
+pub(super) fn phase(number: usize) -> Key {
+    (PHASE, smallvec![u32::try_from(number).unwrap_or(u32::MAX)])
+}
+
+pub(super) fn waited() -> Key {
+    (WAITED, SmallVec::new())
+}
+
+pub(super) fn clock() -> Key {
+    (CLOCK, SmallVec::new())
+}
+
+impl Timeline {
+    /// Adds a timed initial literal; of two about one atom at one time the later one counts.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
+    pub(super) fn add(&mut self, time: &BigRational, key: Key, holds: bool) {
+        let place = self.events.partition_point(|event| event.time < *time);
+        if self.events.get(place).is_none_or(|event| event.time != *time) {
+            self.events.insert(place, Event { time: time.clone(), truths: Truths::new() });
+            self.begun += usize::from(time.is_zero());
+        }
+        self.events[place].truths.insert(key, holds);
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.events.is_empty()
+    }
+
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
+    fn time(&self, number: usize) -> &BigRational {
+        &self.events[number - 1].time
+    }
+
+    /// The time at which a phase ends; none for the last one.
+    fn over(&self, phase: usize) -> Option<&BigRational> {
+        self.events.get(phase).map(|event| &event.time)
+    }
+
+    /// All passages that an action of this duration can have.
+    pub(super) fn passages(&self, duration: &BigRational) -> Vec<Passage> {
+        if self.is_empty() {
+            let end = (duration.clone(), false);
+            return vec![Passage { from: 0, to: 0, at_start: false, at_end: false, latest: None, end }];
+        }
+        let mut all = Vec::new();
+        for from in self.begun..=self.events.len() {
+            for to in from..=self.events.len() {
+                for at_start in [false, true] {
+                    for at_end in [false, true] {
+                        all.extend(self.passage(duration, (from, to), (at_start, at_end)));
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    fn passage(
+        &self,
+        duration: &BigRational,
+        (from, to): (usize, usize),
+        (at_start, at_end): (bool, bool),
+    ) -> Option<Passage> {
+        // At the time of the event before the first there is nothing to start at.
+        if at_start && from == 0 || at_end && to == 0 {
+            return None;
+        }
+        // The start, from both ends of the action.
+        let mut range = Range { low: (BigRational::zero(), false), high: None };
+        if from > 0 {
+            range.begin(self.time(from), at_start);
+        }
+        if to > 0 {
+            range.begin(&(self.time(to) - duration), at_end);
+        }
+        for end in self.over(from).cloned().into_iter().chain(self.over(to).map(|time| time - duration)) {
+            range.before((end, true));
+        }
+        let end = (&range.low.0 + duration, range.low.1);
+        (!range.is_empty()).then_some(Passage { from, to, at_start, at_end, latest: range.high, end })
+    }
+
+    /// A unit of which the times of events and some durations are multiples.
+    pub(super) fn unit<'d>(&'d self, durations: impl Iterator<Item = &'d BigRational>) -> BigRational {
+        let times = self.events.iter().map(|event| &event.time);
+        let common = times.chain(durations).fold(BigInt::one(), |common, time| common.lcm(time.denom()));
+        BigRational::new(BigInt::one(), common)
+    }
+}
+
+/// A range of times.
+struct Range {
+    low: End,
+    high: Option<End>,
+}
+
+impl Range {
+    /// At a time, or later than it.
+    fn begin(&mut self, time: &BigRational, at: bool) {
+        self.low = self.low.clone().max((time.clone(), !at));
+        if at {
+            self.before((time.clone(), false));
+        }
+    }
+
+    fn before(&mut self, (time, left_out): End) {
+        let is_earlier = |(own, own_left_out): &End| (&time, !left_out) < (own, !own_left_out);
+        if self.high.as_ref().is_none_or(is_earlier) {
+            self.high = Some((time, left_out));
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.high
+            .as_ref()
+            .is_some_and(|high| self.low.0 > high.0 || self.low.0 == high.0 && (self.low.1 || high.1))
+    }
+}
+
+impl Passage {
+    /// Nothing is done until the event that begins a phase.
+    pub(super) fn wait(phase: usize, time: &BigRational) -> Self {
+        let end = (time.clone(), false);
+        Self { from: phase, to: phase, at_start: false, at_end: false, latest: None, end }
+    }
+
+    /// What the state before and the clock satisfy if an action starts so: the clock is not later than its start, and not before 0.
+    pub(super) fn condition(&self, timeline: &Timeline) -> Formula {
+        if timeline.is_empty() {
+            return Formula::truth(true);
+        }
+        let own = [Formula::Atom(phase(self.from), true), Formula::Compare(Linear::fluent(clock()), false)];
+        let limit = self.latest.as_ref().map(|(time, left_out)| {
+            let left = Linear::constant(time.clone()).minus(&Linear::fluent(clock()));
+            Formula::Compare(left, *left_out)
+        });
+        Formula::junction(own.into_iter().chain(limit), true)
+    }
+
+    /// The event at the time of the start.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
+    pub(super) fn at_start<'t>(&self, timeline: &'t Timeline) -> Option<&'t Event> {
+        self.at_start.then(|| &timeline.events[self.from - 1])
+    }
+
+    /// The events strictly between start and end.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
+    pub(super) fn between<'t>(&self, timeline: &'t Timeline) -> &'t [Event] {
+        &timeline.events[self.from..self.to - usize::from(self.at_end && self.to > self.from)]
+    }
+
+    /// The event at the time of the end, if the action takes time.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "phases are counted from 0, and each but the first one begins with an event"
+    )]
+    pub(super) fn at_end<'t>(&self, timeline: &'t Timeline) -> Option<&'t Event> {
+        (self.at_end && self.to > self.from).then(|| &timeline.events[self.to - 1])
+    }
+
+    /// What becomes of the phase, and of whether the last thing that happened was a wait.
+    pub(super) fn truths(&self, timeline: &Timeline) -> Truths {
+        if timeline.is_empty() {
+            return Truths::new();
+        }
+        let mut truths = Truths::from([(phase(self.from), false), (waited(), false)]);
+        truths.insert(phase(self.to), true);
+        truths
+    }
+}
+
+/// Whether a clock that has been set so stands for every time from an end on.
+pub(super) fn stands_for(set: &BigRational, (end, left_out): &End, unit: &BigRational) -> bool {
+    let mark = (set / unit).floor() * unit;
+    if set.is_negative() {
+        return false;
+    }
+    if mark == *set { *end >= mark } else { *end > mark || *end == mark && *left_out }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quarters(count: i64) -> BigRational {
+        BigRational::new(count.into(), 4.into())
+    }
+
+    /// Every start is in the one passage that the definition says.
+    #[test]
+    fn passages_divide_the_starts() {
+        for (events, duration) in [
+            (&[][..], 3),
+            (&[0], 4),
+            (&[4], 0),
+            (&[4, 12], 8),
+            (&[4, 12], 3),
+            (&[0, 4, 8, 13], 4),
+            (&[1, 2, 3], 30),
+        ] {
+            let mut timeline = Timeline::default();
+            for time in events {
+                timeline.add(&quarters(*time), phase(0), true);
+            }
+            let passages = timeline.passages(&quarters(duration));
+            for at in 0..60 {
+                let (start, end) = (quarters(at), quarters(at + duration));
+                let holds = |own: &&Passage| {
+                    let earliest = &own.end.0 - quarters(duration);
+                    let late_enough = earliest < start || earliest == start && !own.end.1;
+                    let limit = own.latest.as_ref();
+                    late_enough && limit.is_none_or(|(time, out)| start < *time || start == *time && !out)
+                };
+                let found: Vec<&Passage> = passages.iter().filter(holds).collect();
+                let before = |time: i64| events.iter().filter(|event| **event <= time).count();
+                let expected = (
+                    before(at),
+                    before(at + duration),
+                    events.contains(&at),
+                    events.contains(&(at + duration)),
+                );
+                let own: Vec<_> =
+                    found.iter().map(|own| (own.from, own.to, own.at_start, own.at_end)).collect();
+                assert_eq!(own, [expected], "{events:?} {duration}: {start} to {end}");
+            }
+        }
+    }
+
+    /// A clock that is a moment ahead stands for what comes after its mark, and for nothing at it.
+    #[test]
+    fn a_clock_stands_for_what_is_not_before_its_mark() {
+        let unit = quarters(2);
+        for (set, end, expected) in [
+            (4, (4, false), true),
+            (4, (4, true), true),
+            (5, (4, false), false),
+            (5, (4, true), true),
+            (5, (5, false), true),
+            (6, (5, true), false),
+            (-1, (4, true), false),
+        ] {
+            let (end, left_out) = end;
+            assert_eq!(
+                stands_for(&quarters(set), &(quarters(end), left_out), &unit),
+                expected,
+                "{set} {end}"
+            );
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! The task in terms of the files: what its variables, numbers, conditions and rules say of atoms and fluents.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::faithful::axioms::Axioms;
+use crate::faithful::formula::{Formula, Structure};
+use crate::faithful::invariant::Invariant;
+use crate::faithful::linear::Linear;
+use crate::faithful::reader;
+use crate::faithful::verdict::{Cause, Difference, Obstacle};
+use crate::faithful::world::{Key, World};
+use crate::model::{self, Condition, Fact, Literal, Model};
+
+/// A condition of the task has at most so many parts once its names are replaced by what they stand for.
+const SIZE_LIMIT: usize = 200_000;
+
+/// Conditions of the task refer to each other at most so deep.
+const DEPTH_LIMIT: usize = 200;
+
+type Result<T> = std::result::Result<T, Obstacle>;
+
+/// What the names of the task stand for.
+pub(super) struct Names {
+    /// By variable and value; none for the last value of a variable, and for a name that the files do not have.
+    keys: Vec<Vec<Option<Key>>>,
+    facts: FxHashMap<Key, Fact>,
+    /// By number.
+    pub(super) fluents: Vec<Key>,
+    pub(super) numbers: FxHashMap<Key, u32>,
+    pub(super) structure: Structure,
+    /// Derived atoms that are variables.
+    pub(super) linked: FxHashSet<Key>,
+    /// The layer in which a derived variable gets its value.
+    layers: FxHashMap<u32, usize>,
+}
+
+fn form<T>(reason: impl Into<String>) -> Result<T> {
+    Err(Difference::Form { reason: reason.into() }.into())
+}
+
+impl Names {
+    pub(super) fn new(world: &World<'_>, model: &Model) -> Result<Self> {
+        let mut names = Self {
+            keys: Vec::new(),
+            facts: FxHashMap::default(),
+            fluents: Vec::new(),
+            numbers: FxHashMap::default(),
+            structure: Structure::default(),
+            linked: FxHashSet::default(),
+            layers: FxHashMap::default(),
+        };
+        for (variable, values) in (0..).zip(&model.variables) {
+            let is_basic = (variable as usize) < model.basic;
+            if !is_basic && values.len() != 2 {
+                return form("a derived variable that has not two values");
+            }
+            let mut keys = Vec::new();
+            let atoms = values.split_last().map_or(&[][..], |(_, atoms)| atoms);
+            for (value, text) in (0..).zip(atoms) {
+                let key = world.written(text);
+                let is_derived = |key: &Key| world.rules(key.0).is_some();
+                if is_basic && key.as_ref().is_none_or(is_derived) {
+                    return form(format!("{text} is no atom of the files that actions can change"));
+                }
+                let key = key.filter(|key| is_basic || is_derived(key));
+                if let Some(key) = &key {
+                    if names.facts.insert(key.clone(), (variable, value)).is_some() {
+                        return form(format!("{text} is the value of two variables"));
+                    }
+                    if is_basic {
+                        names.structure.groups.insert(key.clone(), variable);
+                    } else {
+                        names.linked.insert(key.clone());
+                    }
+                }
+                keys.push(key);
+            }
+            keys.push(None);
+            names.keys.push(keys);
+        }
+        let scale = model.number_scale.to_rational();
+        for (number, text) in (0..).zip(&model.fluents) {
+            let Some(key) = world.written(text) else {
+                return form(format!("{text} is no fluent of the files"));
+            };
+            names.structure.integers.insert(key.clone(), scale.clone());
+            if names.numbers.insert(key.clone(), number).is_some() {
+                return form(format!("{text} is two numbers"));
+            }
+            names.fluents.push(key);
+        }
+        names.layers(model)?;
+        Ok(names)
+    }
+
+    /// Every derived variable has its value before a rule of another layer reads it, or reads that it does not hold.
+    fn layers(&mut self, model: &Model) -> Result<()> {
+        for (layer, rules) in model.axioms.iter().enumerate() {
+            for (head, _) in &rules.rules {
+                if self.layers.insert(head.0, layer).is_some_and(|other| other != layer) {
+                    return form("a derived variable in two layers");
+                }
+            }
+        }
+        for (layer, rules) in model.axioms.iter().enumerate() {
+            for (_, body) in &rules.rules {
+                let facts = body.facts.iter().map(|fact| (*fact, true));
+                for (fact, positive) in facts.chain(body.clauses.iter().flatten().copied()) {
+                    let below = self.layers.get(&fact.0);
+                    let holds = positive == (fact.1 == 0);
+                    if below.is_some_and(|below| *below > layer || *below == layer && !holds) {
+                        return form("a rule that reads a derived variable before it has its value");
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn fact(&self, key: &Key) -> Option<Fact> {
+        self.facts.get(key).copied()
+    }
+
+    pub(super) fn key(&self, fact: Fact) -> Option<&Key> {
+        self.keys[fact.0 as usize][fact.1 as usize].as_ref()
+    }
+
+    /// The atoms that are values of a variable.
+    pub(super) fn atoms(&self, variable: u32) -> impl Iterator<Item = (u32, &Key)> {
+        (0..).zip(&self.keys[variable as usize]).filter_map(|(value, key)| Some((value, key.as_ref()?)))
+    }
+}
+
+/// The conditions of a task in terms of atoms and fluents.
+pub(super) struct Translation<'t> {
+    pub(super) world: &'t World<'t>,
+    pub(super) model: &'t Model,
+    pub(super) names: &'t Names,
+    pub(super) invariant: &'t Invariant,
+    pub(super) axioms: &'t Axioms,
+    /// The atoms of each variable that may ever hold, with their values.
+    possible: Vec<Vec<(u32, &'t Key)>>,
+    /// What derived variables stand for that the files do not have, or whose value is known.
+    unfolded: BTreeMap<u32, Formula>,
+}
+
+impl<'t> Translation<'t> {
+    pub(super) fn new(
+        world: &'t World<'t>,
+        model: &'t Model,
+        names: &'t Names,
+        invariant: &'t Invariant,
+        axioms: &'t Axioms,
+    ) -> Result<Self> {
+        let possible =
+            |(variable, _)| names.atoms(variable).filter(|(_, key)| invariant.may_hold(key)).collect();
+        let possible = (0..).zip(&model.variables).map(possible).collect();
+        let mut own = Self { world, model, names, invariant, axioms, possible, unfolded: BTreeMap::new() };
+        for variable in model.derived_variables() {
+            own.unfold(variable, &mut Vec::new())?;
+        }
+        Ok(own)
+    }
+
+    /// The atoms of a variable that may ever hold, with their values.
+    pub(super) fn possible(&self, variable: u32) -> impl Iterator<Item = (u32, &'t Key)> {
+        self.possible[variable as usize].iter().copied()
+    }
+
+    fn is_linked(&self, variable: u32) -> bool {
+        self.names.key((variable, 0)).is_some_and(|key| self.axioms.linked.contains(key))
+    }
+
+    fn unfold(&mut self, variable: u32, above: &mut Vec<u32>) -> Result<()> {
+        if (variable as usize) < self.model.basic
+            || self.is_linked(variable)
+            || self.unfolded.contains_key(&variable)
+        {
+            return Ok(());
+        }
+        if above.contains(&variable) || above.len() > DEPTH_LIMIT {
+            return Err(Cause::unsupported(
+                "a condition of the task that depends on itself, or on many others in a row",
+            )
+            .into());
+        }
+        above.push(variable);
+        let model = self.model;
+        let mut size = 0_usize;
+        for body in bodies(model, variable) {
+            let clauses = body.clauses.iter().flatten().map(|((variable, _), _)| *variable);
+            for below in body.facts.iter().map(|fact| fact.0).chain(clauses) {
+                self.unfold(below, above)?;
+                size = size.saturating_add(self.unfolded.get(&below).map_or(1, Formula::size));
+            }
+        }
+        above.pop();
+        if size > SIZE_LIMIT {
+            let what = "parts of a condition of the task".to_owned();
+            return Err(Cause::TooMany { what, limit: SIZE_LIMIT }.into());
+        }
+        let formula = self.rules(variable);
+        self.unfolded.insert(variable, formula);
+        Ok(())
+    }
+
+    /// The condition under which the rules of the task give a derived variable its atom.
+    pub(super) fn rules(&self, variable: u32) -> Formula {
+        Formula::junction(bodies(self.model, variable).map(|body| self.condition(body, &[], &[])), false)
+    }
+
+    fn fact(&self, (variable, value): Fact) -> Formula {
+        let none = self.model.none(variable);
+        if value == none {
+            let others = (0..none).map(|value| self.fact((variable, value)).negated());
+            return Formula::junction(others, true);
+        }
+        if let Some(unfolded) = self.unfolded.get(&variable) {
+            return unfolded.clone();
+        }
+        match self.names.key((variable, value)) {
+            Some(key) if (variable as usize) >= self.model.basic => Formula::Atom(key.clone(), true),
+            Some(key) => reader::atom(self.world, self.invariant, key.clone(), true),
+            None => Formula::truth(false),
+        }
+    }
+
+    fn literal(&self, (fact, positive): &Literal) -> Formula {
+        let formula = self.fact(*fact);
+        if *positive { formula } else { formula.negated() }
+    }
+
+    pub(super) fn literals(&self, literals: &[Literal], all: bool) -> Formula {
+        Formula::junction(literals.iter().map(|literal| self.literal(literal)), all)
+    }
+
+    /// A condition with a choice of designs.
+    pub(super) fn condition(&self, condition: &Condition, choice: &[u32], sizes: &[usize]) -> Formula {
+        let facts = condition.facts.iter().map(|fact| self.fact(*fact));
+        let clauses = condition.clauses.iter().map(|clause| self.literals(clause, false));
+        let comparisons = condition.comparisons.iter().map(|linear| {
+            let linear = self.linear(linear, choice, sizes);
+            self.invariant.compare(&linear, false)
+        });
+        Formula::junction(facts.chain(clauses).chain(comparisons), true)
+    }
+
+    /// Numbers times factors plus a quantity, over fluents.
+    fn linear(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
+        let scale = self.model.number_scale.to_rational();
+        let mut sum = Linear::constant(self.model.quantity(&linear.quantity, choice, sizes).to_rational());
+        for (number, factor) in &linear.factors {
+            let fluent = Linear::fluent(self.names.fluents[*number as usize].clone());
+            sum = sum.plus(&fluent, &(factor.to_rational() * &scale));
+        }
+        sum
+    }
+
+    /// What a fluent becomes where a number becomes this.
+    pub(super) fn value(&self, linear: &model::Linear, choice: &[u32], sizes: &[usize]) -> Linear {
+        let value = self.linear(linear, choice, sizes).times(&self.model.number_scale.to_rational().recip());
+        self.invariant.settled(&value)
+    }
+}
+
+fn bodies(model: &Model, variable: u32) -> impl Iterator<Item = &Condition> {
+    let rules = model.axioms.iter().flat_map(|layer| &layer.rules);
+    rules.filter(move |(head, _)| head.0 == variable).map(|(_, body)| body)
+}

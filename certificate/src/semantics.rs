@@ -1,0 +1,193 @@
+//! What a written task means: states, operators and what they cost. Slow and plain; all arithmetic is exact.
+
+use std::ops::Range;
+
+use crate::integer::Integer;
+use crate::model::{Condition, Fact, Linear, Literal, Model, Operator, Quantity};
+
+/// Values of all variables and numbers.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct State {
+    pub(super) values: Vec<u32>,
+    pub(super) numbers: Vec<Integer>,
+}
+
+impl Model {
+    /// The variables that are not derived.
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `shape`")]
+    pub(super) fn basic_variables(&self) -> Range<u32> {
+        0..self.basic as u32
+    }
+
+    /// The variables that are derived.
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `shape`")]
+    pub(super) fn derived_variables(&self) -> Range<u32> {
+        self.basic as u32..self.variables.len() as u32
+    }
+
+    /// The value of a variable that holds where none of its atoms does.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::arithmetic_side_effects,
+        reason = "a variable has a value, and fewer than 2^32, see `shape`"
+    )]
+    pub(super) fn none(&self, variable: u32) -> u32 {
+        self.variables[variable as usize].len() as u32 - 1
+    }
+
+    /// A state with these basic values; the derived ones follow.
+    pub(super) fn state(&self, basic: &[u32], numbers: &[Integer]) -> State {
+        let mut values = basic.to_vec();
+        values.resize(self.variables.len(), 0);
+        let mut state = State { values, numbers: numbers.to_vec() };
+        self.derive(&mut state);
+        state
+    }
+
+    pub(super) fn initial(&self) -> State {
+        self.state(&self.values[..self.basic], &self.numbers)
+    }
+
+    /// Gives derived variables their values: the least fixpoint of the rules, layer by layer.
+    fn derive(&self, state: &mut State) {
+        for variable in self.derived_variables() {
+            state.values[variable as usize] = self.none(variable);
+        }
+        for layer in &self.axioms {
+            loop {
+                let holds = |(head, body): &&(Fact, Condition)| {
+                    state.values[head.0 as usize] != head.1 && self.holds(body, state, &[], &[])
+                };
+                let new: Vec<Fact> = layer.rules.iter().filter(holds).map(|(head, _)| *head).collect();
+                for (variable, value) in &new {
+                    state.values[*variable as usize] = *value;
+                }
+                if new.is_empty() {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// How many designs suit each slot of an operator.
+    pub(super) fn sizes(&self, operator: &Operator) -> Vec<usize> {
+        self.uses[operator.uses as usize].iter().map(|(_, designs)| designs.len()).collect()
+    }
+
+    /// All combinations of designs that an operator admits.
+    #[expect(clippy::cast_possible_truncation, reason = "a slot has fewer designs, see `shape`")]
+    pub(super) fn choices(&self, operator: &Operator) -> Vec<Vec<u32>> {
+        let mut all: Vec<Vec<u32>> = vec![Vec::new()];
+        for size in self.sizes(operator) {
+            let longer = |choice: Vec<u32>| {
+                (0..size as u32).map(move |design| choice.iter().copied().chain([design]).collect())
+            };
+            all = all.into_iter().flat_map(longer).collect();
+        }
+        let exclusions = &self.exclusions[operator.exclusions as usize];
+        all.retain(|choice| {
+            !exclusions.iter().any(|exclusion| {
+                let chosen: Vec<u32> = exclusion.slots.iter().map(|slot| choice[*slot as usize]).collect();
+                exclusion.combinations.contains(&chosen)
+            })
+        });
+        all
+    }
+
+    /// The value of a quantity for a combination of designs.
+    #[expect(clippy::arithmetic_side_effects, reason = "a row is below the size of its table, see `shape`")]
+    pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> Integer {
+        let mut sum = quantity.constant.clone();
+        for (slots, table) in &quantity.tables {
+            let mut row = 0;
+            for slot in slots {
+                row = row * sizes[*slot as usize] + choice[*slot as usize] as usize;
+            }
+            sum = &sum + &self.tables[*table as usize][row];
+        }
+        sum
+    }
+
+    /// A lower bound on a quantity for all combinations of designs.
+    pub(super) fn least(&self, quantity: &Quantity) -> Integer {
+        let tables =
+            quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().min());
+        tables.chain([&quantity.constant]).sum()
+    }
+
+    /// An upper bound, as `least` is a lower one.
+    pub(super) fn most(&self, quantity: &Quantity) -> Integer {
+        let tables =
+            quantity.tables.iter().filter_map(|(_, table)| self.tables[*table as usize].iter().max());
+        tables.chain([&quantity.constant]).sum()
+    }
+
+    pub(super) fn linear(&self, linear: &Linear, state: &State, choice: &[u32], sizes: &[usize]) -> Integer {
+        let quantity = self.quantity(&linear.quantity, choice, sizes);
+        let numbers = linear.factors.iter();
+        numbers.fold(quantity, |sum, (number, factor)| &sum + &(&state.numbers[*number as usize] * factor))
+    }
+
+    /// Whether a condition holds; its finite-domain part does not depend on designs.
+    pub(super) fn holds(
+        &self,
+        condition: &Condition,
+        state: &State,
+        choice: &[u32],
+        sizes: &[usize],
+    ) -> bool {
+        holds_without_numbers(condition, state)
+            && condition
+                .comparisons
+                .iter()
+                .all(|linear| !self.linear(linear, state, choice, sizes).is_negative())
+    }
+
+    /// The state after an applicable operator.
+    pub(super) fn successor(
+        &self,
+        operator: &Operator,
+        state: &State,
+        choice: &[u32],
+        sizes: &[usize],
+    ) -> State {
+        let mut next = state.clone();
+        for (variable, value) in &operator.effects {
+            next.values[*variable as usize] = *value;
+        }
+        for conditional in &operator.conditional {
+            if conditional.condition.iter().all(|literal| literal_holds(literal, state)) {
+                for (variable, value) in &conditional.effects {
+                    next.values[*variable as usize] = *value;
+                }
+            }
+        }
+        for (number, value) in &operator.changes {
+            next.numbers[*number as usize] = self.linear(value, state, choice, sizes);
+        }
+        self.derive(&mut next);
+        next
+    }
+
+    /// Whether more of any number never hurts: no factor in any condition or change is negative, and no derived variable
+    /// depends on numbers.
+    pub(super) fn more_never_hurts(&self) -> bool {
+        let rules = self.axioms.iter().flat_map(|layer| &layer.rules);
+        let conditions = self.operators.iter().map(|operator| &operator.condition).chain([&self.goal]);
+        let changes =
+            self.operators.iter().flat_map(|operator| operator.changes.iter().map(|(_, value)| value));
+        let mut linears = conditions.flat_map(|condition| &condition.comparisons).chain(changes);
+        rules.into_iter().all(|(_, body)| body.comparisons.is_empty())
+            && linears.all(|linear| linear.factors.iter().all(|(_, factor)| !factor.is_negative()))
+    }
+}
+
+pub(super) fn holds_without_numbers(condition: &Condition, state: &State) -> bool {
+    let fact = |(variable, value): &Fact| state.values[*variable as usize] == *value;
+    condition.facts.iter().all(fact)
+        && condition.clauses.iter().all(|clause| clause.iter().any(|literal| literal_holds(literal, state)))
+}
+
+fn literal_holds(((variable, value), positive): &Literal, state: &State) -> bool {
+    (state.values[*variable as usize] == *value) == *positive
+}

@@ -1,0 +1,208 @@
+//! Tables of lower bounds by the values of a few variables, and why they are bounds.
+//!
+//! A potential is a lower bound on the cost to the goal if it is at most 0 wherever the goal can hold, and no operator lowers it by
+//! more than it costs. A need is a lower bound on what must be left of a number if no operator makes up for it
+//! otherwise: one that uses the number requires that it stays at least 0, and whatever else changes it may only stand where
+//! nothing is needed.
+
+use crate::integer::Integer;
+use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
+use crate::semantics::State;
+
+/// A bound; none is infinity.
+type Bound<'b> = Option<&'b Integer>;
+
+/// A value (none for infinity) for each combination of values of the pattern.
+pub(super) struct Table<'t> {
+    pattern: &'t [u32],
+    sizes: Vec<usize>,
+    values: &'t [Option<Integer>],
+}
+
+impl<'t> Table<'t> {
+    pub(super) fn new(model: &Model, pattern: &'t [u32], values: &'t [Option<Integer>]) -> Self {
+        let sizes = pattern.iter().map(|variable| model.variables[*variable as usize].len()).collect();
+        Self { pattern, sizes, values }
+    }
+
+    pub(super) fn at(&self, state: &State) -> Bound<'_> {
+        self.at_row(self.row_of(state))
+    }
+
+    fn value(&self, values: &[u32]) -> Bound<'_> {
+        self.at_row(self.row(values))
+    }
+
+    /// The position of a combination of values.
+    #[expect(clippy::arithmetic_side_effects, reason = "a row is below the size of its table, see `shape`")]
+    pub(super) fn row(&self, values: &[u32]) -> usize {
+        self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize)
+    }
+
+    /// The position of a state's values.
+    pub(super) fn row_of(&self, state: &State) -> usize {
+        let values: Vec<u32> = self.pattern.iter().map(|variable| state.values[*variable as usize]).collect();
+        self.row(&values)
+    }
+
+    /// How many combinations of values there are.
+    pub(super) fn rows(&self) -> usize {
+        self.values.len()
+    }
+
+    pub(super) fn at_row(&self, row: usize) -> Bound<'_> {
+        self.values[row].as_ref()
+    }
+
+    /// Every combination that agrees with some facts.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        clippy::cast_possible_truncation,
+        reason = "a row is below the size of its table, see `shape`"
+    )]
+    pub(super) fn matching(&self, facts: &[Fact]) -> Vec<Vec<u32>> {
+        let mut all = vec![Vec::new()];
+        for (variable, size) in self.pattern.iter().zip(&self.sizes) {
+            let fixed = facts.iter().find(|fact| fact.0 == *variable).map(|fact| fact.1);
+            let range = fixed.map_or(0..*size as u32, |value| value..value + 1);
+            let longer = |values: Vec<u32>| {
+                range.clone().map(move |value| values.iter().copied().chain([value]).collect())
+            };
+            all = all.into_iter().flat_map(longer).collect();
+        }
+        all
+    }
+
+    fn after(&self, values: &[u32], effects: &[Fact]) -> Vec<u32> {
+        let effect = |variable: u32| effects.iter().rev().find(|fact| fact.0 == variable).map(|fact| fact.1);
+        self.pattern.iter().zip(values).map(|(variable, value)| effect(*variable).unwrap_or(*value)).collect()
+    }
+
+    pub(super) fn touches(&self, operator: &Operator) -> bool {
+        let conditional = operator.conditional.iter().flat_map(|conditional| &conditional.effects);
+        let mut facts = operator.condition.facts.iter().chain(&operator.effects).chain(conditional);
+        facts.any(|fact| self.pattern.contains(&fact.0))
+    }
+
+    /// Where an operator may lead from some values: what a conditional effect asks for beyond the pattern may hold or not.
+    pub(super) fn targets(&self, operator: &Operator, values: &[u32]) -> Vec<Vec<u32>> {
+        let truth = |((variable, value), positive): &Literal| {
+            let position = self.pattern.iter().position(|own| own == variable)?;
+            Some((values[position] == *value) == *positive)
+        };
+        let mut targets = vec![self.after(values, &operator.effects)];
+        for Conditional { condition, effects } in &operator.conditional {
+            if condition.iter().any(|literal| truth(literal) == Some(false)) {
+                continue;
+            }
+            let fired: Vec<_> = targets.iter().map(|target| self.after(target, effects)).collect();
+            if condition.iter().all(|literal| truth(literal) == Some(true)) {
+                targets = fired;
+            } else {
+                targets.extend(fired);
+                targets.sort_unstable();
+                targets.dedup();
+            }
+        }
+        targets
+    }
+
+    /// Calls `check` with the values before and after, for every operator that touches the pattern. `false` is an error.
+    fn each_transition(
+        &self,
+        model: &Model,
+        check: &dyn Fn(&Operator, Bound<'_>, Bound<'_>) -> bool,
+    ) -> Result<(), String> {
+        for (operator, position) in model.operators.iter().zip(0..) {
+            if !self.touches(operator) {
+                // It leads from each combination to itself; any finite value stands for all.
+                let finite = self.values.iter().flatten().max();
+                if finite.is_some() && !check(operator, finite, finite) {
+                    return Err(format!("operator {position}, which changes nothing that the table knows"));
+                }
+                continue;
+            }
+            for values in self.matching(&operator.condition.facts) {
+                for target in self.targets(operator, &values) {
+                    if !check(operator, self.value(&values), self.value(&target)) {
+                        return Err(format!("operator {position} leads from {values:?} to {target:?}"));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether `left ≤ right + step`, where none is infinite.
+fn at_most(left: Bound<'_>, right: Bound<'_>, step: &Integer) -> bool {
+    right.is_none_or(|right| left.is_some_and(|left| *left <= right + step))
+}
+
+/// Checks that a table bounds the cost to the goal from below.
+pub(super) fn check_potential(model: &Model, table: &Table<'_>) -> Result<(), String> {
+    for values in table.matching(&model.goal.facts) {
+        if !at_most(table.value(&values), Some(&Integer::ZERO), &Integer::ZERO) {
+            return Err(format!("the goal may hold at {values:?}"));
+        }
+    }
+    table.each_transition(model, &|operator, before, after| {
+        at_most(before, after, &model.least(&operator.cost))
+    })
+}
+
+/// What an operator does to a number.
+enum Use {
+    /// It lowers it by at least so much (≥ 0), and requires that at least 0 is left then.
+    Lowers(Integer),
+    /// Anything else.
+    Other,
+}
+
+fn use_of(model: &Model, operator: &Operator, number: u32) -> Use {
+    let mut changes = operator.changes.iter().filter(|(own, _)| *own == number);
+    let Some((_, value)) = changes.next() else { return Use::Lowers(Integer::ZERO) };
+    let most = model.most(&value.quantity);
+    let guarded =
+        most.is_zero() && value.quantity.tables.is_empty() || operator.condition.comparisons.contains(value);
+    if changes.next().is_none() && is_alone(value, number) && !most.is_positive() && guarded {
+        Use::Lowers(-&most)
+    } else {
+        Use::Other
+    }
+}
+
+/// Checks that a table bounds from below what must be left of a number, where it is not 0.
+pub(super) fn check_need(model: &Model, number: u32, table: &Table<'_>) -> Result<(), String> {
+    if table.values.iter().flatten().any(Integer::is_negative) {
+        return Err("it is negative".into());
+    }
+    let left = model
+        .goal
+        .comparisons
+        .iter()
+        .filter_map(|linear| lower_end(linear, number))
+        .max()
+        .unwrap_or_default()
+        .max(Integer::ZERO);
+    for values in table.matching(&model.goal.facts) {
+        if !at_most(table.value(&values), Some(&left), &Integer::ZERO) {
+            return Err(format!("the goal may hold at {values:?}"));
+        }
+    }
+    table.each_transition(model, &|operator, before, after| match use_of(model, operator, number) {
+        Use::Lowers(least) => at_most(before, after, &least),
+        Use::Other => before.is_some_and(Integer::is_zero) || (before.is_none() && after.is_none()),
+    })
+}
+
+/// The value that a number must have for a comparison to hold, if it is about that number alone.
+fn lower_end(linear: &Linear, number: u32) -> Option<Integer> {
+    let Quantity { constant, tables } = &linear.quantity;
+    (is_alone(linear, number) && tables.is_empty()).then(|| -constant)
+}
+
+/// Whether a linear expression is a number plus a quantity.
+pub(super) fn is_alone(linear: &Linear, number: u32) -> bool {
+    linear.factors == [(number, Integer::from(1))]
+}
