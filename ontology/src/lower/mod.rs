@@ -99,11 +99,15 @@ impl Context<'_> {
     }
 
     /// Takes out the rules that the engine rejects (unsafe variables, for one): it would reject the whole program. A
-    /// rule for an axiom binds its variables by the relations of its body.
+    /// rule for an axiom binds its variables by the relations of its body, or has none.
     fn drop_unusable(&mut self) {
+        let is_relation = |atom: &Atom| matches!(atom, Atom::Relation { .. });
+        let is_ground =
+            |atom: &Atom| is_relation(atom) && atom.terms().iter().all(|term| term.as_variable().is_none());
         let is_bound = |rule: &&Rule| {
-            let mut atoms = rule.body.iter();
-            *rule.identity.source == *AXIOM_SOURCE && atoms.any(|atom| matches!(atom, Atom::Relation { .. }))
+            *rule.identity.source == *AXIOM_SOURCE
+                && (rule.body.iter().any(is_relation)
+                    || rule.body.is_empty() && rule.head.iter().all(is_ground))
         };
         let rules = self.rules.iter().filter(|rule| !is_bound(rule)).cloned().collect();
         let program = Program { rules, ..Program::default() };
