@@ -191,9 +191,10 @@ fn is_strict(triple: &Triple) -> bool {
     match &triple.object {
         Term::NamedNode(node) => !is_blank(node),
         Term::Literal(literal) => {
-            literal.language().is_none()
-                && ![rdf::LANG_STRING, rdf::DIR_LANG_STRING].contains(&literal.datatype().as_str())
-                && !literal.value().contains(['\n', '\r'])
+            let is_tag = |tag| oxrdf::Literal::new_language_tagged_literal("", tag).is_ok();
+            let tagged = [rdf::LANG_STRING, rdf::DIR_LANG_STRING];
+            let is_datatype = || !tagged.contains(&literal.datatype().as_str());
+            literal.language().map_or_else(is_datatype, is_tag) && !literal.value().contains(['\n', '\r'])
         }
         Term::BlankNode(_) => true,
     }
