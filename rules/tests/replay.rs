@@ -131,6 +131,7 @@ fn names_in_rules_stay_as_they_are_written() {
     for (rules, later) in [
         ("sameAs(?x, b) -> p(?x) . q(?y) -> sameAs(b, a) .", "q(c)"),
         ("q(?y) -> sameAs(b, a) . sameAs(b, ?x) -> p(?x) .", "q(c)"),
+        ("q(?y) -> sameAs(b, a) . sameAs(a, b) -> p(c) .", "q(c)"),
         ("r(?x) ^ sameAs(?x, b) -> p(?x) . q(?y) -> sameAs(b, a) .", "q(c), r(a)"),
         ("r(?x) ^ sameAs(?x, b) -> p(?x) . p(?y) -> sameAs(b, a) .", "r(b), r(c)"),
         ("sameAs(?x, b) -> p(?x) . p(b) -> sameAs(b, a) . p(a) -> sameAs(c, a) .", "q(c)"),

@@ -81,6 +81,13 @@ impl Equality {
         Derivation { steps }
     }
 
+    /// The pairs by which names became one, each after those that it rests on.
+    pub fn pairs_in_order(&self) -> Vec<Fact> {
+        let edges: BTreeMap<EdgeId, &Edge> =
+            self.classes.edges.iter().map(|(id, edge)| (*id, edge)).collect();
+        edges.into_values().map(|edge| Fact::new(self.same, [edge.left, edge.right])).collect()
+    }
+
     fn is_edge(&self, engine: &Engine, fact: &Fact) -> bool {
         self.is_pair(fact, &engine.symbols) && fact.arguments[0] != fact.arguments[1]
     }
