@@ -409,10 +409,10 @@ impl Knowledge {
         Ok(ontology::lower(&ontology, self.runtime.engine_mut().symbols_mut()).facts)
     }
 
-    /// What follows and is not stated, in the order of its N-Triples. That names stand for one individual is said of an
+    /// What follows and is not stated, in an order that depends on what was read only. That names stand for one individual is said of an
     /// individual of more than 32 names by the pairs with its first name.
     pub fn inferred(&self) -> Vec<Fact> {
-        self.engine().facts_in_brief(MANY_NAMES).filter(|fact| !self.engine().is_asserted(fact)).collect()
+        self.engine().inferred_in_brief(MANY_NAMES)
     }
 
     /// All contradictions; empty if the knowledge is consistent.

@@ -98,10 +98,15 @@ pub enum Error {
         reason: String,
     },
     /// O112: expressions within expressions, more than the reader takes.
-    #[error("{}: error[O112]: expressions are nested more than {deepest} deep", place(file, position.as_ref()))]
+    #[error(
+        "{}: error[O112]: expressions are nested more than {deepest} deep{}",
+        place(file, position.as_ref()), about.as_ref().map_or_else(String::new, |iri| format!(", in what is said of <{iri}>"))
+    )]
     TooDeep {
         /// The document.
         file: String,
+        /// Of what the expression is said, where the syntax does not show the place.
+        about: Option<String>,
         /// Where, if the syntax shows it.
         position: Option<Position>,
         /// How deep they may be.
@@ -322,7 +327,7 @@ pub enum Warning {
     /// O404: several stated values of a property that is declared functional.
     #[error(
         "warning[O404]: <{subject}> has {} values of <{property}>, which is functional: {}; {consequence}",
-        values.len(), values.join(", ")
+        values.len(), in_short(values)
     )]
     SeveralValues {
         /// The individual.
@@ -401,3 +406,14 @@ fn listed(names: &[String]) -> String {
 fn label_suffix(label: Option<&str>) -> String {
     label.map_or_else(String::new, |label| format!(" ({label})"))
 }
+
+/// The first of many values.
+fn in_short(values: &[String]) -> String {
+    match values.get(..MOST_VALUES).filter(|_| values.len() > MOST_VALUES + 1) {
+        Some(first) => format!("{} and {} more", first.join(", "), values.len() - MOST_VALUES),
+        None => values.join(", "),
+    }
+}
+
+/// So many values are listed in a message.
+const MOST_VALUES: usize = 10;

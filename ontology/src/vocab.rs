@@ -22,7 +22,7 @@ vocabulary! {
     /// RDF.
     rdf = "http://www.w3.org/1999/02/22-rdf-syntax-ns#" {
         TYPE = "type", FIRST = "first", REST = "rest", NIL = "nil", LIST = "List", PROPERTY = "Property",
-        PLAIN_LITERAL = "PlainLiteral",
+        PLAIN_LITERAL = "PlainLiteral", LANG_STRING = "langString", DIR_LANG_STRING = "dirLangString",
     }
 }
 

@@ -115,6 +115,30 @@ fn statements_follow_or_are_not_shown() {
     assert!(follows(":A owl:disjointWith :B . :i a :A , :B .", ":x :p :y ."), "anything follows");
 }
 
+/// Who asks need not declare again what the knowledge base declares.
+#[test]
+fn conclusions_use_the_declarations_of_the_knowledge_base() {
+    let asks = |text: &str, known: &Ontology| {
+        let prefixes: Vec<&str> = PREFIXES.lines().filter(|line| line.starts_with("@prefix")).collect();
+        let text = format!("{}\n{text}", prefixes.join("\n"));
+        let options = ReadOptions { known: known.entities.clone(), ..ReadOptions::default() };
+        read_text(&text, "question", &options).expect("well-formed")
+    };
+    let premise = ":p a owl:FunctionalProperty ; rdfs:range :A . :d a owl:FunctionalProperty .";
+    for (conclusion, expected) in [
+        (":p a owl:FunctionalProperty .", true),
+        (":d a owl:FunctionalProperty .", true),
+        (":q a owl:FunctionalProperty .", false),
+        (":p rdfs:range :A .", true),
+        (":p rdfs:range :B .", false),
+    ] {
+        let found = entailments(&engine(premise), &asks(conclusion, &read(premise))).expect("it ends");
+        assert!(!found.is_empty(), "{conclusion}");
+        let all = found.iter().all(|one| matches!(one.answer, Answer::Follows(_)));
+        assert_eq!(all, expected, "{conclusion}: {found:?}");
+    }
+}
+
 #[test]
 fn classes_and_properties_are_ordered() {
     let text = ":A rdfs:subClassOf :B . :B rdfs:subClassOf :C . :C owl:disjointWith :D . :D a owl:Class .

@@ -269,6 +269,10 @@ fn unusable_rules_are_reported_and_the_others_kept() {
             rule(&format!("{a} {}", built_in("<http://custom/#f>")), &b),
             "is left out: the built-in <http://custom/#f> is not known",
         ),
+        (
+            rule(&format!("{a} {}", built_in("swrlb:lesThan")), &b),
+            "is left out: the built-in <http://www.w3.org/2003/11/swrlb#lesThan> is not known; did you mean `lessThan`?",
+        ),
     ] {
         let (engine, warnings) = engine(&format!("{prefixes}{bad}{good}"));
         assert_eq!(derived(&engine), BTreeSet::from(["i a B".to_owned()]));

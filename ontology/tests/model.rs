@@ -10,6 +10,7 @@ use rules::{Engine, Symbols};
 /// Prefixes for models that import our metamodel.
 const HEAD: &str = "@prefix t: <http://metacontrol.org/tomasys#> .\n\
     @prefix owl: <http://www.w3.org/2002/07/owl#> .\n@prefix : <http://x#> .\n\
+    @prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .\n\
     @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n\
     @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .\n\
     <urn:model> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n\
@@ -54,6 +55,24 @@ fn mistakes_are_reported() {
         ],
     );
     check(":v a t:QAvalue ; t:hasValue 1 , 1.0 .", &[]);
+    // Nothing is known of values of a datatype without a definition, or of XML.
+    for (values, contradict) in [
+        ("\"a\" , \"b\"", true),
+        ("\"a\"^^:D , \"b\"^^:D", false),
+        ("\"a\"^^:D , \"b\"^^:D , 1 , 2", true),
+        ("\"<a/>\"^^rdf:XMLLiteral , \"<b/>\"^^rdf:XMLLiteral", false),
+    ] {
+        let text = format!("{HEAD}:d a owl:DatatypeProperty , owl:FunctionalProperty . :i :d {values} .");
+        let found = warnings(&read_text(&text, "model.ttl", &ReadOptions::default()).expect("well-formed"));
+        let [warning] = &found[..] else { panic!("{found:?}") };
+        assert!(warning.starts_with("warning[O404]"), "{warning}");
+        let end = if contradict {
+            "; this is a contradiction"
+        } else {
+            "; whether these are one value is not decided"
+        };
+        assert!(warning.ends_with(end), "{warning}");
+    }
     check(
         ":g a t:Function . :fd t:solvesF :g .",
         &["warning[O404]: <http://x#fd> has 2 values of <http://metacontrol.org/tomasys#solvesF>"],
@@ -79,7 +98,8 @@ fn mistakes_are_reported() {
 fn a_string_where_a_boolean_is_declared() {
     let model = "@prefix t: <http://metacontrol.org/tomasys#> .\n\
         @prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
-        @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n\
+        @prefix rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#> .\n\
+    @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n\
         @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .\n\
         <urn:model> a owl:Ontology . t:Component a owl:Class .\n\
         t:c_status a owl:DatatypeProperty ; rdfs:range xsd:boolean .\n\

@@ -405,3 +405,36 @@ fn owl_xml_with_sections_and_comments_in_literals() {
     let ontology = read_text(text, "document", &ReadOptions::default()).unwrap_or_else(|e| panic!("{e:?}"));
     assert_eq!(shown(&ontology), ["DataPropertyAssertion(<d> <i> \"a & </b> ]> & 'c d\")"]);
 }
+
+/// However quickly N-Triples are parsed, nothing passes that the grammar does not have.
+#[test]
+fn triples_in_lines_are_checked() {
+    let read = |subject: &str, object: &str| {
+        read_text(&format!("{subject} <http://e/p> {object} .\n"), "t.nt", &ReadOptions::default())
+    };
+    for (subject, object) in [
+        ("<http://e/a b>", "<http://e/b>"),
+        ("<http://e/a>", "<http://e/b|c>"),
+        ("<http://e/a>", "<_:b>"),
+        ("<_:a>", "<http://e/b>"),
+        ("<http://e/a>", "\"x\"@toolonglanguage"),
+        ("<http://e/a>", "\"x\"^^<http://www.w3.org/1999/02/22-rdf-syntax-ns#langString>"),
+        ("<http://e/a>", "\"x\ny\""),
+        ("<http://e/a>", "\"x\\uD800\""),
+        ("<http://e/a>", "\"x\"^^<http://e/ b>"),
+    ] {
+        let errors = read(subject, object).expect_err(object);
+        assert!(errors[0].to_string().starts_with("t.nt:1:"), "{subject} {object}: {}", errors[0]);
+    }
+    for (object, expected) in [
+        ("\"x\"@en", "DataPropertyAssertion(<http://e/p> <http://e/a> \"x\"@en)"),
+        ("\"x\\ny\"", "DataPropertyAssertion(<http://e/p> <http://e/a> \"x\ny\")"),
+        ("<http://e/\\u0041>", "ObjectPropertyAssertion(<http://e/p> <http://e/a> <http://e/A>)"),
+        ("<b>", "ObjectPropertyAssertion(<http://e/p> <http://e/a> <file:///b>)"),
+    ] {
+        let ontology = read("<http://e/a>", object).expect(object);
+        let axioms: Vec<String> =
+            ontology.axioms.iter().map(|annotated| annotated.axiom.to_string()).collect();
+        assert_eq!(axioms, [expected]);
+    }
+}

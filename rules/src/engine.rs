@@ -231,18 +231,26 @@ impl Engine {
 
     /// Everything that holds, in the order of symbols.
     pub fn facts(&self) -> impl Iterator<Item = Fact> {
-        self.facts_in_brief(usize::MAX)
-    }
-
-    /// As [`Engine::facts`]; but that names stand for one individual is said of an individual of more than `most` names only
-    /// by the pairs with its first name, from which the others follow.
-    pub fn facts_in_brief(&self, most: usize) -> impl Iterator<Item = Fact> {
         let mut facts: Vec<Fact> = match &self.equality {
-            Some(equality) => equality.facts(self, most),
+            Some(equality) => equality.facts(self, usize::MAX),
             None => self.rows_with(0).collect(),
         };
         facts.sort_unstable();
         facts.into_iter()
+    }
+
+    /// What holds and is not stated, in the order of the engine's history: equal histories give equal orders. That names stand
+    /// for one individual is said of an individual of more than `most` names only by the pairs with its first name, from
+    /// which the others follow.
+    pub fn inferred_in_brief(&self, most: usize) -> Vec<Fact> {
+        match &self.equality {
+            Some(equality) => {
+                let mut facts = equality.facts(self, most);
+                facts.retain(|fact| !equality.is_stated(self, fact));
+                facts
+            }
+            None => self.rows_where(|bits| bits & state::ASSERTED == 0).collect(),
+        }
     }
 
     /// The predicates of all facts that hold, each with the number of its arguments, in no particular order; of some of them
@@ -254,9 +262,13 @@ impl Engine {
 
     /// The rows of the store with these state bits, those of constraints and aggregates left out.
     pub(crate) fn rows_with(&self, bits: u8) -> impl Iterator<Item = Fact> {
+        self.rows_where(move |state| state & bits == bits)
+    }
+
+    fn rows_where(&self, fits: impl Fn(u8) -> bool + Copy) -> impl Iterator<Item = Fact> {
         let named = self.store.relations.iter().filter_map(|relation| Some((relation, relation.predicate?)));
         named.flat_map(move |(relation, predicate)| {
-            let rows = relation.scan().filter(move |&row| relation.state(row) & bits == bits);
+            let rows = relation.scan().filter(move |&row| fits(relation.state(row)));
             rows.map(move |row| Fact { predicate, arguments: SmallVec::from_slice(relation.row(row)) })
         })
     }

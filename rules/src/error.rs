@@ -1,5 +1,6 @@
 //! Everything that can be wrong with rules or an update, one numbered variant per cause.
 
+use crate::builtin::{BuiltIn, SWRLB};
 use crate::rule::RuleIdentity;
 
 /// What is wrong. R1xx: rule text; R2xx: a rule; R3xx: an update.
@@ -30,8 +31,8 @@ pub enum Error {
         /// Without the colon.
         prefix: String,
     },
-    /// A `swrlb` name that the engine does not know.
-    #[error("{file}:{line}:{column}: R103 unknown or unsupported built-in `{name}`")]
+    /// A `swrlb` name that SWRL does not have.
+    #[error("{file}:{line}:{column}: R104 there is no built-in `{name}`{}", did_you_mean(&format!("{SWRLB}{name}")))]
     UnknownBuiltIn {
         /// The source as named by the caller.
         file: String,
@@ -58,7 +59,8 @@ pub enum Error {
     },
     /// A built-in of a library that the engine does not have.
     #[error(
-        "{file}:{line}:{column}: R104 built-in <{name}> belongs to a library that the engine does not have"
+        "{file}:{line}:{column}: R104 built-in <{name}> belongs to a library that the engine does not have{}",
+        did_you_mean(name)
     )]
     ForeignBuiltIn {
         /// The source as named by the caller.
@@ -195,4 +197,9 @@ pub enum Error {
         /// How many there are.
         count: usize,
     },
+}
+
+/// The built-in that the author of an unknown one may have meant.
+fn did_you_mean(iri: &str) -> String {
+    BuiltIn::similar(iri).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }

@@ -236,6 +236,11 @@ fn unknown_built_ins_are_errors() {
     let message =
         format!("test:1:9: R104 built-in <{library}soon> belongs to a library that the engine does not have");
     check(&format!("p(?x) ^ <{library}soon>(?x) -> q(?x)"), &[&message]);
+    let known = "http://swrl.stanford.edu/ontologies/built-ins/3.3/temporal.owl#before";
+    let message = format!(
+        "test:1:9: R104 built-in <{library}befor> belongs to a library that the engine does not have; did you mean `{known}`?"
+    );
+    check(&format!("p(?x) ^ <{library}befor>(?x, ?x) -> q(?x)"), &[&message]);
 }
 
 #[test]

@@ -143,11 +143,16 @@ fn a_clone_goes_its_own_way() {
 /// The pairs of a class grow with its square, and are not listed where nobody wants them.
 #[test]
 fn large_classes_are_listed_in_brief() {
-    let stated: Vec<String> = (1..40).map(|n| format!("sameAs(n0, n{n})")).collect();
-    let engine = engine("", &stated.join(", "));
-    assert_eq!(engine.facts().count(), 40 * 39);
-    assert_eq!(engine.facts_in_brief(40).count(), 40 * 39);
-    let brief: Vec<Fact> = engine.facts_in_brief(39).collect();
+    let stated: Vec<String> = (1..40).map(|n| format!("is(n{n}, n0)")).collect();
+    let engine = engine("is(?x, ?y) -> sameAs(?x, ?y) .", &stated.join(", "));
+    let same = |fact: &Fact| {
+        engine.symbols().value(fact.predicate).as_name() == Some("http://www.w3.org/2002/07/owl#sameAs")
+    };
+    assert_eq!(engine.facts().filter(same).count(), 40 * 39);
+    assert_eq!(engine.inferred_in_brief(40).into_iter().filter(same).count(), 40 * 39);
+    let mut brief = engine.inferred_in_brief(39);
+    assert!(brief.iter().all(|fact| engine.holds(fact) && !engine.is_asserted(fact)));
+    brief.retain(same);
     assert_eq!(brief.len(), 39);
-    assert!(brief.iter().all(|fact| engine.holds(fact) && fact.arguments[0] == brief[0].arguments[0]));
+    assert!(brief.iter().all(|fact| fact.arguments[0] == brief[0].arguments[0]));
 }

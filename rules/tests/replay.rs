@@ -4,8 +4,8 @@
 mod text;
 
 use metaplan_rules::replay::{Replayed, replay};
-use metaplan_rules::{Derivation, Engine, Fact, Reason};
-use text::engine;
+use metaplan_rules::{Delta, Derivation, Engine, Fact, Program, Reason, Symbols, parse_rules};
+use text::{engine, facts, prefixes};
 
 const RULES: &str = "
     [usable] design(?fd) ^ not broken(?fd) -> usable(?fd) .
@@ -123,4 +123,32 @@ fn what_is_negated_must_not_hold() {
         derivation.steps.push(usable);
     };
     check(deny, Err("<broken>(<b>) follows by rule test#1 (low), and is missing"));
+}
+
+/// A rule that compares a variable with a name concludes about that name, and about its other names by equality only.
+#[test]
+fn names_in_rules_stay_as_they_are_written() {
+    for (rules, later) in [
+        ("sameAs(?x, b) -> p(?x) . q(?y) -> sameAs(b, a) .", "q(c)"),
+        ("q(?y) -> sameAs(b, a) . sameAs(b, ?x) -> p(?x) .", "q(c)"),
+        ("q(?y) -> sameAs(b, a) . sameAs(a, b) -> p(c) .", "q(c)"),
+        ("r(?x) ^ sameAs(?x, b) -> p(?x) . q(?y) -> sameAs(b, a) .", "q(c), r(a)"),
+        ("r(?x) ^ sameAs(?x, b) -> p(?x) . p(?y) -> sameAs(b, a) .", "r(b), r(c)"),
+        ("sameAs(?x, b) -> p(?x) . p(b) -> sameAs(b, a) . p(a) -> sameAs(c, a) .", "q(c)"),
+    ] {
+        // Facts about `p` are the first ones, and `a` stands for all of its names.
+        let (text, mut symbols) = (format!("p(a) ^ never(a) -> p(a) . {rules}"), Symbols::new());
+        let program = parse_rules(&text, "test", &mut symbols, &prefixes()).expect("rules");
+        let program = Program { equality: true, ..program };
+        let mut engine = Engine::new(symbols, program, []).expect("safe");
+        for fact in facts(engine.symbols_mut(), later) {
+            engine.apply(Delta { insert: vec![fact], delete: Vec::new() }).expect("within the budget");
+            let mut symbols = engine.symbols().clone();
+            let replayed = replay(engine.program(), &mut symbols, &stated(&engine), &engine.everything());
+            assert!(replayed.is_ok(), "{rules}: {replayed:?}");
+            for fact in engine.facts() {
+                assert!(engine.why(&fact).is_some_and(|derivation| derivation.steps[0].fact == fact));
+            }
+        }
+    }
 }

@@ -95,6 +95,14 @@ fn errors_have_codes_and_positions() {
         &["test:1:9: R104 built-in `listConcat` works on lists, which the engine has no values for"],
     );
     check(
+        "p(?x) ^ swrlb:lesThan(?x, 3) -> q(?x) . p(?x) ^ swrlb:greaterthan(?x, 3) -> q(?x) . p(?x) ^ swrlb:frobnicate(?x) -> q(?x)",
+        &[
+            "test:1:9: R104 there is no built-in `lesThan`; did you mean `lessThan`?",
+            "test:1:49: R104 there is no built-in `greaterthan`; did you mean `greaterThan`?",
+            "test:1:93: R104 there is no built-in `frobnicate`",
+        ],
+    );
+    check(
         "@prefix t: <http://swrl.stanford.edu/ontologies/built-ins/3.3/abox.owl#> .\nt:add(?x, ?y, 1, \"Days\") -> q(?x)",
         &[
             "test:2:1: R104 built-in <http://swrl.stanford.edu/ontologies/built-ins/3.3/abox.owl#add> belongs to a \

@@ -61,7 +61,8 @@ impl Questions {
     }
 
     fn follows(&self, knowledge: &Knowledge, imports: &Imports) -> Result<(String, Json, Exit), Failure> {
-        let options = ontology::ReadOptions { allow_missing_imports: true, ..imports.options() };
+        let known = knowledge.entities().to_vec();
+        let options = ontology::ReadOptions { allow_missing_imports: true, known, ..imports.options() };
         let conclusions = ontology::read_files(&self.entails, &options)
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
         let mut found =

@@ -1,8 +1,9 @@
-//! What follows from ontologies of our own making, by metaplan and by `reasonable` (OWL 2 RL in Rust), side by side: user time and
-//! peak memory of a process for each, from the file to all conclusions written as N-Triples.
+//! What follows from ontologies of our own making, by metaplan and by `reasonable` (OWL 2 RL in Rust), side by side: processor time
+//! and peak memory of a process for each, from the file to the number of all conclusions; what parsing alone takes; and both with all
+//! conclusions written as sorted N-Triples (where `reasonable` spends most on the system, since it does not buffer its output).
 //!
-//! `cargo run --release` runs all. `--write DIRECTORY` leaves the universities there, as one document in N-Triples and as one
-//! in RDF/XML for each department.
+//! `cargo run --release` runs all. `--write DIRECTORY` leaves the ontologies there, and the universities as one document in
+//! RDF/XML for each department.
 
 mod shapes;
 mod university;
@@ -29,49 +30,76 @@ impl Random {
 /// From so many names on, equal individuals are listed by pairs with the first.
 const MANY_NAMES: usize = 32;
 
-fn metaplan(files: &[PathBuf]) -> usize {
+fn metaplan(files: &[PathBuf], write: bool) -> usize {
     let ontology = read_files(files, &ReadOptions::default()).expect("readable");
     let mut symbols = Symbols::new();
     let lowered = lower(&ontology, &mut symbols);
     drop(ontology);
     let engine = Engine::new(symbols, lowered.program, lowered.facts).expect("safe rules");
-    let inferred: Vec<_> =
-        engine.facts_in_brief(MANY_NAMES).filter(|fact| !engine.is_asserted(fact)).collect();
-    let text = ntriples(engine.symbols(), &inferred);
-    std::fs::write("/dev/null", text).expect("written");
+    let inferred = engine.inferred_in_brief(MANY_NAMES);
+    if write {
+        let text = ntriples(engine.symbols(), &inferred);
+        std::fs::write(files[0].with_extension("out.nt"), text).expect("written");
+    }
     inferred.len()
 }
 
-fn reasonable(files: &[PathBuf]) -> usize {
+fn reasonable(files: &[PathBuf], write: bool) -> usize {
     let mut reasoner = reasonable::reasoner::Reasoner::new();
     for file in files {
         reasoner.load_file(&file.to_string_lossy()).expect("readable");
     }
     let before = reasoner.get_input().len();
     reasoner.reason();
-    let out = files[0].with_extension("out.n3");
-    reasoner.dump_file(&out.to_string_lossy()).expect("written");
+    if write {
+        let out = files[0].with_extension("out.n3");
+        reasoner.dump_file(&out.to_string_lossy()).expect("written");
+    }
     reasoner.view_output().len().saturating_sub(before)
 }
 
-/// User time in seconds and peak memory in MB of this process.
+/// What parsing alone costs with the parsers that metaplan uses (oxttl): all that is left is for reasoning, if metaplan reads by them.
+fn parse(files: &[PathBuf]) -> usize {
+    let parse = |file: &PathBuf| {
+        let text = std::fs::read(file).expect("readable");
+        if text.starts_with(b"@prefix") {
+            oxttl::TurtleParser::new().for_slice(&text).count()
+        } else {
+            oxttl::NTriplesParser::new().lenient().for_slice(&text).count()
+        }
+    };
+    files.iter().map(parse).sum()
+}
+
+/// Processor time in seconds and peak memory in MB of this process.
 fn usage() -> (f64, u64) {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after = stat.rsplit(") ").next().unwrap_or_default();
-    let ticks: f64 = after.split(' ').nth(11).and_then(|ticks| ticks.parse().ok()).unwrap_or(0.0);
+    let time = cpu_time::ProcessTime::now().as_duration().as_secs_f64();
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     let kilobytes: u64 = peak.and_then(|peak| peak.trim().trim_end_matches(" kB").parse().ok()).unwrap_or(0);
-    (ticks / 100.0, kilobytes / 1024)
+    (time, kilobytes / 1024)
 }
 
-/// User time, memory and number of conclusions in a process of its own.
+/// How often each is run that takes less than a second; the quickest run counts, since whatever else the machine does only makes it
+/// slower.
+const RUNS: usize = 3;
+
+/// Processor time, memory and number of conclusions in a process of its own.
 fn measure(peer: &str, files: &[PathBuf]) -> Option<(f64, u64, usize)> {
     let me = std::env::current_exe().expect("a program");
-    let output = Command::new(me).arg("--child").arg(peer).args(files).output().expect("started");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let mut words = text.split_whitespace();
-    Some((words.next()?.parse().ok()?, words.next()?.parse().ok()?, words.next()?.parse().ok()?))
+    let run = || {
+        let output = Command::new(&me).arg("--child").arg(peer).args(files).output().expect("started");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let mut words = text.split_whitespace();
+        Some((words.next()?.parse().ok()?, words.next()?.parse().ok()?, words.next()?.parse().ok()?))
+    };
+    let mut best: (f64, u64, usize) = run()?;
+    for _ in 1..RUNS {
+        if best.0 < 1.0 {
+            best = Some(run()?).filter(|again| again.0 < best.0).unwrap_or(best);
+        }
+    }
+    Some(best)
 }
 
 fn write(directory: &Path, documents: &[Vec<university::Triple>], name: &str) -> PathBuf {
@@ -86,16 +114,20 @@ fn main() {
     match arguments.first().map(String::as_str) {
         Some("--child") => {
             let files: Vec<PathBuf> = arguments[2..].iter().map(PathBuf::from).collect();
-            let count = if arguments[1] == "metaplan" { metaplan(&files) } else { reasonable(&files) };
+            let count = match arguments[1].as_str() {
+                "metaplan" => metaplan(&files, false),
+                "metaplan-writes" => metaplan(&files, true),
+                "reasonable-writes" => reasonable(&files, true),
+                "parse" => parse(&files),
+                _ => reasonable(&files, false),
+            };
             let (seconds, megabytes) = usage();
             println!("{seconds} {megabytes} {count}");
         }
         Some("--write") => {
             let directory = PathBuf::from(&arguments[1]);
-            let documents = university::universities(5);
-            let text: String = documents.iter().map(|document| university::ntriples(document)).collect();
-            std::fs::write(directory.join("universities.nt"), text).expect("written");
-            for (number, document) in documents.iter().enumerate() {
+            write_all(&directory);
+            for (number, document) in university::universities(5).iter().enumerate() {
                 let file = directory.join(format!("university{number}.rdf"));
                 std::fs::write(file, university::rdf_xml(document)).expect("written");
             }
@@ -104,41 +136,57 @@ fn main() {
     }
 }
 
-fn compare() {
-    let directory = std::env::temp_dir().join(format!("metaplan-peers-{}", std::process::id()));
-    std::fs::create_dir_all(&directory).expect("a directory");
+/// The ontologies that are compared, with their files.
+fn write_all(directory: &Path) -> Vec<(&'static str, PathBuf)> {
     let (one, five) = (university::universities(1), university::universities(5));
     let mut cases = vec![
-        ("a department", write(&directory, &five[..2], "department")),
-        ("5 departments", write(&directory, &five[..6], "departments")),
-        ("1 university", write(&directory, &one, "university")),
-        ("5 universities", write(&directory, &five, "universities")),
+        ("a department", write(directory, &five[..2], "department")),
+        ("5 departments", write(directory, &five[..6], "departments")),
+        ("1 university", write(directory, &one, "university")),
+        ("5 universities", write(directory, &five, "universities")),
     ];
     for (name, text) in shapes::all() {
         let file = directory.join(format!("{}.ttl", name.replace(' ', "-")));
         std::fs::write(&file, text).expect("written");
         cases.push((name, file));
     }
-    println!("| ontology | metaplan | reasonable | ratio | conclusions |\n|---|---|---|---|---|");
-    let mut ratios = Vec::new();
+    cases
+}
+
+fn compare() {
+    let directory = std::env::temp_dir().join(format!("metaplan-peers-{}", std::process::id()));
+    std::fs::create_dir_all(&directory).expect("a directory");
+    let cases = write_all(&directory);
+    println!("| ontology | metaplan | of which parsing | reasonable | ratio | written, too | conclusions |");
+    println!("|---|---|---|---|---|---|---|");
+    let (mut ratios, mut written) = (Vec::new(), Vec::new());
     for (name, file) in &cases {
         let files = [file.clone()];
-        let (Some(own), Some(other)) = (measure("metaplan", &files), measure("reasonable", &files)) else {
-            println!("| {name} | failed | | | |");
+        let peers = ["metaplan", "parse", "reasonable", "metaplan-writes", "reasonable-writes"];
+        let [Some(own), Some(parsing), Some(other), Some(own_all), Some(other_all)] =
+            peers.map(|peer| measure(peer, &files))
+        else {
+            println!("| {name} | failed | | | | | |");
             continue;
         };
-        let ratio = other.0 / own.0.max(0.01);
+        let (ratio, ratio_all) = (other.0 / own.0, other_all.0 / own_all.0);
         ratios.push(ratio);
+        written.push(ratio_all);
         println!(
-            "| {name} | {:.2} s, {} MB | {:.2} s, {} MB | {ratio:.1} | {} / {} |",
-            own.0, own.1, other.0, other.1, own.2, other.2
+            "| {name} | {:.3} s, {} MB | {:.3} s | {:.3} s, {} MB | {ratio:.1} | {:.3} / {:.3} s: {ratio_all:.1} | {} / {} |",
+            own.0, own.1, parsing.0, other.0, other.1, own_all.0, other_all.0, own.2, other.2
         );
     }
-    ratios.sort_by(f64::total_cmp);
     println!(
-        "median of {}: {:.1}",
+        "median of {}: {:.1}, with writing {:.1}",
         ratios.len(),
-        (ratios[(ratios.len() - 1) / 2] + ratios[ratios.len() / 2]) / 2.0
+        median(&mut ratios),
+        median(&mut written)
     );
     let _ = std::fs::remove_dir_all(&directory);
+}
+
+fn median(ratios: &mut [f64]) -> f64 {
+    ratios.sort_by(f64::total_cmp);
+    f64::midpoint(ratios[(ratios.len() - 1) / 2], ratios[ratios.len() / 2])
 }

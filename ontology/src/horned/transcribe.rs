@@ -17,6 +17,18 @@ pub(crate) struct Fault {
     pub message: String,
 }
 
+/// What is wrong, without the place.
+fn message(error: &HornedError) -> String {
+    match error {
+        HornedError::ValidityError(message, _) if message == "Unexpected EoF" => {
+            "an element ends here that lacks a part, or has one that OWL does not know".to_owned()
+        }
+        HornedError::ValidityError(message, _) => message.clone(),
+        HornedError::ParserError(error, _) => error.to_string(),
+        _ => error.to_string(),
+    }
+}
+
 /// An OWL/XML or functional-style document as an N-Triples document.
 pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> {
     let fault = |error: HornedError| {
@@ -29,7 +41,7 @@ pub(crate) fn transcribe(text: &[u8], syntax: Syntax) -> Result<Vec<u8>, Fault> 
             },
             _ => 0,
         };
-        Fault { offset: usize::try_from(offset).unwrap_or(0), message: error.to_string() }
+        Fault { offset: usize::try_from(offset).unwrap_or(0), message: message(&error) }
     };
     let transcription = || -> Result<Vec<u8>, HornedError> {
         let (mut text, build) = (text, ho::Build::new_rc());

@@ -62,24 +62,24 @@ fn assertion(context: &mut Context, axiom: &Axiom) {
     match axiom {
         // That an individual is one need not be said, unless something asks.
         Axiom::ClassAssertion(ClassExpression::Class(class), individual) if &**class != owl::THING => {
-            let (class, individual) = (context.name(class), context.name(individual));
+            let (class, individual) = (context.iri(class), context.iri(individual));
             context.state(class, [individual]);
         }
         Axiom::ObjectPropertyAssertion(property, from, to) => {
-            let (from, to) = (context.name(from), context.name(to));
+            let (from, to) = (context.iri(from), context.iri(to));
             match property {
                 Property::Property(iri) => {
-                    let property = context.name(iri);
+                    let property = context.iri(iri);
                     context.state(property, [from, to]);
                 }
                 Property::Inverse(iri) => {
-                    let property = context.name(iri);
+                    let property = context.iri(iri);
                     context.state(property, [to, from]);
                 }
             }
         }
         Axiom::DataPropertyAssertion(property, from, to) => {
-            let (property, from, to) = (context.name(property), context.name(from), context.literal(to));
+            let (property, from, to) = (context.iri(property), context.iri(from), context.literal(to));
             context.state(property, [from, to]);
         }
         Axiom::SameIndividual(individuals) => {

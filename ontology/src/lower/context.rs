@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term, Variable};
+use rustc_hash::FxHashMap;
 
 use super::{AXIOM_SOURCE, Equality, INTERNAL};
 use crate::error::Warning;
@@ -29,6 +30,8 @@ pub(crate) struct Context<'a> {
     gaps: Vec<&'static str>,
     /// Classes that have an auxiliary relation.
     pub abbreviated: HashSet<String>,
+    /// The symbols of IRIs by where their texts lie: an ontology keeps each text once.
+    shared: FxHashMap<*const u8, Symbol>,
 }
 
 /// The variables of one rule.
@@ -89,6 +92,7 @@ impl<'a> Context<'a> {
             identity: RuleIdentity::new(AXIOM_SOURCE, 0),
             gaps: Vec::new(),
             abbreviated: HashSet::new(),
+            shared: FxHashMap::default(),
         }
     }
 
@@ -125,6 +129,12 @@ impl<'a> Context<'a> {
 
     pub(crate) fn name(&mut self, iri: &str) -> Symbol {
         self.symbols.name(iri)
+    }
+
+    /// The symbol of an IRI of the ontology, which is found without looking at its text.
+    pub(crate) fn iri(&mut self, iri: &Iri) -> Symbol {
+        let symbols = &mut *self.symbols;
+        *self.shared.entry(iri.as_ptr()).or_insert_with(|| symbols.name(iri))
     }
 
     pub(crate) fn constant(&mut self, iri: &str) -> Term {

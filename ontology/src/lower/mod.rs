@@ -99,12 +99,14 @@ impl Context<'_> {
     }
 
     /// Takes out the rules that the engine rejects (unsafe variables, for one): it would reject the whole program. A
-    /// rule for an axiom binds its variables by the relations of its body.
+    /// rule for an axiom binds its variables by the relations of its body, or by names that they stand for.
     fn drop_unusable(&mut self) {
-        let is_bound = |rule: &&Rule| {
-            let mut atoms = rule.body.iter();
-            *rule.identity.source == *AXIOM_SOURCE && atoms.any(|atom| matches!(atom, Atom::Relation { .. }))
+        let binds = |atom: &Atom| match atom {
+            Atom::Relation { .. } => true,
+            Atom::Same(left, right) => [left, right].iter().any(|term| term.as_variable().is_none()),
+            _ => false,
         };
+        let is_bound = |rule: &&Rule| *rule.identity.source == *AXIOM_SOURCE && rule.body.iter().any(binds);
         let rules = self.rules.iter().filter(|rule| !is_bound(rule)).cloned().collect();
         let program = Program { rules, ..Program::default() };
         let Err(errors) = rules::Engine::new(self.symbols.clone(), program, []) else { return };

@@ -188,8 +188,11 @@ fn condition(
             vec![vec![context.different(x, y)]]
         }
         Atom::BuiltIn(iri, arguments) => {
-            let built_in =
-                BuiltIn::from_iri(iri).ok_or_else(|| format!("the built-in <{iri}> is not known"))?;
+            let unknown = || {
+                let meant = BuiltIn::similar(iri).map(|name| format!("; did you mean `{name}`?"));
+                format!("the built-in <{iri}> is not known{}", meant.unwrap_or_default())
+            };
+            let built_in = BuiltIn::from_iri(iri).ok_or_else(unknown)?;
             let arguments = with_names(built_in, arguments.clone());
             let arguments = arguments.iter().map(|argument| term(context, argument, variables)).collect();
             vec![vec![rules::Atom::BuiltIn { built_in, arguments }]]

@@ -1,6 +1,10 @@
-//! Which statements no pass has to look at: assertions about named individuals with declared classes and properties, where
+//! Which statements no pass has to look at: assertions about named individuals with classes and declared properties, where
 //! nothing is said of the individuals that could be part of an axiom, a list or a rule. Most of a large knowledge base are
 //! such, and they stay triples of numbers until they become axioms.
+
+use std::collections::BTreeSet;
+
+use rustc_hash::FxHashSet;
 
 use super::is_reserved;
 use crate::names::{Compact, Names, Object};
@@ -15,6 +19,8 @@ struct Said {
     reserved: bool,
     /// It may be part of an axiom, a list, a rule or a header; or it is a blank node.
     special: bool,
+    /// It is a blank node, or declared to be something.
+    known: bool,
     class: bool,
     object: bool,
     data: bool,
@@ -33,6 +39,7 @@ impl Known {
         let reserved = |number| Said {
             reserved: is_reserved(names.text(number)),
             special: names.is_blank(number),
+            known: names.is_blank(number),
             ..Said::default()
         };
         let said: Vec<Said> = (0..names.len() as u32).map(reserved).collect();
@@ -59,7 +66,7 @@ impl Known {
                 return;
             }
             let own = &mut self.said[triple.subject as usize];
-            own.special = true;
+            (own.special, own.known) = (true, true);
             match &**names.text(class) {
                 owl::CLASS | rdfs::CLASS => own.class = true,
                 owl::OBJECT_PROPERTY => own.object = true,
@@ -85,11 +92,24 @@ impl Known {
         let property = said(triple.predicate);
         match triple.object {
             Object::Node(class) if Some(triple.predicate) == self.kind => {
-                said(class).class && !said(class).reserved
+                let class = said(class);
+                (class.class || !class.known) && !class.reserved
             }
             _ if property.reserved || property.annotation => false,
             Object::Node(object) => property.object && !property.data && !said(object).special,
             Object::Literal(_) => property.data && !property.object,
         }
+    }
+
+    /// The classes that such statements name and nothing declares.
+    pub(super) fn undeclared(&self, bulk: &[Compact], names: &Names) -> BTreeSet<String> {
+        let typed = bulk.iter().filter(|triple| Some(triple.predicate) == self.kind);
+        let classes: FxHashSet<u32> = typed
+            .filter_map(|triple| match triple.object {
+                Object::Node(class) if !self.said[class as usize].class => Some(class),
+                _ => None,
+            })
+            .collect();
+        classes.into_iter().map(|class| names.text(class).to_string()).collect()
     }
 }

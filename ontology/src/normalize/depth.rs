@@ -23,8 +23,8 @@ const NESTS: [&str; 10] = [
     rdf::REST,
 ];
 
-/// The index of a triple at which an expression begins that is nested deeper than [`DEEPEST`].
-pub(crate) fn too_deep(graph: &Graph) -> Option<usize> {
+/// The index of a triple at which an expression begins that is nested deeper than [`DEEPEST`], and the IRI of which it is said.
+pub(crate) fn too_deep(graph: &Graph) -> Option<(usize, Option<String>)> {
     let mut depths: FxHashMap<NamedOrBlankNode, usize> = FxHashMap::default();
     for (index, triple) in graph.iter() {
         let Some(root) = nested(&triple.object) else { continue };
@@ -32,10 +32,20 @@ pub(crate) fn too_deep(graph: &Graph) -> Option<usize> {
             continue;
         }
         if depth(graph, &root, &mut depths) >= DEEPEST {
-            return Some(index);
+            return Some((index, said_of(graph, &mut depths)));
         }
     }
     None
+}
+
+/// The first IRI of which an expression is said that is nested too deep.
+fn said_of(graph: &Graph, depths: &mut FxHashMap<NamedOrBlankNode, usize>) -> Option<String> {
+    graph.iter().find_map(|(_, triple)| match (&triple.subject, nested(&triple.object)) {
+        (NamedOrBlankNode::NamedNode(iri), Some(root)) if depth(graph, &root, depths) >= DEEPEST => {
+            Some(iri.as_str().to_owned())
+        }
+        _ => None,
+    })
 }
 
 fn nested(object: &Term) -> Option<NamedOrBlankNode> {

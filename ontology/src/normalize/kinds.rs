@@ -12,7 +12,8 @@ use rustc_hash::FxHashSet as HashSet;
 use super::{ORIGIN, is_reserved};
 use crate::error::Warning;
 use crate::graph::{Graph, is_type};
-use crate::owl::ANONYMOUS;
+use crate::names::Names;
+use crate::owl::{ANONYMOUS, EntityKind, Iri};
 use crate::vocab::{owl, rdf, rdfs, swrl, swrla, xsd};
 
 /// How far a kind spreads between undeclared properties.
@@ -33,9 +34,9 @@ struct Use {
     entity: bool,
 }
 
-pub(crate) fn declare(graph: &mut Graph, warnings: &mut Vec<Warning>) {
-    let declared = Declared::of(graph);
-    let (mut classes, mut properties) = (BTreeSet::new(), BTreeMap::new());
+/// Declares what is not; `classes` are used elsewhere and not declared.
+pub(crate) fn declare(graph: &mut Graph, mut classes: BTreeSet<String>, warnings: &mut Vec<Warning>) {
+    let (declared, mut properties) = (Declared::of(graph), BTreeMap::new());
     for (_, triple) in graph.iter() {
         record_classes(triple, &declared, &mut classes);
         record_property(graph, triple, &declared, &mut properties);
@@ -57,6 +58,29 @@ pub(crate) fn declare(graph: &mut Graph, warnings: &mut Vec<Warning>) {
         state(graph, enabled, owl::ANNOTATION_PROPERTY);
     }
     state(graph, ORIGIN, owl::ANNOTATION_PROPERTY);
+}
+
+/// Declares those of some entities that documents name and do not declare.
+pub(crate) fn declare_known(graph: &mut Graph, known: &[(EntityKind, Iri)], names: &Names) {
+    if known.is_empty() {
+        return;
+    }
+    let declared = Declared::of(graph);
+    for (kind, iri) in known.iter().filter(|(_, iri)| names.find(iri).is_some() && !is_reserved(iri)) {
+        let (class, is_declared) = match kind {
+            EntityKind::Class => (owl::CLASS, declared.classes.contains(&**iri)),
+            EntityKind::Datatype => (rdfs::DATATYPE, declared.datatypes.contains(&**iri)),
+            EntityKind::ObjectProperty => (owl::OBJECT_PROPERTY, declared.properties.contains(&**iri)),
+            EntityKind::DataProperty => (owl::DATATYPE_PROPERTY, declared.properties.contains(&**iri)),
+            EntityKind::AnnotationProperty => {
+                (owl::ANNOTATION_PROPERTY, declared.properties.contains(&**iri))
+            }
+            EntityKind::NamedIndividual => continue,
+        };
+        if !is_declared {
+            state(graph, iri, class);
+        }
+    }
 }
 
 /// What is known of properties: their declarations and their uses.

@@ -30,7 +30,7 @@ pub(crate) use swrl::{INDIVIDUAL, ORIGIN, TRUE, VARIABLE};
 use crate::error::{Error, Warning};
 use crate::graph::Graph;
 use crate::names::{Compact, Names, Object};
-use crate::owl::Iri;
+use crate::owl::{EntityKind, Iri};
 use crate::read::{Document, Parts};
 use crate::vocab::{self, owl, rdf, rdfs, xsd};
 
@@ -94,24 +94,30 @@ pub(crate) fn merge(documents: Vec<Document>, names: &Names, is_bulk: impl Fn(&C
     Merged { graph, bulk, parts }
 }
 
-/// Merges and rewrites; see the module documentation.
+/// Merges and rewrites; see the module documentation. What is `known` need not be declared.
 ///
 /// # Errors
 /// Class expressions are nested too deep.
-pub(crate) fn normalize(documents: Vec<Document>, mut names: Names) -> Result<Normal, Error> {
+pub(crate) fn normalize(
+    documents: Vec<Document>,
+    mut names: Names,
+    known_entities: &[(EntityKind, Iri)],
+) -> Result<Normal, Error> {
     let files: Vec<String> = documents.iter().map(|document| document.name.clone()).collect();
     let known = bulk::Known::of(&documents, &names);
     let Merged { mut graph, bulk, parts } = merge(documents, &names, |triple| known.is_bulk(triple));
+    let undeclared = known.undeclared(&bulk, &names);
     let mut warnings = Vec::new();
-    if let Some(index) = depth::too_deep(&graph) {
+    if let Some((index, about)) = depth::too_deep(&graph) {
         let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);
-        return Err(Error::TooDeep { file: files[part].clone(), position: None, deepest: DEEPEST });
+        return Err(Error::TooDeep { file: files[part].clone(), about, position: None, deepest: DEEPEST });
     }
+    kinds::declare_known(&mut graph, known_entities, &names);
     let rules = swrl::rewrite(&mut graph, &parts, &mut warnings);
     forms::rewrite(&mut graph);
     let disjoint = lists::rewrite(&mut graph, &mut warnings);
     anonymous::rewrite(&mut graph, &mut warnings);
-    kinds::declare(&mut graph, &mut warnings);
+    kinds::declare(&mut graph, undeclared, &mut warnings);
     let mut plain = plain::take(&mut graph, bulk, &mut names);
     plain.axioms.extend(disjoint);
     Ok(Normal { ntriples: graph.to_ntriples(), plain, names, rules, warnings })

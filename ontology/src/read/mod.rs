@@ -45,6 +45,8 @@ pub struct ReadOptions {
     /// Whether documents are N-Triples that import nothing, as for those that nobody vouches for: no file is opened but those
     /// that are named, and no text is larger when it has been read.
     pub closed: bool,
+    /// Entities that documents need not declare, as those of the knowledge base that they ask about.
+    pub known: Vec<(EntityKind, Iri)>,
 }
 
 /// Reads documents and all that they import into one ontology. The file `-` is standard input.
@@ -102,7 +104,8 @@ fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec
     let sources: Vec<Source> = documents.iter().map(source).collect();
     let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
     let Normal { ntriples, plain, names, rules, warnings: more } =
-        normalize::normalize(documents, names).map_err(|error| vec![error])?;
+        normalize::normalize(documents, names, &options.known)
+            .map_err(|error| vec![spelling::placed(error, &texts)])?;
     warnings.extend(more);
     let parts = horned::build(&ntriples, &about, &rules, plain, names).map_err(|reason| {
         let place = spelling::place(&reason, &texts);

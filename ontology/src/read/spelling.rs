@@ -2,7 +2,7 @@
 //! searched for the name: as a whole IRI, or its last part behind a prefix.
 
 use super::text::Text;
-use crate::error::{Position, Warning};
+use crate::error::{Error, Position, Warning};
 
 /// Only so many warnings are given a place: each costs a search through all documents.
 const MOST_SEARCHES: usize = 100;
@@ -22,6 +22,18 @@ pub(super) fn locate(warnings: &mut [Warning], texts: &[(String, Text)]) {
             *position = offset(iri, words).map(|offset| Position::of_offset(name, &text, offset));
             position.is_none()
         });
+    }
+}
+
+/// An error with the place of what it is about, if it has none and its document spells that.
+pub(super) fn placed(error: Error, texts: &[(String, Text)]) -> Error {
+    match error {
+        Error::TooDeep { file, about: Some(iri), position: None, deepest } => {
+            let own: Vec<_> = texts.iter().filter(|(name, _)| *name == file).cloned().collect();
+            let position = place(&format!("<{iri}>"), &own);
+            Error::TooDeep { file, about: Some(iri), position, deepest }
+        }
+        error => error,
     }
 }
 
@@ -46,7 +58,7 @@ fn offset(iri: &str, text: &str) -> Option<usize> {
 /// The first place where a word stands behind one of some characters and no name goes on after it.
 fn spelled(text: &str, word: &str, opens: impl Fn(char) -> bool) -> Option<usize> {
     let goes_on = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
-    text.match_indices(word).map(|(offset, _)| offset).find(|offset| {
+    memchr::memmem::find_iter(text.as_bytes(), word).find(|offset| {
         text[..*offset].chars().next_back().is_some_and(&opens)
             && !text[offset + word.len()..].chars().next().is_some_and(goes_on)
     })

@@ -26,7 +26,7 @@ impl Structural<'_> {
 
     fn too_deep(&self, offset: usize) -> Vec<Error> {
         let (file, position) = (self.name.to_owned(), Some(self.place(offset)));
-        vec![Error::TooDeep { file, position, deepest: DEEPEST }]
+        vec![Error::TooDeep { file, about: None, position, deepest: DEEPEST }]
     }
 
     /// OWL/XML as N-Triples.

@@ -99,12 +99,24 @@ fn several_values(ontology: &Ontology) -> Vec<Warning> {
             values: values.into_iter().collect(),
             consequence: if individuals {
                 "they are taken for one individual"
-            } else {
+            } else if any_differ(axioms) {
                 "this is a contradiction"
+            } else {
+                "whether these are one value is not decided"
             },
         })
     });
     several.collect()
+}
+
+/// Whether two of the values of assertions are certainly two.
+fn any_differ(axioms: &[AnnotatedAxiom]) -> bool {
+    let values = axioms.iter().filter_map(|annotated| match &annotated.axiom {
+        Axiom::DataPropertyAssertion(_, _, to) => Some(value(to)),
+        _ => None,
+    });
+    let values: Vec<Value> = values.collect();
+    values.iter().enumerate().any(|(at, one)| values[at + 1..].iter().any(|other| one.differs(other)))
 }
 
 /// The property that an axiom says is functional.

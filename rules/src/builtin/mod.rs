@@ -15,6 +15,7 @@ mod library;
 mod math;
 mod parts;
 mod pattern;
+mod similar;
 mod temporal;
 mod text;
 mod uri;

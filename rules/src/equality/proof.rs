@@ -14,9 +14,10 @@ use crate::engine::Engine;
 use crate::explain::{Aggregated, Derivation, DerivationStep, Reason};
 use crate::fact::Fact;
 use crate::fixpoint::resolve;
-use crate::rule::{Atom, Term, Variable};
+use crate::rule::{Atom, Rule, Term, Variable};
 use crate::safety::bound_variables;
 use crate::store::{Record, state};
+use crate::symbol::Symbol;
 
 /// A fact and what makes it hold, where an equality that has a derivation of its own counts as stated.
 pub(super) type Step = DerivationStep;
@@ -81,6 +82,13 @@ impl Equality {
             steps.push(DerivationStep { fact, reason });
         }
         Derivation { steps }
+    }
+
+    /// The pairs by which names became one, each after those that it rests on.
+    pub fn pairs_in_order(&self) -> Vec<Fact> {
+        let edges: BTreeMap<EdgeId, &Edge> =
+            self.classes.edges.iter().map(|(id, edge)| (*id, edge)).collect();
+        edges.into_values().map(|edge| Fact::new(self.same, [edge.left, edge.right])).collect()
     }
 
     fn is_edge(&self, engine: &Engine, fact: &Fact) -> bool {
@@ -259,7 +267,7 @@ impl<'a> Builder<'a> {
         let relation = engine.store.get(engine.store.find(row.predicate, row.arguments.len())?);
         let record = relation.record(relation.find(&row.arguments)?);
         let rule = engine.rule_of(record)?;
-        let bound = engine.records.get(record);
+        let bound = &*self.as_written(rule, engine.records.get(record));
         let heads = rule.head.iter().filter_map(|head| engine.concluded(head, bound));
         let concluded = heads.into_iter().find(|head| self.equality.classes.normal(head) == *row)?;
         if concluded != *fact {
@@ -286,6 +294,24 @@ impl<'a> Builder<'a> {
             absent: atoms(true),
             aggregates,
         })
+    }
+
+    /// What a rule's variables stand for, where the rule compares one with a name by that name: what was recorded is its
+    /// representative, which it is only because of an equality that no atom of the rule asks for.
+    fn as_written(&self, rule: &Rule, bound: &[Symbol]) -> Vec<Symbol> {
+        let mut values = bound.to_vec();
+        for atom in &rule.body {
+            let (Atom::Same(Term::Variable(variable), Term::Constant(name))
+            | Atom::Same(Term::Constant(name), Term::Variable(variable))) = atom
+            else {
+                continue;
+            };
+            let value = &mut values[usize::from(variable.0)];
+            if self.equality.classes.find(*value) == self.equality.classes.find(*name) {
+                *value = *name;
+            }
+        }
+        values
     }
 
     fn aggregates(&mut self, record: Record) -> Vec<Aggregated> {

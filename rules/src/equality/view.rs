@@ -64,16 +64,20 @@ impl Equality {
     /// Everything that holds, in no order; of a class of more than `most` names, only the pairs with the first.
     pub fn facts(&self, engine: &Engine, most: usize) -> Vec<Fact> {
         let names = |symbol| self.names(symbol);
-        let facts = engine.rows_with(0).flat_map(|row| {
+        let mut facts: Vec<Fact> = Vec::new();
+        for row in engine.rows_with(0) {
             match row.arguments.first().and_then(|&name| self.names(name)) {
                 Some(class) if class.len() > most && self.is_reflexive(&row) => {
-                    let pair = |&name: &Symbol| Fact::new(self.same, [class[0], name]);
-                    class[1..].iter().map(pair).collect()
+                    facts.extend(class[1..].iter().map(|&name| Fact::new(self.same, [class[0], name])));
                 }
-                _ => self.facts_of(&row, &names),
+                None if row.arguments.iter().all(|&name| self.names(name).is_none())
+                    && !self.is_reflexive(&row) =>
+                {
+                    facts.push(row);
+                }
+                _ => facts.extend(self.facts_of(&row, &names)),
             }
-        });
-        let mut facts: Vec<Fact> = facts.collect();
+        }
         facts.extend(self.reflexive_pairs(None).map(|arguments| Fact { predicate: self.same, arguments }));
         facts
     }

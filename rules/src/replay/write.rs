@@ -11,7 +11,9 @@ impl Engine {
     pub fn everything(&self) -> Derivation {
         let mut positions: FxHashMap<Fact, usize> = FxHashMap::default();
         let mut steps = Vec::new();
-        for fact in self.facts() {
+        // A rule that asks whether two of its own names are one has no support that says so.
+        let pairs = self.equality.as_ref().map_or_else(Vec::new, |equality| equality.pairs_in_order());
+        for fact in pairs.into_iter().chain(self.facts()) {
             if !positions.contains_key(&fact)
                 && let Some(derivation) = self.why(&fact)
             {

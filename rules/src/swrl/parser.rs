@@ -28,7 +28,7 @@ pub struct Syntax {
 /// of those given.
 ///
 /// # Errors
-/// All errors of the text: R101, R102, R103, R104.
+/// All errors of the text: R101, R102, R104.
 pub fn parse_rules(
     text: &str,
     source: &str,

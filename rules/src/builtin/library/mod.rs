@@ -24,8 +24,19 @@ static ALL: LazyLock<Vec<&'static dyn Definition>> =
 
 /// The built-in of an IRI, whichever version of its library the IRI names.
 pub(super) fn find(iri: &str) -> Option<BuiltIn> {
-    let name = |iri: &str| iri.strip_prefix(ROOT)?.split_once('/').map(|(_, name)| name.to_owned());
     let wanted = name(iri)?;
-    let found = ALL.iter().find(|definition| name(definition.iri()).as_ref() == Some(&wanted));
+    let found = ALL.iter().find(|definition| name(definition.iri()) == Some(wanted));
     found.map(|definition| BuiltIn::custom(*definition))
+}
+
+/// The IRIs of all built-ins of the library that an IRI is in, whichever version it names.
+pub(super) fn names_beside(iri: &str) -> Vec<&'static str> {
+    let library = |iri| name(iri).and_then(|name| name.split_once('#')).map(|(library, _)| library);
+    let all = ALL.iter().map(|definition| definition.iri());
+    all.filter(|known| library(iri).is_some() && library(known) == library(iri)).collect()
+}
+
+/// Library and local name, without the version.
+fn name(iri: &str) -> Option<&str> {
+    iri.strip_prefix(ROOT)?.split_once('/').map(|(_, name)| name)
 }
