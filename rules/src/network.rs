@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::fixpoint::PlanId;
 use crate::lower::Lowering;
 use crate::plan::{Condition, Lowered, Plan, Planner, Template};
-use crate::rule::{Atom, Program, Rule, Term};
+use crate::rule::{Atom, Program, Rule, RuleIdentity, Term};
 use crate::safety::check;
 use crate::store::{RelationId, Store};
 use crate::strata::components;
@@ -69,7 +69,7 @@ pub(crate) fn compile(
     let mut seen = FxHashSet::default();
     let mut lowering = Lowering::new(symbols, store, &mut network.constraints, FxHashSet::default());
     for (position, rule) in program.rules.iter().enumerate() {
-        if seen.insert((&rule.head, &rule.body)) {
+        if seen.insert(content(rule)) {
             lowering.rule(position, rule);
         }
     }
@@ -107,13 +107,10 @@ pub(crate) fn revise(
     }
     let mut positions = FxHashMap::default();
     for (position, rule) in new.rules.iter().enumerate() {
-        positions.entry((&rule.head, &rule.body)).or_insert(position);
+        positions.entry(content(rule)).or_insert(position);
     }
     let mut revised = Network { constraints: Vec::new(), ..network.clone() };
-    let position_of = |position: usize| {
-        let rule = &old.rules[position];
-        positions.get(&(&rule.head, &rule.body)).copied()
-    };
+    let position_of = |position: usize| positions.get(&content(&old.rules[position])).copied();
     let kept = network.constraints.iter();
     revised.constraints = kept.filter_map(|&(id, rule)| Some((id, position_of(rule)?))).collect();
     let (mut removed, mut unused, mut compiled) = (FxHashSet::default(), Vec::new(), FxHashSet::default());
@@ -156,6 +153,11 @@ pub(crate) fn revise(
     revised.widths = revised.rules.iter().map(|rule| rule.width).collect();
     revised.plan(store, true);
     Ok(Some(Revision { network: revised, removed, added }))
+}
+
+/// Rules with the same content are one. What an integrity constraint concludes is that it is violated, it and no other.
+fn content(rule: &Rule) -> (&[Atom], &[Atom], Option<&RuleIdentity>) {
+    (&rule.head, &rule.body, rule.head.is_empty().then_some(&rule.identity))
 }
 
 fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {

@@ -109,6 +109,25 @@ fn violations_name_what_is_stated() {
     assert_eq!(engine.violations(), []);
 }
 
+/// Constraints about names of one individual stay two, however the names come together.
+#[test]
+fn constraints_do_not_become_one() {
+    let (rules, all) = ("p(b) -> . p(a) -> .", "sameAs(b, a), p(b)");
+    for order in [["sameAs(b, a)", "p(b)"], ["p(a)", "sameAs(b, a)"], ["sameAs(a, b)", "p(a)"]] {
+        let mut engine = engine(rules, "q(c)");
+        for text in order {
+            let insert = facts(engine.symbols_mut(), text);
+            engine.apply(Delta { insert, delete: vec![] }).expect("no budget needed");
+        }
+        assert_eq!(engine.violations().len(), 2, "{order:?}");
+        let delete =
+            facts(engine.symbols_mut(), order.iter().find(|text| text.starts_with('s')).expect("one"));
+        engine.apply(Delta { insert: vec![], delete }).expect("no budget needed");
+        assert_eq!(engine.violations().len(), 1, "{order:?}");
+    }
+    assert_eq!(engine(rules, all).violations().len(), 2);
+}
+
 #[test]
 fn an_update_that_is_stopped_leaves_everything_as_it_was() {
     let rules = "go(?x) -> n(0) . n(?x) ^ swrlb:add(?y, ?x, 1) -> n(?y) . go(?x) -> sameAs(?x, b) .";
