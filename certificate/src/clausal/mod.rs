@@ -1,7 +1,7 @@
 //! A second way to the same claim, for small tasks: a formula that says "there is a cheaper plan of at most T steps", its
 //! refutation, and why no longer plan is cheaper.
 //!
-//! [`formula`] is plain: one operator at each step, all states written out, sums in binary. It knows no windows, no reduced
+//! [`encoding`] is plain: one operator at each step, all states written out, sums in binary. It knows no windows, no reduced
 //! costs and no symmetries, and shares nothing with the planner's encoding. It is this formula that a SAT solver refutes for the
 //! certificate, not the one that the plan was found with. [`proof`] checks the refutation, clause by clause, by going through notes
 //! of what each follows from; it is no solver. [`steps`] bounds the number of steps by arithmetic on a potential.
@@ -9,12 +9,14 @@
 //! The formula of a task is made again to check it, and compared with the written one.
 
 mod binary;
+mod encoding;
 mod formula;
 pub mod lines;
 mod literal;
 mod proof;
 mod steps;
 mod sums;
+mod timeline;
 
 use std::io::BufRead;
 
@@ -63,7 +65,7 @@ pub fn formula(
     let (model, argument, cost) = parse(task, argument, claim).map_err(|fault| fault.to_string())?;
     let cost = cost.ok_or("that there is no plan is not a matter of a number of steps")?;
     let steps = steps::bound(&model, &argument, &cost, by)?;
-    Ok((Formula::new(&model, &cost, steps, LITERAL_LIMIT)?, steps))
+    Ok((encoding::encode(&model, &cost, steps, LITERAL_LIMIT)?, steps))
 }
 
 /// Checks a refutation: that the formula is the one of the task, that the proof refutes it, and that no plan of more steps is
@@ -87,7 +89,7 @@ pub fn check_refutation(
     };
     let steps_checked = steps::check(&model, &argument, &cost, steps)
         .map(|position| format!("no plan of more than {steps} steps is cheaper, by potential {position}"));
-    let formula = Formula::new(&model, &cost, steps, LITERAL_LIMIT);
+    let formula = encoding::encode(&model, &cost, steps, LITERAL_LIMIT);
     let (formula_checked, proof_checked) = match formula {
         Ok(formula) => {
             let same = formula.compare(written, legend).map(|()| {

@@ -7,8 +7,9 @@
 use std::collections::BTreeMap;
 
 use crate::clausal::binary::{Bits, sign, width};
-use crate::clausal::formula::{Formula, Timeline};
+use crate::clausal::formula::Formula;
 use crate::clausal::literal::Literal;
+use crate::clausal::timeline::Timeline;
 use crate::integer::Integer;
 use crate::model::{Linear, Model, Operator, Quantity};
 use crate::table::is_alone;
