@@ -7,16 +7,16 @@ use num_rational::BigRational;
 use num_traits::{One, Zero};
 use rustc_hash::FxHashMap;
 
+use crate::faithful::case::Case;
 use crate::faithful::effects::{self, Made};
 use crate::faithful::formula::{Formula, Known};
-use crate::faithful::lengths::Length;
+use crate::faithful::key::{Key, PHASE};
+use crate::faithful::length::Length;
 use crate::faithful::linear::Linear;
-use crate::faithful::meaning::Case;
 use crate::faithful::reader::{Reader, TOTAL_TIME};
 use crate::faithful::timeline::{self, stands_for};
 use crate::faithful::translation::Translation;
 use crate::faithful::verdict::{Cause, Difference, Obstacle};
-use crate::faithful::world::{Key, PHASE};
 use crate::model::{Argument, Operator};
 use pddl::ast::{Action, Direction};
 

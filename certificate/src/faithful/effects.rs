@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::faithful::case::Case;
 use crate::faithful::formula::{Formula, Known};
+use crate::faithful::key::{CLOCK, Key};
 use crate::faithful::linear::Linear;
-use crate::faithful::meaning::Case;
 use crate::faithful::translation::Translation;
-use crate::faithful::world::{CLOCK, Key};
 use crate::model::Operator;
 
 /// A variable is looked at in at most so many cases.

@@ -6,9 +6,9 @@ use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 use rustc_hash::FxHashMap;
 
+use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
 use crate::faithful::verdict::Cause;
-use crate::faithful::world::Key;
 
 /// A condition falls apart into at most so many cases.
 const CASE_LIMIT: usize = 4_096;

@@ -2,8 +2,8 @@
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, sections 7 and 8 (no moving targets).
 
+use crate::faithful::case::Moment;
 use crate::faithful::formula::Formula;
-use crate::faithful::meaning::Moment;
 use crate::faithful::reads::Reads;
 use pddl::ast::Assignment;
 

@@ -12,11 +12,12 @@ use num_traits::{Signed, Zero};
 use rustc_hash::{FxHashMap, FxHashSet};
 use serde::{Deserialize, Serialize};
 
+use crate::faithful::case::Case;
 use crate::faithful::formula::{Formula, Known, Structure};
+use crate::faithful::key::{CLOCK, Key};
 use crate::faithful::linear::{Interval, Linear};
-use crate::faithful::meaning::Case;
 use crate::faithful::verdict::{Cause, Difference};
-use crate::faithful::world::{CLOCK, Key, World};
+use crate::faithful::world::World;
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 

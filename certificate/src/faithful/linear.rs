@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
-use crate::faithful::world::Key;
+use crate::faithful::key::Key;
 
 /// Fluents times factors (none of them 0), plus a constant.
 #[derive(Debug, Clone, PartialEq, Eq)]

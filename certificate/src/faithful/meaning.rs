@@ -8,35 +8,20 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use num_traits::Zero;
 
+use crate::faithful::case::{Case, Moment};
 use crate::faithful::formula::{Formula, Known, Structure};
 use crate::faithful::happening;
-use crate::faithful::lengths::Length;
+use crate::faithful::key::Key;
+use crate::faithful::length::Length;
 use crate::faithful::linear::Linear;
 use crate::faithful::reader::{Applied, Reader};
 use crate::faithful::reads::Reads;
 use crate::faithful::timeline::{self, Event, Passage, Timeline};
 use crate::faithful::verdict::Cause;
-use crate::faithful::world::Key;
 use pddl::ast::{
     Action, ActionBody, Assignment, Condition, ConditionTime, DurationConstraint, Effect, EffectTime,
     Expression,
 };
-
-/// One way in which the conditions of an instance can turn out. Cases may overlap; together they are all.
-#[derive(Debug)]
-pub(super) struct Case {
-    /// What holds before.
-    pub(super) known: Known,
-    /// What has become of atoms at the start.
-    pub(super) truths: BTreeMap<Key, bool>,
-    /// What becomes of atoms at the end, each under a condition; what is both added and deleted holds.
-    pub(super) effects: Vec<(Formula, Key, bool)>,
-    /// Fluents that have these values afterwards.
-    pub(super) changes: BTreeMap<Key, Linear>,
-    /// None for an instantaneous action, and for a wait.
-    pub(super) length: Option<Length>,
-    pub(super) passage: Passage,
-}
 
 /// What happens when nothing is done until the next event, for each event.
 #[expect(clippy::arithmetic_side_effects, reason = "the place of an event that is held in memory")]
@@ -64,14 +49,6 @@ pub(super) fn waits(timeline: &Timeline, structure: &Structure) -> Result<Vec<Ca
 
 /// What fluents become.
 type Changes = BTreeMap<Key, Linear>;
-
-/// Effects that take place at once, each under a condition.
-#[derive(Default)]
-pub(super) struct Moment {
-    pub(super) atoms: Vec<(Formula, Key, bool)>,
-    /// A value is missing where it is undefined.
-    pub(super) numbers: Vec<(Formula, Assignment, Key, Option<Linear>)>,
-}
 
 /// The cases in which an instance can be executed; the reader has its arguments.
 pub(super) fn cases<'r>(

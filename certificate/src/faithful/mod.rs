@@ -20,12 +20,16 @@
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
 
 mod axioms;
+mod case;
 mod compare;
+mod derived;
 mod effects;
 mod formula;
 mod happening;
 mod instances;
 mod invariant;
+mod key;
+mod length;
 mod lengths;
 mod linear;
 mod meaning;
@@ -45,15 +49,16 @@ use crate::model::Model;
 use crate::model::TASK_FORMAT;
 use crate::shape;
 use axioms::Axioms;
+use case::Case;
 use compare::Comparison;
 use invariant::{Invariant, Widening};
-use meaning::Case;
+use key::Key;
 use pddl::ast::{Action, ActionBody, ConditionTime, Domain, Effect, Problem};
 use reader::Reader;
 use translation::{Names, Translation};
 use verdict::Obstacle;
 pub use verdict::{Cause, Difference, Faithful};
-use world::{Key, World};
+use world::World;
 
 /// With more instances, nothing is checked.
 const INSTANCE_LIMIT: usize = 400_000;
@@ -176,7 +181,7 @@ impl<'f> Files<'f> {
         // An instance that always does the same need not be looked at again.
         let mut open: Vec<&Instance> = self.instances.iter().collect();
         for _ in 0..ROUND_LIMIT {
-            let axioms = Axioms::new(&self.world, &widening.invariant, &self.names.linked)?;
+            let axioms = derived::axioms(&self.world, &widening.invariant, &self.names.linked)?;
             // What is known of derived atoms is about the invariant as it is now.
             let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
             let (mut news, mut next) = (false, Vec::new());
@@ -204,7 +209,7 @@ impl<'f> Files<'f> {
     #[expect(clippy::arithmetic_side_effects, reason = "instances are held in memory")]
     fn compare(&self, witness: &str) -> Result<Faithful> {
         let invariant = Invariant::read(&self.world, witness)?;
-        let axioms = Axioms::new(&self.world, &invariant, &self.names.linked)?;
+        let axioms = derived::axioms(&self.world, &invariant, &self.names.linked)?;
         let task = Translation::new(&self.world, self.model, &self.names, &invariant, &axioms)?;
         let timed = self.world.problem.metric.is_none() && self.takes_time(&invariant, &axioms)?;
         let unit = self.unit(&invariant, &axioms)?;

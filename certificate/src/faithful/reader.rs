@@ -11,10 +11,11 @@ use smallvec::SmallVec;
 use crate::faithful::axioms::Axioms;
 use crate::faithful::formula::Formula;
 use crate::faithful::invariant::Invariant;
-use crate::faithful::lengths::Length;
+use crate::faithful::key::Key;
+use crate::faithful::length::Length;
 use crate::faithful::linear::Linear;
 use crate::faithful::verdict::Cause;
-use crate::faithful::world::{Key, World};
+use crate::faithful::world::World;
 use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypedName};
 
 /// The conditions of one instance have at most so many parts.

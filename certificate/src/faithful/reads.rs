@@ -5,8 +5,9 @@
 use rustc_hash::FxHashMap;
 
 use crate::faithful::axioms::Axioms;
+use crate::faithful::key::Key;
 use crate::faithful::timeline::Event;
-use crate::faithful::world::{Key, World};
+use crate::faithful::world::World;
 use pddl::ast::{Atom, Condition, Effect, Expression, Name, Term, TypedName};
 
 /// One happening of an instance.

@@ -18,8 +18,8 @@ use num_traits::{One, Signed, Zero};
 use smallvec::{SmallVec, smallvec};
 
 use crate::faithful::formula::Formula;
+use crate::faithful::key::{CLOCK, Key, PHASE, WAITED};
 use crate::faithful::linear::Linear;
-use crate::faithful::world::{CLOCK, Key, PHASE, WAITED};
 
 /// What becomes of atoms.
 pub(super) type Truths = BTreeMap<Key, bool>;

@@ -7,10 +7,11 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::faithful::axioms::Axioms;
 use crate::faithful::formula::{Formula, Structure};
 use crate::faithful::invariant::Invariant;
+use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
 use crate::faithful::reader;
 use crate::faithful::verdict::{Cause, Difference, Obstacle};
-use crate::faithful::world::{Key, World};
+use crate::faithful::world::World;
 use crate::model::{self, Condition, Fact, Literal, Model};
 
 /// A condition of the task has at most so many parts once its names are replaced by what they stand for.

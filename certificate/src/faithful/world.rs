@@ -3,24 +3,14 @@
 use num_rational::BigRational;
 use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
-use smallvec::SmallVec;
 
+use crate::faithful::key::{CLOCK, Key, PHASE, WAITED};
 use crate::faithful::timeline::{self, Timeline};
 use crate::faithful::verdict::Cause;
 use pddl::TypeHierarchy;
 use pddl::ast::{
     ActionBody, Atom, Derived, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
 };
-
-/// A predicate or function with objects, both by number.
-pub(super) type Key = (u32, SmallVec<[u32; 4]>);
-
-/// `(the phase phase N)`, with N in place of objects: so many events have taken place.
-pub(super) const PHASE: u32 = u32::MAX - 1;
-/// `(has waited)`: since the last event nothing has been done.
-pub(super) const WAITED: u32 = u32::MAX - 2;
-/// `(the clock)`, in the time unit of the files.
-pub(super) const CLOCK: u32 = u32::MAX - 3;
 
 pub(super) struct World<'w> {
     pub(super) problem: &'w Problem,

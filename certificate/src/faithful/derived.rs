@@ -1,0 +1,206 @@
+//! Derived atoms: which of them always or never hold, and which the task knows.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::faithful::axioms::Axioms;
+use crate::faithful::formula::Formula;
+use crate::faithful::invariant::Invariant;
+use crate::faithful::key::Key;
+use crate::faithful::reader::Reader;
+use crate::faithful::verdict::Cause;
+use crate::faithful::world::World;
+use pddl::ast::{Condition, Expression};
+
+/// With more derived atoms, nothing is checked.
+const ATOM_LIMIT: usize = 50_000;
+
+/// What the witness says of derived atoms.
+pub(super) fn axioms(
+    world: &World<'_>,
+    invariant: &Invariant,
+    linked: &FxHashSet<Key>,
+) -> Result<Axioms, Cause> {
+    let mut axioms = Axioms { reads: reads(world)?, ..Axioms::default() };
+    if axioms.reads.is_empty() {
+        return Ok(axioms);
+    }
+    let bodies = bodies(world, invariant, &axioms)?;
+    // Each set is sound if the other one is, and each gets better with the other one.
+    loop {
+        let may = fixpoint(&bodies, |formula, own| possible(world, formula, own, &axioms.must));
+        let must = fixpoint(&bodies, |formula, own| certain(world, formula, own, &may));
+        let settled = may == axioms.may && must == axioms.must;
+        (axioms.may, axioms.must) = (may, must);
+        if settled {
+            break;
+        }
+    }
+    let circular = circular(&axioms, &bodies);
+    axioms.linked = linked.iter().filter(|key| circular.contains(*key)).cloned().collect();
+    Ok(axioms)
+}
+
+/// The derived atoms that depend on themselves, and those in between: what is left once those are taken away that depend on
+/// none that is left, or on which none depends.
+fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b Key> {
+    let open = |key: &Key| axioms.known(key).is_none();
+    let mut left: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
+    for (key, body) in bodies.iter().filter(|(key, _)| open(key)) {
+        let mut below = FxHashSet::default();
+        atoms(body, &mut below);
+        left.insert(key, below);
+    }
+    loop {
+        let heads: FxHashSet<&Key> = left.keys().copied().collect();
+        for below in left.values_mut() {
+            below.retain(|key| heads.contains(key));
+        }
+        let needed: FxHashSet<&Key> = left.values().flatten().copied().collect();
+        left.retain(|key, below| !below.is_empty() && needed.contains(key));
+        if left.len() == heads.len() {
+            return heads;
+        }
+    }
+}
+
+/// Derived atoms with the conditions under which they hold, in terms of atoms of both kinds.
+fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<(Key, Formula)>, Cause> {
+    let mut heads: FxHashSet<Key> = FxHashSet::default();
+    for (symbol, rules) in world.derived() {
+        for rule in rules {
+            let mut reader = Reader::new(world, invariant, axioms);
+            let names: Vec<_> = rule.head.parameters.iter().map(|own| &own.identifier.name).collect();
+            reader.each(&rule.head.parameters, &mut |own| {
+                let objects = names.iter().map(|name| own.binding[name]).collect();
+                heads.insert((symbol, objects));
+                if heads.len() > ATOM_LIMIT {
+                    return Err(Cause::TooMany { what: "derived atoms".into(), limit: ATOM_LIMIT });
+                }
+                Ok(true)
+            })?;
+        }
+    }
+    let mut heads: Vec<Key> = heads.into_iter().collect();
+    heads.sort_unstable();
+    let body = |key: Key| {
+        let mut reader = Reader::new(world, invariant, axioms);
+        reader.opaque = true;
+        let body = reader.unfold(&key)?;
+        Ok((key, body))
+    };
+    heads.into_iter().map(body).collect()
+}
+
+/// All atoms in a formula.
+fn atoms<'f>(formula: &'f Formula, found: &mut FxHashSet<&'f Key>) {
+    match formula {
+        Formula::All(parts) | Formula::Any(parts) => parts.iter().for_each(|part| atoms(part, found)),
+        Formula::Atom(key, _) => {
+            found.insert(key);
+        }
+        Formula::Compare(..) => {}
+    }
+}
+
+fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>) -> bool) -> FxHashSet<Key> {
+    let mut own: FxHashSet<Key> = FxHashSet::default();
+    let mut open: Vec<&(Key, Formula)> = bodies.iter().collect();
+    loop {
+        let before = open.len();
+        open.retain(|(key, body)| {
+            let new = holds(body, &own);
+            if new {
+                own.insert(key.clone());
+            }
+            !new
+        });
+        if open.len() == before {
+            return own;
+        }
+    }
+}
+
+/// Whether a body may hold where derived atoms hold only if they are in one set, and surely if they are in the other one.
+fn possible(world: &World<'_>, formula: &Formula, may: &FxHashSet<Key>, must: &FxHashSet<Key>) -> bool {
+    match formula {
+        Formula::All(parts) => parts.iter().all(|part| possible(world, part, may, must)),
+        Formula::Any(parts) => parts.iter().any(|part| possible(world, part, may, must)),
+        Formula::Atom(key, true) => may.contains(key) || world.rules(key.0).is_none(),
+        Formula::Atom(key, false) => !must.contains(key),
+        Formula::Compare(..) => true,
+    }
+}
+
+/// Whether a body holds in any case.
+fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &FxHashSet<Key>) -> bool {
+    match formula {
+        Formula::All(parts) => parts.iter().all(|part| certain(world, part, must, may)),
+        Formula::Any(parts) => parts.iter().any(|part| certain(world, part, must, may)),
+        Formula::Atom(key, true) => must.contains(key),
+        Formula::Atom(key, false) => world.rules(key.0).is_some() && !may.contains(key),
+        Formula::Compare(..) => false,
+    }
+}
+
+/// The predicates and functions on which each derived predicate depends, itself included if it is recursive.
+fn reads(world: &World<'_>) -> Result<FxHashMap<u32, FxHashSet<u32>>, Cause> {
+    let mut reads: FxHashMap<u32, FxHashSet<u32>> = FxHashMap::default();
+    for (symbol, rules) in world.derived() {
+        let own = reads.entry(symbol).or_default();
+        for rule in rules {
+            in_condition(world, &rule.condition, own)?;
+        }
+    }
+    loop {
+        let before = reads.clone();
+        for own in reads.values_mut() {
+            let more: Vec<u32> =
+                own.iter().filter_map(|symbol| before.get(symbol)).flatten().copied().collect();
+            own.extend(more);
+        }
+        if reads == before {
+            return Ok(reads);
+        }
+    }
+}
+
+fn in_condition(world: &World<'_>, condition: &Condition, found: &mut FxHashSet<u32>) -> Result<(), Cause> {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => {
+            parts.iter().try_for_each(|part| in_condition(world, part, found))
+        }
+        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+            in_condition(world, inner, found)
+        }
+        Condition::Imply(left, right) => {
+            in_condition(world, left, found)?;
+            in_condition(world, right, found)
+        }
+        Condition::Atom(atom) => {
+            found.insert(world.symbol(&atom.predicate.name)?);
+            Ok(())
+        }
+        Condition::Equal(..) => Ok(()),
+        Condition::Compare(_, left, right, _) => {
+            in_expression(world, left, found)?;
+            in_expression(world, right, found)
+        }
+    }
+}
+
+fn in_expression(
+    world: &World<'_>,
+    expression: &Expression,
+    found: &mut FxHashSet<u32>,
+) -> Result<(), Cause> {
+    match expression {
+        Expression::Fluent(atom) => {
+            found.insert(world.symbol(&atom.predicate.name)?);
+            Ok(())
+        }
+        Expression::Operation(_, parts, _) => {
+            parts.iter().try_for_each(|part| in_expression(world, part, found))
+        }
+        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => Ok(()),
+    }
+}
