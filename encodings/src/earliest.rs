@@ -6,10 +6,11 @@
 
 use num_traits::Zero;
 
+use crate::ground_plan::{GroundPlan, GroundStep, replay};
 use crate::limits::Limits;
-use crate::number::{Rational, TaskNumber};
-use crate::plan::{GroundPlan, GroundStep, replay};
+use crate::number::Rational;
 use crate::task::{Operator, OperatorId, Task};
+use crate::task_number::TaskNumber;
 
 /// The same actions, each as early as the ones before it and the rest of the plan admit; as far as the limits let it.
 pub(crate) fn earliest<N: TaskNumber>(

@@ -31,6 +31,7 @@ mod configuration;
 mod ground;
 mod quantity;
 mod task;
+mod task_number;
 
 mod alternatives;
 mod bounds;
@@ -38,6 +39,7 @@ mod certificate;
 mod concurrent;
 mod earliest;
 mod encode;
+mod ground_plan;
 mod integral;
 mod limits;
 mod objectives;

@@ -7,10 +7,11 @@
 //! [1] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
 //! and system optimization, IEEE Trans. SMC 1(3), 1971.
 
+use crate::ground_plan::GroundPlan;
 use crate::limits::Limits;
 use crate::number::{Int, Rational};
 use crate::optimize::{Config, optimize};
-use crate::plan::{Exact, GroundPlan};
+use crate::plan::Exact;
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::solution::{Improvement, Solution, Status};
 use crate::task::{NumericEffect, Operator, Task};

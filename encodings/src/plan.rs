@@ -5,33 +5,13 @@ use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
 use crate::earliest::{earliest, starts};
+use crate::ground_plan::GroundPlan;
 use crate::lifted::ObjectId;
 use crate::limits::Limits;
-use crate::number::{Int, Rational, TaskNumber};
-use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
+use crate::number::{Int, Rational};
+use crate::task::{Argument, Objective, Operator, Task};
+use crate::task_number::TaskNumber;
 use pddl::to_decimal;
-
-/// One step of a plan over operators.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct GroundStep {
-    pub(crate) operator: OperatorId,
-    /// An index into `SlotUse::designs` for each slot of the operator.
-    pub(crate) choice: Vec<u32>,
-}
-
-/// A plan and the sum of its operators' costs, in the task's integer unit.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct GroundPlan<N = Int> {
-    pub(crate) steps: Vec<GroundStep>,
-    pub(crate) cost: N,
-}
-
-impl GroundPlan {
-    /// The limit on the cost of cheaper plans.
-    pub(crate) fn below(&self) -> Int {
-        self.cost.saturating_sub(1)
-    }
-}
 
 /// An exact number of any size, in the units of the PDDL files.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -219,48 +199,4 @@ fn configuration<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> V
     let name = |function: ObjectId| task.object_names[function.index()].clone();
     let pairs = operator.configuration.iter();
     pairs.map(|(function, design)| (name(*function), argument(task, operator, choice, *design))).collect()
-}
-
-/// The states that a plan passes through, the initial one first, and its cost; none if a step is not applicable, the last
-/// state is not a goal state, or the cost does not fit.
-pub(crate) fn replay<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<(Vec<State<N>>, N)> {
-    replay_from(task, &task.initial, plan)
-}
-
-/// The same from a state of its own.
-pub(crate) fn replay_from<N: TaskNumber>(
-    task: &Task<N>,
-    initial: &State<N>,
-    plan: &[GroundStep],
-) -> Option<(Vec<State<N>>, N)> {
-    let states = pass(task, initial, plan)?;
-    Some((states, cost(task, plan)?))
-}
-
-/// The sum of the costs of steps; none if it does not fit.
-pub(crate) fn cost<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<N> {
-    plan.iter().try_fold(N::zero(), |sum, step| {
-        let operator = &task.operators[step.operator.index()];
-        sum.plus(&operator.cost.at(&step.choice, &operator.sizes())).filter(N::is_moderate)
-    })
-}
-
-/// The states that a plan passes through from a state on; none if a step is not applicable, or the last state is not a goal
-/// state.
-pub(crate) fn pass<N: TaskNumber>(
-    task: &Task<N>,
-    initial: &State<N>,
-    plan: &[GroundStep],
-) -> Option<Vec<State<N>>> {
-    let mut states = vec![initial.clone()];
-    for step in plan {
-        let operator = &task.operators[step.operator.index()];
-        let state = states.last()?;
-        if !operator.admits(&step.choice) || !operator.applicable(state, &step.choice) {
-            return None;
-        }
-        let next = task.successor(operator, state, &step.choice)?;
-        states.push(next);
-    }
-    task.is_goal(states.last()?).then_some(states)
 }

@@ -16,11 +16,12 @@ use std::collections::hash_map::Entry;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
+use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::limits::{Interrupted, Limits, Pulse};
-use crate::number::{Int, TaskNumber, dense};
-use crate::plan::{GroundPlan, GroundStep};
+use crate::number::{Int, dense};
 use crate::successors::{OperatorIndex, Priced, undominated};
 use crate::task::{Condition, Fact, OperatorId, State, Task};
+use crate::task_number::TaskNumber;
 
 /// How many states are stored at most.
 pub(crate) const STATE_LIMIT: usize = 400_000;

@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use crate::plan::{Exact, GroundPlan, Plan};
+use crate::ground_plan::GroundPlan;
+use crate::plan::{Exact, Plan};
 
 /// How good the answer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

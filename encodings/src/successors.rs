@@ -5,9 +5,10 @@ use std::collections::hash_map::Entry;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::limits::{Interrupted, Limits};
-use crate::number::{TaskNumber, dense};
+use crate::number::dense;
 use crate::quantity::{Quantity, SlotSet};
 use crate::task::{Operator, OperatorId, State, Task};
+use crate::task_number::TaskNumber;
 
 /// Operators by that fact of their condition whose variable has the most values.
 pub(crate) struct OperatorIndex {

@@ -17,10 +17,11 @@ use std::sync::OnceLock;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::bounds::{Bounds, Projection};
+use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::Int;
-use crate::plan::{GroundPlan, GroundStep, resolve};
+use crate::plan::resolve;
 use crate::search::is_monotone;
 use crate::successors::{OperatorIndex, undominated};
 use crate::task::{OperatorId, State, Task};

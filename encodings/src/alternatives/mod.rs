@@ -12,9 +12,10 @@ mod tests;
 
 use crate::bounds::Bounds;
 use crate::encode::{CostLimit, Counting, Encoding, Meaning, Semantics};
+use crate::ground_plan::{GroundPlan, GroundStep, replay};
 use crate::number::dense;
 use crate::optimize::Config;
-use crate::plan::{GroundPlan, GroundStep, Plan, decode, replay};
+use crate::plan::{Plan, decode};
 use crate::sat::{Answer, Backend, Lit, Solver};
 use crate::solution::{Solution, Status};
 use crate::task::{Argument, Task};

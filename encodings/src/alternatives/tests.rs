@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 
 use super::{Forced, alternatives};
 use crate::ground::{Config as GroundConfig, ground};
+use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::optimize::{Config, optimize};
-use crate::plan::{GroundPlan, GroundStep, Plan, decode};
+use crate::plan::{Plan, decode};
 use crate::solution::Status;
 use crate::task::{State, Task};
 use crate::tests::missions::Mission;

@@ -11,7 +11,7 @@ use std::cmp::Reverse;
 
 use num_bigint::BigInt;
 
-use crate::bounds::Projection;
+use crate::bounds::projection::Projection;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{GROWTH_LIMIT, Int};
 use crate::task::Task;

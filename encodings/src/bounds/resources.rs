@@ -7,7 +7,7 @@
 //! [1] I. Dumitrescu, N. Boland: Improved preprocessing, labeling and scaling algorithms for the weight-constrained shortest
 //! path problem, Networks 42(3), 2003.
 
-use crate::bounds::Projection;
+use crate::bounds::projection::Projection;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
 use crate::quantity::NumericId;

@@ -5,9 +5,10 @@ use num_bigint::BigInt;
 use num_integer::Integer as _;
 use num_traits::{One, Signed};
 
-use crate::number::{Rational, TaskNumber};
+use crate::number::Rational;
 use crate::quantity::{Linear, Quantity};
 use crate::task::Task;
+use crate::task_number::TaskNumber;
 
 /// A common denominator with more bits is none.
 const BIT_LIMIT: u64 = 1 << 20;

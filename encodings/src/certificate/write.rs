@@ -14,11 +14,12 @@ use crate::bounds::{Bounds, Projection};
 use crate::certificate::scales::{Scales, scaled, whole};
 use crate::exact::{ExactTask, RoundedBounds};
 use crate::limits::Limits;
-use crate::number::{Int, Rational, TaskNumber};
+use crate::number::{Int, Rational};
 use crate::quantity::NumericId;
 use crate::search::{Estimate, closed_labels};
 use crate::solution::{Solution, Status};
 use crate::task::{self, Task};
+use crate::task_number::TaskNumber;
 
 /// A certificate of an optimal plan, or of there being none: two JSON documents.
 #[derive(Debug, Clone)]

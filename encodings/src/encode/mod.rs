@@ -27,9 +27,9 @@ use std::cell::OnceCell;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
+use crate::ground_plan::GroundStep;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, dense};
-use crate::plan::GroundStep;
 use crate::sat::{Lit, Solver};
 use crate::task::{Fact, Literal, OperatorId, Task};
 use conditional::Fires;

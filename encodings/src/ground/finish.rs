@@ -20,12 +20,13 @@ use crate::ground::normal_form::{GroundCondition, GroundLiteral};
 use crate::ground::prune::{atom_name, numeric_name, read_atoms};
 use crate::lifted::{Lifted, ObjectId, Rational};
 use crate::limits::{Interrupted, Limits};
-use crate::number::{TaskNumber, checked_lcm, dense};
+use crate::number::{checked_lcm, dense};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::task::{
     Axiom, Condition, ConditionalEffect, Fact, Layer, Literal, NumericEffect, Objective, Operator, Slot,
     SlotId, SlotUse, State, Task, Variable, VariableId,
 };
+use crate::task_number::TaskNumber;
 
 /// Builds the final task.
 ///

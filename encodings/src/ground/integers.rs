@@ -7,8 +7,9 @@ use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::lifted::Rational;
-use crate::number::{Int, LIMIT, TaskNumber, checked_lcm};
+use crate::number::{Int, LIMIT, checked_lcm};
 use crate::quantity::{Quantity, Table};
+use crate::task_number::TaskNumber;
 
 /// The values of a table, and what they are mapped to.
 type Mapped<M> = (Arc<[Rational]>, Arc<[M]>);

@@ -33,8 +33,9 @@ use crate::ground::reach::Reached;
 use crate::lifted::Lifted;
 use crate::limits::Limits;
 use crate::normalize::{normalize, zero};
-use crate::number::{Int, TaskNumber};
+use crate::number::Int;
 use crate::task::Task;
+use crate::task_number::TaskNumber;
 use pddl::ast::{Domain, Metric, Name, Problem};
 
 /// How the domain's symbols are to be read.

@@ -3,13 +3,15 @@
 use std::cell::OnceCell;
 
 use crate::bounds::Bounds;
+use crate::ground_plan::{GroundStep, cost, pass};
 use crate::limits::{Interrupted, Limits};
-use crate::number::{Int, TaskNumber};
+use crate::number::Int;
 use crate::optimize::{Best, Config, Run, Tightened, optimize};
-use crate::plan::{GroundStep, cost, decode, pass};
+use crate::plan::decode;
 use crate::quantity::Quantity;
 use crate::solution::{Improvement, Proof, Solution, Status, Unbounded};
 use crate::task::Task;
+use crate::task_number::TaskNumber;
 
 impl Run<'_> {
     /// For a metric that actions improve: fewest steps first, then the best metric among those plans.

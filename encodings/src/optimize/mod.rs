@@ -17,9 +17,10 @@ use std::time::Instant;
 
 use crate::bounds::Bounds;
 use crate::encode::{CostLimit, Counting, Encoding, Semantics, Symmetry};
+use crate::ground_plan::GroundPlan;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
-use crate::plan::{GroundPlan, decode, metric};
+use crate::plan::{decode, metric};
 use crate::sat::{Answer, Backend};
 use crate::search::{Found, search};
 use crate::solution::{Improvement, Proof, Solution, Statistics, Status};

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use crate::encode::Encoding;
+use crate::ground_plan::{GroundPlan, GroundStep, cost, pass};
 use crate::optimize::{Best, Run, Tightened};
-use crate::plan::{GroundPlan, GroundStep, cost, pass};
 use crate::sat::{Answer, Backend, Lit, Solver};
 
 /// A solver that has the clauses of a formula, up to some position.

@@ -7,10 +7,11 @@
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
 
+use crate::ground_plan::{GroundPlan, GroundStep, replay_from};
 use crate::lifted::ObjectId;
 use crate::limits::Limits;
 use crate::number::{Int, dense};
-use crate::plan::{GroundPlan, GroundStep, decode, replay_from, resolve};
+use crate::plan::{decode, resolve};
 use crate::replan::layout::Situation;
 use crate::replan::{Base, Progress, Query, Replanned, Set};
 use crate::search::{Found, search_from};

@@ -10,7 +10,7 @@ use std::cell::Cell;
 use batsat::{Callbacks, ClauseKind, SolverInterface as _, lbool};
 
 use crate::limits::Limits;
-use crate::sat::{Answer, Lit, Solver};
+use crate::sat::solver::{Answer, Lit, Solver};
 
 /// How many decisions pass between two looks at the clock.
 const CLOCK_INTERVAL: u32 = 64;

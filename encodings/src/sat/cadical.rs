@@ -5,7 +5,7 @@
 //! \[1\] A. Biere, T. Faller, K. Fazekas, M. Fleury, N. Froleyks, F. Pollitt: `CaDiCaL` 2.0, CAV 2024.
 
 use crate::limits::Limits;
-use crate::sat::{Answer, Lit, Solver};
+use crate::sat::solver::{Answer, Lit, Solver};
 
 /// A `CaDiCaL` solver.
 pub(super) struct Cadical {

@@ -15,7 +15,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::limits::Limits;
-use crate::sat::{Answer, Lit, Solver};
+use crate::sat::solver::{Answer, Lit, Solver};
 
 /// Time in place of a budget of conflicts.
 const BUDGET_TIME: Duration = Duration::from_secs(2);

@@ -7,7 +7,7 @@ use rustsat::encodings::card::{BoundUpper as _, BoundUpperIncremental as _, Tota
 use rustsat::instances::{BasicVarManager, Cnf, ManageVars as _};
 use rustsat::types::{Lit as TreeLit, Var};
 
-use crate::sat::Lit;
+use crate::sat::solver::Lit;
 
 /// Counts literals.
 pub(crate) struct Totalizer {

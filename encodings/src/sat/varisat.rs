@@ -18,7 +18,7 @@ use varisat::ExtendFormula as _;
 
 use crate::limits::Limits;
 use crate::number::dense;
-use crate::sat::{Answer, Lit, Solver};
+use crate::sat::solver::{Answer, Lit, Solver};
 
 /// A Varisat solver.
 pub(super) struct Varisat {

@@ -1,0 +1,77 @@
+//! What every solver has in common: literals, answers, and the trait.
+
+/// A literal: a variable, counted from 0, or its negation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct Lit(u32);
+
+impl Lit {
+    /// The first variable, which formulas fix to true.
+    pub(crate) const TRUE: Self = Self(0);
+
+    pub(crate) fn positive(variable: u32) -> Self {
+        Self(variable << 1)
+    }
+
+    pub(crate) fn new(variable: u32, positive: bool) -> Self {
+        if positive { Self::positive(variable) } else { !Self::positive(variable) }
+    }
+
+    pub(crate) fn variable(self) -> u32 {
+        self.0 >> 1
+    }
+
+    /// A number for the literal, counted from 0.
+    pub(crate) fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    pub(crate) fn is_positive(self) -> bool {
+        self.0 & 1 == 0
+    }
+
+    /// As in DIMACS files: variables count from 1, negation is the sign.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "fewer than 2^31 - 1 variables are held in memory with their clauses"
+    )]
+    pub(crate) fn dimacs(self) -> i32 {
+        let number = i32::try_from(self.variable()).expect("invariant: fewer than 2^31 variables") + 1;
+        if self.is_positive() { number } else { -number }
+    }
+}
+
+impl std::ops::Not for Lit {
+    type Output = Self;
+
+    fn not(self) -> Self {
+        Self(self.0 ^ 1)
+    }
+}
+
+/// What a solver says of its clauses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Answer {
+    Satisfiable,
+    Unsatisfiable,
+    /// A limit was reached; the solver is of no further use.
+    Interrupted,
+}
+
+/// A SAT solver for a formula that grows.
+pub(crate) trait Solver {
+    /// Adds a clause; its variables need no declaration.
+    fn add_clause(&mut self, clause: &[Lit]);
+    /// Decides the clauses added so far together with the assumptions, which hold for this call only.
+    fn solve(&mut self, assumptions: &[Lit]) -> Answer;
+    /// Assumptions of the last call that cannot hold together, if its answer was `Unsatisfiable`; in no particular order, and
+    /// not always as few as possible. None of them if the clauses alone are unsatisfiable.
+    fn core(&self) -> &[Lit];
+    /// The value of a variable in the assignment found last.
+    fn value(&self, variable: u32) -> bool;
+    /// Clauses learnt so far, one for each conflict; 0 if the solver does not tell.
+    fn conflicts(&self) -> u64;
+    /// Why the solver was interrupted, if not by a limit.
+    fn failure(&self) -> Option<&str> {
+        None
+    }
+}
