@@ -2,10 +2,11 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::concurrent::compile::{Happening, Instance, Role, Unit};
 use crate::concurrent::footprint::{Footprint, Footprints};
+use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::keys::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
+use crate::concurrent::unit::Unit;
 use crate::error::Error;
 use crate::ground::evaluate::{AtomId, Binding, World};
 use crate::ground::reach::Reached;

@@ -3,61 +3,18 @@
 use rustc_hash::FxHashSet;
 
 use crate::concurrent::builder::Builder;
-use crate::concurrent::held::drop_held;
-use crate::concurrent::keys::{Accesses, Designs};
+use crate::concurrent::happening::{Happening, Instance, Role};
+use crate::concurrent::links::drop_links;
 use crate::concurrent::measure::Measure;
 use crate::concurrent::split::{Half, Split};
+use crate::concurrent::unit::Unit;
 use crate::error::{Error, File, Place};
 use crate::ground::reach::Reached;
 use crate::lifted::Rational;
 use crate::limits::{Interrupted, Limits};
-use crate::number::{Int, checked_lcm};
+use crate::number::Int;
 use crate::task::{OperatorId, Task};
 use pddl::ast::Span;
-
-/// Times and durations stay below this.
-const LIMIT: Int = 1 << 90;
-
-/// What a happening is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Role {
-    /// The start of an instance.
-    Start(u32),
-    /// The end of an instance.
-    End(u32),
-    /// All of an action that takes no time.
-    Whole,
-    /// Timed initial literals, at this time.
-    Timed(Int),
-    /// A condition over all, or half of an instance that cannot be executed: never happens.
-    #[default]
-    Never,
-}
-
-/// A happening: an operator of the task with what concerns its time.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Happening {
-    pub(super) role: Role,
-    pub(super) accesses: Accesses,
-    pub(super) designs: Designs,
-    /// The atoms (even) and numbers (odd) that it writes, ascending.
-    pub(super) writes: Vec<u32>,
-    /// The variables that it sets and whose time of change matters.
-    pub(super) sets: Vec<u32>,
-}
-
-/// A durative action with its arguments.
-#[derive(Debug, Clone)]
-pub(super) struct Instance {
-    pub(super) start: OperatorId,
-    pub(super) end: OperatorId,
-    /// The operator whose condition must hold over all.
-    pub(super) over_all: Option<OperatorId>,
-    pub(super) duration: Int,
-    pub(super) designs: Designs,
-    /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
-    pub(super) joint: Vec<u32>,
-}
 
 /// A ground task whose actions can overlap.
 #[derive(Debug, Clone)]
@@ -73,37 +30,6 @@ pub struct Concurrent {
     pub(super) measure: Measure,
     /// How far apart interfering happenings are, in the task's time unit.
     pub(super) separation: Int,
-}
-
-/// The unit of all times: so many to the unit of the files.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Unit(Int);
-
-impl Unit {
-    /// A unit in which durations, separation and timed initial literals are integers.
-    fn new(task: &Task, split: &Split, separation: &Rational) -> Result<Self, Error> {
-        let mut times = split.events.iter().map(|event| &event.time).chain([separation]);
-        let common = times.try_fold(task.time_scale, |scale, time| {
-            checked_lcm(scale, time.denominator()?).filter(|scale| *scale < LIMIT)
-        });
-        common.map(Self).ok_or_else(|| Error::Overflow { what: "durations and times".into() })
-    }
-
-    fn of(self, time: &Rational) -> Result<Int, Error> {
-        let units = (time.clone() * &Rational::from_integer(self.0)).to_int();
-        units
-            .filter(|units| (-LIMIT..LIMIT).contains(units))
-            .ok_or_else(|| Error::Overflow { what: "a time".into() })
-    }
-
-    /// A duration of the task, in this unit.
-    pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<Int, Error> {
-        let factor = self.0.checked_div(task.time_scale);
-        let own = task.operators[operator.index()].duration.constant;
-        let duration = factor.and_then(|factor| own.checked_mul(factor));
-        let duration = duration.filter(|duration| (-LIMIT..LIMIT).contains(duration));
-        duration.ok_or_else(|| Error::Overflow { what: "a duration".into() })
-    }
 }
 
 /// Makes happenings of a split ground task.
@@ -139,7 +65,7 @@ pub(super) fn compile(
     }
     events.sort_unstable();
     task.time_scale = unit.0;
-    drop_held(&mut task, &instances);
+    drop_links(&mut task, &instances);
     let guards = vec![None; keys];
     let mut concurrent = Concurrent { task, happenings, instances, events, guards, measure, separation };
     concurrent.guard(limits).map_err(|interrupted| vec![interrupted.into()])?;

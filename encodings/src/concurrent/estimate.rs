@@ -8,7 +8,8 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::concurrent::clocks::Clocks;
-use crate::concurrent::compile::{Concurrent, Role};
+use crate::concurrent::compile::Concurrent;
+use crate::concurrent::happening::Role;
 use crate::number::{Int, dense};
 use crate::task::{Fact, State, VariableId};
 

@@ -11,13 +11,15 @@ mod clocks;
 mod compile;
 mod estimate;
 mod footprint;
-mod held;
+mod happening;
 mod keys;
+mod links;
 mod measure;
 mod schedule;
 mod search;
 mod split;
 mod time;
+mod unit;
 
 use std::time::Instant;
 
@@ -38,8 +40,8 @@ use pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
 
 pub use compile::Concurrent;
 
-use compile::Role;
 use estimate::Estimate;
+use happening::Role;
 use search::{Ended, Search, Sequence};
 
 /// How many nodes the greedy search for a first plan expands.

@@ -3,7 +3,8 @@
 use rustc_hash::FxHashMap;
 
 use crate::concurrent::clocks::Key;
-use crate::concurrent::compile::{Concurrent, Role};
+use crate::concurrent::compile::Concurrent;
+use crate::concurrent::happening::Role;
 use crate::number::Int;
 use crate::task::OperatorId;
 

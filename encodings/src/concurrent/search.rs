@@ -15,8 +15,9 @@ use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
 use crate::concurrent::clocks::{self, Clocks, Kind};
-use crate::concurrent::compile::{Concurrent, Role};
+use crate::concurrent::compile::Concurrent;
 use crate::concurrent::estimate::Estimate;
+use crate::concurrent::happening::Role;
 use crate::concurrent::keys::Accesses;
 use crate::limits::Limits;
 use crate::number::{GROWTH_LIMIT, Int, dense, words};
@@ -237,7 +238,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether an action under way uses a function with another design.
-    fn clashes(&self, clocks: &Clocks, happening: &crate::concurrent::compile::Happening) -> bool {
+    fn clashes(&self, clocks: &Clocks, happening: &crate::concurrent::happening::Happening) -> bool {
         happening.designs.iter().any(|(function, design)| {
             clocks.opens().iter().any(|open| {
                 let other = &self.concurrent.instances[open.instance as usize].designs;

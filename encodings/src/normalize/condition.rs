@@ -1,8 +1,7 @@
 //! Conditions, effects and expressions of the syntax tree in ids.
 
 use crate::lifted::{Bound, Change, Effect, Expression, Formula, Term};
-use crate::normalize::duration::Duration;
-use crate::normalize::{Normalizer, Rational, Scope};
+use crate::normalize::{Duration, Normalizer, Rational, Scope};
 use pddl::ast::{self, TypedName};
 
 impl Normalizer {

@@ -5,17 +5,8 @@
 
 use crate::error::File;
 use crate::lifted::{Expression, Formula, Metric, Rational};
-use crate::normalize::{Normalizer, Scope};
+use crate::normalize::{Duration, Normalizer, Scope};
 use pddl::ast::{self, Comparison, Direction};
-
-/// What `?duration` stands for.
-pub(super) enum Duration {
-    /// The action has none.
-    Instantaneous,
-    Fixed(Expression),
-    /// The planner chooses it.
-    Open,
-}
 
 /// Whether the metrics reward time; nothing if that cannot be told from the metrics alone, or if they disagree.
 pub(super) fn is_rewarded(metrics: &[Metric]) -> Option<bool> {

@@ -14,10 +14,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::configuration::{is_static, recursive_through_forall};
 use crate::error::{Error, File, Place};
 use crate::lifted::{
-    Axiom, Change, Event, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter, Predicate,
-    PredicateId, Rational, Schema, Term, Time,
+    Axiom, Change, Event, Expression, Formula, Function, FunctionId, Lifted, Metric, ObjectId, Parameter,
+    Predicate, PredicateId, Rational, Schema, Term, Time,
 };
-use crate::normalize::duration::Duration;
 use crate::number::dense;
 use pddl::ast::{self, ConditionTime, EffectTime, Identifier, Name, Span, TypedName};
 
@@ -121,6 +120,15 @@ fn compares_for_all(formula: &Formula, below: bool) -> bool {
         Formula::Literal { .. } | Formula::Equal { .. } => false,
         Formula::Compare(..) => below,
     }
+}
+
+/// What `?duration` stands for.
+enum Duration {
+    /// The action has none.
+    Instantaneous,
+    Fixed(Expression),
+    /// The planner chooses it.
+    Open,
 }
 
 /// The variables in sight, each with what it stands for, and the file that is read.

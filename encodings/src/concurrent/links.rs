@@ -1,11 +1,11 @@
 //! The variables that link a condition over all to an end are taken out of the task once both are paired.
 
-use crate::concurrent::compile::Instance;
+use crate::concurrent::happening::Instance;
 use crate::task::{Condition, Fact, Task, VariableId};
 
 /// Takes out the variables that only link a condition over all to an end.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
-pub(super) fn drop_held(task: &mut Task, instances: &[Instance]) {
+pub(super) fn drop_links(task: &mut Task, instances: &[Instance]) {
     let mut held = vec![false; task.variables.len()];
     for id in instances.iter().filter_map(|instance| instance.over_all) {
         for fact in std::mem::take(&mut task.operators[id.index()].effects) {

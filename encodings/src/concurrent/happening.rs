@@ -1,0 +1,46 @@
+//! Happenings and instances of durative actions.
+
+use crate::concurrent::keys::{Accesses, Designs};
+use crate::number::Int;
+use crate::task::OperatorId;
+
+/// What a happening is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Role {
+    /// The start of an instance.
+    Start(u32),
+    /// The end of an instance.
+    End(u32),
+    /// All of an action that takes no time.
+    Whole,
+    /// Timed initial literals, at this time.
+    Timed(Int),
+    /// A condition over all, or half of an instance that cannot be executed: never happens.
+    #[default]
+    Never,
+}
+
+/// A happening: an operator of the task with what concerns its time.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Happening {
+    pub(super) role: Role,
+    pub(super) accesses: Accesses,
+    pub(super) designs: Designs,
+    /// The atoms (even) and numbers (odd) that it writes, ascending.
+    pub(super) writes: Vec<u32>,
+    /// The variables that it sets and whose time of change matters.
+    pub(super) sets: Vec<u32>,
+}
+
+/// A durative action with its arguments.
+#[derive(Debug, Clone)]
+pub(super) struct Instance {
+    pub(super) start: OperatorId,
+    pub(super) end: OperatorId,
+    /// The operator whose condition must hold over all.
+    pub(super) over_all: Option<OperatorId>,
+    pub(super) duration: Int,
+    pub(super) designs: Designs,
+    /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
+    pub(super) joint: Vec<u32>,
+}

@@ -1,0 +1,41 @@
+//! The unit of all times.
+
+use crate::concurrent::split::Split;
+use crate::error::Error;
+use crate::lifted::Rational;
+use crate::number::{Int, checked_lcm};
+use crate::task::{OperatorId, Task};
+
+/// Times and durations stay below this.
+const LIMIT: Int = 1 << 90;
+
+/// The unit of all times: so many to the unit of the files.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Unit(pub(super) Int);
+
+impl Unit {
+    /// A unit in which durations, separation and timed initial literals are integers.
+    pub(super) fn new(task: &Task, split: &Split, separation: &Rational) -> Result<Self, Error> {
+        let mut times = split.events.iter().map(|event| &event.time).chain([separation]);
+        let common = times.try_fold(task.time_scale, |scale, time| {
+            checked_lcm(scale, time.denominator()?).filter(|scale| *scale < LIMIT)
+        });
+        common.map(Self).ok_or_else(|| Error::Overflow { what: "durations and times".into() })
+    }
+
+    pub(super) fn of(self, time: &Rational) -> Result<Int, Error> {
+        let units = (time.clone() * &Rational::from_integer(self.0)).to_int();
+        units
+            .filter(|units| (-LIMIT..LIMIT).contains(units))
+            .ok_or_else(|| Error::Overflow { what: "a time".into() })
+    }
+
+    /// A duration of the task, in this unit.
+    pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<Int, Error> {
+        let factor = self.0.checked_div(task.time_scale);
+        let own = task.operators[operator.index()].duration.constant;
+        let duration = factor.and_then(|factor| own.checked_mul(factor));
+        let duration = duration.filter(|duration| (-LIMIT..LIMIT).contains(duration));
+        duration.ok_or_else(|| Error::Overflow { what: "a duration".into() })
+    }
+}
