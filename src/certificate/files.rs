@@ -1,38 +1,19 @@
 //! The files of a certificate: read as the manifest has them, and none that it does not have.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest as _, Sha256};
-
-use super::{
+use super::digest::{digest, digest_of};
+use super::manifest::{
     ARGUMENT, Claim, DOMAIN, FORMAT, File, HINTS, Manifest, PLAN, PROBLEM, PROOF, PROOF_LIMIT, Refutation,
-    SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, WITNESS, derivations, knowledge,
+    SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, WITNESS,
 };
+use super::{derivations, knowledge};
 
 /// The text of a file among several.
 pub(super) fn text<'t, N: AsRef<str>>(files: &'t [(N, String)], name: &str) -> &'t str {
     files.iter().find(|(own, _)| own.as_ref() == name).map_or("", |(_, text)| text.as_str())
-}
-
-/// The size of a file and its SHA-256, read piece by piece.
-pub(super) fn digest_of(path: &Path) -> std::io::Result<(u64, String)> {
-    let mut hasher = Sha256::new();
-    let bytes = std::io::copy(&mut fs::File::open(path)?, &mut hasher)?;
-    Ok((bytes, hexadecimal(&hasher.finalize())))
-}
-
-pub(super) fn digest(bytes: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(bytes))
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 /// The manifest, and the contents of the files, each as the manifest says.

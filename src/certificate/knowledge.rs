@@ -10,7 +10,7 @@ use rules::replay::{Replayed, replay};
 use serde::{Deserialize, Serialize};
 
 use super::derivations::{self, DERIVATIONS};
-use super::files::digest;
+use super::digest::digest;
 use crate::knowledge::{COADAPTATION, Knowledge, Sources, Stated, Statements, TOMASYS, rule_text};
 use crate::message::Message;
 use crate::mission::{Bindings, Mission};

@@ -13,8 +13,10 @@
 //! | `argument.json` | why no plan is cheaper: labels, potentials, needs (see `encodings::check_certificate`) |
 
 mod derivations;
+mod digest;
 mod files;
 mod knowledge;
+mod manifest;
 mod verify;
 
 use std::fs;
@@ -28,96 +30,19 @@ use encodings::{
 use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::{print_domain, print_problem};
-use serde::{Deserialize, Serialize};
 
+pub use manifest::{Claim, Part, Report};
 pub use verify::{conditions, verify};
 
-use files::{digest_of, text};
+use digest::digest_of;
+use files::text;
+use manifest::{
+    ARGUMENT, DOMAIN, DRAFT, FORMAT, FORMULA, File, HINTS, LEGEND, Manifest, PLAN, PROBLEM, PROOF,
+    PROOF_LIMIT, Refutation, STREAMED, TASK, TEXT_LIMIT, WITNESS,
+};
 
 use crate::message::Message;
 use crate::mission::Mission;
-
-const FORMAT: &str = "metaplan-certificate/3";
-/// All files that are never in memory as a whole are together at most this large, in bytes.
-const SIZE_LIMIT: u64 = 1 << 30;
-/// All files that are in memory as a whole are together at most this large, in bytes.
-const TEXT_LIMIT: u64 = 1 << 28;
-const DOMAIN: &str = "domain.pddl";
-const PROBLEM: &str = "problem.pddl";
-const PLAN: &str = "plan.txt";
-const TASK: &str = "task.json";
-const WITNESS: &str = "witness.json";
-const ARGUMENT: &str = "argument.json";
-const FORMULA: &str = "formula.cnf";
-const LEGEND: &str = "legend.txt";
-const PROOF: &str = "proof.drat";
-const HINTS: &str = "hints.txt";
-/// What the solver writes, before it is shortened.
-const DRAFT: &str = "draft.drat";
-/// These may be large, and are never in memory as a whole.
-const STREAMED: [&str; 4] = [FORMULA, LEGEND, PROOF, HINTS];
-/// A proof and its hints are at most this large each, in bytes.
-const PROOF_LIMIT: u64 = 1 << 28;
-
-/// What a certificate claims, and of which files it consists.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Manifest {
-    format: String,
-    claim: Claim,
-    refutation: Refutation,
-    files: Vec<File>,
-}
-
-/// Whether there is a formula with a proof besides the argument.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-enum Refutation {
-    /// For plans of at most so many steps; longer ones are not cheaper.
-    Steps(usize),
-    /// Why not.
-    None(String),
-}
-
-/// What is claimed.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Claim {
-    /// The plan is valid, this is its metric, and no plan has a better one.
-    Optimal {
-        /// Exact: a decimal or a fraction.
-        metric: String,
-    },
-    /// There is no plan.
-    Unsolvable,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    name: String,
-    bytes: u64,
-    sha256: String,
-}
-
-/// What came of one part of a verification.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Part {
-    /// `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`, `formula`, `proof`, `steps` or `mission`; or
-    /// `limits`, where time or memory was up.
-    pub part: &'static str,
-    /// What was checked; or why it fails, with the first thing that is wrong.
-    pub result: Result<String, String>,
-}
-
-/// What came of a verification.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Report {
-    /// The claim; none if the manifest does not say.
-    pub claim: Option<Claim>,
-    /// In order; what rests on a part that fails is left out.
-    pub parts: Vec<Part>,
-}
 
 impl Report {
     /// Whether the claim is proved.

@@ -13,10 +13,10 @@ use pddl::ast::{ActionBody, Comparison, Domain, InitialElement, Name, Problem};
 use pddl::validate::{Options, PlanText, validate};
 
 use super::files::{read, text};
-use super::{
+use super::manifest::{
     ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Part, Refutation, Report, STREAMED, TASK, WITNESS,
-    derivations, knowledge,
 };
+use super::{derivations, knowledge};
 use crate::measure::measure;
 use crate::message::Message;
 use crate::mission::Mission;

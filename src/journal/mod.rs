@@ -22,6 +22,7 @@ mod directory;
 mod lock;
 mod record;
 mod recover;
+mod recovery;
 mod report;
 
 use std::fs::File;
@@ -33,6 +34,8 @@ use serde_json::{Value, json};
 
 use crate::mapek::{Answer, Decision, Loop, Observation, Snapshot};
 use crate::message::Message;
+pub use recovery::Recovery;
+
 use directory::{Contents, broken, closing, name, path};
 use lock::Lock;
 use record::{Link, header};
@@ -66,17 +69,6 @@ impl Default for Policy {
     fn default() -> Self {
         Self { sync: Sync::default(), snapshot_every: 1000 }
     }
-}
-
-/// What opening a journal has come to.
-#[derive(Debug, Clone, Default)]
-pub struct Recovery {
-    /// How many observations were handled again; none for a new journal.
-    pub replayed: Option<u64>,
-    /// How many bytes of an incomplete record were cut off.
-    pub cut: u64,
-    /// What is wrong with the journal and has changed nothing.
-    pub warnings: Vec<Message>,
 }
 
 /// An open journal.

@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::Recovery;
 use super::directory::{Contents, End, OLD_FORMAT, Segment, broken, closing, open_private, path};
 use super::record::{Link, Record};
+use super::recovery::Recovery;
 use crate::mapek::{Answer, Loop, Observation};
 use crate::message::Message;
 
