@@ -1,12 +1,13 @@
 //! Metaplan adapts a robot's task plan and its software architecture together.
 //!
-//! This facade joins the three libraries: [`ontology`] (what the robot is), [`rules`] (what follows) and [`encodings`] (what to
-//! do about it); and `metaplan-probabilistic`, model checking of decision processes, which [`probabilistic`] brings to a mission.
+//! This facade joins the libraries: [`ontology`] (what the robot is), [`rules`] (what follows) and [`encodings`] (what to
+//! do about it); and `metaplan-probabilistic`, model checking of decision processes, which [`comparison`] brings to a mission.
 //! [`mission`] is the only place that sees OWL and PDDL at once. Order lives here, not logic.
 
 pub use {encodings, ontology, rules};
 
 pub mod certificate;
+pub mod comparison;
 pub mod explain;
 pub mod journal;
 pub mod knowledge;
@@ -14,7 +15,6 @@ pub mod mapek;
 pub mod measure;
 pub mod message;
 pub mod mission;
-pub mod probabilistic;
 pub mod simulate;
 
 /// The example of the README is compiled and run with the tests.

@@ -11,8 +11,8 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use metaplan::comparison::{Battery, Coadaptation, Process, Risk, program};
 use metaplan::mission::Mission;
-use metaplan::probabilistic::{Battery, Coadaptation, Process, Risk, program};
 use probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use probabilistic::explore::{Bounds, explore};
 use probabilistic::prism::ast::{

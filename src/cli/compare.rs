@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use encodings::Limits;
 use indicatif::{ProgressBar, ProgressDrawTarget};
-use metaplan::message::Message;
-use metaplan::mission::Mission;
-use metaplan::probabilistic::{
+use metaplan::comparison::{
     Action, Candidate, Coadaptation, Comparison, Config, Costs, Failure as Unfinished, Planned, Report, Risk,
     Roles, Situation, Stages, Tasked, compare,
 };
+use metaplan::message::Message;
+use metaplan::mission::Mission;
 use pddl::ast::Problem;
 
 use crate::cli::check::failure as process_failure;

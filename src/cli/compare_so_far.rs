@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use encodings::Limits;
+use metaplan::comparison::{Candidate, Comparison, Costs};
 use metaplan::message::Message;
-use metaplan::probabilistic::{Candidate, Comparison, Costs};
 use serde_json::{Value, json};
 
 use crate::cli::compare_table::{

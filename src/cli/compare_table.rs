@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use metaplan::comparison::{Candidate, Comparison, Costs, Measures, Stages};
 use metaplan::message::Message;
 use metaplan::mission::source;
-use metaplan::probabilistic::{Candidate, Comparison, Costs, Measures, Stages};
 use serde_json::{Map, Value, json};
 
 use crate::cli::{Failure, output};

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use metaplan::comparison::{Coadaptation, Risk, Tasked, program, published_program};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
-use metaplan::probabilistic::{Coadaptation, Risk, Tasked, program, published_program};
 use pddl::ast::Problem;
 use pddl::{portable, print_domain, print_problem};
 use serde_json::json;

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
+use metaplan::comparison::{MapOptions, import_map};
 use metaplan::message::Message;
 use metaplan::mission::source;
-use metaplan::probabilistic::{MapOptions, import_map};
 use serde_json::json;
 
 use crate::cli::{Common, Exit, Failure, Format, output};

@@ -34,7 +34,7 @@ pub struct Manifest {
     adaptation: AdaptationSection,
     /// The symbols of the co-adaptation process, where they differ from the defaults.
     #[serde(default)]
-    pub probabilistic: crate::probabilistic::Roles,
+    pub probabilistic: crate::comparison::Roles,
     /// Situations by name.
     #[serde(default)]
     pub scenarios: BTreeMap<String, Scenario>,

@@ -19,10 +19,10 @@ use num_rational::BigRational;
 use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use pddl::{self, Severity, Source};
 
+use crate::comparison::Roles;
 use crate::knowledge::Knowledge;
 use crate::mapek::Settings;
 use crate::message::Message;
-use crate::probabilistic::Roles;
 use kind::Kind;
 
 pub use binding::Bindings;

@@ -4,10 +4,10 @@
 
 use std::path::PathBuf;
 
-use metaplan::mission::Mission;
-use metaplan::probabilistic::{
+use metaplan::comparison::{
     Coadaptation, MapOptions, Process, Risk, import_map, program, published, shortest_routes,
 };
+use metaplan::mission::Mission;
 use num_rational::BigRational;
 use probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use probabilistic::explore::{Bounds, explore};

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-use metaplan::probabilistic::{Coadaptation, MapOptions, Process, Risk};
+use metaplan::comparison::{Coadaptation, MapOptions, Process, Risk};
 use probabilistic::explore::{Bounds, explore};
 use probabilistic::solve::solve;
 use probabilistic::{Direction, Number, Problem};

@@ -8,9 +8,9 @@ use probabilistic::policy::with_secondary;
 use probabilistic::solve::{NONE, Solution, solve};
 use probabilistic::{Direction, Error, Problem};
 
-use crate::probabilistic::coadaptation::Coadaptation;
-use crate::probabilistic::play::{Measures, play};
-use crate::probabilistic::process::{Action, Process, REWARDS, Risk, Situation, State};
+use crate::comparison::coadaptation::Coadaptation;
+use crate::comparison::play::{Measures, play};
+use crate::comparison::process::{Action, Process, REWARDS, Risk, Situation, State};
 
 /// A policy and what it is best at.
 pub type NamedPolicy = (String, Vec<u32>);

@@ -250,7 +250,7 @@ impl Coadaptation {
     }
 
     /// Whether a problem spells out places and configurations, as [`Coadaptation::new`] reads them; otherwise the states
-    /// of the task serve ([`Tasked`](crate::probabilistic::Tasked)).
+    /// of the task serve ([`Tasked`](crate::comparison::Tasked)).
     pub fn is_spelt_out(problem: &Problem, roles: &Roles) -> bool {
         let facts = Facts::new(problem);
         [&roles.configured, &roles.suits].iter().any(|role| !facts.of(role).is_empty())

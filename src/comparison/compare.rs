@@ -9,14 +9,14 @@ use num_rational::BigRational;
 use probabilistic::Error;
 use probabilistic::explore::{Bounds, explore};
 
+use crate::comparison::coadaptation::Coadaptation;
+use crate::comparison::hindsight::{self, Hindsight, LossReport, Spent};
+use crate::comparison::play::{Measures, play};
+use crate::comparison::process::{Action, Process, REWARDS, Risk, Situation, State};
+use crate::comparison::published::{published, shortest_routes};
+use crate::comparison::referee::Referee;
+use crate::comparison::route::best_on_route;
 use crate::message::Message;
-use crate::probabilistic::coadaptation::Coadaptation;
-use crate::probabilistic::loss::{self, Hindsight, LossReport, Spent};
-use crate::probabilistic::play::{Measures, play};
-use crate::probabilistic::process::{Action, Process, REWARDS, Risk, Situation, State};
-use crate::probabilistic::published::{published, shortest_routes};
-use crate::probabilistic::referee::Referee;
-use crate::probabilistic::route::best_on_route;
 
 /// A plan from a situation, and what it cost to find it.
 #[derive(Debug, Clone, Default)]
@@ -217,12 +217,12 @@ pub fn compare(
     }
     let loss = match &first {
         Some(plan) if mission.loss.is_some() => {
-            Some(loss::report(&referee, plan, anticipating.as_deref().unwrap_or_default(), &mut memo)?)
+            Some(hindsight::report(&referee, plan, anticipating.as_deref().unwrap_or_default(), &mut memo)?)
         }
         _ => None,
     };
     let hindsight = [(Spent::Time, penalty), (Spent::Energy, f64::INFINITY)]
-        .map(|(spent, penalty)| loss::hindsight(mission, config.risk, penalty, spent));
+        .map(|(spent, penalty)| hindsight::hindsight(mission, config.risk, penalty, spent));
     let no_price = referee.no_price();
     let mut comparison =
         Comparison { candidates, front, hindsight, penalty, no_price, loss, costs: memo.costs };

@@ -5,10 +5,10 @@ use probabilistic::explore::{Bounds, explore};
 use probabilistic::solve::solve;
 use probabilistic::{Direction, Problem};
 
-use crate::probabilistic::coadaptation::{Coadaptation, Switch, Traversal};
-use crate::probabilistic::compare::{Failure, Memo, after, time_of};
-use crate::probabilistic::process::{Action, Process, Risk, Situation};
-use crate::probabilistic::referee::Referee;
+use crate::comparison::coadaptation::{Coadaptation, Switch, Traversal};
+use crate::comparison::compare::{Failure, Memo, after, time_of};
+use crate::comparison::process::{Action, Process, Risk, Situation};
+use crate::comparison::referee::Referee;
 
 /// What happens when the component is lost after some move of the nominal run.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,8 @@
 
 use num_rational::BigRational;
 
-use crate::probabilistic::coadaptation::{Coadaptation, Switch, Traversal};
-use crate::probabilistic::process::Action;
+use crate::comparison::coadaptation::{Coadaptation, Switch, Traversal};
+use crate::comparison::process::Action;
 
 /// The fastest way to drive a route, reconfiguring before any arc; none if it cannot be driven.
 pub fn best_on_route(mission: &Coadaptation, route: &[usize]) -> Option<Vec<Action>> {

@@ -6,8 +6,8 @@
 
 mod coadaptation;
 mod compare;
+mod hindsight;
 mod import;
-mod loss;
 mod play;
 mod process;
 mod program;
@@ -19,8 +19,8 @@ mod task;
 
 pub use coadaptation::{Arc, Battery, Coadaptation, Configuration, Loss, Roles, Switch, Traversal};
 pub use compare::{Candidate, Comparison, Config, Costs, Failure, Planned, Planner, Report, Stages, compare};
+pub use hindsight::{Hindsight, LossAt, LossReport};
 pub use import::{Files, MapOptions, import_map};
-pub use loss::{Hindsight, LossAt, LossReport};
 pub use play::Measures;
 pub use process::{Action, Process, REWARDS, Risk, Situation, State};
 pub use program::program;

@@ -13,11 +13,11 @@ use probabilistic::prism::ast::{
 };
 use probabilistic::prism::identifier;
 
-use crate::probabilistic::coadaptation::Coadaptation;
-use crate::probabilistic::program::{
+use crate::comparison::coadaptation::Coadaptation;
+use crate::comparison::program::{
     all, assign, command, equals, flag, item, model, not, number, range, updates,
 };
-use crate::probabilistic::published::{ROUTES, shortest_routes};
+use crate::comparison::published::{ROUTES, shortest_routes};
 
 /// The mission as a model of the published setting: `r` is the route (0 before it is chosen), `p` how many of its arcs are
 /// behind the robot, `c` the configuration, `b` the battery; `rd` says that a reconfiguration was made.

@@ -8,7 +8,7 @@ use probabilistic::policy::conditioned;
 use probabilistic::solve::solve;
 use probabilistic::{Direction, Error, Mdp, Number, Problem};
 
-use crate::probabilistic::process::{Process, State};
+use crate::comparison::process::{Process, State};
 
 /// Decides what to do in a state after so many steps, by the number of the action; none ends the mission.
 pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;

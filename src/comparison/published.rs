@@ -9,8 +9,8 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
-use crate::probabilistic::coadaptation::{Coadaptation, Traversal};
-use crate::probabilistic::process::Action;
+use crate::comparison::coadaptation::{Coadaptation, Traversal};
+use crate::comparison::process::Action;
 use probabilistic::Number;
 
 /// How many routes are kept.

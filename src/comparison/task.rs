@@ -13,12 +13,12 @@ use num_traits::{One, Zero};
 use pddl::ast::{InitialElement, Name, Problem};
 use pddl::validate::{PlanStep, advance};
 
-use crate::message::Message;
-use crate::mission::Mission;
-use crate::probabilistic::coadaptation::{
+use crate::comparison::coadaptation::{
     Arc, Coadaptation, Configuration, Facts, Loss, Roles, Switch, Traversal, components, fits,
 };
-use crate::probabilistic::process::{Action, Situation};
+use crate::comparison::process::{Action, Situation};
+use crate::message::Message;
+use crate::mission::Mission;
 
 /// States of the task beyond which it does not become a process.
 const STATES: usize = 50_000;

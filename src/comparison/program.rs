@@ -11,8 +11,8 @@ use probabilistic::prism::ast::{
 };
 use probabilistic::prism::identifier;
 
-use crate::probabilistic::coadaptation::{Coadaptation, Traversal};
-use crate::probabilistic::process::Risk;
+use crate::comparison::coadaptation::{Coadaptation, Traversal};
+use crate::comparison::process::Risk;
 
 /// The mission as a model: `l` is the place, `c` the configuration, `b` the battery; `hit`, `failed` and `lost` are flags.
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
@@ -101,7 +101,7 @@ impl Writer<'_> {
         format!("A co-adaptation mission.\nl, the place: {places}\nc, the configuration: {designs}")
     }
 
-    fn battery(&self) -> Option<crate::probabilistic::Battery> {
+    fn battery(&self) -> Option<crate::comparison::Battery> {
         self.mission.battery.filter(|_| self.risk.battery)
     }
 

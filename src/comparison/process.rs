@@ -9,7 +9,7 @@ use probabilistic::explore::{Choices, Generator};
 use probabilistic::states::States;
 use probabilistic::{Error, Number};
 
-use crate::probabilistic::coadaptation::Coadaptation;
+use crate::comparison::coadaptation::Coadaptation;
 
 /// The rewards that the process has, in this order: time, energy, collisions, reconfigurations, moves.
 pub const REWARDS: [&str; 5] = ["time", "energy", "collisions", "reconfigurations", "moves"];
