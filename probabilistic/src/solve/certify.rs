@@ -8,10 +8,10 @@
 
 use crate::mdp::dense;
 use crate::number::{Number, count};
-use crate::solve::Direction;
 use crate::solve::chain::solve_chain;
-use crate::solve::component::Quotient;
 use crate::solve::local::NONE;
+use crate::solve::problem::Direction;
+use crate::solve::quotient::Quotient;
 
 /// Rounds of policy iteration for the longest way.
 const ROUNDS: usize = 200;

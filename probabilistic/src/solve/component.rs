@@ -8,7 +8,8 @@ use crate::solve::certify::certify;
 use crate::solve::chain::{Rows, solve_chain};
 use crate::solve::interval::{self, Enclosed};
 use crate::solve::local::{EndComponents, Local, NONE, attractor, end_components};
-use crate::solve::{Direction, Run, TINY};
+use crate::solve::problem::{Direction, EXACT_WORK, Run, TINY};
+use crate::solve::quotient::Quotient;
 
 /// Rounds of policy iteration after which the best policy so far is taken; the certificate tells what it is worth.
 const ROUNDS: usize = 1000;
@@ -16,38 +17,6 @@ const ROUNDS: usize = 1000;
 const SWEEPS: usize = 40;
 /// Blocks from which on sweeps pay off.
 const LARGE: usize = 200;
-
-/// A component with its end components merged into blocks.
-pub struct Quotient<N> {
-    /// For each block its first row, and the end.
-    pub first: Vec<u32>,
-    /// What each choice that leaves its block leads to; columns are blocks, own loops are divided out.
-    pub rows: Rows<N>,
-    /// For each row its local choice.
-    pub choices: Vec<u32>,
-    /// The most transitions that a row was made of.
-    pub widest: usize,
-}
-
-impl<N: Number> Quotient<N> {
-    /// How many blocks there are.
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "the end is listed, too, so that the list is never empty"
-    )]
-    pub fn blocks(&self) -> usize {
-        self.first.len() - 1
-    }
-
-    /// The rows of a block.
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "the start of the next one is there, because the end is listed, too"
-    )]
-    pub fn range(&self, block: usize) -> std::ops::Range<usize> {
-        self.first[block] as usize..self.first[block + 1] as usize
-    }
-}
 
 impl<N: Number> Run<'_, N> {
     /// Solves a component of more than one state; none where exact arithmetic takes too long.
@@ -269,7 +238,7 @@ impl<N: Number> Run<'_, N> {
                 let sizes = values.iter().map(Number::size).fold(0, u64::saturating_add);
                 self.work = self.work.saturating_add(sizes.saturating_mul(8));
             }
-            if N::EXACT && self.work > super::EXACT_WORK {
+            if N::EXACT && self.work > EXACT_WORK {
                 return None;
             }
             if !improved {

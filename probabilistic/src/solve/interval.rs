@@ -9,9 +9,9 @@ use num_rational::BigRational;
 
 use crate::mdp::dense;
 use crate::number::{Number, count};
-use crate::solve::Direction;
-use crate::solve::component::Quotient;
 use crate::solve::local::NONE;
+use crate::solve::problem::Direction;
+use crate::solve::quotient::Quotient;
 
 /// Policies with values, and how far these can be from the truth.
 pub struct Enclosed<N> {

@@ -6,7 +6,8 @@
 
 use crate::mdp::dense;
 use crate::number::{Number, count, is_whole};
-use crate::solve::{Direction, NONE, Run};
+use crate::solve::local::NONE;
+use crate::solve::problem::{Direction, Run};
 
 /// States up to which the next best state is looked for one by one.
 const SMALL: usize = 64;
