@@ -1,6 +1,7 @@
 //! A model and a property to an answer: explored in doubles, and once more in rationals where the model is small.
 
 mod answer;
+mod options;
 mod query;
 mod steps;
 mod table;
@@ -11,47 +12,19 @@ use std::time::{Duration, Instant};
 use num_rational::BigRational;
 
 use crate::error::Error;
-use crate::explore::{Bounds, Explored, explore};
+use crate::explore::{Explored, explore};
 use crate::number::Number;
 use crate::prism::ast::Model;
-use crate::prism::{Packed, Program, Settings};
-use crate::property::{Property, RewardPath};
+use crate::prism::{Packed, Program};
+use crate::property::Property;
 use crate::solve::NONE;
 
 pub use answer::{Answer, Outcome, Quantity};
+pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
 /// Transitions up to which a model is solved in rationals unless asked otherwise.
 const SMALL: usize = 150_000;
-
-/// Whether to solve in rationals.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Exactness {
-    /// Where the model is small.
-    #[default]
-    Auto,
-    /// Always.
-    Always,
-    /// Never.
-    Never,
-}
-
-/// How a property is checked.
-#[derive(Default)]
-pub struct Options<'a> {
-    /// Values of constants.
-    pub settings: Settings,
-    /// Limits of exploration.
-    pub bounds: Bounds<'a>,
-    /// Whether to solve in rationals.
-    pub exactness: Exactness,
-    /// The reward that breaks ties of policies; the number of steps otherwise.
-    pub secondary: Option<String>,
-    /// Whether a policy is wanted.
-    pub policy: bool,
-    /// A policy to evaluate, in place of the best one.
-    pub evaluate: Option<PolicyTable>,
-}
 
 /// What came out.
 #[derive(Debug, Clone)]
@@ -183,9 +156,4 @@ fn policy_table<N: Number>(
         }
     }
     table
-}
-
-/// Whether a property sums rewards until something is reached.
-fn reaches(path: &RewardPath) -> bool {
-    matches!(path, RewardPath::Reach(_))
 }

@@ -5,7 +5,8 @@ use num_rational::BigRational;
 use num_traits::ToPrimitive;
 
 use crate::check::answer::{Answer, Outcome};
-use crate::check::{Options, reaches, steps};
+use crate::check::options::Options;
+use crate::check::steps;
 use crate::error::{Diagnostic, Error, Place};
 use crate::explore::{DEADLOCK, Explored};
 use crate::mdp::Mdp;
@@ -452,4 +453,9 @@ fn constrained<N: Number>(found: Option<Constrained<N>>, shown: impl Fn(Bounded<
 
 fn indicator<N: Number>(set: &FixedBitSet, states: usize) -> Vec<N> {
     (0..states).map(|state| if set.contains(state) { N::one() } else { N::zero() }).collect()
+}
+
+/// Whether a property sums rewards until something is reached.
+fn reaches(path: &RewardPath) -> bool {
+    matches!(path, RewardPath::Reach(_))
 }
