@@ -1,18 +1,14 @@
 //! Declarations, commands and rewards of the syntax tree to those of a program.
 
-use num_rational::BigRational;
-use num_traits::{One, Signed};
+use num_traits::Signed;
 
-use crate::error::{Diagnostic, Place};
+use crate::error::Diagnostic;
 use crate::number::Number;
 use crate::prism::ast::{self, Type};
-use crate::prism::code::{Code, Fault, rounded};
+use crate::prism::code::{Code, rounded};
+use crate::prism::command::{Command, RewardItem, Update, Variable, probabilities};
 use crate::prism::compile::Names;
 use crate::prism::guard::Guard;
-use crate::prism::model::{Command, RewardItem, Update, Variable};
-
-/// How far the sum of probabilities may be from one, as in PRISM; what is within is scaled to one.
-const SUM_TOLERANCE: f64 = 1e-5;
 
 pub fn declare(names: &mut Names, variable: &ast::Variable) -> Result<Variable, Diagnostic> {
     let whole = |names: &mut Names, expression: &ast::Expr, kind| match names.constant(expression, kind)? {
@@ -90,36 +86,6 @@ pub fn compile_command<N: Number>(
     let constant = updates.iter().all(|update| update.probability.is_constant());
     let certain = constant.then(|| probabilities(&updates, &[], command.place)).and_then(Result::ok);
     Ok(Command { guard: Guard::new(guard), updates, certain, place: command.place })
-}
-
-/// The probabilities of the updates of a command, which sum to one.
-pub fn probabilities<N: Number>(
-    updates: &[Update],
-    values: &[i64],
-    place: Place,
-) -> Result<Vec<N>, Diagnostic> {
-    let fault = |Fault(text)| Diagnostic::new("Q303", place, text);
-    let mut exact = Vec::with_capacity(updates.len());
-    for update in updates {
-        let probability = update.probability.number(values).map_err(fault)?;
-        if probability.is_negative() {
-            let text = format!("a negative probability, {}", Number::to_f64(&probability));
-            return Err(Diagnostic::new("Q302", place, text));
-        }
-        exact.push(probability);
-    }
-    let sum: BigRational = exact.iter().sum();
-    let off = (Number::to_f64(&sum) - 1.0).abs();
-    if off.is_nan() || off > SUM_TOLERANCE {
-        let text = format!("the probabilities sum to {}, not to 1", Number::to_f64(&sum));
-        return Err(Diagnostic::new("Q301", place, text));
-    }
-    if !sum.is_one() {
-        for probability in &mut exact {
-            *probability /= &sum;
-        }
-    }
-    exact.iter().map(|probability| rounded(probability).map_err(fault)).collect()
 }
 
 pub fn reward_item<N: Number>(

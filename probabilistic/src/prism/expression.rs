@@ -4,6 +4,7 @@ use crate::error::{Diagnostic, Place};
 use crate::number::parse_decimal;
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Function};
 use crate::prism::lexer::{Kind, Token};
+use crate::prism::reserved::is_reserved;
 
 /// How deep expressions may be nested.
 const DEPTH: usize = 200;
@@ -113,7 +114,7 @@ impl<'a> Cursor<'a> {
     pub fn name(&mut self, what: &str) -> Read<(String, Place)> {
         let place = self.place();
         match self.peek() {
-            Kind::Name(name) if !super::is_reserved(name) => {
+            Kind::Name(name) if !is_reserved(name) => {
                 self.advance();
                 Ok((name.clone(), place))
             }

@@ -3,60 +3,21 @@
 //! Commands whose guards fix one variable (`l=5 & …`) are found by its value, and so are the actions that have such
 //! commands, so that the cost of a state does not grow with the number of commands for other states.
 
-use std::borrow::Cow;
 use std::cmp::Reverse;
 
 use rustc_hash::FxHashMap;
 
-use crate::error::{Diagnostic, Error, Place};
+use crate::error::{Diagnostic, Error};
 use crate::mdp::dense;
 use crate::number::Number;
 use crate::prism::ast::{self, Model, ModelKind, Type};
-use crate::prism::build::{compile_command, declare, probabilities, reward_item};
-use crate::prism::code::Code;
+use crate::prism::build::{compile_command, declare, reward_item};
+use crate::prism::command::{Command, RewardItem, Variable};
 use crate::prism::compile::{Names, Settings};
-use crate::prism::guard::Guard;
 use crate::prism::state::{Layout, Packed, Valuation, above_least};
 
 /// The action number of commands without name.
 pub const UNNAMED: u32 = u32::MAX - 1;
-
-/// A variable with its range evaluated.
-#[derive(Debug, Clone)]
-pub struct Variable {
-    /// Its name.
-    pub name: String,
-    /// Whether it is a truth value.
-    pub is_bool: bool,
-    pub least: i64,
-    pub greatest: i64,
-    pub initial: i64,
-}
-
-#[derive(Debug, Clone)]
-pub struct Update {
-    pub probability: Code,
-    pub assignments: Vec<(u32, Code, Place)>,
-}
-
-#[derive(Debug, Clone)]
-pub struct Command<N> {
-    pub guard: Guard,
-    pub updates: Vec<Update>,
-    /// The probabilities of the updates, where no variable occurs in them and they sum to one.
-    pub certain: Option<Vec<N>>,
-    pub place: Place,
-}
-
-impl<N: Number> Command<N> {
-    /// The probabilities of its updates in a state.
-    pub fn probabilities(&self, values: &[i64]) -> Result<Cow<'_, [N]>, Error> {
-        Ok(match &self.certain {
-            Some(certain) => Cow::Borrowed(certain),
-            None => Cow::Owned(probabilities(&self.updates, values, self.place)?),
-        })
-    }
-}
 
 /// The commands of one module that bear one action.
 #[derive(Debug, Clone, Default)]
@@ -83,15 +44,6 @@ pub(super) struct Structure<N> {
     pub unnamed: Vec<RewardItem<N>>,
     /// For each action.
     pub actions: Vec<Vec<RewardItem<N>>>,
-}
-
-#[derive(Debug, Clone)]
-pub struct RewardItem<N> {
-    pub guard: Guard,
-    pub reward: Code,
-    /// The reward, where no variable occurs in it.
-    pub certain: Option<N>,
-    pub place: Place,
 }
 
 /// A model that can be explored.

@@ -14,7 +14,8 @@ use crate::mdp::dense;
 use crate::number::Number;
 use crate::prism::ast::ModelKind;
 use crate::prism::code::{Code, Fault, rounded};
-use crate::prism::model::{Command, Group, Program, RewardItem, UNNAMED, Variable};
+use crate::prism::command::{Command, RewardItem, Variable};
+use crate::prism::model::{Group, Program, UNNAMED};
 use crate::prism::state::{Packed, Valuation, above_least};
 
 /// The values of the variables, of one state at a time.

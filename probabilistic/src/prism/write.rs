@@ -7,7 +7,7 @@ use num_rational::BigRational;
 use num_traits::{One, Signed};
 
 use crate::prism::ast::{Expr, ExprKind, Model, ModelKind, Variable};
-use crate::prism::is_reserved;
+use crate::prism::reserved::is_reserved;
 
 /// A model as text.
 pub fn write(model: &Model) -> String {
