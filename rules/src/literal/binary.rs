@@ -1,7 +1,7 @@
 //! `xsd:hexBinary`, `xsd:base64Binary` and the recurring dates (`xsd:gYear` and its kin) as values: sequences of bytes, and
 //! canonical forms.
 
-use super::Literal;
+use super::temporal::{split_zone, zone_text};
 
 /// The bytes of pairs of hexadecimal digits.
 pub(super) fn parse_hexadecimal(text: &str) -> Option<Box<[u8]>> {
@@ -55,9 +55,9 @@ pub(super) fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// A recurring date, which is known by its canonical form.
-pub(super) fn recurring(text: &str, local: &str) -> Option<Literal> {
-    let (body, zone) = super::temporal::split_zone(text)?;
+/// A recurring date, which is known by its canonical form, with the local name of its datatype.
+pub(super) fn recurring(text: &str, local: &str) -> Option<(Box<str>, &'static str)> {
+    let (body, zone) = split_zone(text)?;
     let number = |part: &str, range: std::ops::RangeInclusive<u32>| {
         part.len() == 2
             && part.bytes().all(|b| b.is_ascii_digit())
@@ -87,8 +87,8 @@ pub(super) fn recurring(text: &str, local: &str) -> Option<Literal> {
         }
         _ => ("gDay", body.strip_prefix("---").is_some_and(|day| number(day, 1..=31))),
     };
-    let zone = zone.map(super::temporal::zone_text).unwrap_or_default();
-    valid.then(|| Literal::Recurring(format!("{body}{zone}").into(), local))
+    let zone = zone.map(zone_text).unwrap_or_default();
+    valid.then(|| (format!("{body}{zone}").into(), local))
 }
 
 /// The IRI of a datatype of recurring dates.

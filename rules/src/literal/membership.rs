@@ -1,10 +1,8 @@
 //! Whether two literals are two values, and whether a value lies in a datatype: yes, no, or undecided.
 
-use num_bigint::BigInt;
-use num_rational::BigRational;
-use num_traits::Zero;
-
-use super::{Decimal, Literal, OWL_RATIONAL, OWL_REAL, Parsed, RDF, RDFS_LITERAL, XSD, parse_xsd};
+use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD};
+use super::lexical::{Parsed, parse_xsd};
+use super::value::Literal;
 
 const XML_LITERAL: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#XMLLiteral";
 
@@ -102,27 +100,6 @@ fn is_known(iri: &str) -> bool {
         (_, Some(local)) => ["PlainLiteral", "langString"].contains(&local),
         _ => [OWL_REAL, OWL_RATIONAL].contains(&iri),
     }
-}
-
-/// `numerator / denominator` of `owl:rational`; a decimal where it is one.
-pub(super) fn parse_rational(lexical: &str) -> Parsed {
-    let text = lexical.trim_matches([' ', '\t', '\n', '\r']);
-    let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
-    let plain = |text: &str| text.trim().strip_prefix('+').unwrap_or(text.trim()).parse::<BigInt>().ok();
-    let (Some(numerator), Some(denominator)) = (plain(numerator), plain(denominator)) else {
-        return Parsed::IllTyped;
-    };
-    if denominator <= BigInt::zero() {
-        return Parsed::IllTyped;
-    }
-    let exact = BigRational::new(numerator, denominator);
-    let decimal = Decimal::from_rational(&exact);
-    Parsed::Value(if decimal.to_rational() == exact {
-        Literal::Decimal(decimal)
-    } else {
-        let lexical = format!("{}/{}", exact.numer(), exact.denom());
-        Literal::Opaque { lexical: lexical.into(), datatype: OWL_RATIONAL.into() }
-    })
 }
 
 #[cfg(test)]

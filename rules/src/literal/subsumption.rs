@@ -1,7 +1,7 @@
 //! Whether all values that lie in several datatypes lie in another one, by the hierarchy of XML Schema ([1], section 3) and the
 //! bounds of its integer types.
 
-use super::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD, integer_range};
+use super::datatype::{OWL_RATIONAL, OWL_REAL, RDF, RDFS_LITERAL, XSD, integer_range};
 
 /// Datatypes below others, by local name; integer types are told by their bounds.
 const BELOW: [(&str, &str); 9] = [

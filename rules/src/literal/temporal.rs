@@ -7,8 +7,8 @@
 use std::cmp::Ordering;
 use std::fmt;
 
-use super::XSD;
-use super::decimal::Decimal;
+use super::datatype::XSD;
+use super::decimal::{Decimal, ten_to};
 use num_bigint::BigInt;
 use num_traits::Zero;
 
@@ -254,7 +254,7 @@ impl Duration {
     /// Its seconds as days, hours, minutes and seconds, all of one sign; `None` beyond the range of days.
     pub(crate) fn clock(&self) -> Option<(i64, i64, i64, Decimal)> {
         let (unscaled, scale) = self.seconds.parts();
-        let unit = super::ten_to(scale);
+        let unit = ten_to(scale);
         let whole = i64::try_from(&unscaled / &unit).ok()?;
         let rest = Decimal::new(unscaled % unit, scale);
         Some((whole / DAY, whole % DAY / 3600, whole % 3600 / 60, add_seconds(&rest, whole % 60)))
@@ -333,7 +333,7 @@ fn add(left: &Decimal, right: &Decimal) -> Decimal {
 
 fn add_seconds(value: &Decimal, whole: i64) -> Decimal {
     let (unscaled, scale) = value.parts();
-    Decimal::new(unscaled + BigInt::from(whole) * super::ten_to(scale), scale)
+    Decimal::new(unscaled + BigInt::from(whole) * ten_to(scale), scale)
 }
 
 /// A time zone, in seconds east of UTC, as text.
@@ -416,7 +416,7 @@ fn civil_from_days(days: i64) -> (i64, i64, i64) {
 /// Whole days, and the clock time `hh:mm:ss.fff` of the rest.
 fn split_day(seconds: &Decimal) -> (i64, String) {
     let (unscaled, scale) = seconds.parts();
-    let unit = super::ten_to(scale);
+    let unit = ten_to(scale);
     let (mut whole, mut fraction) = (&unscaled / &unit, &unscaled % &unit);
     if fraction < BigInt::zero() {
         whole -= 1;

@@ -1,0 +1,131 @@
+//! Lexical forms to values.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use super::datatype::{OWL_RATIONAL, RDF, XSD, integer_range};
+use super::decimal::{self, Decimal};
+use super::temporal::{Duration, Moment};
+use super::value::Literal;
+use super::{binary, text};
+
+impl Literal {
+    /// Reads a literal; never fails, see [`Literal::IllTyped`]. A language makes the datatype irrelevant.
+    ///
+    /// `"1e-05"^^xsd:decimal`, which Python programs write, is read as a decimal although XSD forbids exponents.
+    pub fn parse(lexical: &str, datatype_iri: Option<&str>, language: Option<&str>) -> Self {
+        if let Some(tag) = language.filter(|tag| !tag.is_empty()) {
+            return Self::Language { text: lexical.into(), tag: tag.to_ascii_lowercase().into() };
+        }
+        let Some(datatype) = datatype_iri else { return Self::String(lexical.into()) };
+        let value = match (datatype.strip_prefix(XSD), datatype.strip_prefix(RDF)) {
+            (Some(local), _) => parse_xsd(lexical, local),
+            (_, Some("PlainLiteral")) => Parsed::Value(parse_plain_literal(lexical)),
+            _ if datatype == OWL_RATIONAL => parse_rational(lexical),
+            _ => Parsed::Unknown,
+        };
+        let (lexical, datatype) = (Box::from(lexical), Box::from(datatype));
+        match value {
+            Parsed::Value(literal) => literal,
+            Parsed::IllTyped => Self::IllTyped { lexical, datatype },
+            Parsed::Unknown => Self::Opaque { lexical, datatype },
+        }
+    }
+}
+
+/// What a lexical form stands for.
+pub(super) enum Parsed {
+    /// This value.
+    Value(Literal),
+    /// None: its datatype forbids it.
+    IllTyped,
+    /// Nothing is known of its datatype.
+    Unknown,
+}
+
+/// `text@tag` of `rdf:PlainLiteral`; the last at-sign separates.
+fn parse_plain_literal(lexical: &str) -> Literal {
+    match lexical.rsplit_once('@') {
+        Some((text, "")) => Literal::String(text.into()),
+        Some((text, tag)) => Literal::Language { text: text.into(), tag: tag.to_ascii_lowercase().into() },
+        None => Literal::String(lexical.into()),
+    }
+}
+
+/// What a lexical form of a datatype of XSD stands for; the datatype is given by its local name.
+pub(super) fn parse_xsd(lexical: &str, local: &str) -> Parsed {
+    let collapsed = lexical.trim_matches([' ', '\t', '\n', '\r']);
+    let value = match local {
+        "string" => Some(Literal::String(lexical.into())),
+        "normalizedString" | "token" | "language" | "Name" | "NCName" | "NMTOKEN" => {
+            text::parse(lexical, local).map(|text| Literal::String(text.into()))
+        }
+        "anyURI" => Some(Literal::Uri(collapsed.into())),
+        "boolean" => match collapsed {
+            "true" | "1" => Some(Literal::Boolean(true)),
+            "false" | "0" => Some(Literal::Boolean(false)),
+            _ => None,
+        },
+        "decimal" => Decimal::parse(collapsed).map(Literal::Decimal),
+        "float" => parse_float(collapsed).map(Literal::float),
+        "double" => parse_float(collapsed).map(Literal::double),
+        "dateTime" | "dateTimeStamp" | "date" | "time" => {
+            Moment::parse(collapsed, local).map(Literal::Moment)
+        }
+        "duration" | "dayTimeDuration" | "yearMonthDuration" => {
+            Duration::parse(collapsed, local).map(Literal::Duration)
+        }
+        "gYear" | "gYearMonth" | "gMonth" | "gMonthDay" | "gDay" => {
+            binary::recurring(collapsed, local).map(|(text, local)| Literal::Recurring(text, local))
+        }
+        "hexBinary" => binary::parse_hexadecimal(collapsed).map(Literal::Hexadecimal),
+        "base64Binary" => binary::parse_base64(collapsed).map(Literal::Base64),
+        _ => match integer_range(local) {
+            Some((minimum, maximum)) => parse_integer(collapsed, minimum, maximum),
+            None => return Parsed::Unknown,
+        },
+    };
+    value.map_or(Parsed::IllTyped, Parsed::Value)
+}
+
+fn parse_integer(lexical: &str, minimum: Option<i128>, maximum: Option<i128>) -> Option<Literal> {
+    if lexical.contains(['.', 'e', 'E']) {
+        return None;
+    }
+    let value = Decimal::parse(lexical)?;
+    decimal::in_range(&value, minimum, maximum).then_some(Literal::Decimal(value))
+}
+
+/// XSD's spelling of floats: `INF`, `-INF`, `NaN`, and no `infinity` as Rust would accept.
+fn parse_float<F: std::str::FromStr>(lexical: &str) -> Option<F> {
+    let normal = match lexical {
+        "INF" | "+INF" => "inf",
+        "-INF" => "-inf",
+        "NaN" => "NaN",
+        other if other.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b)) => other,
+        _ => return None,
+    };
+    normal.parse().ok()
+}
+
+/// `numerator / denominator` of `owl:rational`; a decimal where it is one.
+fn parse_rational(lexical: &str) -> Parsed {
+    let text = lexical.trim_matches([' ', '\t', '\n', '\r']);
+    let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
+    let plain = |text: &str| text.trim().strip_prefix('+').unwrap_or(text.trim()).parse::<BigInt>().ok();
+    let (Some(numerator), Some(denominator)) = (plain(numerator), plain(denominator)) else {
+        return Parsed::IllTyped;
+    };
+    if denominator <= BigInt::zero() {
+        return Parsed::IllTyped;
+    }
+    let exact = BigRational::new(numerator, denominator);
+    let decimal = Decimal::from_rational(&exact);
+    Parsed::Value(if decimal.to_rational() == exact {
+        Literal::Decimal(decimal)
+    } else {
+        let lexical = format!("{}/{}", exact.numer(), exact.denom());
+        Literal::Opaque { lexical: lexical.into(), datatype: OWL_RATIONAL.into() }
+    })
+}

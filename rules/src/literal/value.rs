@@ -1,0 +1,214 @@
+//! Values, their order and their canonical forms.
+
+use std::cmp::Ordering;
+use std::fmt;
+
+use num_rational::BigRational;
+
+use super::binary;
+use super::decimal::Decimal;
+use super::temporal::{Duration, Moment};
+
+/// A data value. `Eq` and `Hash` are those of the value, not of the spelling.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+#[non_exhaustive]
+pub enum Literal {
+    /// `xsd:string`, its derived types, plain literals, `rdf:PlainLiteral` without language.
+    String(Box<str>),
+    /// A language-tagged string; the tag is in lower case.
+    Language {
+        /// The text.
+        text: Box<str>,
+        /// For example `en-gb`.
+        tag: Box<str>,
+    },
+    /// `xsd:boolean`.
+    Boolean(bool),
+    /// `xsd:decimal` and its integer types.
+    Decimal(Decimal),
+    /// `xsd:float`, by bits (one NaN).
+    Float(u32),
+    /// `xsd:double`, by bits (one NaN).
+    Double(u64),
+    /// `xsd:dateTime`, `xsd:date` or `xsd:time`.
+    Moment(Moment),
+    /// `xsd:duration` and its two derived types.
+    Duration(Duration),
+    /// `xsd:gYear`, `gYearMonth`, `gMonth`, `gMonthDay` or `gDay`: canonical form and local name.
+    Recurring(Box<str>, &'static str),
+    /// `xsd:hexBinary`.
+    Hexadecimal(Box<[u8]>),
+    /// `xsd:base64Binary`.
+    Base64(Box<[u8]>),
+    /// `xsd:anyURI`.
+    Uri(Box<str>),
+    /// A datatype that has no meaning here, a rational number that is no decimal (in lowest terms), or an XML literal.
+    Opaque {
+        /// As written.
+        lexical: Box<str>,
+        /// Its IRI.
+        datatype: Box<str>,
+    },
+    /// A lexical form that its datatype forbids, which makes a knowledge base inconsistent.
+    IllTyped {
+        /// As written.
+        lexical: Box<str>,
+        /// The datatype's IRI.
+        datatype: Box<str>,
+    },
+}
+
+impl Literal {
+    /// An `xsd:string`.
+    pub fn string(text: &str) -> Self {
+        Self::String(text.into())
+    }
+
+    /// An `xsd:integer`.
+    pub fn integer(value: i64) -> Self {
+        Self::Decimal(value.into())
+    }
+
+    /// An `xsd:double`; every NaN is the same, and zero has a sign.
+    pub fn double(value: f64) -> Self {
+        Self::Double(if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() })
+    }
+
+    /// An `xsd:float`; every NaN is the same, and zero has a sign.
+    pub fn float(value: f32) -> Self {
+        Self::Float(if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() })
+    }
+
+    /// Whether the lexical form is forbidden by its datatype.
+    pub fn is_ill_typed(&self) -> bool {
+        matches!(self, Self::IllTyped { .. })
+    }
+
+    /// The IRI of the most specific datatype of the canonical form; `rdf:langString` for tagged strings.
+    pub fn datatype(&self) -> &str {
+        match self {
+            Self::String(_) => "http://www.w3.org/2001/XMLSchema#string",
+            Self::Language { .. } => "http://www.w3.org/1999/02/22-rdf-syntax-ns#langString",
+            Self::Boolean(_) => "http://www.w3.org/2001/XMLSchema#boolean",
+            Self::Decimal(value) if value.is_integer() => "http://www.w3.org/2001/XMLSchema#integer",
+            Self::Decimal(_) => "http://www.w3.org/2001/XMLSchema#decimal",
+            Self::Float(_) => "http://www.w3.org/2001/XMLSchema#float",
+            Self::Double(_) => "http://www.w3.org/2001/XMLSchema#double",
+            Self::Moment(moment) => moment.datatype(),
+            Self::Duration(duration) => duration.datatype(),
+            Self::Recurring(_, local) => binary::recurring_datatype(local),
+            Self::Hexadecimal(_) => "http://www.w3.org/2001/XMLSchema#hexBinary",
+            Self::Base64(_) => "http://www.w3.org/2001/XMLSchema#base64Binary",
+            Self::Uri(_) => "http://www.w3.org/2001/XMLSchema#anyURI",
+            Self::Opaque { datatype, .. } | Self::IllTyped { datatype, .. } => datatype,
+        }
+    }
+
+    /// The canonical lexical form.
+    pub fn lexical(&self) -> String {
+        match self {
+            Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
+                text.to_string()
+            }
+            Self::Hexadecimal(bytes) => binary::hexadecimal(bytes),
+            Self::Base64(bytes) => binary::base64(bytes),
+            Self::Boolean(value) => value.to_string(),
+            Self::Decimal(value) => value.to_string(),
+            Self::Float(bits) => canonical_float(f32::from_bits(*bits)),
+            Self::Double(bits) => canonical_float(f64::from_bits(*bits)),
+            Self::Moment(moment) => moment.to_string(),
+            Self::Duration(duration) => duration.to_string(),
+            Self::Opaque { lexical, .. } | Self::IllTyped { lexical, .. } => lexical.to_string(),
+        }
+    }
+
+    /// The order of two values, with numeric promotion. `None` where they are incomparable: different kinds, NaN,
+    /// moments with and without time zone that are closer than a time zone can tell apart.
+    pub fn compare(&self, other: &Self) -> Option<Ordering> {
+        match (self, other) {
+            (Self::Decimal(a), Self::Decimal(b)) => Some(a.cmp(b)),
+            (Self::String(a), Self::String(b)) | (Self::Uri(a), Self::Uri(b)) => Some(a.cmp(b)),
+            (Self::Boolean(a), Self::Boolean(b)) => Some(a.cmp(b)),
+            (Self::Moment(a), Self::Moment(b)) => a.partial_cmp(b),
+            (Self::Duration(a), Self::Duration(b)) => a.partial_cmp(b),
+            (Self::Float(_) | Self::Decimal(_), Self::Float(_) | Self::Decimal(_)) => {
+                self.as_f32()?.partial_cmp(&other.as_f32()?)
+            }
+            _ if self.is_numeric() && other.is_numeric() => self.as_f64()?.partial_cmp(&other.as_f64()?),
+            (Self::IllTyped { .. }, _) | (_, Self::IllTyped { .. }) => None,
+            _ if self == other => Some(Ordering::Equal),
+            _ => None,
+        }
+    }
+
+    /// Whether the value is a number.
+    pub fn is_numeric(&self) -> bool {
+        matches!(self, Self::Decimal(_) | Self::Float(_) | Self::Double(_))
+    }
+
+    /// The exact value of a finite number.
+    pub fn as_rational(&self) -> Option<BigRational> {
+        match self {
+            Self::Decimal(value) => Some(value.to_rational()),
+            Self::Float(bits) => BigRational::from_float(f32::from_bits(*bits)),
+            Self::Double(bits) => BigRational::from_float(f64::from_bits(*bits)),
+            _ => None,
+        }
+    }
+
+    /// The nearest double of a number.
+    pub fn as_f64(&self) -> Option<f64> {
+        match self {
+            Self::Decimal(value) => Some(value.to_f64()),
+            Self::Float(bits) => Some(f32::from_bits(*bits).into()),
+            Self::Double(bits) => Some(f64::from_bits(*bits)),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn as_f32(&self) -> Option<f32> {
+        match self {
+            Self::Decimal(value) => Some(value.to_f32()),
+            Self::Float(bits) => Some(f32::from_bits(*bits)),
+            _ => None,
+        }
+    }
+}
+
+/// N-Triples: `"1.5"^^<http://www.w3.org/2001/XMLSchema#decimal>`, strings without datatype.
+impl fmt::Display for Literal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"")?;
+        for character in self.lexical().chars() {
+            match character {
+                '"' => f.write_str("\\\"")?,
+                '\\' => f.write_str("\\\\")?,
+                '\n' => f.write_str("\\n")?,
+                '\r' => f.write_str("\\r")?,
+                '\t' => f.write_str("\\t")?,
+                other => write!(f, "{other}")?,
+            }
+        }
+        f.write_str("\"")?;
+        match self {
+            Self::String(_) => Ok(()),
+            Self::Language { tag, .. } => write!(f, "@{tag}"),
+            _ => write!(f, "^^<{}>", self.datatype()),
+        }
+    }
+}
+
+/// XSD's canonical form of a float: `1.5E0`, `INF`, `NaN`.
+fn canonical_float<F: fmt::LowerExp>(value: F) -> String {
+    let text = format!("{value:e}");
+    match text.as_str() {
+        "inf" => "INF".into(),
+        "-inf" => "-INF".into(),
+        "NaN" => text,
+        _ => match text.split_once('e') {
+            Some((mantissa, exponent)) if mantissa.contains('.') => format!("{mantissa}E{exponent}"),
+            Some((mantissa, exponent)) => format!("{mantissa}.0E{exponent}"),
+            None => text,
+        },
+    }
+}
