@@ -4,7 +4,6 @@ use std::cmp::Ordering;
 use std::fmt;
 use std::hash::{Hash, Hasher};
 
-use super::BuiltIn;
 use crate::literal::Literal;
 
 /// A built-in of one's own: a test on literals, or a function of literals. It must be pure, since the engine calls it in
@@ -36,15 +35,7 @@ pub trait Definition: Send + Sync {
 
 /// A registered [`Definition`], compared by its IRI.
 #[derive(Clone, Copy)]
-pub struct CustomBuiltIn(&'static dyn Definition);
-
-impl BuiltIn {
-    /// Makes a built-in of a definition, for rules built as data or for [`crate::Syntax::built_ins`]. Definitions live
-    /// as long as the process: a `static`, or a box that is leaked.
-    pub fn custom(definition: &'static dyn Definition) -> Self {
-        Self::Custom(CustomBuiltIn(definition))
-    }
-}
+pub struct CustomBuiltIn(pub(super) &'static dyn Definition);
 
 impl CustomBuiltIn {
     pub(super) fn definition(self) -> &'static dyn Definition {

@@ -4,7 +4,7 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{Signed, ToPrimitive, Zero};
 
-use super::BuiltIn;
+use super::signature::BuiltIn;
 use crate::literal::{Decimal, Literal, ten_to};
 
 /// The largest exponent of an exact power, and the most digits of rounding.

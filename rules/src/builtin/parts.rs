@@ -4,7 +4,8 @@
 //! or zero, as those that `XPath` gives. What has other parts as well (`PT90M`) is taken apart into the canonical ones, but
 //! known parts may be any that make the value.
 
-use super::{BuiltIn, uri};
+use super::signature::BuiltIn;
+use super::uri;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind};
 
 impl BuiltIn {

@@ -1,6 +1,7 @@
 //! The built-in that somebody may have meant by a name that none has.
 
-use super::{BuiltIn, SWRLB, library};
+use super::library;
+use super::signature::{BuiltIn, SWRLB};
 
 impl BuiltIn {
     /// The name of the built-in whose IRI is most like `iri`, if one of the same library is like it at all: at most a third of the

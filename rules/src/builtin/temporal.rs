@@ -5,7 +5,7 @@
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
-use super::BuiltIn;
+use super::signature::BuiltIn;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
 
 /// The value of a temporal function; `None` for other functions and unsuitable arguments.

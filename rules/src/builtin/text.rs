@@ -1,6 +1,6 @@
 //! String tests and functions, by characters (not bytes), as `XPath` defines them.
 
-use super::BuiltIn;
+use super::signature::BuiltIn;
 use crate::literal::Literal;
 
 /// Whether a string test holds.
@@ -20,9 +20,6 @@ pub(super) fn test(built_in: BuiltIn, left: &Literal, right: &Literal) -> bool {
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     if built_in == BuiltIn::StringConcat {
         return Some(Literal::String(arguments.iter().map(|a| a.lexical()).collect::<String>().into()));
-    }
-    if built_in == BuiltIn::Replace {
-        return super::pattern::replace(arguments);
     }
     let first = as_text(arguments.first()?)?;
     if built_in == BuiltIn::Substring {

@@ -4,7 +4,7 @@
 
 use oxiri::{Iri, IriRef};
 
-use super::BuiltIn;
+use super::signature::BuiltIn;
 use super::text::as_text;
 use crate::literal::Literal;
 

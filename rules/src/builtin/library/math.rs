@@ -5,7 +5,8 @@
 //! Text of that form stays as it is.
 
 use super::expression;
-use crate::builtin::{BuiltIn, Definition};
+use crate::builtin::custom::Definition;
+use crate::builtin::signature::BuiltIn;
 use crate::literal::Literal;
 
 const EVAL: &str = "http://swrl.stanford.edu/ontologies/built-ins/3.4/swrlm.owl#eval";

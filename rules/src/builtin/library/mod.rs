@@ -13,7 +13,8 @@ mod temporal;
 
 use std::sync::LazyLock;
 
-use super::{BuiltIn, Definition};
+use super::custom::Definition;
+use super::signature::BuiltIn;
 
 /// Where the libraries of `SWRLTab` live, followed by a version.
 const ROOT: &str = "http://swrl.stanford.edu/ontologies/built-ins/";

@@ -12,7 +12,7 @@ use std::cmp::Ordering;
 use num_bigint::BigInt;
 use num_traits::ToPrimitive;
 
-use crate::builtin::Definition;
+use crate::builtin::custom::Definition;
 use crate::literal::{Decimal, Duration, Literal, Moment, MomentKind, XSD};
 
 /// Units of time, the finest last.
