@@ -4,7 +4,7 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::Axiom;
+use super::axiom::Axiom;
 use crate::symbol::Symbol;
 
 /// What is below what, reflexive and transitive.
