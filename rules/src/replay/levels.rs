@@ -4,7 +4,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::replay::Fault;
+use crate::replay::fault::Fault;
 use crate::rule::{Atom, Program, Rule};
 use crate::symbol::Symbol;
 

@@ -9,7 +9,6 @@ use crate::fact::Fact;
 use crate::literal::Literal;
 use crate::plan::Source;
 use crate::replay::facts::Facts;
-use crate::replay::instance;
 use crate::replay::names::Names;
 use crate::rule::{Aggregate, Atom, Rule, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
@@ -25,6 +24,12 @@ pub(super) fn value(term: Term, values: &Values) -> Option<Symbol> {
         Term::Constant(symbol) => Some(symbol),
         Term::Variable(Variable(number)) => values[usize::from(number)],
     }
+}
+
+/// A relation under values of all its variables.
+pub(super) fn instance(predicate: Symbol, terms: &[Term], values: &Values) -> Option<Fact> {
+    let arguments: Option<Vec<Symbol>> = terms.iter().map(|term| value(*term, values)).collect();
+    Some(Fact::new(predicate, arguments?))
 }
 
 pub(super) struct Matcher<'m> {

@@ -16,6 +16,7 @@
 //! \[2\] Gelfond, Lifschitz, "The stable model semantics for logic programming", ICLP 1988.
 
 mod facts;
+mod fault;
 mod levels;
 mod matches;
 mod names;
@@ -25,11 +26,14 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::explain::{Derivation, DerivationStep, Reason};
 use crate::fact::Fact;
-use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
+use crate::literal::Literal;
+use crate::rule::{Atom, Program, Rule, RuleIdentity, Variable};
 use crate::symbol::{Symbol, Symbols};
 use facts::Facts;
-use matches::{Matcher, Values};
+use matches::{Matcher, Values, instance};
 use names::Names;
+
+pub use fault::Fault;
 
 /// The relation of equal names.
 const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
@@ -45,45 +49,6 @@ pub struct Replayed {
     pub derived: usize,
     /// Matches of rules that were looked at to see that nothing is missing.
     pub matches: usize,
-}
-
-/// Why derivations are not accepted: the first thing that is wrong. Facts are given as text.
-#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Fault {
-    /// A rule negates, or aggregates over, what depends on its own conclusion.
-    #[error("the rules are not stratified at rule {0}")]
-    Unstratified(RuleIdentity),
-    /// A step does not follow from those before it.
-    #[error("step {step}, {fact}: {reason}")]
-    Step {
-        /// Its position, counted from 0.
-        step: usize,
-        /// What it concludes.
-        fact: String,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// Something is stated, and no step says so.
-    #[error("{0} is stated, and missing")]
-    MissingStatement(String),
-    /// A rule concludes something that no step says.
-    #[error("{fact} follows by rule {rule}, and is missing")]
-    MissingConclusion {
-        /// What follows.
-        fact: String,
-        /// By which rule.
-        rule: RuleIdentity,
-    },
-    /// Names that may be one are compared by a rule, not by what is known to differ.
-    #[error("a rule asks whether names differ that may be one")]
-    Difference,
-    /// A rule, or an aggregate in it, has more matches than are gone through.
-    #[error("rule {0} has too many matches")]
-    TooMany(RuleIdentity),
-    /// The facts contradict each other.
-    #[error("the knowledge is inconsistent: {0}")]
-    Inconsistent(String),
 }
 
 /// Checks that the steps of a derivation, each after what it rests on, are exactly what holds by a program and stated facts.
@@ -151,7 +116,7 @@ impl Replayer<'_> {
             let clash = self.is_pair(fact)
                 && rest[0] != *first
                 && (literal(*first).is_some() || literal(rest[0]).is_some());
-            clash || fact.arguments.iter().any(|own| literal(*own).is_some_and(crate::Literal::is_ill_typed))
+            clash || fact.arguments.iter().any(|own| literal(*own).is_some_and(Literal::is_ill_typed))
         });
         wrong.map_or(Ok(()), |fact| Err(Fault::Inconsistent(self.show(fact))))
     }
@@ -296,10 +261,4 @@ fn without_guards(program: &Program) -> Program {
         }
     }
     program
-}
-
-/// A relation under values of all its variables.
-fn instance(predicate: Symbol, terms: &[Term], values: &Values) -> Option<Fact> {
-    let arguments: Option<Vec<Symbol>> = terms.iter().map(|term| matches::value(*term, values)).collect();
-    Some(Fact::new(predicate, arguments?))
 }
