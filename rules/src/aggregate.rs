@@ -8,8 +8,8 @@ use std::cmp::Ordering;
 use num_rational::BigRational;
 
 use crate::literal::{Decimal, Literal};
-use crate::plan::Source;
 use crate::rule::Aggregate;
+use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
 /// An aggregate over the rows of a relation.

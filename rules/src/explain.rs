@@ -1,141 +1,19 @@
 //! Why a fact holds, from the derivations that the engine recorded; and which integrity constraints are violated.
 
-use std::fmt;
-
 use rustc_hash::FxHashMap;
 
+use crate::derivation::{Aggregated, Cause, Derivation, DerivationStep, Reason, Violation};
 use crate::engine::Engine;
 use crate::fact::Fact;
 use crate::fixpoint::resolve;
-use crate::network::{DIFFERENT_FROM, SAME_AS};
-use crate::plan::{Condition, Source};
-use crate::rule::{Atom, Rule, RuleIdentity, Variable};
+use crate::literal::Literal;
+use crate::plan::Condition;
+use crate::rule::{Atom, Rule, Variable};
 use crate::safety::bound_variables;
+use crate::source::Source;
 use crate::store::{Record, RelationId, Row, state};
-use crate::symbol::{Symbol, Symbols};
-
-/// A derivation: each fact that it rests on once, so that its size is that of the facts involved, not of the tree
-/// that repeats them.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Derivation {
-    /// The first is the fact asked for; supports come after what they support.
-    pub steps: Vec<DerivationStep>,
-}
-
-/// A fact and what makes it hold.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct DerivationStep {
-    /// What holds.
-    pub fact: Fact,
-    /// By what.
-    pub reason: Reason,
-}
-
-/// What makes a fact hold.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Reason {
-    /// It is stated.
-    Asserted,
-    /// The same holds of other names of the individuals.
-    Equality {
-        /// The positions in [`Derivation::steps`] of that fact and of the pairs of names; for a pair of names, of the
-        /// pairs between them.
-        supports: Vec<usize>,
-    },
-    /// A rule concludes it.
-    Rule {
-        /// Which rule.
-        identity: RuleIdentity,
-        /// The rule's variables and their values, those of aggregates' own left out; variables are named without
-        /// question mark.
-        bindings: Vec<(String, Symbol)>,
-        /// For each relation atom of the body, in order, the position of its fact in [`Derivation::steps`].
-        supports: Vec<usize>,
-        /// For each negated atom of the body, in order, the fact that does not hold.
-        absent: Vec<Fact>,
-        /// For each aggregate of the body, in order, what it ran over.
-        aggregates: Vec<Aggregated>,
-    },
-}
-
-/// The value of an aggregate and the matches that it comes from.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Aggregated {
-    /// The value.
-    pub result: Symbol,
-    /// For each match the positions in [`Derivation::steps`] of the facts that its relation atoms found.
-    pub matches: Vec<Vec<usize>>,
-}
-
-/// Something that must not hold, and does.
-#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub struct Violation {
-    /// What is violated.
-    pub cause: Cause,
-    /// The facts that together violate it.
-    pub supports: Vec<Fact>,
-}
-
-/// What a [`Violation`] violates.
-#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
-#[non_exhaustive]
-pub enum Cause {
-    /// A rule with an empty head.
-    Constraint(RuleIdentity),
-    /// A literal whose lexical form its datatype forbids.
-    IllTyped(Symbol),
-    /// A literal that would be the same as another literal or as an individual.
-    Clash,
-}
-
-impl Derivation {
-    /// Prints the derivation as an indented tree, a fact a line with its reason; what was printed before is not
-    /// explained again.
-    pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
-        DisplayDerivation { derivation: self, symbols }
-    }
-}
-
-struct DisplayDerivation<'a> {
-    derivation: &'a Derivation,
-    symbols: &'a Symbols,
-}
-
-impl fmt::Display for DisplayDerivation<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut printed = vec![false; self.derivation.steps.len()];
-        let mut stack = vec![(0, 0)];
-        while let Some((position, depth)) = stack.pop() {
-            let step = &self.derivation.steps[position];
-            write!(f, "{:indent$}{}", "", step.fact.display(self.symbols), indent = 2 * depth)?;
-            let repeated = std::mem::replace(&mut printed[position], true);
-            match &step.reason {
-                Reason::Asserted => writeln!(f, " is stated")?,
-                Reason::Rule { .. } | Reason::Equality { .. } if repeated => writeln!(f, ", as above")?,
-                Reason::Equality { supports } => {
-                    writeln!(f, " by equality")?;
-                    stack.extend(supports.iter().rev().map(|&support| (support, depth + 1)));
-                }
-                Reason::Rule { identity, supports, absent, aggregates, .. } => {
-                    writeln!(f, " by rule {identity}")?;
-                    for fact in absent {
-                        let fact = fact.display(self.symbols);
-                        writeln!(f, "{:indent$}not {fact}", "", indent = 2 * depth + 2)?;
-                    }
-                    for Aggregated { result, matches } in aggregates {
-                        let (result, count) = (self.symbols.value(*result), matches.len());
-                        writeln!(f, "{:indent$}{result} from {count} matches", "", indent = 2 * depth + 2)?;
-                    }
-                    let matched =
-                        aggregates.iter().rev().flat_map(|aggregate| aggregate.matches.iter().rev());
-                    stack.extend(matched.flat_map(|found| found.iter().rev().map(|&at| (at, depth + 2))));
-                    stack.extend(supports.iter().rev().map(|&support| (support, depth + 1)));
-                }
-            }
-        }
-        Ok(())
-    }
-}
+use crate::symbol::Symbol;
+use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 
 impl Engine {
     /// Why a fact holds: the derivation by which it was first concluded, down to what is stated. `None` where it does
@@ -189,8 +67,7 @@ impl Engine {
     }
 
     fn ill_typed(&self) -> impl Iterator<Item = Violation> {
-        let is_bad =
-            |symbol: &Symbol| self.symbols.as_literal(*symbol).is_some_and(crate::Literal::is_ill_typed);
+        let is_bad = |symbol: &Symbol| self.symbols.as_literal(*symbol).is_some_and(Literal::is_ill_typed);
         self.facts().filter_map(move |fact| {
             let bad = fact.arguments.iter().copied().find(is_bad)?;
             Some(Violation { cause: Cause::IllTyped(bad), supports: vec![fact] })

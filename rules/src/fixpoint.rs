@@ -19,7 +19,8 @@ use crate::aggregate::Function;
 use crate::fact::Arguments;
 use crate::limits::Budget;
 use crate::literal::Literal;
-use crate::plan::{HIDDEN, Pattern, Plan, Source, Step};
+use crate::plan::{HIDDEN, Pattern, Plan, Step};
+use crate::source::Source;
 use crate::store::{Relation, RelationId, Row, Store, state};
 use crate::symbol::{Symbol, Symbols};
 

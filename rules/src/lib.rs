@@ -2,8 +2,10 @@
 #![doc = include_str!("../README.md")]
 
 mod aggregate;
+mod apply;
 mod builtin;
 mod cost;
+mod derivation;
 mod engine;
 mod equality;
 mod error;
@@ -24,16 +26,18 @@ mod revision;
 mod rule;
 mod safety;
 mod solve;
+mod source;
 mod store;
 mod strata;
 mod swrl;
 mod symbol;
+mod vocabulary;
 mod why_not;
 
 pub use builtin::{BuiltIn, CustomBuiltIn, Definition, SWRLB};
+pub use derivation::{Aggregated, Cause, Derivation, DerivationStep, Reason, Violation};
 pub use engine::{Delta, Engine};
 pub use error::Error;
-pub use explain::{Aggregated, Cause, Derivation, DerivationStep, Reason, Violation};
 pub use fact::{Arguments, Fact};
 pub use limits::{DEFAULT_STEP_BUDGET, Interrupt, Limits};
 pub use literal::{Decimal, Duration, Literal, Moment, MomentKind, is_subsumed};

@@ -4,12 +4,13 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::aggregate::Function;
-use crate::network::{DIFFERENT_FROM, SAME_AS};
-use crate::plan::{Condition, Lowered, Source, Template};
+use crate::plan::{Condition, Lowered, Template};
 use crate::rule::{Atom, Rule, Term, Variable};
 use crate::safety::{Scope, binding, bound_variables};
+use crate::source::Source;
 use crate::store::{RelationId, Store};
 use crate::symbol::{Symbol, Symbols};
+use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 
 /// Lowers rules that [`crate::safety::check`] found nothing wrong with.
 pub(crate) struct Lowering<'a> {

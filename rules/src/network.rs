@@ -13,11 +13,7 @@ use crate::safety::check;
 use crate::store::{RelationId, Store};
 use crate::strata::components;
 use crate::symbol::Symbols;
-
-/// The relation in which equal individuals are concluded.
-pub(crate) const SAME_AS: &str = "http://www.w3.org/2002/07/owl#sameAs";
-/// The relation in which different individuals are concluded.
-pub(crate) const DIFFERENT_FROM: &str = "http://www.w3.org/2002/07/owl#differentFrom";
+use crate::vocabulary::SAME_AS;
 
 /// A compiled program. Its parts refer to each other and to the store's relations by number.
 #[derive(Clone, Default, Debug)]

@@ -7,19 +7,12 @@
 use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
 use crate::cost::Costs;
-use crate::rule::{Term, Variable};
+use crate::source::Source;
 use crate::store::{RelationId, Store, state};
 use crate::symbol::Symbol;
 
 /// Rows that no step of an insertion sees.
 pub(crate) const HIDDEN: u8 = state::FREE | state::PENDING | state::DOOMED;
-
-/// Where a step takes a value from.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Source {
-    Variable(u16),
-    Constant(Symbol),
-}
 
 /// What a row must look like, and which variables it binds.
 #[derive(Clone, Default, Debug)]
@@ -144,15 +137,6 @@ pub(crate) enum Condition {
     },
     Same(Source, Source),
     Different(Source, Source),
-}
-
-impl From<Term> for Source {
-    fn from(term: Term) -> Self {
-        match term {
-            Term::Variable(Variable(number)) => Self::Variable(number),
-            Term::Constant(symbol) => Self::Constant(symbol),
-        }
-    }
 }
 
 impl Condition {

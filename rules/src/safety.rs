@@ -7,8 +7,9 @@
 use std::collections::BTreeSet;
 
 use crate::error::Error;
-use crate::plan::{Bound, Source};
+use crate::plan::Bound;
 use crate::rule::{Atom, Rule, Term};
+use crate::source::Source;
 
 /// What an aggregate takes from outside and what is its own.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use crate::builtin::BuiltIn;
 use crate::fixpoint::{Round, intern, resolve};
 use crate::literal::Literal;
-use crate::plan::Source;
+use crate::source::Source;
 use crate::symbol::Symbol;
 
 impl Round<'_> {

@@ -14,8 +14,9 @@ use crate::builtin::BuiltIn;
 use crate::engine::Engine;
 use crate::fact::Fact;
 use crate::literal::{Decimal, Literal};
-use crate::plan::{Condition, Lowered, Source};
+use crate::plan::{Condition, Lowered};
 use crate::rule::{Aggregate, RuleIdentity, Variable};
+use crate::source::Source;
 use crate::store::RelationId;
 use crate::symbol::{Symbol, Symbols};
 

@@ -9,9 +9,12 @@ use std::sync::Arc;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::proof::Step;
+use crate::derivation::DerivationStep;
 use crate::fact::{Arguments, Fact};
 use crate::symbol::Symbol;
+
+/// A fact and what makes it hold, where an equality that has a derivation of its own counts as stated.
+pub(super) type Step = DerivationStep;
 
 /// Edges in the order in which they were made.
 pub(super) type EdgeId = u32;

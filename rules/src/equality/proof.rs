@@ -9,18 +9,15 @@ use std::collections::BTreeMap;
 use rustc_hash::FxHashMap;
 
 use super::Equality;
-use super::classes::{Edge, EdgeId};
+use super::classes::{Edge, EdgeId, Step};
+use crate::derivation::{Aggregated, Derivation, DerivationStep, Reason};
 use crate::engine::Engine;
-use crate::explain::{Aggregated, Derivation, DerivationStep, Reason};
 use crate::fact::Fact;
 use crate::fixpoint::resolve;
 use crate::rule::{Atom, Rule, Term, Variable};
 use crate::safety::bound_variables;
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
-
-/// A fact and what makes it hold, where an equality that has a derivation of its own counts as stated.
-pub(super) type Step = DerivationStep;
 
 /// The edge of a concluded pair.
 pub(super) fn edge_of(engine: &Engine, equality: &Equality, pair: &Fact) -> Edge {

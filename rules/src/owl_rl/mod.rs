@@ -17,11 +17,11 @@
 mod axiom;
 mod schema;
 
-use crate::network::{DIFFERENT_FROM, SAME_AS};
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Term};
 use crate::safety::bound_variables;
 use crate::swrl::{Prefixes, parse_rules};
 use crate::symbol::{Symbol, Symbols};
+use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 
 pub use axiom::Axiom;
 

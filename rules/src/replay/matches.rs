@@ -7,10 +7,10 @@ use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
 use crate::fact::Fact;
 use crate::literal::Literal;
-use crate::plan::Source;
 use crate::replay::facts::Facts;
 use crate::replay::names::Names;
 use crate::rule::{Aggregate, Atom, Rule, Term, Variable};
+use crate::source::Source;
 use crate::symbol::{Symbol, Symbols};
 
 /// With more matches of one body, none is looked at.

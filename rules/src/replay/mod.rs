@@ -24,7 +24,7 @@ mod write;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::explain::{Derivation, DerivationStep, Reason};
+use crate::derivation::{Derivation, DerivationStep, Reason};
 use crate::fact::Fact;
 use crate::literal::Literal;
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Variable};

@@ -2,8 +2,8 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::derivation::{Derivation, DerivationStep, Reason};
 use crate::engine::Engine;
-use crate::explain::{Derivation, DerivationStep, Reason};
 use crate::fact::Fact;
 
 impl Engine {
