@@ -3,7 +3,7 @@
 use rules::{Atom, RuleIdentity, Term};
 
 use super::class;
-use super::context::{Conjunction, Context, Variables, identity};
+use super::context::{Conjunction, Context, Variables, cross, identity};
 use super::groups;
 use super::range;
 use crate::error::Warning;
@@ -255,7 +255,7 @@ impl Lowering<'_, '_> {
                 let x = variables.fresh("x");
                 let left = class::condition(self.context, first, x, &mut variables);
                 let right = class::condition(self.context, second, x, &mut variables);
-                for body in class::cross(&left, &right) {
+                for body in cross(&left, &right) {
                     self.rule(body, Vec::new(), &variables);
                 }
             }
@@ -300,7 +300,7 @@ impl Lowering<'_, '_> {
             let value = variables.fresh("v");
             keys.extend([x, y].map(|end| self.context.relation(property, [end, value])));
         }
-        for body in class::cross(&class::cross(&left, &right), &[keys]) {
+        for body in cross(&cross(&left, &right), &[keys]) {
             self.context.merge(&self.identity, [x, y], body, &variables);
         }
     }

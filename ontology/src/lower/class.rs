@@ -2,8 +2,7 @@
 
 use rules::{Atom, Term};
 
-use super::INTERNAL;
-use super::context::{Conjunction, Context, Variables};
+use super::context::{Conjunction, Context, INTERNAL, Variables, cross};
 use super::range;
 use crate::owl::{Bound, ClassExpression, DataRange};
 use crate::vocab::owl;
@@ -106,11 +105,6 @@ pub(crate) fn abbreviated(
 /// As [`condition`], for a data range.
 fn range_condition(context: &mut Context, range: &DataRange, value: Term) -> Vec<Conjunction> {
     range::condition(context, range, value).unwrap_or_else(|reason| context.gap(reason))
-}
-
-/// Every conjunction of the first with every one of the second.
-pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
-    left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
 }
 
 /// What follows from `x` being in `class`. What cannot be concluded by rules is a gap.

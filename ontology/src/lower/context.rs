@@ -5,13 +5,33 @@ use std::collections::{HashMap, HashSet};
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term, Variable};
 use rustc_hash::FxHashMap;
 
-use super::{AXIOM_SOURCE, Equality, INTERNAL};
 use crate::error::Warning;
 use crate::owl::{Axiom, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Ontology};
 use crate::vocab::{local_name, owl};
 
+/// What the names of relations start with that serve this crate only; they are no part of the knowledge base.
+pub const INTERNAL: &str = "urn:metaplan:";
+
+/// The identity's source of rules that stand for axioms; the label is then the axiom in functional-style syntax.
+pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
+
+/// Whether two names can stand for one individual.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Equality {
+    /// They can: the semantics of OWL.
+    #[default]
+    Owl,
+    /// They cannot: the semantics of databases and of PDDL.
+    UniqueNames,
+}
+
 /// Atoms that must all hold.
 pub(crate) type Conjunction = Vec<Atom>;
+
+/// Every conjunction of the first with every one of the second.
+pub(crate) fn cross(left: &[Conjunction], right: &[Conjunction]) -> Vec<Conjunction> {
+    left.iter().flat_map(|l| right.iter().map(move |r| l.iter().chain(r).cloned().collect())).collect()
+}
 
 /// Rules, facts and warnings so far.
 pub(crate) struct Context<'a> {

@@ -5,29 +5,18 @@
 //! follows from disjoint classes and from different values of functional properties; it is derived only where some rule
 //! asks for it.
 //!
-//! Under the unique-name assumption of [`Equality::UniqueNames`] no rule of this file is needed: a functional object
+//! Under the unique-name assumption of [`UniqueNames`](super::Equality::UniqueNames) no rule of this file is needed: a functional object
 //! property then concludes nothing, and any two names differ.
 
 use std::collections::HashSet;
 
 use rules::{Atom, Rule, RuleIdentity, Symbol, Term};
 
-use super::AXIOM_SOURCE;
-use super::context::{Context, Variables};
+use super::context::{AXIOM_SOURCE, Context, Variables};
 use super::groups;
 use crate::error::Warning;
 use crate::owl::{AnnotatedAxiom, Axiom, Characteristic, ClassExpression, EntityKind};
 use crate::vocab::owl;
-
-/// Whether two names can stand for one individual.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Equality {
-    /// They can: the semantics of OWL.
-    #[default]
-    Owl,
-    /// They cannot: the semantics of databases and of PDDL.
-    UniqueNames,
-}
 
 /// Whether anything concludes or states that two names are one; adds the rules for difference, if anything but the
 /// constraint that forbids to differ from oneself asks.

@@ -3,8 +3,7 @@
 
 use rules::{Atom, RuleIdentity, Symbol, Term};
 
-use super::INTERNAL;
-use super::context::{Context, Variables};
+use super::context::{Context, INTERNAL, Variables};
 use crate::vocab::owl;
 
 /// So many members are still related by pairs, which explain themselves.

@@ -26,13 +26,8 @@ use rules::{Atom, Error, Fact, Program, Rule, RuleIdentity, Symbols};
 use crate::error::Warning;
 use crate::owl::Ontology;
 use context::Context;
-pub use equality::Equality;
 
-/// What the names of relations start with that serve this crate only; they are no part of the knowledge base.
-pub const INTERNAL: &str = "urn:metaplan:";
-
-/// The identity's source of rules that stand for axioms; the label is then the axiom in functional-style syntax.
-pub const AXIOM_SOURCE: &str = "http://www.w3.org/2002/07/owl";
+pub use context::{AXIOM_SOURCE, Equality, INTERNAL};
 
 /// An ontology as rules and facts.
 #[derive(Clone, Debug)]

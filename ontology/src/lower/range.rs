@@ -5,7 +5,7 @@
 
 use rules::{Atom, BuiltIn, Literal, Term};
 
-use super::context::{Conjunction, Context};
+use super::context::{Conjunction, Context, cross};
 use crate::owl::DataRange;
 use crate::vocab::{owl, rdf, rdfs, xsd};
 
@@ -75,8 +75,8 @@ impl Lowering<'_, '_> {
                 let mut outside = self.datatype(iri, false)?;
                 for (facet, bound) in facets {
                     let outer = self.facet(facet, bound, false)?;
-                    outside.extend(super::class::cross(&within, &[vec![outer]]));
-                    within = super::class::cross(&within, &[vec![self.facet(facet, bound, true)?]]);
+                    outside.extend(cross(&within, &[vec![outer]]));
+                    within = cross(&within, &[vec![self.facet(facet, bound, true)?]]);
                 }
                 Ok(if inside { within } else { outside })
             }
@@ -86,7 +86,7 @@ impl Lowering<'_, '_> {
     fn all(&mut self, ranges: &[DataRange], inside: bool, depth: usize) -> Tests {
         let mut product = vec![Vec::new()];
         for range in ranges {
-            product = super::class::cross(&product, &self.tests(range, inside, depth - 1)?);
+            product = cross(&product, &self.tests(range, inside, depth - 1)?);
             if product.len() > MOST_ALTERNATIVES {
                 return Err("a data range of too many alternatives");
             }

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use rules::{BuiltIn, RuleIdentity, Term, Variable};
 
 use super::class;
-use super::context::{Conjunction, Context, Variables};
+use super::context::{Conjunction, Context, Variables, cross};
 use super::range;
 use crate::error::Warning;
 use crate::owl::{Argument, Atom, ClassExpression, Rule};
@@ -90,7 +90,7 @@ fn lower_rule(rule: &Rule, identity: &RuleIdentity, context: &mut Context) -> Re
             let x = term(context, argument, &mut variables);
             ways = class::abbreviated(context, class, ways, x);
         }
-        bodies = class::cross(&bodies, &ways);
+        bodies = cross(&bodies, &ways);
     }
     for body in &mut bodies {
         individuals(context, rule, body, &mut variables);

@@ -9,8 +9,7 @@ use std::collections::BTreeSet;
 
 use rules::{Atom, RuleIdentity, Symbol, Term};
 
-use super::AXIOM_SOURCE;
-use super::context::{Context, Variables};
+use super::context::{AXIOM_SOURCE, Context, Variables};
 use crate::owl::{Axiom, EntityKind, Iri, Ontology};
 use crate::vocab::owl;
 
