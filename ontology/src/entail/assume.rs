@@ -2,7 +2,7 @@
 
 use rules::{Delta, Engine, Error, Fact, Literal};
 
-use super::{Prover, Shown, contradiction, edge, literal, member, same, shown, value, with};
+use super::prover::{Prover, Shown, contradiction, edge, literal, member, same, shown, value, with};
 use crate::lower::lower;
 use crate::owl::{AnnotatedAxiom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
 use crate::vocab::owl;

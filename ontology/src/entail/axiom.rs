@@ -3,7 +3,7 @@
 use rules::{Engine, Error, Fact, Literal};
 
 use super::assume::{pairwise_different, refuted};
-use super::{Answer, Prover, Shown, edge, literal, same, shown, value, with};
+use super::prover::{Answer, Prover, Shown, edge, literal, same, shown, value, with};
 use crate::owl::{Axiom, Characteristic, ClassExpression, Iri, ObjectPropertyExpression as Property};
 use crate::vocab::owl;
 

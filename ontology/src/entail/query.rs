@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rules::{Error, Symbol};
 
-use super::{Answer, Prover, edge, literal, same, shown, value};
+use super::prover::{Answer, Prover, edge, literal, same, shown, value};
 use crate::owl::{ANONYMOUS, Axiom, ClassExpression, Iri, ObjectPropertyExpression as Property};
 
 /// So many partial answers are looked at.

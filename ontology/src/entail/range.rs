@@ -3,7 +3,8 @@
 
 use rules::{Atom, BuiltIn, Literal, Rule, Symbol, Term, is_subsumed};
 
-use super::{Prover, Shown, refuted, value, with};
+use super::assume::refuted;
+use super::prover::{Prover, Shown, value, with};
 use crate::owl::{DataRange, Iri};
 
 impl Prover {

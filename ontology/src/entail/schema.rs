@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rules::{Delta, Engine, Error, Fact, Symbol};
 
-use super::{Prover, contradiction, edge, member, value};
+use super::prover::{Prover, contradiction, edge, member, value};
 use crate::owl::{EntityKind, Iri, ObjectPropertyExpression};
 use crate::vocab::owl;
 
