@@ -2,7 +2,7 @@
 
 use rules::{Delta, Fact, Literal, Symbol};
 
-use super::{Mode, Runtime};
+use super::knowledge::{Mode, Runtime};
 use crate::error::Error;
 use crate::tomasys::Individual;
 use crate::tomasys::change::{self, is_recovered};

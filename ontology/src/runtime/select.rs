@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use rules::Symbol;
 
-use super::Runtime;
+use super::knowledge::Runtime;
 use crate::error::Error;
 use crate::tomasys::Individual;
 use crate::tomasys::change;

@@ -2,7 +2,7 @@
 
 use rules::{Derivation, Fact, Literal, Symbol};
 
-use super::Runtime;
+use super::knowledge::Runtime;
 use crate::error::Error;
 use crate::tomasys::Individual;
 use crate::tomasys::facts::Facts;
