@@ -5,6 +5,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::read::syntax::Syntax;
+
 /// A place in a document: lines and columns count from 1, columns in characters.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Position {
@@ -53,7 +55,7 @@ pub enum Error {
         /// Where.
         position: Position,
         /// The syntax that its content looks like.
-        syntax: crate::Syntax,
+        syntax: Syntax,
         /// What the parser says.
         message: String,
     },

@@ -182,3 +182,11 @@ pub(crate) fn subject_of(term: &Term) -> Option<NamedOrBlankNode> {
         Term::Literal(_) => None,
     }
 }
+
+/// The IRI of a node that has one.
+pub(crate) fn iri_of(term: &Term) -> Option<&str> {
+    match term {
+        Term::NamedNode(node) => Some(node.as_str()),
+        _ => None,
+    }
+}

@@ -10,6 +10,7 @@ pub mod vocab;
 
 mod owl;
 
+mod contents;
 mod error;
 mod functional;
 mod graph;
@@ -19,6 +20,7 @@ mod names;
 mod normalize;
 mod ntriples;
 mod read;
+mod triples;
 mod write;
 
 pub mod entail;

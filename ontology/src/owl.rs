@@ -12,6 +12,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::error::Warning;
+use crate::read::syntax::Syntax;
 
 /// An IRI, absolute and not shortened.
 pub type Iri = Arc<str>;
@@ -260,7 +261,7 @@ pub struct Source {
     /// Its `owl:versionIRI`.
     pub version: Option<Iri>,
     /// The concrete syntax found.
-    pub syntax: crate::Syntax,
+    pub syntax: Syntax,
 }
 
 /// One or more documents and all that they import, merged.

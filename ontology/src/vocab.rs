@@ -161,3 +161,8 @@ pub fn local_name(iri: &str) -> &str {
     let start = iri.rfind('#').or_else(|| iri.rfind('/')).map_or(0, |index| index + 1);
     if start < iri.len() { &iri[start..] } else { iri }
 }
+
+/// Whether an IRI belongs to the vocabularies of RDF, RDFS, OWL, SWRL or XML Schema itself.
+pub(crate) fn is_reserved(iri: &str) -> bool {
+    [rdf::NS, rdfs::NS, owl::NS, swrl::NS, xsd::NS].iter().any(|ns| iri.starts_with(ns))
+}

@@ -16,6 +16,7 @@ use horned_owl::io::ParserConfiguration;
 use horned_owl::io::rdf::reader::{ConcreteRcRDFOntology, IncompleteParse, OntologyParser, Term};
 use horned_owl::model::{self as ho, Component, RcAnnotatedComponent, RcStr};
 
+use crate::contents::Parts;
 use crate::error::Warning;
 use crate::names::Names;
 use crate::normalize::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
@@ -23,7 +24,6 @@ use crate::owl::{
     ANONYMOUS, AnnotatedAxiom, Annotation, AnnotationValue, Argument, Atom, Axiom, Bound, Characteristic,
     ClassExpression, DataRange, EntityKind, INVERSE, Iri, Literal, ObjectPropertyExpression, Rule,
 };
-use crate::read::Parts;
 use crate::vocab::{rdfs, swrla};
 
 /// What a class expression is called of which no axiom says anything.

@@ -6,8 +6,8 @@ use horned_owl::model::{self as ho, RcAnnotatedComponent, RcStr};
 use horned_owl::ontology::component_mapped::ComponentMappedOntology;
 use horned_owl::ontology::set::SetOntology;
 
-use super::with_stack;
-use crate::read::Syntax;
+use super::stack::with_stack;
+use crate::read::syntax::Syntax;
 
 /// Why a document cannot be transcribed.
 #[derive(Debug)]

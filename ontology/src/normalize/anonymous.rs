@@ -8,11 +8,10 @@ use std::collections::BTreeMap;
 use oxrdf::{BlankNode, NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::FxHashSet as HashSet;
 
-use super::is_reserved;
 use crate::error::Warning;
 use crate::graph::Graph;
 use crate::owl::ANONYMOUS;
-use crate::vocab::{owl, rdf, rdfs, swrla};
+use crate::vocab::{is_reserved, owl, rdf, rdfs, swrla};
 
 pub(crate) fn rewrite(graph: &mut Graph, warnings: &mut Vec<Warning>) {
     let structural = structural(graph);

@@ -6,10 +6,9 @@ use std::collections::BTreeSet;
 
 use rustc_hash::FxHashSet;
 
-use super::is_reserved;
 use crate::names::{Compact, Names, Object};
-use crate::read::Document;
-use crate::vocab::{owl, rdf, rdfs};
+use crate::triples::Document;
+use crate::vocab::{is_reserved, owl, rdf, rdfs};
 
 /// What is said of a name, as far as it matters here.
 #[derive(Clone, Copy, Default)]

@@ -9,12 +9,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use oxrdf::{NamedNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::FxHashSet as HashSet;
 
-use super::{ORIGIN, is_reserved};
+use super::swrl::ORIGIN;
 use crate::error::Warning;
-use crate::graph::{Graph, is_type};
+use crate::graph::{Graph, iri_of, is_type};
 use crate::names::Names;
 use crate::owl::{ANONYMOUS, EntityKind, Iri};
-use crate::vocab::{owl, rdf, rdfs, swrl, swrla, xsd};
+use crate::vocab::{is_reserved, owl, rdf, rdfs, swrl, swrla, xsd};
 
 /// How far a kind spreads between undeclared properties.
 const SPREADS: usize = 16;
@@ -111,7 +111,7 @@ impl Kinds<'_> {
             .iter()
             .filter(|(_, triple)| relations.contains(&triple.predicate.as_str()))
             .filter_map(|(index, triple)| {
-                let (first, second) = (named(&triple.subject)?, crate::read::iri_of(&triple.object)?);
+                let (first, second) = (named(&triple.subject)?, iri_of(&triple.object)?);
                 Some((index, first.to_owned(), second.to_owned()))
             })
             .filter(|(_, first, second)| !is_reserved(first) && !is_reserved(second))
@@ -253,7 +253,7 @@ fn record_classes(triple: &Triple, declared: &Declared, classes: &mut BTreeSet<S
             classes.insert(iri.to_owned());
         }
     };
-    let object = crate::read::iri_of(&triple.object);
+    let object = iri_of(&triple.object);
     match triple.predicate.as_str() {
         rdf::TYPE | rdfs::DOMAIN | swrl::CLASS_PREDICATE => note(object),
         rdfs::RANGE => {
@@ -281,7 +281,7 @@ fn record_property(graph: &Graph, triple: &Triple, declared: &Declared, uses: &m
         }
     };
     let predicate = triple.predicate.as_str();
-    let object = crate::read::iri_of(&triple.object);
+    let object = iri_of(&triple.object);
     match predicate {
         swrl::PROPERTY_PREDICATE => {
             let data = graph.of(&triple.subject).any(|(_, t)| is_type(t, swrl::DATAVALUED_PROPERTY_ATOM));

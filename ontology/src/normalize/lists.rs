@@ -4,7 +4,7 @@
 use oxrdf::{NamedNode, NamedOrBlankNode, Term};
 
 use crate::error::Warning;
-use crate::graph::{Graph, subject_of};
+use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{AnnotatedAxiom, Axiom, ClassExpression, Iri};
 use crate::vocab::{owl, rdf};
 
@@ -36,8 +36,7 @@ fn groups(graph: &mut Graph) -> Vec<AnnotatedAxiom> {
             else {
                 continue;
             };
-            let named: Option<Vec<Iri>> =
-                list.items.iter().map(|item| crate::read::iri_of(item).map(Iri::from)).collect();
+            let named: Option<Vec<Iri>> = list.items.iter().map(|item| iri_of(item).map(Iri::from)).collect();
             let Some(named) = named.filter(|named| named.len() > PAIRS) else { continue };
             for item in list.items.iter().filter_map(subject_of) {
                 graph.state(&item, rdf::TYPE, NamedNode::new_unchecked(class));

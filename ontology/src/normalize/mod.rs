@@ -17,22 +17,23 @@
 
 mod anonymous;
 mod bulk;
-mod depth;
+pub(crate) mod depth;
 mod forms;
 mod kinds;
 mod lists;
 mod plain;
 mod swrl;
 
-pub(crate) use depth::DEEPEST;
-pub(crate) use swrl::{INDIVIDUAL, ORIGIN, TRUE, VARIABLE};
+use depth::DEEPEST;
+pub(crate) use swrl::{INDIVIDUAL, ORIGIN, Origin, TRUE, VARIABLE};
 
+use crate::contents::Parts;
 use crate::error::{Error, Warning};
 use crate::graph::Graph;
 use crate::names::{Compact, Names, Object};
 use crate::owl::{EntityKind, Iri};
-use crate::read::{Document, Parts};
-use crate::vocab::{self, owl, rdf, rdfs, xsd};
+use crate::triples::Document;
+use crate::vocab::{owl, rdf};
 
 /// What normalisation yields.
 #[derive(Debug)]
@@ -46,17 +47,6 @@ pub(crate) struct Normal {
     /// Where each rule comes from; its canonical form is annotated with the index here.
     pub rules: Vec<Origin>,
     pub warnings: Vec<Warning>,
-}
-
-/// Where a rule comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Origin {
-    /// The ontology that states it, or the document's name.
-    pub ontology: Iri,
-    /// Its place there, from 0.
-    pub position: u32,
-    /// Its own IRI, if it has one.
-    pub iri: Option<Iri>,
 }
 
 /// The triples of all documents, with the header of the first only.
@@ -121,9 +111,4 @@ pub(crate) fn normalize(
     let mut plain = plain::take(&mut graph, bulk, &mut names);
     plain.axioms.extend(disjoint);
     Ok(Normal { ntriples: graph.to_ntriples(), plain, names, rules, warnings })
-}
-
-/// Whether an IRI belongs to the vocabularies of RDF, RDFS, OWL, SWRL or XML Schema itself.
-pub(crate) fn is_reserved(iri: &str) -> bool {
-    [rdf::NS, rdfs::NS, owl::NS, vocab::swrl::NS, xsd::NS].iter().any(|ns| iri.starts_with(ns))
 }

@@ -8,14 +8,13 @@
 use oxrdf::{NamedOrBlankNode, Term, Triple};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::is_reserved;
-use crate::graph::Graph;
+use crate::contents::Parts;
+use crate::graph::{Graph, iri_of};
 use crate::names::{Compact, Names, Object};
 use crate::owl::{
     AnnotatedAxiom, Annotation, AnnotationValue, Axiom, ClassExpression, EntityKind, ObjectPropertyExpression,
 };
-use crate::read::{Parts, iri_of};
-use crate::vocab::{owl, rdf, rdfs};
+use crate::vocab::{is_reserved, owl, rdf, rdfs};
 
 /// Annotation properties that need no declaration.
 const DESCRIPTIONS: [&str; 4] = [rdfs::LABEL, rdfs::COMMENT, rdfs::SEE_ALSO, rdfs::IS_DEFINED_BY];

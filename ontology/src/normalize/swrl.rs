@@ -8,11 +8,21 @@ use std::collections::HashSet;
 
 use oxrdf::{Literal, NamedNode, NamedOrBlankNode, Term};
 
-use super::Origin;
 use crate::error::Warning;
-use crate::graph::{Graph, subject_of};
+use crate::graph::{Graph, iri_of, subject_of};
 use crate::owl::{ANONYMOUS, Iri};
 use crate::vocab::{owl, rdf, swrl};
+
+/// Where a rule comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Origin {
+    /// The ontology that states it, or the document's name.
+    pub ontology: Iri,
+    /// Its place there, from 0.
+    pub position: u32,
+    /// Its own IRI, if it has one.
+    pub iri: Option<Iri>,
+}
 
 /// What the IRIs of rule variables start with; the rule's index and a colon follow. Two rules never share a variable,
 /// or horned-owl would take equal rules of two ontologies for one and mix their annotations.
@@ -136,7 +146,7 @@ impl Pass {
         let node =
             subject_of(item).ok_or_else(|| format!("the literal {item} stands where an atom should"))?;
         self.rubbish.extend(graph.of(&node).map(|(index, _)| index));
-        let types: Vec<_> = graph.objects(&node, rdf::TYPE).filter_map(crate::read::iri_of).collect();
+        let types: Vec<_> = graph.objects(&node, rdf::TYPE).filter_map(iri_of).collect();
         let typed = |class: &str| types.contains(&class);
         let object = |predicate| graph.object(&node, predicate).cloned();
         let two = [swrl::ARGUMENT1, swrl::ARGUMENT2];

@@ -4,37 +4,22 @@
 //! this file sees triples only.
 
 use std::borrow::Cow;
-use std::sync::Arc;
 
 use oxrdf::{BlankNode, NamedOrBlankNode, Term, Triple};
 use rustc_hash::FxHashMap as HashMap;
 
+use super::message::shortened;
 use super::structural::Structural;
 use super::syntax::{self, Syntax};
 use super::{encoding, entities, foreign};
 use crate::error::{Error, Position};
+use crate::graph::iri_of;
 use crate::names::{Compact, Names, Object};
+use crate::triples::Document;
 use crate::vocab::{owl, rdf};
 
 /// After so many syntax errors in one document its parser is stopped.
 const MOST_ERRORS: usize = 10;
-
-/// Messages of parsers are cut after so many characters.
-const LONGEST_MESSAGE: usize = 300;
-
-/// The triples of one document and what they say about the document.
-#[derive(Debug)]
-pub(crate) struct Document {
-    /// Path or name, for messages.
-    pub name: String,
-    pub syntax: Syntax,
-    /// The ontology IRI, if the document declares one.
-    pub iri: Option<Arc<str>>,
-    pub version: Option<Arc<str>>,
-    /// The IRIs imported, in order of appearance, with the place of each where it is spelled out.
-    pub imports: Vec<(String, Option<Position>)>,
-    pub triples: Vec<Compact>,
-}
 
 /// The text of a document in UTF-8, without a byte order mark.
 pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, Vec<Error>> {
@@ -259,19 +244,4 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result
         return Err(malformed(text.len(), &format!("the document ends before </{root}>")));
     }
     Ok(())
-}
-
-/// Parsers quote what they cannot read, which may be the whole document.
-pub(super) fn shortened(message: &str) -> String {
-    match message.char_indices().nth(LONGEST_MESSAGE) {
-        Some((end, _)) => format!("{}…", &message[..end]),
-        None => message.to_owned(),
-    }
-}
-
-pub(crate) fn iri_of(term: &Term) -> Option<&str> {
-    match term {
-        Term::NamedNode(node) => Some(node.as_str()),
-        _ => None,
-    }
 }

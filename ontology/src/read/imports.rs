@@ -17,10 +17,11 @@ use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::ReadOptions;
-use super::document::{self, Document};
+use super::document;
+use super::options::ReadOptions;
 use crate::error::Error;
 use crate::kb;
+use crate::triples::Document;
 
 /// The catalog that Protégé writes beside an ontology.
 const CATALOG: &str = "catalog-v001.xml";

@@ -9,14 +9,17 @@
 mod document;
 mod encoding;
 mod entities;
+mod file;
 mod foreign;
 mod imports;
+mod message;
+mod options;
 mod spelling;
 mod structural;
-mod syntax;
+pub(crate) mod syntax;
 mod text;
 
-pub(crate) use document::{Document, iri_of};
+pub use options::ReadOptions;
 pub use syntax::Syntax;
 
 use std::borrow::Cow;
@@ -29,25 +32,11 @@ use crate::error::{Error, Warning};
 use crate::horned;
 use crate::names::{Compact, Names};
 use crate::normalize::{self, Normal};
-use crate::owl::{AnnotatedAxiom, Annotation, EntityKind, Iri, Ontology, Rule, Source};
+use crate::owl::{Iri, Ontology, Source};
+use crate::triples::Document;
+use file::{regular_file, standard_input};
 use imports::{Resolution, Resolver};
 use text::{Seen, Text};
-
-/// Where to look for what a document imports.
-#[derive(Clone, Debug, Default)]
-pub struct ReadOptions {
-    /// OASIS XML catalogs.
-    pub catalogs: Vec<PathBuf>,
-    /// Directories to search, with those below them.
-    pub directories: Vec<PathBuf>,
-    /// Whether an import that is found nowhere is a warning instead of an error.
-    pub allow_missing_imports: bool,
-    /// Whether documents are N-Triples that import nothing, as for those that nobody vouches for: no file is opened but those
-    /// that are named, and no text is larger when it has been read.
-    pub closed: bool,
-    /// Entities that documents need not declare, as those of the knowledge base that they ask about.
-    pub known: Vec<(EntityKind, Iri)>,
-}
 
 /// Reads documents and all that they import into one ontology. The file `-` is standard input.
 ///
@@ -86,16 +75,6 @@ pub(crate) fn merged<P: AsRef<Path>>(
 enum Pending {
     File(PathBuf),
     Text(String, Vec<u8>),
-}
-
-/// The contents of an ontology, each list sorted but the rules, which are in document order.
-#[derive(Debug, Default)]
-pub(crate) struct Parts {
-    pub entities: Vec<(EntityKind, Iri)>,
-    pub axioms: Vec<AnnotatedAxiom>,
-    pub annotations: Vec<(Iri, Annotation)>,
-    pub rules: Vec<Rule>,
-    pub warnings: Vec<Warning>,
 }
 
 fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
@@ -224,33 +203,6 @@ fn load(
     };
     let document = document::parse(&text, &name, &base, &format!("d{index}"), names)?;
     Ok(seen.text(text, path.as_deref()).map(|text| (document, path, text)))
-}
-
-/// Documents with more bytes are not read.
-const LARGEST: u64 = 1 << 30;
-
-/// The bytes of a regular file: a pipe would keep us waiting, and some devices have no end.
-pub(crate) fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
-    use std::io::Read;
-    let metadata = std::fs::metadata(path)?;
-    if !metadata.is_file() {
-        return Err(std::io::Error::other("it is no regular file"));
-    }
-    let mut bytes = Vec::with_capacity(metadata.len().min(LARGEST) as usize + 1);
-    std::fs::File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST {
-        return Err(std::io::Error::other(format!("it has more than {LARGEST} bytes")));
-    }
-    Ok(bytes)
-}
-
-fn standard_input() -> Result<Vec<u8>, Vec<Error>> {
-    use std::io::Read;
-    let mut text = Vec::new();
-    match std::io::stdin().read_to_end(&mut text) {
-        Ok(_) => Ok(text),
-        Err(error) => Err(vec![Error::Unreadable { file: "-".into(), reason: error.to_string() }]),
-    }
 }
 
 /// A warning where another document declares the same ontology.

@@ -1,11 +1,11 @@
 //! OWL/XML and functional-style documents as N-Triples: what their readers do not take is treated or refused before.
 
-use super::document::shortened;
 use super::entities;
+use super::message::shortened;
 use super::syntax::{self, Syntax};
 use crate::error::{Error, Position};
 use crate::horned;
-use crate::normalize::DEEPEST;
+use crate::normalize::depth::DEEPEST;
 
 /// A document in one of the two.
 pub(super) struct Structural<'a> {

@@ -7,7 +7,8 @@ use std::hash::{BuildHasher, RandomState};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{document, regular_file};
+use super::document;
+use super::file::regular_file;
 
 /// The text of a document.
 #[derive(Clone, Debug)]
