@@ -8,8 +8,7 @@ use pddl::ast::Problem;
 use serde_json::{Value, json};
 
 use crate::cli::Failure;
-use crate::cli::concurrent::Reading;
-use crate::cli::plan::confirm;
+use crate::cli::confirm::{Reading, confirm};
 use crate::cli::plan_json::step_json;
 use crate::cli::plan_text::steps_text;
 

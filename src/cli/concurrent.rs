@@ -5,7 +5,6 @@ use encodings::{Improvement, Limits, Plan, Point, optimize_concurrent};
 use metaplan::mission::Mission;
 use num_rational::BigRational;
 use pddl::ast::Problem;
-use pddl::validate::Options;
 
 use crate::cli::objectives::Objectives;
 use crate::cli::validate::time;
@@ -34,25 +33,6 @@ impl Overlap {
     /// The separation of actions that interfere; none if actions are executed one after another.
     pub(super) fn separation(&self) -> Option<&BigRational> {
         self.concurrent.then_some(&self.epsilon)
-    }
-}
-
-/// How the validator is to read a plan.
-pub(super) struct Reading {
-    pub(super) options: Options,
-    /// Whether a plan without a metric is measured by its time.
-    pub(super) timed: bool,
-}
-
-impl Reading {
-    /// Actions are executed one after another.
-    pub(super) fn sequential(timed: bool) -> Self {
-        Self { options: Options::default(), timed }
-    }
-
-    /// Actions overlap.
-    pub(super) fn concurrent(separation: &BigRational) -> Self {
-        Self { options: Options { concurrent: true, tolerance: separation.clone() }, timed: true }
     }
 }
 

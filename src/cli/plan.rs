@@ -1,28 +1,28 @@
 //! `metaplan plan`.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use encodings::{
-    Alternatives, Backend, BackendError, Config, Front, Improvement, Limits, Plan, Point, Semantics,
-    Solution, Status, Task,
+    Alternatives, Backend, BackendError, Config, Front, Improvement, Limits, Point, Semantics, Solution,
+    Status, Task,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::certificate::{self, Ground};
-use metaplan::measure::measure;
 use metaplan::message::Message;
 use metaplan::mission::{Blocking, Mission};
-use pddl::ast::{Name, Problem};
-use pddl::validate::{PlanStep, PlanText, validate};
+use pddl::ast::Problem;
 use serde_json::json;
 
-use crate::cli::concurrent::{self, Overlap, Reading};
+use crate::cli::concurrent::{self, Overlap};
+use crate::cli::confirm::{Reading, fault};
 use crate::cli::limits::Guard;
 use crate::cli::objectives::Objectives;
+use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_json::json as plan_json;
-use crate::cli::plan_text::{plan_text, steps_text};
+use crate::cli::plan_stages::Stages;
+use crate::cli::plan_text::{PlanFormat, plan_text};
 use crate::cli::plan_verdict::{blocking_text, verdict};
 use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, output, plan_exact};
 
@@ -79,16 +79,6 @@ pub struct Arguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum PlanFormat {
-    /// Lines `(action arguments)`, or `start: (action arguments) [duration]`.
-    Ipc,
-    /// What the POPF plugin of `PlanSys2` parses.
-    Plansys2,
-    /// As `--format json`.
-    Json,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Encoding {
     /// One.
     Sequential,
@@ -132,13 +122,6 @@ impl From<Encoding> for Semantics {
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is no number of seconds"))?;
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
-}
-
-/// Milliseconds spent before the optimizer runs.
-#[derive(Default)]
-pub(super) struct Stages {
-    pub(super) read: Duration,
-    pub(super) ground: Duration,
 }
 
 /// What the user asks of the optimizer.
@@ -316,7 +299,7 @@ fn show(
             Some(output::pretty(&answer))
         }
         (None, _) => {
-            let plan = text(name, solution, common.verbose, stages);
+            let plan = answer_text(name, solution, common.verbose, stages);
             let others = beside.others.as_ref().map(|others| alternatives::text(others, solution));
             let blocking = beside.blocking.as_ref().map(blocking_text);
             let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
@@ -368,39 +351,6 @@ fn show_front(
     Ok(exit(front.status))
 }
 
-/// Has the independent validator execute the plan; what it refuses, or measures otherwise, is not shown.
-pub(super) fn confirm(
-    mission: &Mission,
-    problem: &Problem,
-    plan: &Plan,
-    reading: &Reading,
-) -> Result<(), Failure> {
-    let steps = plan.steps.iter().map(|step| PlanStep {
-        action: Name::new(&step.action),
-        arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
-        start: Some(step.start.to_rational()),
-        duration: (!step.duration.is_zero()).then(|| step.duration.to_rational()),
-        line: 0,
-    });
-    let verdict = validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &reading.options);
-    let reason = match (&verdict.violation, measure(problem, &verdict, plan.steps.len(), reading.timed)) {
-        (Some(violation), _) => {
-            format!("the validator refuses the plan that was found: {}", violation.message)
-        }
-        (None, Some(value)) if value != plan.cost.to_rational() => {
-            format!("the plan that was found costs {value}, and not {} as claimed", plan.cost)
-        }
-        (None, _) => return Ok(()),
-    };
-    Err(fault(&reason))
-}
-
-/// A fault of ours.
-fn fault(reason: &str) -> Failure {
-    let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
-    Failure { exit: Exit::Fault, messages: vec![Message::error("M170", text)] }
-}
-
 fn exit(status: Status) -> Exit {
     match status {
         Status::Optimal => Exit::Done,
@@ -421,65 +371,4 @@ fn progress(common: &Common) -> ProgressBar {
     }
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
-}
-
-/// The status in a word, as JSON has it.
-pub(super) fn status_word(status: Status) -> &'static str {
-    match status {
-        Status::Optimal => "optimal",
-        Status::Feasible => "feasible",
-        Status::Unsolvable => "unsolvable",
-        Status::UnsolvableWithinHorizon => "unsolvable_within_horizon",
-        Status::Unknown => "unknown",
-    }
-}
-
-pub(super) fn text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> String {
-    let mut text = String::new();
-    if let Some(plan) = &solution.plan {
-        if plan.steps.is_empty() {
-            text += "nothing has to be done: the goal holds already\n";
-        }
-        text += &steps_text(plan);
-        let _ = write!(
-            text,
-            "\n{}cost {}",
-            if name.is_empty() { String::new() } else { format!("{name}: ") },
-            plan.cost
-        );
-        if let Some(bound) = solution.lower_bound.as_ref().filter(|_| solution.status != Status::Optimal) {
-            let _ = write!(text, ", lower bound {bound}");
-        }
-        text += ": ";
-    }
-    text += &verdict(solution);
-    if verbose {
-        text += &statistics_text(solution, stages);
-    }
-    text
-}
-
-pub(super) fn milliseconds(duration: Duration) -> f64 {
-    (duration.as_secs_f64() * 1e6).round() / 1e3
-}
-
-fn statistics_text(solution: &Solution, stages: &Stages) -> String {
-    let statistics = &solution.statistics;
-    let families: Vec<_> =
-        statistics.families.iter().map(|(family, count)| format!("{family} {count}")).collect();
-    format!(
-        "{} operators; {} variables, {} clauses ({}); {} conflicts in {} solver calls\n\
-         read {} ms, ground {} ms, search {} ms, encode {} ms, solve {} ms\n",
-        statistics.operators,
-        statistics.variables,
-        statistics.clauses,
-        families.join(", "),
-        statistics.conflicts,
-        statistics.calls,
-        milliseconds(stages.read),
-        milliseconds(stages.ground),
-        milliseconds(statistics.search),
-        milliseconds(statistics.encode),
-        milliseconds(statistics.solve),
-    )
 }

@@ -5,7 +5,7 @@ use metaplan::message::Message;
 use metaplan::mission::Mission;
 use pddl::ast::Problem;
 
-use crate::cli::concurrent::Reading;
+use crate::cli::confirm::Reading;
 use crate::cli::objectives::Objectives;
 use crate::cli::output;
 

@@ -4,7 +4,7 @@ use encodings::{Proof, Solution, Step, Unbounded};
 use serde_json::{Value, json};
 
 use crate::cli::output;
-use crate::cli::plan::{Stages, milliseconds, status_word};
+use crate::cli::plan_stages::{Stages, milliseconds, status_word};
 
 /// A step of a plan as JSON has it.
 pub(super) fn step_json(step: &Step) -> Value {

@@ -1,11 +1,21 @@
 //! A plan in the formats of other programs.
 
+use clap::ValueEnum;
 use std::fmt::Write as _;
 
 use encodings::{Exact, Plan, Step};
 
 use crate::cli::output;
-use crate::cli::plan::PlanFormat;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum PlanFormat {
+    /// Lines `(action arguments)`, or `start: (action arguments) [duration]`.
+    Ipc,
+    /// What the POPF plugin of `PlanSys2` parses.
+    Plansys2,
+    /// As `--format json`.
+    Json,
+}
 
 /// The plan in the formats of the planning competitions and of `PlanSys2`.
 pub(super) fn plan_text(plan: &Plan, format: PlanFormat) -> String {
