@@ -81,7 +81,7 @@ type BlockId = u32;
 mod program {
     //! The crepe program.
 
-    use super::{BlockId, Handle, PlanId};
+    use crate::fixpoint::{BlockId, Handle, PlanId};
     use crepe::crepe;
 
     crepe! {
