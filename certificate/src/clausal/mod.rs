@@ -28,6 +28,7 @@ use crate::integer::Integer;
 use crate::model::Model;
 pub use formula::Formula;
 pub use literal::Literal;
+pub use steps::StepBound;
 
 /// A formula with more literals than this is not written.
 const LITERAL_LIMIT: usize = 4_000_000;
@@ -41,15 +42,6 @@ pub struct Inputs<'i> {
     pub proof: &'i mut dyn BufRead,
     /// For each line of the proof the numbers of the clauses that it follows from: the formula's from 1, then the proof's.
     pub hints: &'i mut dyn BufRead,
-}
-
-/// By what a cheaper plan has only so many steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StepBound {
-    /// By what the steps cost: the formula alone then says that no plan is cheaper.
-    Spent,
-    /// By what they cost and what a potential says is still to be paid: fewer steps, and a smaller formula.
-    Potential,
 }
 
 /// The formula "a plan that is cheaper than the claim has at most so many steps", with that number. The claim is as for

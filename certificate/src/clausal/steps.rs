@@ -5,10 +5,18 @@
 //! below the claim, a cheaper plan has at most T steps.
 
 use crate::argument::Argument;
-use crate::clausal::StepBound;
 use crate::integer::Integer;
 use crate::model::Model;
 use crate::table::Table;
+
+/// By what a cheaper plan has only so many steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepBound {
+    /// By what the steps cost: the formula alone then says that no plan is cheaper.
+    Spent,
+    /// By what they cost and what a potential says is still to be paid: fewer steps, and a smaller formula.
+    Potential,
+}
 
 /// No formula has more steps.
 const STEP_LIMIT: usize = 64;

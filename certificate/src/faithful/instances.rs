@@ -3,10 +3,12 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::faithful::INSTANCE_LIMIT;
 use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
+
+/// With more instances, nothing is checked.
+pub(super) const INSTANCE_LIMIT: usize = 400_000;
 
 /// Values of parameters so far.
 type Binding<'b> = FxHashMap<&'b Name, u32>;

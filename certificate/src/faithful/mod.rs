@@ -60,8 +60,6 @@ use verdict::Obstacle;
 pub use verdict::{Cause, Difference, Faithful};
 use world::World;
 
-/// With more instances, nothing is checked.
-const INSTANCE_LIMIT: usize = 400_000;
 /// A witness is looked for in at most so many rounds.
 const ROUND_LIMIT: usize = 10_000;
 
@@ -149,7 +147,7 @@ impl<'f> Files<'f> {
                 let requires = requires(&world, schema, &arguments)?;
                 all.push(Instance { action, arguments, requires });
             }
-            if all.len() > INSTANCE_LIMIT {
+            if all.len() > instances::INSTANCE_LIMIT {
                 return Err(instances::too_many("actions").into());
             }
         }
