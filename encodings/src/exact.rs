@@ -274,8 +274,12 @@ impl Estimate<Rational> for RoundedBounds {
     }
 }
 
-/// A factor for costs: one that makes integers of them if these are short enough, else a power of ten after which the largest
-/// one is nearly as long as admitted. What is a decimal stays one.
+/// A factor for costs: one that makes integers of them if these are short enough, else a power of two after which the largest
+/// one is as long as admitted.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers have fewer than 2^63 bits, and the greater length is what the smaller one is taken from"
+)]
 fn factor(costs: &[BigRational]) -> BigRational {
     let largest = costs.iter().max().cloned().unwrap_or_default();
     let most = BigInt::one() << COST_BITS;
@@ -286,17 +290,17 @@ fn factor(costs: &[BigRational]) -> BigRational {
             break;
         }
     }
-    let (common, most) = (BigRational::from_integer(common), BigRational::from_integer(most));
-    if &largest * &common <= most {
+    let common = BigRational::from_integer(common);
+    if &largest * &common <= BigRational::from_integer(most.clone()) {
         return common;
     }
-    let ten = || BigRational::from_integer(10.into());
-    let digits = |number: BigRational| number.ceil().to_integer().to_string().len();
-    // A number of so many digits is less than ten to that power, and at least to the power before.
-    if largest <= most {
-        num_traits::pow(ten(), digits((most / largest).floor()).saturating_sub(1))
+    // At most this long: a number below 2^a divided by one of at least 2^(b - 1) is below 2^(a - b + 1).
+    let (numerator, denominator) = (largest.numer().bits(), largest.denom().bits());
+    let one = BigInt::one();
+    if denominator + COST_BITS > numerator {
+        BigRational::from_integer(one << (denominator + COST_BITS - numerator - 1))
     } else {
-        num_traits::pow(ten(), digits(largest / most)).recip()
+        BigRational::new(one.clone(), one << (numerator + 1 - denominator - COST_BITS))
     }
 }
 
