@@ -1,6 +1,6 @@
 //! The checker of certificates: why no plan is cheaper, in a form that is checked by arithmetic.
 //!
-//! The argument is a closed set of labels [1]. A label is a state with what was paid on the way to it. It *covers* a
+//! The argument is a closed set of labels \[1\]. A label is a state with what was paid on the way to it. It *covers* a
 //! state with the same values that cost no less and has no more of any number (exactly the same numbers where more may
 //! hurt). *Potentials* bound from below what is still to be paid, as tables over a few variables; *needs* bound what must be left of
 //! a resource. If the initial state is covered or cut off, no label is a goal state cheaper than the claim, and each
@@ -13,7 +13,7 @@
 //!
 //! What is absent: whatever plans. No grounder, no search and no SAT solver is linked.
 //!
-//! [1] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning, ICAPS 2017 (inductive sets);
+//! \[1\] S. Eriksson, G. Röger, M. Helmert: Unsolvability certificates for classical planning, ICAPS 2017 (inductive sets);
 //! labels as in M. Desrochers, F. Soumis, INFOR 26(3), 1988.
 
 #![warn(
