@@ -156,14 +156,13 @@ enum Explored {
 }
 
 fn explore(task: &Task<Rational>, limits: &Limits) -> Explored {
-    let Ok(Integral { task, cost_scale }) = Integral::of(task, limits) else {
+    let prepared = Integral::of(task, limits)
+        .and_then(|integral| Ok((RoundedBounds::new(&integral.task, limits)?, integral)));
+    let Ok((bounds, Integral { task, cost_scale })) = prepared else {
         return Explored::Unknown(None, Rational::zero());
     };
     let unscaled = |cost: Rational| cost / cost_scale.clone();
     let original = |plan: GroundPlan<Rational>| GroundPlan { cost: unscaled(plan.cost), ..plan };
-    let Ok(bounds) = RoundedBounds::new(&task, limits) else {
-        return Explored::Unknown(None, Rational::zero());
-    };
     let none = |proof| Explored::Known(Box::new(answer(Status::Unsolvable, None, Some(proof))));
     let Some(lower) = bounds.estimate(&task.initial) else {
         let reason = "no path leads to the goal in a projection of the task to one or two of its variables";

@@ -36,6 +36,7 @@ mod task_number;
 mod alternatives;
 mod bounds;
 mod certificate;
+mod common_denominator;
 mod concurrent;
 mod earliest;
 mod encode;
@@ -50,6 +51,7 @@ mod sat;
 mod search;
 mod solution;
 mod successors;
+mod table_map;
 mod ties;
 mod transitions;
 

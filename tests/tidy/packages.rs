@@ -1,6 +1,6 @@
 //! What a package is linked with.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 use serde_json::Value;
@@ -27,32 +27,34 @@ fn linked(package: &str) -> BTreeSet<String> {
         .expect("cargo");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let metadata: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
-    let name = |id: &Value| {
-        let packages = list(&metadata["packages"]);
-        let own = packages.iter().find(|own| own["id"] == *id).expect("a package").clone();
-        own["name"].as_str().expect("a name").to_owned()
-    };
-    let nodes = list(&metadata["resolve"]["nodes"]);
-    let mut open: Vec<Value> =
-        nodes.iter().map(|node| node["id"].clone()).filter(|id| name(id) == package).collect();
+    let packages = &metadata["packages"];
+    let names: BTreeMap<_, _> =
+        list(packages).iter().map(|own| (text(&own["id"]), text(&own["name"]))).collect();
+    let nodes = &metadata["resolve"]["nodes"];
+    let nodes: BTreeMap<_, _> = list(nodes).iter().map(|node| (text(&node["id"]), node)).collect();
+    let mut open: Vec<_> = nodes.keys().copied().filter(|id| names[id] == package).collect();
     assert_eq!(open.len(), 1, "one package has the name {package}");
     let mut seen = BTreeSet::new();
-    let mut names = BTreeSet::new();
     while let Some(id) = open.pop() {
-        if !seen.insert(id.to_string()) {
+        if !seen.insert(id) {
             continue;
         }
-        names.insert(name(&id));
-        let node = nodes.iter().find(|node| node["id"] == id).expect("a node");
-        for dependency in list(&node["deps"]) {
-            // What only tests need has the kind `dev`.
-            if list(&dependency["dep_kinds"]).iter().any(|kind| kind["kind"] != "dev") {
-                open.push(dependency["pkg"].clone());
-            }
-        }
+        // What only tests need has the kind `dev`.
+        let needed =
+            |dependency: &&Value| list(&dependency["dep_kinds"]).iter().any(|kind| kind["kind"] != "dev");
+        open.extend(
+            list(&nodes[id]["deps"]).iter().filter(needed).map(|dependency| text(&dependency["pkg"])),
+        );
     }
-    names
+    seen.iter().map(|id| names[id].to_owned()).collect()
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().map_or(&[], Vec::as_slice)
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().expect("a text")
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub fn literals(line: &[u8], variables: usize, literals: &mut Vec<Literal>) -> O
 }
 
 /// The places in a list of so many clauses that a line names by numbers from 1; none if something else is there.
-pub fn places(line: &[u8], clauses: usize, places: &mut Vec<usize>) -> Option<()> {
+pub(crate) fn places(line: &[u8], clauses: usize, places: &mut Vec<usize>) -> Option<()> {
     places.clear();
     numbers(line, clauses, &mut |negative, number| {
         places.push(number.checked_sub(1).filter(|_| !negative)?);

@@ -8,15 +8,15 @@ pub struct Literal(i32);
 
 impl Literal {
     /// The first variable.
-    pub const FIRST: Self = Self(1);
+    pub(crate) const FIRST: Self = Self(1);
 
     /// None if the number is that of no literal.
-    pub fn new(number: i32) -> Option<Self> {
+    pub(crate) fn new(number: i32) -> Option<Self> {
         (number != 0 && number != i32::MIN).then_some(Self(number))
     }
 
     /// The variable of a number; none if there are not so many.
-    pub fn of_variable(number: usize) -> Option<Self> {
+    pub(crate) fn of_variable(number: usize) -> Option<Self> {
         i32::try_from(number).ok().and_then(Self::new)
     }
 

@@ -5,13 +5,14 @@ use num_bigint::BigInt;
 use num_integer::Integer as _;
 use num_traits::{One, Signed};
 
+use crate::common_denominator::CommonDenominator;
 use crate::number::Rational;
-use crate::quantity::{Linear, Quantity};
+use crate::quantity::Linear;
 use crate::task::Task;
 use crate::task_number::TaskNumber;
 
 /// A common denominator with more bits is none.
-const BIT_LIMIT: u64 = 1 << 20;
+const MOST_BITS: u64 = 1 << 20;
 
 /// A factor for each kind of numbers.
 pub(super) struct Scales {
@@ -32,10 +33,10 @@ impl Scales {
     /// For a task in rationals, with bounds on costs in multiples of `unit`. None if a number is multiplied by a fraction, so that its
     /// values have no common denominator.
     pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
-        let mut numbers = Common(BigInt::one());
-        let mut times = Common(BigInt::one());
-        let mut costs = Common(BigInt::one());
-        task.initial.numbers.iter().for_each(|number| numbers.add(number));
+        let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
+        let mut times = CommonDenominator::of_at_most(MOST_BITS);
+        let mut costs = CommonDenominator::of_at_most(MOST_BITS);
+        task.initial.numbers.iter().for_each(|number| numbers.number(number));
         let rules = task.axioms.iter().flat_map(|layer| &layer.rules).map(|rule| &rule.body);
         let conditions = task.operators.iter().map(|operator| &operator.condition);
         for condition in conditions.chain(rules).chain([&task.goal]) {
@@ -50,33 +51,13 @@ impl Scales {
             }
             costs.quantity(&operator.cost);
             times.quantity(&operator.duration);
-            operator.wait.iter().for_each(|time| times.add(time));
+            operator.wait.iter().for_each(|time| times.number(time));
         }
-        costs.add(&task.objective.offset);
-        costs.add(unit);
-        let all = [&numbers, &times, &costs];
-        if all.iter().any(|common| common.0.bits() > BIT_LIMIT) {
-            return None;
-        }
-        let costs = Integer::from(costs.0);
+        costs.number(&task.objective.offset);
+        costs.number(unit);
+        let costs = Integer::from(costs.get()?);
         let bounds = scaled(unit, &costs);
-        Some(Self { numbers: numbers.0.into(), times: times.0.into(), costs, bounds })
-    }
-}
-
-/// A common denominator.
-struct Common(BigInt);
-
-impl Common {
-    fn add(&mut self, number: &Rational) {
-        if !number.is_integer() && self.0.bits() <= BIT_LIMIT {
-            self.0 = self.0.lcm(number.to_big().denom());
-        }
-    }
-
-    fn quantity(&mut self, quantity: &Quantity<Rational>) {
-        let tables = quantity.tables.iter().flat_map(|table| table.values.iter());
-        tables.chain([&quantity.constant]).for_each(|number| self.add(number));
+        Some(Self { numbers: numbers.get()?.into(), times: times.get()?.into(), costs, bounds })
     }
 }
 

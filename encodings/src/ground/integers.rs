@@ -8,43 +8,9 @@ use rustc_hash::FxHashMap;
 use crate::error::Error;
 use crate::lifted::Rational;
 use crate::number::{Int, LIMIT, checked_lcm};
-use crate::quantity::{Quantity, Table};
+use crate::quantity::Quantity;
+use crate::table_map::TableMap;
 use crate::task_number::TaskNumber;
-
-/// The values of a table, and what they are mapped to.
-type Mapped<M> = (Arc<[Rational]>, Arc<[M]>);
-
-/// Maps numbers of quantities; tables that operators share stay shared.
-#[derive(Debug)]
-pub(super) struct TableMap<M> {
-    /// By where a table lies; it is kept, so that nothing else can come to lie there.
-    done: FxHashMap<*const Rational, Mapped<M>>,
-}
-
-impl<M> TableMap<M> {
-    pub(super) fn new() -> Self {
-        Self { done: FxHashMap::default() }
-    }
-
-    pub(super) fn map<E>(
-        &mut self,
-        quantity: &Quantity<Rational>,
-        f: &dyn Fn(&Rational) -> Result<M, E>,
-    ) -> Result<Quantity<M>, E> {
-        let mut tables = Vec::with_capacity(quantity.tables.len());
-        for table in &quantity.tables {
-            let values = match self.done.entry(table.values.as_ptr()) {
-                Entry::Occupied(known) => &known.into_mut().1,
-                Entry::Vacant(new) => {
-                    let values = table.values.iter().map(f).collect::<Result<_, _>>()?;
-                    &new.insert((table.values.clone(), values)).1
-                }
-            };
-            tables.push(Table { slots: table.slots.clone(), values: values.clone() });
-        }
-        Ok(Quantity { constant: f(&quantity.constant)?, tables })
-    }
-}
 
 /// The least factor that makes all numbers of one kind integers.
 #[derive(Debug)]
@@ -134,6 +100,7 @@ mod tests {
     use num_traits::Zero;
 
     use super::*;
+    use crate::quantity::Table;
 
     /// A quantity of so many tables over slots of their own, each of 0 and a number.
     fn quantity(tables: u32, number: Int) -> Quantity<Rational> {

@@ -12,10 +12,10 @@ use num_traits::{One, Zero};
 use crate::error::{Error, Place};
 use crate::ground::evaluate::{Failure, World};
 use crate::ground::instantiate::{GroundOperator, GroundTask};
-use crate::ground::integers::TableMap;
 use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::limits::Limits;
 use crate::quantity::{Linear, NumericId, Quantity};
+use crate::table_map::TableMap;
 use pddl::ast::Direction;
 
 /// How operator costs relate to the metric.

@@ -92,9 +92,15 @@ impl Decimal {
         if bits(big.numer()) > BITS.into() || bits(big.denom()) > U256::BITS.into() {
             return None;
         }
-        let places =
-            (0..=PLACES).find(|places| (BigInt::from(10).pow(*places) % big.denom()) == BigInt::ZERO)?;
-        let mantissa = big.numer() * (BigInt::from(10).pow(places) / big.denom());
+        let mut power = BigInt::ONE;
+        let places = (0..=PLACES).find(|_| {
+            let enough = (&power % big.denom()) == BigInt::ZERO;
+            if !enough {
+                power *= 10;
+            }
+            enough
+        })?;
+        let mantissa = big.numer() * (power / big.denom());
         let bytes = mantissa.to_signed_bytes_le();
         if bytes.len() > 32 {
             return None;
