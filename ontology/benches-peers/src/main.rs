@@ -2,7 +2,7 @@
 //! and peak memory of a process for each, from the file to the number of all conclusions; what parsing alone takes; and both with all
 //! conclusions written as sorted N-Triples (where `reasonable` spends most on the system, since it does not buffer its output).
 //!
-//! `cargo run --release` runs all. `--write DIRECTORY` leaves the ontologies there, and the universities as one document in
+//! `cargo run --release` runs all; with files in Turtle (`.ttl`) or N-Triples (`.n3`) as arguments, these. `--write DIRECTORY` leaves the ontologies there, and the universities as one document in
 //! RDF/XML for each department.
 
 mod shapes;
@@ -132,36 +132,39 @@ fn main() {
                 std::fs::write(file, university::rdf_xml(document)).expect("written");
             }
         }
-        _ => compare(),
+        Some(_) => compare(arguments.iter().map(|file| (file.clone(), PathBuf::from(file))).collect()),
+        None => {
+            let directory = std::env::temp_dir().join(format!("metaplan-peers-{}", std::process::id()));
+            std::fs::create_dir_all(&directory).expect("a directory");
+            compare(write_all(&directory));
+            let _ = std::fs::remove_dir_all(&directory);
+        }
     }
 }
 
 /// The ontologies that are compared, with their files.
-fn write_all(directory: &Path) -> Vec<(&'static str, PathBuf)> {
+fn write_all(directory: &Path) -> Vec<(String, PathBuf)> {
     let (one, five) = (university::universities(1), university::universities(5));
     let mut cases = vec![
-        ("a department", write(directory, &five[..2], "department")),
-        ("5 departments", write(directory, &five[..6], "departments")),
-        ("1 university", write(directory, &one, "university")),
-        ("5 universities", write(directory, &five, "universities")),
+        ("a department".to_owned(), write(directory, &five[..2], "department")),
+        ("5 departments".to_owned(), write(directory, &five[..6], "departments")),
+        ("1 university".to_owned(), write(directory, &one, "university")),
+        ("5 universities".to_owned(), write(directory, &five, "universities")),
     ];
     for (name, text) in shapes::all() {
         let file = directory.join(format!("{}.ttl", name.replace(' ', "-")));
         std::fs::write(&file, text).expect("written");
-        cases.push((name, file));
+        cases.push((name.to_owned(), file));
     }
     cases
 }
 
-fn compare() {
-    let directory = std::env::temp_dir().join(format!("metaplan-peers-{}", std::process::id()));
-    std::fs::create_dir_all(&directory).expect("a directory");
-    let cases = write_all(&directory);
+fn compare(cases: Vec<(String, PathBuf)>) {
     println!("| ontology | metaplan | of which parsing | reasonable | ratio | written, too | conclusions |");
     println!("|---|---|---|---|---|---|---|");
     let (mut ratios, mut written) = (Vec::new(), Vec::new());
-    for (name, file) in &cases {
-        let files = [file.clone()];
+    for (name, file) in cases {
+        let files = [file];
         let peers = ["metaplan", "parse", "reasonable", "metaplan-writes", "reasonable-writes"];
         let [Some(own), Some(parsing), Some(other), Some(own_all), Some(other_all)] =
             peers.map(|peer| measure(peer, &files))
@@ -183,7 +186,6 @@ fn compare() {
         median(&mut ratios),
         median(&mut written)
     );
-    let _ = std::fs::remove_dir_all(&directory);
 }
 
 fn median(ratios: &mut [f64]) -> f64 {
