@@ -71,3 +71,17 @@ fn the_language_links_no_planner_either() {
     let planners: Vec<_> = PLANNERS.iter().filter(|name| linked.contains(**name)).collect();
     assert!(planners.is_empty(), "the language is linked with {planners:?}");
 }
+
+/// Numbers are exact: what does not fit is a fault, also in a release build, and in packages that are still to come.
+#[test]
+fn own_packages_check_for_overflows_in_releases() {
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")).expect("the manifest");
+    let manifest: toml::Table = text.parse().expect("TOML");
+    let release = &manifest["profile"]["release"];
+    assert_eq!(release["overflow-checks"].as_bool(), Some(true));
+    for (package, settings) in release["package"].as_table().expect("packages") {
+        let is_own = package.starts_with("metaplan");
+        assert!(!is_own || settings.get("overflow-checks").is_none(), "{package}");
+    }
+}
