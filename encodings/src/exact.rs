@@ -330,7 +330,7 @@ impl Operator<Rational> {
             others: Vec::new(),
             duration: Quantity::constant(0),
             wait: None,
-            timing: crate::ground::events::Timing::free(),
+            timing: crate::timing::Timing::free(),
         }
     }
 }

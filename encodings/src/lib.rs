@@ -32,6 +32,7 @@ mod ground;
 mod quantity;
 mod task;
 mod task_number;
+mod timing;
 
 mod alternatives;
 mod bounds;

@@ -304,7 +304,7 @@ mod tests {
             others: Vec::new(),
             duration: Quantity::constant(0),
             wait: None,
-            timing: crate::ground::events::Timing::free(),
+            timing: crate::timing::Timing::free(),
         }
     }
 

@@ -9,12 +9,12 @@
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use crate::ground::events::Timing;
 use crate::lifted::ObjectId;
 use crate::number::{Int, dense};
 pub use crate::quantity::NumericId;
 use crate::quantity::{Linear, Quantity, SlotSet};
 use crate::task_number::{TaskNumber, sum_of_products};
+use crate::timing::Timing;
 
 /// A finite-domain variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -8,9 +8,10 @@ use crate::concurrent::keys::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::Unit;
 use crate::error::Error;
-use crate::ground::evaluate::{AtomId, Binding, World};
-use crate::ground::reach::Reached;
-use crate::ground::reads::Reads;
+use crate::ground::evaluate::reads::Reads;
+use crate::ground::vocabulary::atom::{AtomId, Binding};
+use crate::ground::vocabulary::reached::Reached;
+use crate::ground::vocabulary::world::World;
 use crate::lifted::{Change, Effect, ObjectId};
 use crate::limits::Limits;
 use crate::number::{Int, dense};
@@ -63,10 +64,10 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(super) fn new(split: &'a Split, reached: &'a Reached, separation: Int) -> Self {
+    pub(super) fn new(split: &'a Split, reached: &'a Reached, separation: Int, limits: &'a Limits) -> Self {
         let held = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
         Self {
-            footprints: Footprints::new(World::new(&split.lifted, reached)),
+            footprints: Footprints::new(World::new(&split.lifted, reached, limits)),
             split,
             separation,
             written: Vec::new(),

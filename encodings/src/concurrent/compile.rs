@@ -9,7 +9,7 @@ use crate::concurrent::measure::Measure;
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::Unit;
 use crate::error::{Error, File, Place};
-use crate::ground::reach::Reached;
+use crate::ground::vocabulary::reached::Reached;
 use crate::lifted::Rational;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
@@ -45,7 +45,9 @@ pub(super) fn compile(
     let unit = Unit::new(&task, split, separation).map_err(one)?;
     let separation = unit.of(separation).map_err(one)?;
     refuse_rewards(&task, split).map_err(one)?;
-    let mut builder = Builder::new(split, reached, separation);
+    // Operators are watched as they are collected, each as a whole.
+    let unlimited = Limits::none();
+    let mut builder = Builder::new(split, reached, separation, &unlimited);
     builder.collect(&task, limits)?;
     let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(one)?;
     let mut roles = vec![Role::Never; task.operators.len()];

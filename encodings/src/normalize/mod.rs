@@ -6,6 +6,7 @@
 
 mod condition;
 pub(crate) mod duration;
+pub(crate) mod events;
 mod objects;
 pub(crate) mod zero;
 

@@ -1,62 +1,66 @@
-//! Changes of numbers: those of one happening together, in terms of the state before an action.
+//! Changes of one happening together, in terms of the state before an action.
+
+use std::sync::Arc;
 
 use crate::error::{Error, Place};
-use crate::ground::effects::GroundChange;
-use crate::ground::evaluate::Failure;
+use crate::ground::evaluate::reads::{Reads, matches};
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::numbers::Numbers;
+use crate::ground::vocabulary::world::World;
 use crate::lifted::Rational;
 use crate::quantity::{Linear, NumericId};
+use crate::task::Forbidden;
 use pddl::ast::Assignment;
 
-/// What numeric variables become; a list, because an operator changes few.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Numbers {
-    /// Ascending by variable.
-    changes: Vec<(NumericId, Linear<Rational>)>,
+/// A change of an atom or of a number.
+#[derive(Clone)]
+pub(super) enum GroundChange {
+    Atom(AtomId, bool),
+    Number {
+        variable: NumericId,
+        assignment: Assignment,
+        /// None if it is undefined: the operator does not exist where the change would be made.
+        operand: Option<Linear<Rational>>,
+        /// Combinations of designs for which it is undefined.
+        undefined: Arc<[Forbidden]>,
+        place: Place,
+    },
 }
 
-impl Numbers {
-    pub(crate) fn get(&self, variable: NumericId) -> Option<&Linear<Rational>> {
-        let position = self.changes.binary_search_by_key(&variable, |(own, _)| *own);
-        position.ok().map(|position| &self.changes[position].1)
+impl GroundChange {
+    pub(super) fn undefined(&self) -> &[Forbidden] {
+        match self {
+            Self::Atom(..) => &[],
+            Self::Number { undefined, .. } => undefined,
+        }
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &(NumericId, Linear<Rational>)> {
-        self.changes.iter()
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.changes.is_empty()
-    }
-
-    pub(crate) fn retain(&mut self, keep: &dyn Fn(NumericId) -> bool) {
-        self.changes.retain(|(variable, _)| keep(*variable));
-    }
-
-    /// One variable that changes.
-    pub(super) fn one(variable: NumericId, value: Linear<Rational>) -> Self {
-        Self { changes: vec![(variable, value)] }
-    }
-
-    /// All numbers that change.
-    pub(super) fn each(&mut self, change: &mut dyn FnMut(&mut Linear<Rational>)) {
-        self.changes.iter_mut().for_each(|(_, value)| change(value));
-    }
-
-    /// Takes over the changes of other numbers.
-    pub(super) fn complete(&mut self, earlier: Self) {
-        for (variable, value) in earlier.changes {
-            if self.get(variable).is_none() {
-                self.insert(variable, value);
+    /// Whether it changes what is read.
+    pub(super) fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
+        match self {
+            Self::Atom(atom, _) => {
+                let (predicate, arguments) = world.atom_key(*atom);
+                reads.atoms.iter().any(|pattern| matches(pattern, predicate, arguments))
+            }
+            Self::Number { variable, .. } => {
+                let (function, arguments) = world.numeric_key(*variable);
+                reads.numbers.iter().any(|pattern| matches(pattern, function, arguments))
             }
         }
     }
+}
 
-    pub(super) fn insert(&mut self, variable: NumericId, value: Linear<Rational>) {
-        match self.changes.binary_search_by_key(&variable, |(own, _)| *own) {
-            Ok(position) => self.changes[position].1 = value,
-            Err(position) => self.changes.insert(position, (variable, value)),
+/// The atoms that changes make true, and those that they make false; what is both becomes true.
+pub(super) fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, Vec<AtomId>) {
+    let (mut adds, mut deletes) = (Vec::new(), Vec::new());
+    for change in changes {
+        if let GroundChange::Atom(atom, positive) = change {
+            if *positive { &mut adds } else { &mut deletes }.push(*atom);
         }
     }
+    deletes.retain(|atom| !adds.contains(atom));
+    (adds, deletes)
 }
 
 /// How a number changes; two changes of one way commute, unless both assign (0).
@@ -154,6 +158,7 @@ fn scaled(
     Ok(value)
 }
 
+/// Puts what numeric variables have become in their place.
 pub(super) fn substitute(linear: &mut Linear<Rational>, before: &Numbers) {
     if !linear.coefficients.iter().any(|(variable, _)| before.get(*variable).is_some()) {
         return;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
 
-use crate::ground::evaluate::Binding;
+use crate::ground::vocabulary::atom::Binding;
 use crate::lifted::{
     Bound, Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Term,
 };

@@ -13,9 +13,10 @@ use std::collections::{BTreeMap, BinaryHeap};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
-use crate::ground::evaluate::AtomId;
-use crate::ground::instantiate::{GroundOperator, GroundTask};
-use crate::ground::normal_form::GroundLiteral;
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::condition::GroundLiteral;
+use crate::ground::vocabulary::operator::GroundOperator;
+use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::{ObjectId, PredicateId};
 use crate::limits::{Interrupted, Limits};
 
@@ -42,19 +43,16 @@ pub(crate) struct Group {
 
 /// Disjoint groups, largest first.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
-pub(crate) fn groups(
-    task: &GroundTask<'_>,
-    relevant: &FxHashSet<AtomId>,
-    limits: &Limits,
-) -> Result<Vec<Group>, Interrupted> {
+pub(crate) fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Group>, Interrupted> {
+    let limits = task.world.limits;
     let mut instances: Vec<Vec<AtomId>> = Vec::new();
-    for candidate in invariants(task, relevant, limits)? {
+    for candidate in invariants(task, relevant)? {
         let mut by_key: BTreeMap<Key, (usize, Vec<AtomId>)> = BTreeMap::new();
         for atom in limits.watch(sorted(relevant)) {
             let atom = atom?;
             if let Some(key) = key_of(task, &candidate, atom) {
                 let entry = by_key.entry(key).or_default();
-                entry.0 += usize::from(initially(task, atom));
+                entry.0 += usize::from(task.world.is_initial(atom));
                 entry.1.push(atom);
             }
         }
@@ -94,11 +92,6 @@ fn sorted(atoms: &FxHashSet<AtomId>) -> Vec<AtomId> {
     all
 }
 
-fn initially(task: &GroundTask<'_>, atom: AtomId) -> bool {
-    let key = task.world.atoms.get_index(atom.index());
-    key.is_some_and(|((predicate, arguments), ())| task.world.holds_initially(*predicate, arguments))
-}
-
 /// The key of an atom under a candidate, if the candidate covers its predicate.
 fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<Key> {
     let ((predicate, arguments), ()) = task.world.atoms.get_index(atom.index())?;
@@ -108,11 +101,7 @@ fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<
 
 /// The candidates that hold up.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit on candidates")]
-fn invariants(
-    task: &GroundTask<'_>,
-    relevant: &FxHashSet<AtomId>,
-    limits: &Limits,
-) -> Result<Vec<Candidate>, Interrupted> {
+fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Candidate>, Interrupted> {
     let mut arities: BTreeMap<PredicateId, usize> = BTreeMap::new();
     for atom in relevant {
         if let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index()) {
@@ -135,7 +124,7 @@ fn invariants(
         let candidate = open[next].clone();
         next += 1;
         let mut broken = None;
-        for operator in limits.watch(&task.operators) {
+        for operator in task.world.limits.watch(&task.operators) {
             broken = broken_by(task, &candidate, operator?);
             if broken.is_some() {
                 break;

@@ -9,9 +9,13 @@ use std::sync::Arc;
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term as RuleTerm, Variable};
 use rustc_hash::FxHashMap;
 
-use crate::configuration::{has_numbers, is_static};
-use crate::ground::reach::{free, with_bound};
-use crate::lifted::{Formula, Lifted, ObjectId, PredicateId, Term};
+use crate::configuration::{formula_terms, has_numbers, is_static};
+use crate::ground::evaluate::condition::residual;
+use crate::ground::evaluate::join::each_binding;
+use crate::ground::vocabulary::reached::Reached;
+use crate::ground::vocabulary::residual::Residual;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::{Arguments, Bound, Formula, Lifted, ObjectId, PredicateId, Term};
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
@@ -26,7 +30,7 @@ pub(super) struct Names {
 }
 
 /// A program under construction.
-pub(super) struct Builder<'a> {
+pub(super) struct Relaxed<'a> {
     pub(super) lifted: &'a Lifted,
     limits: &'a Limits,
     names: Names,
@@ -36,7 +40,7 @@ pub(super) struct Builder<'a> {
     relations: usize,
 }
 
-impl<'a> Builder<'a> {
+impl<'a> Relaxed<'a> {
     pub(super) fn new(lifted: &'a Lifted, limits: &'a Limits) -> Self {
         let mut table = Symbols::new();
         let objects: Vec<_> = (0..lifted.objects.len()).map(|i| table.name(&format!("object {i}"))).collect();
@@ -206,8 +210,7 @@ impl<'a> Builder<'a> {
     fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Result<Symbol, Interrupted> {
         let relation = self.fresh("comparison");
         let variables = free(formula);
-        let rows =
-            crate::ground::evaluate::satisfying(self.lifted, formula, &variables, candidates, self.limits)?;
+        let rows = satisfying(self.lifted, formula, &variables, candidates, self.limits)?;
         for row in rows {
             let arguments = row.iter().map(|object| self.names.objects[object.index()]).collect();
             self.facts.push(Fact { predicate: relation, arguments });
@@ -219,4 +222,66 @@ impl<'a> Builder<'a> {
 /// The variable of a rule for a parameter or bound variable.
 fn variable(number: u32) -> RuleTerm {
     RuleTerm::Variable(Variable(u16::try_from(number).expect("invariant: `reach` refuses more variables")))
+}
+
+/// The objects for which a static comparison holds, one for each variable.
+#[expect(clippy::arithmetic_side_effects, reason = "variables of a condition are numbered in memory")]
+fn satisfying(
+    lifted: &Lifted,
+    comparison: &Formula,
+    variables: &[u32],
+    candidates: &Candidates,
+    limits: &Limits,
+) -> Result<Vec<Arguments>, Interrupted> {
+    let reached = Reached::default();
+    let mut world = World::new(lifted, &reached, limits);
+    let bound: Vec<_> = variables
+        .iter()
+        .filter_map(|v| Some(Bound { variable: *v, candidates: candidates.get(v)?.clone() }))
+        .collect();
+    let mut binding = vec![None; variables.iter().max().map_or(0, |v| *v as usize + 1)];
+    let mut rows = Vec::new();
+    each_binding(&mut world, &bound, &[], &mut binding, &mut |world, binding| {
+        if matches!(residual(world, comparison, binding), Ok(Residual::True)) {
+            rows.push(variables.iter().filter_map(|v| binding[*v as usize]).collect());
+        }
+        true
+    })?;
+    // What was cut short above counts as not satisfied.
+    limits.check()?;
+    Ok(rows)
+}
+
+/// The variables that a quantifier binds, and all candidates in its scope.
+pub(super) fn with_bound(candidates: &Candidates, bound: &[Bound]) -> (Vec<u32>, Candidates) {
+    let mut inner = candidates.clone();
+    inner.extend(bound.iter().map(|b| (b.variable, b.candidates.clone())));
+    (bound.iter().map(|b| b.variable).collect(), inner)
+}
+
+/// The variables of a condition that no quantifier in it binds, ascending.
+pub(super) fn free(formula: &Formula) -> Vec<u32> {
+    fn bound_in(formula: &Formula, out: &mut Vec<u32>) {
+        match formula {
+            Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| bound_in(part, out)),
+            Formula::Exists(bound, body) | Formula::ForAll(bound, body) => {
+                out.extend(bound.iter().map(|b| b.variable));
+                bound_in(body, out);
+            }
+            _ => {}
+        }
+    }
+    let mut bound = Vec::new();
+    bound_in(formula, &mut bound);
+    let mut free = Vec::new();
+    formula_terms(formula, &mut |term| {
+        if let Term::Parameter(variable) = term
+            && !bound.contains(&variable)
+        {
+            free.push(variable);
+        }
+    });
+    free.sort_unstable();
+    free.dedup();
+    free
 }

@@ -1,10 +1,19 @@
-//! Whether any combination of designs is left when some are forbidden.
+//! Combinations of designs that are forbidden, and whether any is left.
 
 use rustc_hash::FxHashSet;
 
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::quantity::SlotSet;
 use crate::task::Forbidden;
+
+/// Adds a combination of designs to those that are forbidden.
+pub(super) fn forbid(forbidden: &mut Vec<Forbidden>, slots: &SlotSet, combination: SlotSet) {
+    match forbidden.iter_mut().find(|rule| rule.slots == *slots) {
+        Some(rule) if rule.combinations.contains(&combination) => {}
+        Some(rule) => rule.combinations.push(combination),
+        None => forbidden.push(Forbidden { slots: slots.clone(), combinations: vec![combination] }),
+    }
+}
 
 /// Whether some combination of designs is not forbidden; `sizes` counts the designs of each slot.
 ///

@@ -1,47 +1,27 @@
-//! What an instance changes, by case and by moment.
+//! The cases of an instance: one for each way in which its conditions can turn out.
 
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::error::{Error, Place};
-use crate::ground::admit::admit_some;
-use crate::ground::evaluate::{AtomId, Failure, World};
-use crate::ground::events::{Interference, Passage};
-use crate::ground::frame::Operand;
-use crate::ground::instantiate::{Apart, Build, GroundConditional, GroundOperator, forbid};
-use crate::ground::join::guards_of_exists;
-use crate::ground::numbers::{Numbers, numbers, substitute, way_of};
-use crate::ground::reads::{Reads, matches};
-use crate::ground::residual::{Residual, constant_comparison};
-use crate::lifted::{Change, Effect, Rational, Schema};
+use crate::error::Error;
+use crate::ground::evaluate::normal_form::Definitions;
+use crate::ground::instantiate::admit::{admit_some, forbid};
+use crate::ground::instantiate::change::{GroundChange, atoms, numbers, substitute};
+use crate::ground::instantiate::moment::Moment;
+use crate::ground::instantiate::passage::{Interference, Passage};
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::failure::{Failure, possible};
+use crate::ground::vocabulary::numbers::Numbers;
+use crate::ground::vocabulary::operator::{GroundConditional, GroundOperator};
+use crate::ground::vocabulary::residual::{Residual, constant_comparison};
+use crate::ground::vocabulary::world::World;
+use crate::lifted::Schema;
 use crate::limits::Limits;
-use crate::quantity::{Linear, NumericId};
 use crate::task::Forbidden;
-use pddl::ast::Assignment;
 
 /// An instance becomes at most this many operators.
 const CASE_LIMIT: usize = 64;
-
-/// What the start or the end of an instance changes, each change under a condition.
-#[derive(Clone)]
-pub(super) struct Moment {
-    pub(super) changes: Vec<(Residual, GroundChange)>,
-}
-
-#[derive(Clone)]
-pub(super) enum GroundChange {
-    Atom(AtomId, bool),
-    Number {
-        variable: NumericId,
-        assignment: Assignment,
-        /// None if it is undefined: the operator does not exist where the change would be made.
-        operand: Option<Linear<Rational>>,
-        /// Combinations of designs for which it is undefined.
-        undefined: Arc<[Forbidden]>,
-        place: Place,
-    },
-}
 
 /// One way in which the conditions of an instance can turn out, all its conditions in terms of the state before it.
 pub(super) struct Case {
@@ -58,81 +38,6 @@ struct Start {
     numbers: Numbers,
     /// Combinations of designs for which a number has no value.
     undefined: Vec<Forbidden>,
-}
-
-impl Build<'_, '_> {
-    /// The changes of effects that happen at once.
-    pub(super) fn moment(&mut self, effects: &[Effect], operands: &[Operand]) -> Result<Moment, Failure> {
-        let mut changes = Vec::with_capacity(effects.len());
-        for (effect, operand) in effects.iter().zip(operands) {
-            if effect.bound.is_empty() {
-                self.effect(effect, operand, &mut changes)?;
-                continue;
-            }
-            let guards = guards_of_exists(&effect.condition);
-            let mut bindings = Vec::new();
-            self.world.each_binding(&effect.bound, &guards, &mut self.binding, &mut |_, binding| {
-                bindings.push(binding.clone());
-                true
-            })?;
-            let own = std::mem::take(&mut self.binding);
-            for binding in bindings {
-                self.binding = binding;
-                self.effect(effect, operand, &mut changes)?;
-            }
-            self.binding = own;
-        }
-        Ok(Moment { changes })
-    }
-
-    fn effect(
-        &mut self,
-        effect: &Effect,
-        operand: &Operand,
-        changes: &mut Vec<(Residual, GroundChange)>,
-    ) -> Result<(), Failure> {
-        self.world.in_effect = true;
-        let condition = self.world.residual(&effect.condition, &mut self.binding);
-        self.world.in_effect = false;
-        let condition = condition?;
-        if condition != Residual::False {
-            let change = self.change(&effect.change, operand, condition == Residual::True)?;
-            changes.push((condition, change));
-        }
-        Ok(())
-    }
-
-    fn change(&mut self, change: &Change, operand: &Operand, certain: bool) -> Result<GroundChange, Failure> {
-        Ok(match change {
-            Change::Add(predicate, terms) | Change::Delete(predicate, terms) => {
-                let atom = self.world.atom(*predicate, &World::arguments(terms, &self.binding));
-                GroundChange::Atom(atom, matches!(change, Change::Add(..)))
-            }
-            Change::Assign { assignment, function, terms, expression, place } => {
-                let arguments = World::arguments(terms, &self.binding);
-                let variable = self.world.numeric(*function, &arguments, *place)?;
-                let nothing: Arc<[Forbidden]> = [].into();
-                let Apart { operand, undefined } = match operand {
-                    Operand::Undefined => Apart { operand: None, undefined: nothing },
-                    Operand::Open(operand, undefined) => {
-                        Apart { operand: Some(operand.clone()), undefined: undefined.clone() }
-                    }
-                    Operand::Closed if certain => {
-                        Apart { operand: possible(self.open(expression))?, undefined: nothing }
-                    }
-                    Operand::Closed => self.open_apart(expression)?,
-                };
-                GroundChange::Number { variable, assignment: *assignment, operand, undefined, place: *place }
-            }
-        })
-    }
-}
-
-impl Moment {
-    /// Nothing changes.
-    pub(super) fn nothing() -> Self {
-        Self { changes: Vec::new() }
-    }
 }
 
 impl Start {
@@ -237,15 +142,6 @@ pub(super) fn cases(
     Ok(all)
 }
 
-/// Nothing where something cannot be.
-pub(super) fn possible<T>(result: Result<T, Failure>) -> Result<Option<T>, Failure> {
-    match result {
-        Ok(value) => Ok(Some(value)),
-        Err(Failure::Undefined) => Ok(None),
-        Err(error) => Err(error),
-    }
-}
-
 /// Whether parts cannot hold together, as far as their literals tell.
 fn contradictory(parts: &[Residual]) -> bool {
     fn note(parts: &[Residual], known: &mut FxHashMap<AtomId, bool>) -> bool {
@@ -257,61 +153,6 @@ fn contradictory(parts: &[Residual]) -> bool {
         })
     }
     note(parts, &mut FxHashMap::default())
-}
-
-/// Conditions under which two parts of one happening interfere: one changes what the other reads, they set an atom to
-/// different values, or they change a number in ways that do not commute.
-pub(super) fn clashes(
-    world: &World<'_>,
-    (first_reads, first): (&Reads, &Moment),
-    (second_reads, second): (&Reads, &Moment),
-) -> Vec<Residual> {
-    let mut clashes = Vec::new();
-    for (reads, moment) in [(first_reads, second), (second_reads, first)] {
-        let disturbing = moment.changes.iter().filter(|(_, change)| change.disturbs(world, reads));
-        clashes.extend(disturbing.map(|(condition, _)| condition.clone()));
-    }
-    for (one, earlier) in &first.changes {
-        for (other, later) in &second.changes {
-            let clash = match (earlier, later) {
-                (GroundChange::Atom(atom, holds), GroundChange::Atom(same, positive)) => {
-                    atom == same && holds != positive
-                }
-                (
-                    GroundChange::Number { variable, assignment: way, .. },
-                    GroundChange::Number { variable: same, assignment, .. },
-                ) => variable == same && (way_of(*way) != way_of(*assignment) || way_of(*way) == 0),
-                _ => false,
-            };
-            if clash {
-                clashes.push(Residual::junction([one.clone(), other.clone()], true));
-            }
-        }
-    }
-    clashes
-}
-
-impl GroundChange {
-    fn undefined(&self) -> &[Forbidden] {
-        match self {
-            Self::Atom(..) => &[],
-            Self::Number { undefined, .. } => undefined,
-        }
-    }
-
-    /// Whether it changes what is read.
-    fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
-        match self {
-            Self::Atom(atom, _) => {
-                let (predicate, arguments) = world.atom_key(*atom);
-                reads.atoms.iter().any(|pattern| matches(pattern, predicate, arguments))
-            }
-            Self::Number { variable, .. } => {
-                let (function, arguments) = world.numeric_key(*variable);
-                reads.numbers.iter().any(|pattern| matches(pattern, function, arguments))
-            }
-        }
-    }
 }
 
 /// Every way in which conditions can turn out: what must hold then, and which of them hold.
@@ -371,9 +212,10 @@ impl Case {
     pub(super) fn operator(
         self,
         world: &mut World<'_>,
+        definitions: &mut Definitions,
         template: GroundOperator,
     ) -> Result<GroundOperator, Failure> {
-        let forbidden = self.forbidden(&template, &world.limits)?;
+        let forbidden = self.forbidden(&template, world.limits)?;
         let start = self.start;
         let certain = || self.end.iter().filter(|(condition, _)| *condition == Residual::True);
         let (end_adds, end_deletes) = atoms(certain().map(|(_, change)| change));
@@ -386,7 +228,7 @@ impl Case {
             if !positive && (gone || end_adds.contains(atom)) {
                 continue;
             }
-            let condition = literals(world, condition);
+            let condition = literals(world, definitions, condition);
             if condition.windows(2).any(|pair| pair[0].0 == pair[1].0) {
                 continue;
             }
@@ -409,31 +251,23 @@ impl Case {
         deletes.sort_unstable();
         deletes.dedup();
         deletes.retain(|atom| !adds.contains(atom));
-        let condition = world.condition(&self.parts)?;
+        let condition = definitions.condition(world, &self.parts)?;
         Ok(GroundOperator { forbidden, condition, adds, deletes, conditional, numeric_effects, ..template })
     }
 }
 
 /// The literals of a conjunction; parts that are none get a name.
-fn literals(world: &mut World<'_>, condition: &Residual) -> Vec<(AtomId, bool)> {
+fn literals(
+    world: &mut World<'_>,
+    definitions: &mut Definitions,
+    condition: &Residual,
+) -> Vec<(AtomId, bool)> {
     let parts =
         if let Residual::And(parts) = condition { &parts[..] } else { std::slice::from_ref(condition) };
-    let mut literals: Vec<_> = parts.iter().map(|part| world.literal(part)).collect();
+    let mut literals: Vec<_> = parts.iter().map(|part| definitions.literal(world, part)).collect();
     literals.sort_unstable();
     literals.dedup();
     literals
-}
-
-/// The atoms that changes make true, and those that they make false; what is both becomes true.
-fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, Vec<AtomId>) {
-    let (mut adds, mut deletes) = (Vec::new(), Vec::new());
-    for change in changes {
-        if let GroundChange::Atom(atom, positive) = change {
-            if *positive { &mut adds } else { &mut deletes }.push(*atom);
-        }
-    }
-    deletes.retain(|atom| !adds.contains(atom));
-    (adds, deletes)
 }
 
 /// A condition of the middle or end of a durative action in terms of the state before its start.

@@ -8,11 +8,10 @@
 
 use num_traits::Zero;
 
-use crate::ground::instantiate::GroundTask;
-use crate::ground::metric::initial_value;
-use crate::ground::normal_form::GroundCondition;
+use crate::ground::vocabulary::condition::GroundCondition;
+use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::Rational;
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Interrupted;
 use crate::quantity::{Linear, NumericId, Quantity};
 
 /// Ends of intervals move freely for this many rounds.
@@ -26,36 +25,37 @@ struct Interval {
 }
 
 /// Removes operators and rules whose comparisons can never hold. Returns whether there were any.
-pub(crate) fn prune_by_numbers(task: &mut GroundTask<'_>, limits: &Limits) -> Result<bool, Interrupted> {
+pub(crate) fn prune_by_numbers(task: &mut GroundTask<'_>) -> Result<bool, Interrupted> {
     let conditions = task.operators.iter().map(|operator| &operator.condition);
-    let bodies = task.world.definitions.axioms.iter().map(|axiom| &axiom.body);
+    let bodies = task.axioms.iter().map(|axiom| &axiom.body);
     if conditions.chain(bodies).all(|condition| condition.comparisons.is_empty()) {
         return Ok(false);
     }
-    let intervals = reachable(task, limits)?;
-    let (operators, axioms) = (task.operators.len(), task.world.definitions.axioms.len());
+    let intervals = reachable(task)?;
+    let (operators, axioms) = (task.operators.len(), task.axioms.len());
     task.operators.retain(|operator| can_hold(&operator.condition, &intervals));
-    task.world.definitions.axioms.retain(|axiom| can_hold(&axiom.body, &intervals));
-    Ok(operators != task.operators.len() || axioms != task.world.definitions.axioms.len())
+    task.axioms.retain(|axiom| can_hold(&axiom.body, &intervals));
+    Ok(operators != task.operators.len() || axioms != task.axioms.len())
 }
 
 /// Whether the numeric part of the goal can hold.
-pub(crate) fn goal_can_hold(task: &GroundTask<'_>, limits: &Limits) -> Result<bool, Interrupted> {
+pub(crate) fn goal_can_hold(task: &GroundTask<'_>) -> Result<bool, Interrupted> {
     let Some(goal) = task.goal.as_ref().filter(|goal| !goal.comparisons.is_empty()) else {
         return Ok(true);
     };
-    Ok(can_hold(goal, &reachable(task, limits)?))
+    Ok(can_hold(goal, &reachable(task)?))
 }
 
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "after a few rounds each one moves an end, or is the last"
 )]
-fn reachable(task: &GroundTask<'_>, limits: &Limits) -> Result<Vec<Interval>, Interrupted> {
+fn reachable(task: &GroundTask<'_>) -> Result<Vec<Interval>, Interrupted> {
+    let limits = task.world.limits;
     let variables = NumericId::all(task.world.numerics.len());
     let mut intervals: Vec<Interval> = variables
         .map(|variable| {
-            let initial = initial_value(&task.world, variable);
+            let initial = task.world.initial_value(variable);
             Interval { low: Some(initial.clone()), high: Some(initial) }
         })
         .collect();

@@ -4,66 +4,60 @@
 //! numbers inside disjunctions, get a name: a derived atom that holds where the part does. So no condition grows by more than a
 //! constant factor.
 
-use crate::ground::derived::GroundAxiom;
-use crate::ground::evaluate::{AtomId, Failure, World};
-use crate::ground::residual::Residual;
-use crate::lifted::Rational;
-use crate::quantity::Linear;
+use rustc_hash::FxHashMap;
+
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::axiom::GroundAxiom;
+use crate::ground::vocabulary::condition::{GroundCondition, GroundLiteral};
+use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::residual::Residual;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::{ObjectId, PredicateId};
+use crate::number::dense;
 
 /// Disjunctions with more clauses than this are named rather than multiplied out.
 const CLAUSE_LIMIT: usize = 16;
 
-/// An atom or its negation.
-pub(crate) type GroundLiteral = (AtomId, bool);
-
-/// A conjunction of literals, clauses and comparisons.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub(crate) struct GroundCondition {
-    pub(crate) literals: Vec<GroundLiteral>,
-    pub(crate) clauses: Vec<Vec<GroundLiteral>>,
-    pub(crate) comparisons: Vec<(Linear<Rational>, bool)>,
+/// Parts of conditions that have a name, and the rules of all derived atoms.
+#[derive(Debug, Default)]
+pub(crate) struct Definitions {
+    named: FxHashMap<Residual, AtomId>,
+    pub(crate) axioms: Vec<GroundAxiom>,
 }
 
-impl GroundCondition {
-    /// Sorts and removes repetitions; false if literals contradict each other.
-    pub(crate) fn tidy(&mut self) -> bool {
-        self.literals.sort_unstable();
-        self.literals.dedup();
-        self.clauses.sort_unstable();
-        self.clauses.dedup();
-        self.literals.windows(2).all(|pair| pair[0].0 != pair[1].0)
-    }
-
-    /// All atoms that occur.
-    pub(crate) fn atoms(&self) -> impl Iterator<Item = AtomId> + '_ {
-        self.literals.iter().chain(self.clauses.iter().flatten()).map(|(atom, _)| *atom)
-    }
-}
-
-impl World<'_> {
+impl Definitions {
     /// Conjunctive normal form; `Failure::Undefined` if the condition is false.
-    pub(crate) fn condition(&mut self, parts: &[Residual]) -> Result<GroundCondition, Failure> {
+    pub(crate) fn condition(
+        &mut self,
+        world: &mut World<'_>,
+        parts: &[Residual],
+    ) -> Result<GroundCondition, Failure> {
         let mut condition = GroundCondition::default();
         for part in parts {
-            self.conjoin(part, &mut condition)?;
+            self.conjoin(world, part, &mut condition)?;
         }
         if condition.tidy() { Ok(condition) } else { Err(Failure::Undefined) }
     }
 
-    fn conjoin(&mut self, residual: &Residual, condition: &mut GroundCondition) -> Result<(), Failure> {
+    fn conjoin(
+        &mut self,
+        world: &mut World<'_>,
+        residual: &Residual,
+        condition: &mut GroundCondition,
+    ) -> Result<(), Failure> {
         match residual {
             Residual::True => {}
             Residual::False => return Err(Failure::Undefined),
             Residual::And(parts) => {
                 for part in parts {
-                    self.conjoin(part, condition)?;
+                    self.conjoin(world, part, condition)?;
                 }
             }
             Residual::Literal { atom, positive } => condition.literals.push((*atom, *positive)),
             Residual::Compare { linear, strict } => condition.comparisons.push((linear.clone(), *strict)),
             Residual::Or(parts) => {
                 let multiplied = clauses(residual);
-                for clause in multiplied.unwrap_or_else(|| vec![self.clause(parts)]) {
+                for clause in multiplied.unwrap_or_else(|| vec![self.clause(world, parts)]) {
                     match clause[..] {
                         [] => return Err(Failure::Undefined),
                         [literal] => condition.literals.push(literal),
@@ -76,31 +70,40 @@ impl World<'_> {
     }
 
     /// A clause with a literal for each part.
-    fn clause(&mut self, parts: &[Residual]) -> Vec<GroundLiteral> {
-        let mut clause: Vec<_> = parts.iter().map(|part| self.literal(part)).collect();
+    fn clause(&mut self, world: &mut World<'_>, parts: &[Residual]) -> Vec<GroundLiteral> {
+        let mut clause: Vec<_> = parts.iter().map(|part| self.literal(world, part)).collect();
         clause.sort_unstable();
         clause.dedup();
         clause
     }
 
     /// A literal that holds where the condition does: the condition itself, or a derived atom.
-    pub(crate) fn literal(&mut self, residual: &Residual) -> GroundLiteral {
+    pub(crate) fn literal(&mut self, world: &mut World<'_>, residual: &Residual) -> GroundLiteral {
         if let Residual::Literal { atom, positive } = residual {
             return (*atom, *positive);
         }
-        if let Some(atom) = self.definitions.named(residual) {
+        if let Some(atom) = self.named.get(residual).copied() {
             return (atom, true);
         }
-        let atom = self.name(residual.clone());
-        self.define(atom, residual);
+        let atom = self.name(world, residual.clone());
+        self.define(world, atom, residual);
         (atom, true)
     }
 
+    /// A fresh atom for a part of a condition.
+    fn name(&mut self, world: &mut World<'_>, residual: Residual) -> AtomId {
+        let predicate = PredicateId(dense(world.lifted.predicates.len()));
+        let number = ObjectId(dense(self.named.len()));
+        let atom = world.atom(predicate, &[number]);
+        self.named.insert(residual, atom);
+        atom
+    }
+
     /// Adds rules by which an atom holds where the condition does.
-    pub(crate) fn define(&mut self, head: AtomId, residual: &Residual) {
+    pub(crate) fn define(&mut self, world: &mut World<'_>, head: AtomId, residual: &Residual) {
         if let Residual::Or(parts) = residual {
             for part in parts {
-                self.define(head, part);
+                self.define(world, head, part);
             }
             return;
         }
@@ -112,11 +115,11 @@ impl World<'_> {
                 Residual::True => {}
                 Residual::False => return,
                 Residual::Compare { linear, strict } => body.comparisons.push((linear.clone(), *strict)),
-                _ => body.literals.push(self.literal(part)),
+                _ => body.literals.push(self.literal(world, part)),
             }
         }
         if body.tidy() {
-            self.definitions.axioms.push(GroundAxiom { head, body });
+            self.axioms.push(GroundAxiom { head, body });
         }
     }
 }
