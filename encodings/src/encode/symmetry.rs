@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
-use crate::encode::Encoding;
+use crate::encode::builder::Builder;
 use crate::encode::equal_designs::equal_designs;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::lifted::ObjectId;
@@ -43,6 +43,34 @@ impl Symmetry {
             designs.extend(equal_designs(task, slot, limits)?.into_iter().map(|design| (slot, design)));
         }
         Ok(Self { designs, objects: equal_objects(task, limits)? })
+    }
+
+    /// Equal designs and objects are used in their order.
+    pub(super) fn add(&self, builder: &mut Builder<'_>, limits: &Limits) -> Result<(), Interrupted> {
+        let horizon = builder.variables.horizon();
+        for step in 0..horizon {
+            for design in limits.watch(&self.designs) {
+                let (slot, design) = design?;
+                let literal = builder.variables.designs[step][slot.index()][*design as usize];
+                builder.formula.add(Family::Symmetry, [!literal]);
+            }
+        }
+        for (first, only_second) in &self.objects {
+            let mut seen: Lit = !Formula::truth();
+            for step in limits.watch(0..horizon) {
+                let step = step?;
+                let used = builder.group(step, first, Family::Symmetry);
+                let longer = builder.formula.fresh(Meaning::Ladder);
+                builder.formula.add(Family::Symmetry, [!longer, seen, used]);
+                seen = longer;
+                for id in only_second {
+                    if let Some(literal) = builder.variables.operator(step, *id) {
+                        builder.formula.add(Family::Symmetry, [!literal, seen]);
+                    }
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -309,38 +337,5 @@ impl Exchange {
             })
             .collect();
         image
-    }
-}
-
-impl Encoding<'_> {
-    /// Equal designs and objects are used in their order.
-    pub(super) fn break_symmetries(
-        &mut self,
-        symmetry: &Symmetry,
-        limits: &Limits,
-    ) -> Result<(), Interrupted> {
-        for step in 0..self.horizon {
-            for design in limits.watch(&symmetry.designs) {
-                let (slot, design) = design?;
-                let literal = self.designs[step][slot.index()][*design as usize];
-                self.formula.add(Family::Symmetry, [!literal]);
-            }
-        }
-        for (first, only_second) in &symmetry.objects {
-            let mut seen: Lit = !Formula::truth();
-            for step in limits.watch(0..self.horizon) {
-                let step = step?;
-                let used = self.group(step, first, Family::Symmetry);
-                let longer = self.formula.fresh(Meaning::Ladder);
-                self.formula.add(Family::Symmetry, [!longer, seen, used]);
-                seen = longer;
-                for id in only_second {
-                    if let Some(literal) = self.operator(step, *id) {
-                        self.formula.add(Family::Symmetry, [!literal, seen]);
-                    }
-                }
-            }
-        }
-        Ok(())
     }
 }
