@@ -18,7 +18,7 @@ use crate::ground_plan::GroundPlan;
 use crate::integral::Integral;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, Rational, dense};
-use crate::optimize::Config;
+use crate::optimize::{Config, can_repeat_reward};
 use crate::plan::{Plan, decode, metric};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::search::{Estimate, Found, search_states};
@@ -138,7 +138,7 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     };
     let shift = least * &Rational::from_big(BigRational::from_integer(steps.into()));
     let plan = GroundPlan { cost: plan.cost + &shift, ..plan };
-    let proved = task.can_repeat_reward(&plan.steps, &config.limits);
+    let proved = can_repeat_reward(task, &plan.steps, &config.limits);
     Solution {
         horizon: steps,
         unbounded: Some(if proved { Unbounded::Proved } else { Unbounded::Suspected }),

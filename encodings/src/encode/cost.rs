@@ -217,11 +217,12 @@ impl Sum<'_, '_> {
                     self.builder.variables.values[step + 1][variable.index()][value as usize]
                 }));
             }
-            match (potential.to_go(transition.source), potential.to_go(transition.target)) {
-                (Some(before), Some(after)) => alive.push((here, least + after - before)),
-                _ => {
-                    self.builder.formula.add(Family::Cost, here.iter().map(|state| !*state).chain([!literal]))
-                }
+            let to_go = (potential.to_go(transition.source), potential.to_go(transition.target));
+            if let (Some(before), Some(after)) = to_go {
+                alive.push((here, least + after - before));
+            } else {
+                let elsewhere = here.iter().map(|state| !*state);
+                self.builder.formula.add(Family::Cost, elsewhere.chain([!literal]));
             }
         }
         match alive.split_first() {

@@ -12,8 +12,9 @@ use crate::lifted::ObjectId;
 use crate::limits::Limits;
 use crate::number::{Int, dense};
 use crate::plan::{decode, resolve};
+use crate::replan::base::{Base, Set};
 use crate::replan::layout::Situation;
-use crate::replan::{Base, Progress, Query, Replanned, Set};
+use crate::replan::query::{First, Progress, Query, Replanned};
 use crate::search::{Found, search_from};
 use crate::task::{State, Task};
 use crate::ties;
@@ -155,7 +156,7 @@ fn starts(base: &Base, situation: &Situation, query: &Query<'_>) -> Option<Vec<S
         let (state, own) = (situation.state.clone(), sign(&query.metric));
         return Some(vec![Start { first: None, state, designs, arguments, own }]);
     }
-    let start = |(index, first): (usize, &super::First)| {
+    let start = |(index, first): (usize, &First)| {
         let pair = |(function, design): &(String, String)| {
             Some((base.layout.object(function)?, base.layout.object(design)?))
         };
