@@ -6,18 +6,15 @@
 
 use num_traits::Zero;
 
+use crate::context::Context;
 use crate::ground_plan::{GroundPlan, GroundStep, replay};
-use crate::limits::Limits;
 use crate::number::Rational;
 use crate::task::{Operator, OperatorId, Task};
 use crate::task_number::TaskNumber;
 
 /// The same actions, each as early as the ones before it and the rest of the plan admit; as far as the limits let it.
-pub(crate) fn earliest<N: TaskNumber>(
-    task: &Task<N>,
-    plan: &GroundPlan<N>,
-    limits: &Limits,
-) -> GroundPlan<N> {
+pub(crate) fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
+    let Context { task, limits } = context;
     let mut plan = plan.clone();
     if task.operators.iter().all(|operator| operator.wait.is_none()) {
         return plan;

@@ -12,11 +12,12 @@ use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
 use crate::bounds::Bounds;
+use crate::context::Context;
 use crate::error::Error;
 use crate::ground::{Config as GroundConfig, Generality, ground_for};
 use crate::ground_plan::GroundPlan;
 use crate::integral::Integral;
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Interrupted;
 use crate::number::{Int, Rational, dense};
 use crate::optimize::{Config, can_repeat_reward};
 use crate::plan::{Plan, decode, metric};
@@ -24,6 +25,7 @@ use crate::quantity::{Linear, NumericId, Quantity};
 use crate::search::{Estimate, Found, search_states};
 use crate::solution::{Proof, Solution, Statistics, Status, Unbounded};
 use crate::task::{Condition, NumericEffect, Objective, Operator, State, Task};
+use crate::timing::Timing;
 use pddl::ast::{Domain, Problem};
 
 /// How many states are stored at most.
@@ -76,8 +78,9 @@ pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
 
 /// For a task whose operators all cost at least 0.
 fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
-    let any = explore(task, &config.limits);
-    let show = |plan: &GroundPlan<Rational>| decode(task, plan, &config.limits);
+    let context = Context::new(task, &config.limits);
+    let any = explore(context);
+    let show = |plan: &GroundPlan<Rational>| decode(context, plan);
     let too_long =
         |plan: &GroundPlan<Rational>| config.horizon.is_some_and(|horizon| plan.steps.len() > horizon);
     match (any, config.horizon) {
@@ -87,8 +90,8 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
             let solution = answer(Status::Optimal, Some(show(&plan)), Some(Proof::Search));
             Solution { lower_bound: lower, ..solution }
         }
-        (Explored::Optimal(plan), Some(horizon)) => within(task, horizon, &plan.cost, &config.limits),
-        (Explored::Unknown(_, lower), Some(horizon)) => within(task, horizon, &lower, &config.limits),
+        (Explored::Optimal(plan), Some(horizon)) => within(context, horizon, &plan.cost),
+        (Explored::Unknown(_, lower), Some(horizon)) => within(context, horizon, &lower),
         (Explored::Optimal(plan), None) => answer(Status::Feasible, Some(show(&plan)), None),
         (Explored::Unknown(plan, lower), None) => {
             let status = if plan.is_some() { Status::Feasible } else { Status::Unknown };
@@ -99,23 +102,25 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
 }
 
 /// The best plan with at most `horizon` steps, where no plan at all costs less than `lower`.
-fn within(task: &Task<Rational>, horizon: usize, lower: &Rational, limits: &Limits) -> Solution {
-    let (status, plan, proof) = match explore(&task.with_horizon(horizon), limits) {
+fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
+    let shorter = with_horizon(context.task, horizon);
+    let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
         Explored::Optimal(plan) | Explored::Unknown(Some(plan), _) => (Status::Feasible, Some(plan), None),
         Explored::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof),
         Explored::Unknown(None, _) => (Status::Unknown, None, None),
     };
-    let show = |plan: &GroundPlan<Rational>| decode(task, plan, limits);
+    let show = |plan: &GroundPlan<Rational>| decode(context, plan);
     let solution = answer(status, plan.as_ref().map(show), proof);
-    Solution { lower_bound: Some(metric(task, lower)), horizon, ..solution }
+    Solution { lower_bound: Some(metric(context.task, lower)), horizon, ..solution }
 }
 
 /// For a metric that actions improve: fewest steps first, then the best metric among those plans.
 fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let nothing = |solution: Solution| Solution { lower_bound: None, ..solution };
     let unknown = || nothing(answer(Status::Unknown, None, None));
-    let by_steps = task.with_costs(|_| Quantity::constant(Rational::one()));
-    let steps = match explore(&by_steps, &config.limits) {
+    let context = Context::new(task, &config.limits);
+    let by_steps = with_costs(task.clone(), |_| Quantity::constant(Rational::one()));
+    let steps = match explore(Context { task: &by_steps, ..context }) {
         Explored::Optimal(plan) => plan.steps.len(),
         Explored::Known(solution) => return nothing(*solution),
         Explored::Unknown(..) => return unknown(),
@@ -126,23 +131,23 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     }
     // No plan has fewer steps, so a constant for each step changes nothing but the sign of the costs.
     let least = task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or_default();
-    let shifted = task.with_horizon(steps).with_costs(|operator| {
+    let shifted = with_costs(with_horizon(task, steps), |operator| {
         let mut cost = operator.cost.clone();
         cost.constant = cost.constant - &least;
         cost
     });
-    let (plan, proof) = match explore(&shifted, &config.limits) {
+    let (plan, proof) = match explore(Context { task: &shifted, ..context }) {
         Explored::Optimal(plan) => (plan, Some(Proof::Search)),
         Explored::Unknown(Some(plan), _) => (plan, None),
         Explored::Known(_) | Explored::Unknown(None, _) => return unknown(),
     };
     let shift = least * &Rational::from_big(BigRational::from_integer(steps.into()));
     let plan = GroundPlan { cost: plan.cost + &shift, ..plan };
-    let proved = can_repeat_reward(task, &plan.steps, &config.limits);
+    let proved = can_repeat_reward(context, &plan.steps);
     Solution {
         horizon: steps,
         unbounded: Some(if proved { Unbounded::Proved } else { Unbounded::Suspected }),
-        ..nothing(answer(Status::Feasible, Some(decode(task, &plan, &config.limits)), proof))
+        ..nothing(answer(Status::Feasible, Some(decode(context, &plan)), proof))
     }
 }
 
@@ -155,9 +160,10 @@ enum Explored {
     Unknown(Option<GroundPlan<Rational>>, Rational),
 }
 
-fn explore(task: &Task<Rational>, limits: &Limits) -> Explored {
-    let prepared = Integral::of(task, limits)
-        .and_then(|integral| Ok((RoundedBounds::new(&integral.task, limits)?, integral)));
+fn explore(context: Context<'_, Rational>) -> Explored {
+    let limits = context.limits;
+    let prepared = Integral::of(context)
+        .and_then(|integral| Ok((RoundedBounds::new(Context::new(&integral.task, limits))?, integral)));
     let Ok((bounds, Integral { task, cost_scale })) = prepared else {
         return Explored::Unknown(None, Rational::zero());
     };
@@ -168,7 +174,7 @@ fn explore(task: &Task<Rational>, limits: &Limits) -> Explored {
         let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
         return none(Proof::Relaxation(reason.into()));
     };
-    match search_states(&task, &bounds, STATE_LIMIT, limits) {
+    match search_states(Context::new(&task, limits), &bounds, STATE_LIMIT) {
         Found::Optimal(plan) => Explored::Optimal(original(plan)),
         Found::None => none(Proof::Search),
         Found::Unknown(plan) => Explored::Unknown(plan.map(original), unscaled(lower)),
@@ -188,31 +194,31 @@ fn answer(status: Status, plan: Option<Plan>, proof: Option<Proof>) -> Solution 
     }
 }
 
-impl Task<Rational> {
-    /// The same task with other costs, and a metric of their plain sum.
-    fn with_costs(&self, cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>) -> Self {
-        let mut task = self.clone();
-        for operator in &mut task.operators {
-            operator.cost = cost(operator);
-        }
-        task.objective = Objective { scale: 1, offset: Rational::zero(), maximize: false };
-        task
+/// The same task with other costs, and a metric of their plain sum.
+fn with_costs(
+    mut task: Task<Rational>,
+    cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>,
+) -> Task<Rational> {
+    for operator in &mut task.operators {
+        operator.cost = cost(operator);
     }
+    task.objective = Objective { scale: 1, offset: Rational::zero(), maximize: false };
+    task
+}
 
-    /// The same task for plans with at most so many steps: each uses up one of a number of them. As in formulas, waits are steps.
-    fn with_horizon(&self, horizon: usize) -> Self {
-        let mut task = self.clone();
-        let left = NumericId(dense(task.initial.numbers.len()));
-        task.number_names.push("steps left".to_owned());
-        task.initial.numbers.push(Rational::from_big(BigRational::from_integer(horizon.into())));
-        let mut after = Linear::variable(left);
-        after.quantity.constant = -Rational::one();
-        for operator in &mut task.operators {
-            operator.condition.comparisons.push(after.clone());
-            operator.numeric_effects.push(NumericEffect { variable: left, value: after.clone() });
-        }
-        task
+/// The same task for plans with at most so many steps: each uses up one of a number of them. As in formulas, waits are steps.
+fn with_horizon(task: &Task<Rational>, horizon: usize) -> Task<Rational> {
+    let mut task = task.clone();
+    let left = NumericId(dense(task.initial.numbers.len()));
+    task.number_names.push("steps left".to_owned());
+    task.initial.numbers.push(Rational::from_big(BigRational::from_integer(horizon.into())));
+    let mut after = Linear::variable(left);
+    after.quantity.constant = -Rational::one();
+    for operator in &mut task.operators {
+        operator.condition.comparisons.push(after.clone());
+        operator.numeric_effects.push(NumericEffect { variable: left, value: after.clone() });
     }
+    task
 }
 
 /// Bounds of a task without numbers, whose costs are those of the task times a factor, rounded down.
@@ -223,19 +229,20 @@ pub(crate) struct RoundedBounds {
 }
 
 impl RoundedBounds {
-    fn new(task: &Task<Rational>, limits: &Limits) -> Result<Self, Interrupted> {
-        Self::of(task, |bare| Bounds::new(bare, limits))
+    fn new(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
+        Self::of(context, Bounds::new)
     }
 
     /// Bounds that each rest on one projection.
-    pub(crate) fn of_projections(task: &Task<Rational>, limits: &Limits) -> Result<Self, Interrupted> {
-        Self::of(task, |bare| Bounds::of_projections(bare, limits))
+    pub(crate) fn of_projections(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
+        Self::of(context, Bounds::of_projections)
     }
 
     fn of(
-        task: &Task<Rational>,
-        bounds: impl FnOnce(&Task) -> Result<Bounds, Interrupted>,
+        context: Context<'_, Rational>,
+        bounds: impl FnOnce(Context<'_>) -> Result<Bounds, Interrupted>,
     ) -> Result<Self, Interrupted> {
+        let task = context.task;
         let costs: Vec<BigRational> =
             task.operators.iter().map(|operator| operator.cost.minimum().to_big()).collect();
         let factor = factor(&costs);
@@ -262,7 +269,10 @@ impl RoundedBounds {
             time_scale: 1,
             unreachable: None,
         };
-        Ok(Self { bounds: bounds(&bare)?, unit: Rational::from_big(factor.recip()) })
+        Ok(Self {
+            bounds: bounds(Context::new(&bare, context.limits))?,
+            unit: Rational::from_big(factor.recip()),
+        })
     }
 }
 
@@ -330,7 +340,7 @@ impl Operator<Rational> {
             others: Vec::new(),
             duration: Quantity::constant(0),
             wait: None,
-            timing: crate::timing::Timing::free(),
+            timing: Timing::free(),
         }
     }
 }

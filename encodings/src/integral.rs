@@ -6,7 +6,8 @@ use num_rational::BigRational;
 use num_traits::One;
 
 use crate::common_denominator::CommonDenominator;
-use crate::limits::{Interrupted, Limits};
+use crate::context::Context;
+use crate::limits::Interrupted;
 use crate::number::Rational;
 use crate::quantity::{Linear, Quantity};
 use crate::table_map::TableMap;
@@ -50,10 +51,10 @@ fn multiply(quantity: &mut Quantity<Rational>, scale: &Rational, tables: &mut Ta
 
 impl Integral {
     /// What a search goes by is scaled: conditions, effects, costs, and the initial state.
-    pub(crate) fn of(task: &Task<Rational>, limits: &Limits) -> Result<Self, Interrupted> {
-        let mut task = task.clone();
+    pub(crate) fn of(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
+        let mut task = context.task.clone();
         let mut costs = CommonDenominator::of_at_most(MOST_BITS);
-        for operator in limits.watch(&task.operators) {
+        for operator in context.limits.watch(&task.operators) {
             costs.quantity(&operator?.cost);
         }
         let mut numbers = CommonDenominator::of_at_most(MOST_BITS);

@@ -39,6 +39,7 @@ mod bounds;
 mod certificate;
 mod common_denominator;
 mod concurrent;
+mod context;
 mod earliest;
 mod encode;
 mod ground_plan;

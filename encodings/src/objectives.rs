@@ -7,11 +7,11 @@
 //! [1] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
 //! and system optimization, IEEE Trans. SMC 1(3), 1971.
 
+use crate::context::Context;
 use crate::ground_plan::GroundPlan;
-use crate::limits::Limits;
 use crate::number::{Int, Rational};
 use crate::optimize::{Config, optimize};
-use crate::plan::Exact;
+use crate::plan::{Exact, decode};
 use crate::quantity::{Linear, NumericId, Quantity};
 use crate::solution::{Improvement, Solution, Status};
 use crate::task::{NumericEffect, Operator, Task};
@@ -81,6 +81,7 @@ fn in_order(
     config: &Config,
     report: &mut dyn FnMut(Improvement),
 ) -> Point {
+    let context = Context::new(task, &config.limits);
     let mut budgets = budgets.to_vec();
     let mut best: Option<Solution> = None;
     for objective in order {
@@ -93,7 +94,7 @@ fn in_order(
         let Some(plan) = &solution.ground else {
             // The plan that was best so far stays a plan; that nothing better was found for the rest is not proved.
             let known = best.map(|known| Solution { status: Status::Feasible, proof: None, ..known });
-            return finish(task, known.unwrap_or(solution), &config.limits);
+            return finish(context, known.unwrap_or(solution));
         };
         let spent = task.cost_by(*objective, plan);
         budgets.extend(spent.map(|spent| (*objective, spent)));
@@ -113,11 +114,12 @@ fn in_order(
             break;
         }
     }
-    finish(task, best.unwrap_or_else(|| optimize(task, config, report)), &config.limits)
+    finish(context, best.unwrap_or_else(|| optimize(task, config, report)))
 }
 
 /// Shows the plan by the task's own objectives.
-fn finish(task: &Task, mut solution: Solution, limits: &Limits) -> Point {
+fn finish(context: Context<'_>, mut solution: Solution) -> Point {
+    let task = context.task;
     let mut values = Vec::new();
     if let Some(plan) = &solution.ground {
         let objectives = std::iter::once(&task.objective).chain(&task.others);
@@ -128,7 +130,7 @@ fn finish(task: &Task, mut solution: Solution, limits: &Limits) -> Point {
         );
         if let Some(cost) = task.cost_by(0, plan) {
             let plan = GroundPlan { steps: plan.steps.clone(), cost };
-            solution.plan = Some(crate::plan::decode(task, &plan, limits));
+            solution.plan = Some(decode(context, &plan));
             solution.ground = Some(plan);
         }
     }

@@ -4,10 +4,10 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
+use crate::context::Context;
 use crate::earliest::{earliest, starts};
 use crate::ground_plan::GroundPlan;
 use crate::lifted::ObjectId;
-use crate::limits::Limits;
 use crate::number::{Int, Rational};
 use crate::task::{Argument, Objective, Operator, Task};
 use crate::task_number::TaskNumber;
@@ -93,8 +93,8 @@ pub struct Plan {
 }
 
 /// The plan in the names of the task, each action as early as can be found within the limits.
-pub(crate) fn decode<N: TaskNumber>(task: &Task<N>, plan: &GroundPlan<N>, limits: &Limits) -> Plan {
-    let plan = earliest(task, plan, limits);
+pub(crate) fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> Plan {
+    let (task, plan) = (context.task, earliest(context, plan));
     let mut steps = Vec::new();
     let mut current: Vec<(String, String)> = Vec::new();
     let actions = plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none());

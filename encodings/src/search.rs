@@ -16,6 +16,7 @@ use std::collections::hash_map::Entry;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
+use crate::context::Context;
 use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::{Int, dense};
@@ -58,7 +59,8 @@ pub(crate) struct Prepared<N = Int> {
 
 impl<N: TaskNumber> Prepared<N> {
     /// None if some operator has too many combinations of designs.
-    pub(crate) fn new(task: &Task<N>, limits: &Limits) -> Result<Option<Self>, Interrupted> {
+    pub(crate) fn new(context: Context<'_, N>) -> Result<Option<Self>, Interrupted> {
+        let Context { task, limits } = context;
         let monotone = is_monotone(task);
         let mut choices = Vec::with_capacity(task.operators.len());
         for operator in limits.watch(&task.operators) {
@@ -81,8 +83,16 @@ impl Estimate<Int> for Bounds {
     }
 }
 
+/// What a search goes through, and by which estimates.
+pub(crate) struct Space<'a, N, E> {
+    pub(crate) context: Context<'a, N>,
+    pub(crate) bounds: &'a E,
+    pub(crate) prepared: &'a Prepared<N>,
+}
+
 struct Search<'a, N, E> {
     task: &'a Task<N>,
+    limits: &'a Limits,
     bounds: &'a E,
     prepared: &'a Prepared<N>,
     nodes: Vec<Node<N>>,
@@ -99,20 +109,20 @@ struct Search<'a, N, E> {
 }
 
 /// Searches a task whose operators all cost at least 0.
-pub(crate) fn search(task: &Task, bounds: &Bounds, limits: &Limits) -> Found {
-    search_states(task, bounds, STATE_LIMIT, limits)
+pub(crate) fn search(context: Context<'_>, bounds: &Bounds) -> Found {
+    search_states(context, bounds, STATE_LIMIT)
 }
 
 /// Searches it, storing at most so many states.
 pub(crate) fn search_states<N: TaskNumber>(
-    task: &Task<N>,
+    context: Context<'_, N>,
     bounds: &impl Estimate<N>,
     most: usize,
-    limits: &Limits,
 ) -> Found<N> {
-    match Prepared::new(task, limits) {
+    match Prepared::new(context) {
         Ok(Some(prepared)) => {
-            search_within((task, bounds, &prepared), &task.initial, None, most, limits, &mut |_, _| {})
+            let space = Space { context, bounds, prepared: &prepared };
+            search_within(&space, &context.task.initial, None, most, &mut |_, _| {})
         }
         Ok(None) | Err(Interrupted) => Found::Unknown(None),
     }
@@ -124,39 +134,37 @@ pub(crate) type Hear<'a, N> = &'a mut dyn FnMut(Option<&N>, &N);
 /// Searches it from a state of its own, storing at most so many states, for a plan that costs at most `limit`: what a known one
 /// costs, or `Int::MAX`.
 pub(crate) fn search_from(
-    (task, bounds, prepared): (&Task, &Bounds, &Prepared),
+    space: &Space<'_, Int, Bounds>,
     initial: &State,
     limit: Int,
     most: usize,
-    limits: &Limits,
     hear: Hear<'_, Int>,
 ) -> Found {
     let limit = (limit < Int::MAX).then_some(limit);
-    search_within((task, bounds, prepared), initial, limit, most, limits, hear)
+    search_within(space, initial, limit, most, hear)
 }
 
-fn search_within<N: TaskNumber>(
-    (task, bounds, prepared): (&Task<N>, &impl Estimate<N>, &Prepared<N>),
+fn search_within<N: TaskNumber, E: Estimate<N>>(
+    space: &Space<'_, N, E>,
     initial: &State<N>,
     limit: Option<N>,
     most: usize,
-    limits: &Limits,
     hear: Hear<'_, N>,
 ) -> Found<N> {
     let known = limit.is_some();
-    let mut search = Search::new(task, bounds, prepared, initial, false);
+    let mut search = Search::new(space, initial, false);
     search.limit = limit;
-    if let Some(found) = search.run(limits, SOON.min(most), hear) {
+    if let Some(found) = search.run(SOON.min(most), hear) {
         return found;
     }
     let mut some = None;
     if search.best.is_none() && !known {
-        let mut greedy = Search::new(task, bounds, prepared, initial, true);
-        greedy.run(limits, SOON.min(most), &mut |_, _| {});
+        let mut greedy = Search::new(space, initial, true);
+        greedy.run(SOON.min(most), &mut |_, _| {});
         some = greedy.best_plan();
         search.limit = some.as_ref().map(|plan| plan.cost.clone());
     }
-    match search.run(limits, most, hear) {
+    match search.run(most, hear) {
         Some(Found::Unknown(plan)) => Found::Unknown(cheaper(plan, some)),
         Some(found) => found,
         None => Found::Unknown(cheaper(search.best_plan(), some)),
@@ -173,14 +181,14 @@ pub(crate) type ClosedLabel<N> = (Vec<u32>, Vec<N>, N);
 /// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
 /// nothing left; none if there is a cheaper plan, or if a limit comes first.
 pub(crate) fn closed_labels<N: TaskNumber>(
-    task: &Task<N>,
+    context: Context<'_, N>,
     bounds: &impl Estimate<N>,
-    limits: &Limits,
     cost: Option<&N>,
 ) -> Option<Vec<ClosedLabel<N>>> {
-    let prepared = Prepared::new(task, limits).ok()??;
-    let mut search = Search::new(task, bounds, &prepared, &task.initial, false);
-    match (search.run(limits, STATE_LIMIT, &mut |_, _| {})?, cost) {
+    let prepared = Prepared::new(context).ok()??;
+    let task = context.task;
+    let mut search = Search::new(&Space { context, bounds, prepared: &prepared }, &task.initial, false);
+    match (search.run(STATE_LIMIT, &mut |_, _| {})?, cost) {
         (Found::Optimal(plan), Some(cost)) if plan.cost >= *cost => {}
         (Found::None, None) => {}
         _ => return None,
@@ -196,15 +204,11 @@ pub(crate) fn closed_labels<N: TaskNumber>(
 }
 
 impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
-    fn new(
-        task: &'a Task<N>,
-        bounds: &'a E,
-        prepared: &'a Prepared<N>,
-        initial: &State<N>,
-        greedy: bool,
-    ) -> Self {
+    fn new(space: &Space<'a, N, E>, initial: &State<N>, greedy: bool) -> Self {
+        let Space { context: Context { task, limits }, bounds, prepared } = *space;
         let mut search = Search {
             task,
+            limits,
             bounds,
             prepared,
             nodes: Vec::new(),
@@ -220,8 +224,8 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     }
 
     /// None if there are more states than `most` before anything is known; it may be called again.
-    fn run(&mut self, limits: &Limits, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
-        let mut pulse = limits.pulse();
+    fn run(&mut self, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
+        let mut pulse = self.limits.pulse();
         let mut told: Option<(Option<N>, N)> = None;
         while self.nodes.len() <= most {
             let Some(Reverse((total, steps, id))) = self.open.pop() else {

@@ -17,6 +17,7 @@ use std::sync::OnceLock;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::bounds::{Bounds, Projection};
+use crate::context::Context;
 use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits, Pulse};
@@ -93,7 +94,8 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    pub(crate) fn new(task: &Task, bounds: &Bounds, limits: &Limits) -> Result<Self, Interrupted> {
+    pub(crate) fn new(context: Context<'_>, bounds: &Bounds) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
         let configurations = task.operators.iter().flat_map(|operator| &operator.configuration);
         let mut functions: Vec<ObjectId> = configurations.map(|(function, _)| *function).collect();
         functions.sort_unstable();
@@ -111,11 +113,11 @@ impl Prepared {
     /// The combinations that no other one is strictly better than, and those of the steps to stay close to.
     fn choices_of(
         &self,
-        task: &Task,
+        context: Context<'_>,
         id: OperatorId,
         close_to: &FxHashSet<GroundStep>,
-        limits: &Limits,
     ) -> Result<Choices, Interrupted> {
+        let Context { task, limits } = context;
         let operator = &task.operators[id.index()];
         let Some(mut choices) = undominated(operator, self.monotone, true, limits)? else { return Ok(None) };
         for step in close_to.iter().filter(|step| step.operator == id) {
@@ -153,24 +155,23 @@ struct Ties<'a> {
 }
 
 /// The chosen one among the plans that cost as much as a cheapest plan with fewest steps.
-pub(crate) fn choose(task: &Task, bounds: &Bounds, limits: &Limits, plan: GroundPlan) -> GroundPlan {
+pub(crate) fn choose(context: Context<'_>, bounds: &Bounds, plan: GroundPlan) -> GroundPlan {
     let close_to = FxHashSet::default();
-    let beginning = Beginning { state: &task.initial, designs: &[], close_to: &close_to };
-    let Ok(prepared) = Prepared::new(task, bounds, limits) else { return plan };
-    choose_from(task, bounds, &prepared, limits, plan, (usize::MAX, usize::MAX), &beginning).0
+    let beginning = Beginning { state: &context.task.initial, designs: &[], close_to: &close_to };
+    let Ok(prepared) = Prepared::new(context, bounds) else { return plan };
+    let most = (usize::MAX, usize::MAX);
+    choose_from((context, bounds, &prepared), plan, most, &beginning).0
 }
 
 /// The same for plans that begin in another state, or after steps that are settled; with its changes, if they are at most so
 /// many and plans were few enough to tell.
 pub(crate) fn choose_from(
-    task: &Task,
-    bounds: &Bounds,
-    prepared: &Prepared,
-    limits: &Limits,
+    (context, bounds, prepared): (Context<'_>, &Bounds, &Prepared),
     plan: GroundPlan,
     most: Changes,
     beginning: &Beginning<'_>,
 ) -> (GroundPlan, Option<Changes>) {
+    let Context { task, limits } = context;
     let mut designs = vec![None; prepared.functions.len()];
     for (function, design) in beginning.designs {
         if let Ok(position) = prepared.functions.binary_search(function) {
@@ -217,7 +218,10 @@ impl Ties<'_> {
     fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
         let choices = &self.choices.as_ref().unwrap_or(&self.prepared.choices)[operator.index()];
         if choices.get().is_none() {
-            let own = self.prepared.choices_of(self.task, operator, self.close_to, self.limits).ok()?;
+            let own = self
+                .prepared
+                .choices_of(Context::new(self.task, self.limits), operator, self.close_to)
+                .ok()?;
             // If another thread was first, its choices are the same.
             let _ = choices.set(own);
         }

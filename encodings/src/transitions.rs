@@ -2,6 +2,7 @@
 //!
 //! Every function design is chosen here, so an action appears once for each combination of its designs.
 
+use crate::context::Context;
 use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::limits::Limits;
 use crate::number::Int;
@@ -67,7 +68,7 @@ impl Task {
 
     fn step(&self, operator: OperatorId, choice: Vec<u32>) -> Option<Step> {
         let plan = GroundPlan { steps: vec![GroundStep { operator, choice }], cost: 0 };
-        decode(self, &plan, &Limits::none()).steps.pop()
+        decode(Context::new(self, &Limits::none()), &plan).steps.pop()
     }
 
     /// How many operators there are, each standing for all combinations of its designs.

@@ -8,6 +8,7 @@ use crate::concurrent::links::drop_links;
 use crate::concurrent::measure::Measure;
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::Unit;
+use crate::context::Context;
 use crate::error::{Error, File, Place};
 use crate::ground::vocabulary::reached::Reached;
 use crate::lifted::Rational;
@@ -48,11 +49,12 @@ pub(super) fn compile(
     // Operators are watched as they are collected, each as a whole.
     let unlimited = Limits::none();
     let mut builder = Builder::new(split, reached, separation, &unlimited);
-    builder.collect(&task, limits)?;
+    let context = Context::new(&task, limits);
+    builder.collect(context)?;
     let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(one)?;
     let mut roles = vec![Role::Never; task.operators.len()];
-    let mut instances = builder.instances(&task, unit, &mut roles, limits).map_err(one)?;
-    let contradictory = builder.contradictory(&task, limits).map_err(one)?;
+    let mut instances = builder.instances(context, unit, &mut roles).map_err(one)?;
+    let contradictory = builder.contradictory(context).map_err(one)?;
     for ((operator, role), id) in task.operators.iter().zip(&mut roles).zip((0..).map(OperatorId)) {
         match split.origins[operator.schema as usize].half {
             Half::Whole if !contradictory.contains(&id) => *role = Role::Whole,
@@ -60,7 +62,7 @@ pub(super) fn compile(
             _ => {}
         }
     }
-    let (happenings, keys) = builder.happenings(&task, &roles, &mut instances, limits).map_err(one)?;
+    let (happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();
     for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
         events.extend(if let Role::Timed(time) = role { Some((*time, id)) } else { None });

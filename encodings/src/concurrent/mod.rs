@@ -27,6 +27,7 @@ use num_rational::BigRational;
 use num_traits::Signed;
 
 use crate::bounds::Bounds;
+use crate::context::Context;
 use crate::error::{Error, File, Place};
 use crate::ground::{Config as GroundConfig, Generality, ground_lifted};
 use crate::lifted::{Expression, Metric, Rational};
@@ -137,8 +138,9 @@ pub fn optimize_concurrent(
         return solution(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())));
     }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
-    let bounds =
-        (costs || !task.initial.numbers.is_empty()).then(|| Bounds::new(task, limits).ok()).flatten();
+    let bounds = (costs || !task.initial.numbers.is_empty())
+        .then(|| Bounds::new(Context::new(task, limits)).ok())
+        .flatten();
     let estimate = Estimate::new(concurrent);
     let mut hear = |sequence: &Sequence, lower: Int| {
         report(Improvement {

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
+use crate::context::Context;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::variables::Variables;
 use crate::limits::{Interrupted, Limits};
@@ -14,9 +15,10 @@ use crate::number::dense;
 use crate::sat::Lit;
 use crate::task::{Operator, OperatorId, Task};
 
-/// A task, its formula as far as it goes, and what stands for what in it.
+/// A task, when to stop, its formula as far as it goes, and what stands for what in it.
 pub(super) struct Builder<'a> {
     pub(super) task: &'a Task,
+    pub(super) limits: &'a Limits,
     pub(super) formula: Formula,
     pub(super) variables: Variables,
     groups: FxHashMap<(usize, Vec<OperatorId>), Lit>,
@@ -24,10 +26,11 @@ pub(super) struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     /// A formula with variables and without clauses, for plans with the operators that are allowed at each step.
-    pub(super) fn new(task: &'a Task, allowed: &[Vec<bool>], limits: &Limits) -> Result<Self, Interrupted> {
+    pub(super) fn new(context: Context<'a>, allowed: &[Vec<bool>]) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
         let mut formula = Formula::new();
-        let variables = Variables::declare(task, &mut formula, allowed, limits)?;
-        Ok(Self { task, formula, variables, groups: FxHashMap::default() })
+        let variables = Variables::declare(context, &mut formula, allowed)?;
+        Ok(Self { task, limits, formula, variables, groups: FxHashMap::default() })
     }
 
     /// The variable of a group of operators at a step; members that cannot be at the step are left out.

@@ -16,7 +16,6 @@ use crate::encode::builder::Builder;
 use crate::encode::designs::combinations;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::interference::Interference;
-use crate::limits::Limits;
 use crate::number::{Int, dense};
 use crate::sat::Lit;
 use crate::task::{Operator, OperatorId};
@@ -72,7 +71,6 @@ impl Cost {
         builder: &mut Builder<'_>,
         cost: &CostLimit<'_>,
         interference: Option<&Interference>,
-        limits: &Limits,
     ) -> Option<Self> {
         let initial = &builder.task.initial;
         let lower = cost.bounds.estimate(initial);
@@ -89,11 +87,11 @@ impl Cost {
             return Some(Self { lower, spent: Spent::Order(BTreeMap::new()) });
         }
         let mut sum = Sum { builder, cost, interference, gap };
-        let sources = sum.sources(limits)?;
+        let sources = sum.sources()?;
         let spent = if cost.counting == Counting::Apart {
             Spent::Apart(sources.iter().flat_map(|source| sum.apart(source)).collect())
         } else if amounts_fit(&sources, gap) {
-            Spent::Order(sum.in_order(&sources, limits)?)
+            Spent::Order(sum.in_order(&sources)?)
         } else {
             Spent::Binary(sum.in_binary(&sources))
         };
@@ -139,10 +137,10 @@ struct Sum<'s, 'a> {
 
 impl Sum<'_, '_> {
     /// All sources, in the order of steps. None if a limit of the run was reached meanwhile.
-    fn sources(&mut self, limits: &Limits) -> Option<Vec<Source>> {
+    fn sources(&mut self) -> Option<Vec<Source>> {
         let mut sources = Vec::new();
         for step in 0..self.builder.variables.horizon() {
-            if limits.reached() {
+            if self.builder.limits.reached() {
                 return None;
             }
             let own = self.increments(step).into_iter().zip(0..);
@@ -236,10 +234,10 @@ impl Sum<'_, '_> {
         }
     }
 
-    fn in_order(&mut self, sources: &[Source], limits: &Limits) -> Option<BTreeMap<Int, Lit>> {
+    fn in_order(&mut self, sources: &[Source]) -> Option<BTreeMap<Int, Lit>> {
         let mut spent: BTreeMap<Int, Lit> = BTreeMap::new();
         for source in sources {
-            if limits.reached() {
+            if self.builder.limits.reached() {
                 return None;
             }
             spent = self.add_amounts(source, &spent);

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 
+use crate::context::Context;
 use crate::encode::axioms::axioms;
 use crate::encode::builder::Builder;
 use crate::encode::conditional::Fires;
@@ -17,10 +18,20 @@ use crate::encode::state::{domain, frame};
 use crate::encode::symmetry::Symmetry;
 use crate::encode::variables::Variables;
 use crate::ground_plan::GroundStep;
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Interrupted;
 use crate::number::{Int, dense};
 use crate::sat::{Lit, Solver};
 use crate::task::Task;
+
+/// Which plans a formula is about.
+pub(crate) struct Plans<'a> {
+    /// For each step, whether each operator can be there; there are no more steps.
+    pub(crate) allowed: &'a [Vec<bool>],
+    /// What they cost at most, if that matters.
+    pub(crate) cost: Option<CostLimit<'a>>,
+    /// How many operators stand at a step.
+    pub(crate) semantics: Semantics,
+}
 
 /// A formula and what its variables mean.
 pub(crate) struct Encoding<'a> {
@@ -31,35 +42,22 @@ pub(crate) struct Encoding<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// Encodes plans of at most `allowed.len()` steps, with the operators allowed at each step; of plans that differ by
-    /// exchanging what is equal only some; what is equal is found out once for a task, and kept in `symmetry`. None if a limit was reached meanwhile, or if numbers are too large for a formula.
-    pub(crate) fn new(
-        task: &'a Task,
-        allowed: &[Vec<bool>],
-        cost: Option<CostLimit<'_>>,
-        semantics: Semantics,
-        symmetry: &OnceCell<Symmetry>,
-        limits: &Limits,
-    ) -> Option<Self> {
-        let (mut builder, cost) = build(task, allowed, cost, semantics, limits)?;
+    /// Encodes plans; of those that differ by exchanging what is equal only some. What is equal is found out once for a task, and
+    /// kept in `symmetry`. None if a limit was reached meanwhile, or if numbers are too large for a formula.
+    pub(crate) fn new(context: Context<'a>, plans: Plans<'_>, symmetry: &OnceCell<Symmetry>) -> Option<Self> {
+        let (mut builder, cost) = build(context, plans)?;
         if builder.variables.horizon() > 0 {
             if symmetry.get().is_none() {
-                let _ = symmetry.set(Symmetry::new(task, limits).ok()?);
+                let _ = symmetry.set(Symmetry::new(context).ok()?);
             }
-            symmetry.get()?.add(&mut builder, limits).ok()?;
+            symmetry.get()?.add(&mut builder).ok()?;
         }
         Some(Self::of(builder, cost))
     }
 
     /// The same with all plans.
-    pub(crate) fn with_equals(
-        task: &'a Task,
-        allowed: &[Vec<bool>],
-        cost: Option<CostLimit<'_>>,
-        semantics: Semantics,
-        limits: &Limits,
-    ) -> Option<Self> {
-        let (builder, cost) = build(task, allowed, cost, semantics, limits)?;
+    pub(crate) fn with_equals(context: Context<'a>, plans: Plans<'_>) -> Option<Self> {
+        let (builder, cost) = build(context, plans)?;
         Some(Self::of(builder, cost))
     }
 
@@ -132,29 +130,24 @@ impl<'a> Encoding<'a> {
 }
 
 /// All families of clauses but that of symmetries. None if a limit was reached meanwhile, or if numbers do not fit.
-fn build<'a>(
-    task: &'a Task,
-    allowed: &[Vec<bool>],
-    cost: Option<CostLimit<'_>>,
-    semantics: Semantics,
-    limits: &Limits,
-) -> Option<(Builder<'a>, Option<Cost>)> {
+fn build<'a>(context: Context<'a>, plans: Plans<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
+    let Plans { allowed, cost, semantics } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());
-    let interference = Interference::new(task, semantics, potential, limits).ok()?;
-    let mut builder = Builder::new(task, allowed, limits).ok()?;
+    let interference = Interference::new(context, semantics, potential).ok()?;
+    let mut builder = Builder::new(context, allowed).ok()?;
     let horizon = builder.variables.horizon();
     for step in 0..horizon {
-        at_step(&mut builder, step, interference.as_ref(), limits).ok()?;
+        at_step(&mut builder, step, interference.as_ref()).ok()?;
     }
     domain(&mut builder, horizon);
-    let numbers = numeric(&mut builder, limits)?;
-    for item in limits.watch(numbers.iter().enumerate()) {
+    let numbers = numeric(&mut builder)?;
+    for item in context.limits.watch(numbers.iter().enumerate()) {
         let (step, numbers) = item.ok()?;
         axioms(&mut builder, step, numbers)?;
     }
     goal(&mut builder, &numbers[horizon])?;
     let cost = match cost {
-        Some(cost) => Some(Cost::new(&mut builder, &cost, interference.as_ref(), limits)?),
+        Some(cost) => Some(Cost::new(&mut builder, &cost, interference.as_ref())?),
         None => None,
     };
     Some((builder, cost))
@@ -165,20 +158,19 @@ fn at_step(
     builder: &mut Builder<'_>,
     step: usize,
     interference: Option<&Interference>,
-    limits: &Limits,
 ) -> Result<(), Interrupted> {
     domain(builder, step);
     sequence(builder, step, interference.is_none());
     if let Some(interference) = interference {
-        interference.add(builder, step, limits)?;
+        interference.add(builder, step)?;
     }
-    limits.check()?;
+    builder.limits.check()?;
     conditions(builder, step);
-    limits.check()?;
+    builder.limits.check()?;
     let fires = Fires::new(builder, step);
-    limits.check()?;
+    builder.limits.check()?;
     effects(builder, step, &fires);
-    limits.check()?;
+    builder.limits.check()?;
     frame(builder, step, &fires);
-    selection(builder, step, limits)
+    selection(builder, step)
 }

@@ -19,6 +19,7 @@
 use std::collections::BTreeMap;
 
 use crate::bounds::Projection;
+use crate::context::Context;
 use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::limits::{Interrupted, Limits};
@@ -67,11 +68,11 @@ struct Uses {
 impl Interference {
     /// The interferences of a task; none if operators stand alone. Costs are reduced by the potential.
     pub(super) fn new(
-        task: &Task,
+        context: Context<'_>,
         semantics: Semantics,
         potential: Option<&Projection>,
-        limits: &Limits,
     ) -> Result<Option<Self>, Interrupted> {
+        let Context { task, limits } = context;
         if semantics == Semantics::Sequential {
             return Ok(None);
         }
@@ -136,18 +137,13 @@ impl Interference {
     }
 
     /// The operators at a step do not interfere.
-    pub(super) fn add(
-        &self,
-        builder: &mut Builder<'_>,
-        step: usize,
-        limits: &Limits,
-    ) -> Result<(), Interrupted> {
+    pub(super) fn add(&self, builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
         for group in &self.exclusions {
             let literals: Vec<_> =
                 group.iter().filter_map(|id| builder.variables.operator(step, *id)).collect();
             builder.formula.at_most_one(Family::Interference, &literals);
         }
-        for conflict in limits.watch(&self.conflicts) {
+        for conflict in builder.limits.watch(&self.conflicts) {
             let conflict = conflict?;
             let mut users: BTreeMap<OperatorId, (bool, bool)> = BTreeMap::new();
             for id in &conflict.erase {

@@ -27,7 +27,7 @@ mod tests;
 mod variables;
 
 pub(crate) use cost::{CostLimit, Counting};
-pub(crate) use encoding::Encoding;
+pub(crate) use encoding::{Encoding, Plans};
 pub(crate) use formula::{Family, Formula, Meaning};
 pub use interference::Semantics;
 pub(crate) use symmetry::Symmetry;

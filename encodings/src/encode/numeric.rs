@@ -12,7 +12,6 @@ use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::builder::Builder;
 use crate::encode::designs::combinations;
 use crate::encode::formula::{Family, Formula, Meaning};
-use crate::limits::Limits;
 use crate::number::{GROWTH_LIMIT, Int, dense};
 use crate::quantity::{Linear, Quantity};
 use crate::sat::Lit;
@@ -36,13 +35,13 @@ struct Range {
 
 /// Encodes all numeric variables; returns their values before each step and after the last one. None if a limit was
 /// reached meanwhile, or if a number can grow beyond what the formula has bits for.
-pub(super) fn numeric(builder: &mut Builder<'_>, limits: &Limits) -> Option<Vec<Vec<Bits>>> {
+pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     let initial = &builder.task.initial.numbers;
     let mut ranges: Vec<Range> = initial.iter().map(|n| Range { low: *n, high: *n }).collect();
     let numbers: Vec<Bits> = initial.iter().map(|n| Arithmetic::constant(*n, width(*n, *n))).collect();
     let mut all = vec![numbers];
     for step in 0..builder.variables.horizon() {
-        if limits.reached() {
+        if builder.limits.reached() {
             return None;
         }
         let numbers = all.last()?;

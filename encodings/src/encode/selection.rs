@@ -7,11 +7,11 @@
 use crate::encode::builder::Builder;
 use crate::encode::designs::global;
 use crate::encode::formula::{Family, Formula};
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Interrupted;
 use crate::sat::Lit;
 
 /// Each function in use has exactly one design, and one that suits.
-pub(super) fn selection(builder: &mut Builder<'_>, step: usize, limits: &Limits) -> Result<(), Interrupted> {
+pub(super) fn selection(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
     for slot in 0..builder.task.slots.len() {
         let uses = builder.partition(step, |operator| {
             let own = operator.slots.iter().filter(|usage| usage.slot.index() == slot);
@@ -19,7 +19,7 @@ pub(super) fn selection(builder: &mut Builder<'_>, step: usize, limits: &Limits)
         });
         let literals = builder.variables.designs[step][slot].clone();
         let mut users: Vec<Vec<Lit>> = vec![Vec::new(); literals.len()];
-        for item in limits.watch(uses) {
+        for item in builder.limits.watch(uses) {
             let (designs, members) = item?;
             let group = builder.group(step, &members, Family::Selection);
             let suitable = designs.iter().map(|design| literals[*design as usize]);
@@ -35,10 +35,10 @@ pub(super) fn selection(builder: &mut Builder<'_>, step: usize, limits: &Limits)
         let possible: Vec<_> = literals.into_iter().filter(|literal| *literal != falsum).collect();
         builder.formula.at_most_one(Family::Selection, &possible);
     }
-    forbidden(builder, step, limits)
+    forbidden(builder, step)
 }
 
-fn forbidden(builder: &mut Builder<'_>, step: usize, limits: &Limits) -> Result<(), Interrupted> {
+fn forbidden(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
     let parts = builder.partition(step, |operator| {
         let rules = operator.forbidden.iter().flat_map(|rule| {
             rule.combinations.iter().map(|combination| {
@@ -48,7 +48,7 @@ fn forbidden(builder: &mut Builder<'_>, step: usize, limits: &Limits) -> Result<
         });
         rules.collect()
     });
-    for item in limits.watch(parts) {
+    for item in builder.limits.watch(parts) {
         let (combination, members) = item?;
         let group = builder.group(step, &members, Family::Selection);
         let chosen: Vec<_> = combination

@@ -6,8 +6,9 @@ use std::fmt::Write as _;
 use insta::assert_snapshot;
 
 use crate::bounds::Bounds;
+use crate::context::Context;
 use crate::encode::formula::{Family, Meaning};
-use crate::encode::{CostLimit, Counting, Encoding, Semantics};
+use crate::encode::{CostLimit, Counting, Encoding, Plans, Semantics};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
 use crate::sat::Lit;
@@ -92,12 +93,16 @@ fn clauses(encoding: &Encoding<'_>, family: Family) -> String {
 
 fn check(family: Family) -> String {
     let task = task();
-    let bounds = Bounds::new(&task, &Limits::none()).expect("no limit");
+    let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
     let allowed = vec![vec![true; task.operators.len()]; 2];
     let cost = CostLimit { limit: 6, bounds: &bounds, counting: Counting::Sum };
-    let encoding =
-        Encoding::new(&task, &allowed, Some(cost), Semantics::Sequential, &OnceCell::new(), &Limits::none())
-            .expect("no limit");
+    let limits = Limits::none();
+    let encoding = Encoding::new(
+        Context::new(&task, &limits),
+        Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential },
+        &OnceCell::new(),
+    )
+    .expect("no limit");
     clauses(&encoding, family)
 }
 
@@ -117,8 +122,13 @@ fn lamps(semantics: Semantics, family: Family) -> String {
         read(&Source::new("domain", LAMPS.0), &Source::new("problem", LAMPS.1)).expect("PDDL");
     let task = ground(&domain, &problem, &Config::default()).expect("a task");
     let allowed = vec![vec![true; task.operators.len()]; 2];
-    let encoding =
-        Encoding::new(&task, &allowed, None, semantics, &OnceCell::new(), &Limits::none()).expect("no limit");
+    let limits = Limits::none();
+    let encoding = Encoding::new(
+        Context::new(&task, &limits),
+        Plans { allowed: &allowed, cost: None, semantics },
+        &OnceCell::new(),
+    )
+    .expect("no limit");
     clauses(&encoding, family)
 }
 

@@ -2,8 +2,9 @@
 //!
 //! A value that no sequence of allowed operators can produce by a step gets no variable there.
 
+use crate::context::Context;
 use crate::encode::formula::{Formula, Meaning};
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Interrupted;
 use crate::number::dense;
 use crate::sat::Lit;
 use crate::task::{Fact, Literal, OperatorId, Task};
@@ -28,11 +29,11 @@ impl Variables {
         reason = "steps are fewer than the horizon, whose formula is in memory"
     )]
     pub(super) fn declare(
-        task: &Task,
+        context: Context<'_>,
         formula: &mut Formula,
         allowed: &[Vec<bool>],
-        limits: &Limits,
     ) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
         let mut all = Self::default();
         let mut possible: Vec<Vec<bool>> =
             task.variables.iter().map(|v| vec![false; v.values.len()]).collect();

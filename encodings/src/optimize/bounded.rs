@@ -1,8 +1,9 @@
 //! The bounded reading of a metric that actions improve: fewest steps first, then the metric.
 
 use crate::bounds::Bounds;
+use crate::context::Context;
 use crate::ground_plan::{GroundStep, cost, pass};
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Interrupted;
 use crate::number::Int;
 use crate::optimize::config::Config;
 use crate::optimize::first::first_plan;
@@ -18,6 +19,7 @@ use crate::task_number::TaskNumber;
 pub(super) fn bounded_reading(asked: Run<'_>) -> Solution {
     let lowest = asked.task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or(0);
     let by_steps = with_costs(asked.task, |_| Quantity::constant(1));
+    let context = asked.context();
     let mut silent = |_: Improvement| {};
     let shortest = solve(Run::new(&by_steps, asked.config, &mut silent));
     // Waits are steps, too, which a plan in names does not show.
@@ -38,7 +40,7 @@ pub(super) fn bounded_reading(asked: Run<'_>) -> Solution {
     let config = Config { horizon: Some(steps), ..asked.config.clone() };
     let mut run = Run::new(&shifted, &config, &mut silent);
     run.statistics = asked.statistics;
-    let Ok(bounds) = Bounds::new(&shifted, &asked.config.limits) else {
+    let Ok(bounds) = Bounds::new(run.context()) else {
         return unknown(shortest);
     };
     let plan = match first_plan(&mut run, &bounds) {
@@ -59,14 +61,11 @@ pub(super) fn bounded_reading(asked: Run<'_>) -> Solution {
     let statistics = run.statistics;
     let Some(by_metric) = cost(asked.task, &plan.steps) else { return unknown(shortest) };
     plan.cost = by_metric;
-    let unbounded = if can_repeat_reward(asked.task, &plan.steps, &asked.config.limits) {
-        Unbounded::Proved
-    } else {
-        Unbounded::Suspected
-    };
+    let unbounded =
+        if can_repeat_reward(context, &plan.steps) { Unbounded::Proved } else { Unbounded::Suspected };
     Solution {
         status: Status::Feasible,
-        plan: Some(decode(asked.task, &plan, &asked.config.limits)),
+        plan: Some(decode(context, &plan)),
         ground: Some(plan),
         lower_bound: None,
         horizon: steps,
@@ -93,7 +92,8 @@ fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
 
 /// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is; no if a
 /// limit is reached before one is found.
-pub(crate) fn can_repeat_reward<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep], limits: &Limits) -> bool {
+pub(crate) fn can_repeat_reward<N: TaskNumber>(context: Context<'_, N>, plan: &[GroundStep]) -> bool {
+    let Context { task, limits } = context;
     let Some(states) = pass(task, &task.initial, plan) else { return false };
     states.iter().any(|state| {
         task.operators.iter().filter(|operator| operator.cost.minimum() < N::zero()).any(|operator| {

@@ -23,7 +23,7 @@ pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPla
     let mut horizon = 0;
     loop {
         let started = Instant::now();
-        let window = bounds.window(run.task, None, Some(horizon), &run.config.limits);
+        let window = bounds.window(run.context(), None, Some(horizon));
         let encoding = window
             .ok()
             .and_then(|window| run.encoding(&window.allowed, None, run.semantics(Semantics::ExistsStep)));

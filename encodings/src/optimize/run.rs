@@ -4,7 +4,8 @@ use std::cell::OnceCell;
 use std::time::Instant;
 
 use crate::bounds::Bounds;
-use crate::encode::{CostLimit, Encoding, Semantics, Symmetry};
+use crate::context::Context;
+use crate::encode::{CostLimit, Encoding, Plans, Semantics, Symmetry};
 use crate::ground_plan::{GroundPlan, GroundStep, cost, pass};
 use crate::limits::Interrupted;
 use crate::number::Int;
@@ -70,6 +71,10 @@ impl<'a> Run<'a> {
         Self { task, config, report, statistics, symmetry: OnceCell::new() }
     }
 
+    pub(super) fn context(&self) -> Context<'a> {
+        Context::new(self.task, &self.config.limits)
+    }
+
     /// Notes that two parts of the planner contradict each other. It fails loudly where that is tested.
     pub(super) fn contradicted(&mut self, what: &str) {
         debug_assert!(false, "{what}");
@@ -100,13 +105,13 @@ impl<'a> Run<'a> {
         cost: Option<CostLimit<'_>>,
         semantics: Semantics,
     ) -> Option<Encoding<'a>> {
-        Encoding::new(self.task, allowed, cost, semantics, &self.symmetry, &self.config.limits)
+        let plans = Plans { allowed, cost, semantics };
+        Encoding::new(self.context(), plans, &self.symmetry)
     }
 
     /// What plans that cost at most so much can look like.
     pub(super) fn extent(&self, bounds: &Bounds, limit: Int, best: &Best) -> Result<Extent, Interrupted> {
-        let limits = &self.config.limits;
-        let window = bounds.window(self.task, Some(limit), self.config.horizon, limits)?;
+        let window = bounds.window(self.context(), Some(limit), self.config.horizon)?;
         let complete = |steps: &usize| *steps <= window.allowed.len();
         let step_bound = window.steps.filter(complete);
         let allowed = if window.steps.is_some() {
@@ -117,7 +122,7 @@ impl<'a> Run<'a> {
                 .config
                 .horizon
                 .unwrap_or_else(|| best.plan.steps.len().saturating_mul(2).saturating_add(4));
-            bounds.window(self.task, Some(limit), Some(longer), limits)?.allowed
+            bounds.window(self.context(), Some(limit), Some(longer))?.allowed
         };
         Ok(Extent { limit, allowed, step_bound })
     }
@@ -190,6 +195,7 @@ impl<'a> Run<'a> {
         horizon: usize,
         proof: Option<Proof>,
     ) -> Solution {
+        let context = self.context();
         let doubtful = self.statistics.contradiction.is_some();
         let status = match status {
             Status::Optimal if doubtful => Status::Feasible,
@@ -203,7 +209,7 @@ impl<'a> Run<'a> {
         }
         Solution {
             status,
-            plan: plan.map(|plan| decode(self.task, plan, &self.config.limits)),
+            plan: plan.map(|plan| decode(context, plan)),
             ground: plan.cloned(),
             lower_bound: lower.map(|lower| metric(self.task, &lower)),
             horizon,

@@ -33,25 +33,19 @@ const CONFIRM_COST: Int = 1 << 64;
 /// A cheapest plan where no action earns anything.
 pub(super) fn solve(mut run: Run<'_>) -> Solution {
     let started = Instant::now();
-    let Ok(bounds) = Bounds::new(run.task, &run.config.limits) else {
+    let Ok(bounds) = Bounds::new(run.context()) else {
         return run.finish(Status::Unknown, None, None, 0, None);
     };
     let Some(lower) = bounds.estimate(&run.task.initial) else {
         let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
         return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.into())));
     };
-    let found = if run.config.quick_search {
-        search(run.task, &bounds, &run.config.limits)
-    } else {
-        Found::Unknown(None)
-    };
+    let found = if run.config.quick_search { search(run.context(), &bounds) } else { Found::Unknown(None) };
     run.statistics.search = started.elapsed();
     let within = |plan: &GroundPlan| run.config.horizon.is_none_or(|horizon| plan.steps.len() <= horizon);
     let (incumbent, exact) = match found {
         Found::None => return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Search)),
-        Found::Optimal(plan) if within(&plan) => {
-            (Some(ties::choose(run.task, &bounds, &run.config.limits, plan)), true)
-        }
+        Found::Optimal(plan) if within(&plan) => (Some(ties::choose(run.context(), &bounds, plan)), true),
         Found::Unknown(Some(plan)) if within(&plan) => (Some(plan), false),
         Found::Optimal(_) | Found::Unknown(_) => (None, false),
     };
@@ -146,7 +140,7 @@ fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
     }
     let started = Instant::now();
     let allowed = vec![vec![true; run.task.operators.len()]; steps];
-    let bounds = Bounds::trivial(run.task, &run.config.limits).ok()?;
+    let bounds = Bounds::trivial(run.context()).ok()?;
     let cost = CostLimit { limit, bounds: &bounds, counting: Counting::Sum };
     let encoding = run.encoding(&allowed, Some(cost), run.semantics(Semantics::Sequential));
     run.statistics.encode = run.statistics.encode.saturating_add(started.elapsed());

@@ -1,6 +1,7 @@
 //! What is ground once: the task with everything available, and with a part of it.
 
 use crate::bounds::Bounds;
+use crate::context::Context;
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits};
 use crate::replan::layout::Layout;
@@ -39,9 +40,10 @@ impl Base {
     /// What holds for all states in which this is available.
     pub(super) fn restrict(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Set, Interrupted> {
         let task = self.masked(available, limits)?;
-        let bounds = Bounds::new(&task, limits)?;
-        let prepared = Prepared::new(&task, limits)?;
-        let ties = ties::Prepared::new(&task, &bounds, limits)?;
+        let context = Context::new(&task, limits);
+        let bounds = Bounds::new(context)?;
+        let prepared = Prepared::new(context)?;
+        let ties = ties::Prepared::new(context, &bounds)?;
         Ok(Set { task, bounds, prepared, ties })
     }
 
