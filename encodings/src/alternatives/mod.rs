@@ -13,12 +13,12 @@ mod tests;
 use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::encode::{CostLimit, Counting, Encoding, Meaning, Plans, Semantics};
-use crate::ground_plan::{GroundPlan, GroundStep, replay};
 use crate::number::dense;
 use crate::optimize::Config;
+use crate::plan::ground::{GroundPlan, GroundStep, replay};
+use crate::plan::solution::{Solution, Status};
 use crate::plan::{Plan, decode};
 use crate::sat::{Answer, Backend, Lit, Solver};
-use crate::solution::{Solution, Status};
 use crate::task::{Argument, Task};
 
 /// What is known of the other cheapest plans.

@@ -21,7 +21,7 @@ use smallvec::SmallVec;
 use crate::context::Context;
 use crate::limits::Interrupted;
 use crate::number::Int;
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 use crate::task::{State, VariableId};
 
 /// Longest plan that step bounds are computed for.

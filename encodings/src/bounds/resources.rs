@@ -11,7 +11,7 @@ use crate::bounds::projection::Projection;
 use crate::context::Context;
 use crate::limits::Interrupted;
 use crate::number::Int;
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 use crate::task::{Operator, State};
 
 /// A resource, and what each abstract state needs of it, by projection.

@@ -16,11 +16,11 @@ use crate::context::Context;
 use crate::exact::{ExactTask, RoundedBounds};
 use crate::limits::Limits;
 use crate::number::{Int, Rational};
-use crate::quantity::NumericId;
+use crate::plan::solution::{Solution, Status};
 use crate::search::{Estimate, closed_labels};
-use crate::solution::{Solution, Status};
+use crate::task::number::TaskNumber;
+use crate::task::quantity::NumericId;
 use crate::task::{self, Task};
-use crate::task_number::TaskNumber;
 
 /// A certificate of an optimal plan, or of there being none: two JSON documents.
 #[derive(Debug, Clone)]
@@ -248,7 +248,7 @@ impl<N: TaskNumber> Writer<'_, N> {
     }
 
     /// A linear expression, multiplied by a factor besides.
-    fn linear(&mut self, linear: &crate::quantity::Linear<N>, factor: &Integer) -> Linear {
+    fn linear(&mut self, linear: &task::quantity::Linear<N>, factor: &Integer) -> Linear {
         let factors = linear.coefficients.iter();
         let scale = &self.scales.numbers * factor;
         Linear {
@@ -257,7 +257,7 @@ impl<N: TaskNumber> Writer<'_, N> {
         }
     }
 
-    fn quantity(&mut self, quantity: &crate::quantity::Quantity<N>, scale: &Integer) -> Quantity {
+    fn quantity(&mut self, quantity: &task::quantity::Quantity<N>, scale: &Integer) -> Quantity {
         let tables = quantity.tables.iter().map(|table| {
             let key = (table.values.clone(), scale.clone());
             (table.slots.to_vec(), self.tables.position(&key, |(values, scale)| integers(values, scale)))

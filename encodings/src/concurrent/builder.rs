@@ -16,7 +16,7 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Change, Effect, ObjectId};
 use crate::limits::Limits;
 use crate::number::{Int, dense};
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 use crate::task::{Argument, Operator, OperatorId, Task};
 
 /// The halves of an instance that the ground task has.

@@ -17,7 +17,7 @@ use crate::ground::vocabulary::residual::Residual;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId, Schema};
 use crate::number::dense;
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 use pddl::ast::Assignment;
 
 /// How a number changes: two changes of one way commute, unless both assign.

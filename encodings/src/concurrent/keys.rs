@@ -8,7 +8,7 @@ use crate::concurrent::footprint::{Footprint, Way};
 use crate::ground::vocabulary::atom::AtomId;
 use crate::lifted::ObjectId;
 use crate::number::{Int, dense};
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 
 /// A kind of access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -34,8 +34,8 @@ use crate::lifted::{Expression, Metric, Rational};
 use crate::limits::Limits;
 use crate::normalize::normalize;
 use crate::number::Int;
+use crate::plan::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::plan::{Plan, Step};
-use crate::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::task::OperatorId;
 use pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
 

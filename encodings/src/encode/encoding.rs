@@ -17,9 +17,9 @@ use crate::encode::selection::selection;
 use crate::encode::state::{domain, frame};
 use crate::encode::symmetry::Symmetry;
 use crate::encode::variables::Variables;
-use crate::ground_plan::GroundStep;
 use crate::limits::Interrupted;
 use crate::number::{Int, dense};
+use crate::plan::ground::GroundStep;
 use crate::sat::{Lit, Solver};
 use crate::task::Task;
 

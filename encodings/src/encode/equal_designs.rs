@@ -10,7 +10,7 @@ use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use crate::context::Context;
 use crate::limits::Interrupted;
 use crate::number::Int;
-use crate::quantity::{Quantity, SlotSet};
+use crate::task::quantity::{Quantity, SlotSet};
 use crate::task::{Operator, SlotId};
 
 /// Something of a task that may tell designs of a slot apart: it speaks of those that one operator admits, in their order.

@@ -13,8 +13,8 @@ use crate::encode::builder::Builder;
 use crate::encode::designs::combinations;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::number::{GROWTH_LIMIT, Int, dense};
-use crate::quantity::{Linear, Quantity};
 use crate::sat::Lit;
+use crate::task::quantity::{Linear, Quantity};
 use crate::task::{NumericId, Operator, OperatorId};
 
 /// Conjunctions, each with the number that it stands for.

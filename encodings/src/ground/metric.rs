@@ -16,8 +16,8 @@ use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::task::{GroundObjective, GroundTask};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Expression, Metric, Rational};
-use crate::quantity::{Linear, Quantity};
-use crate::table_map::TableMap;
+use crate::task::quantity::{Linear, Quantity};
+use crate::task::table_map::TableMap;
 use pddl::ast::Direction;
 
 /// Gives every operator its costs, and the task the rest of the metrics.

@@ -10,7 +10,7 @@
 //! |---|---|---|
 //! | `reach` | `Lifted`, slots | `Reached`: instances of schemas, atoms that can hold |
 //! | `instantiate` | the `World` of these | `GroundTask`: operators, rules and a goal over atoms |
-//! | `derived` | rules | those that stay, once what has one rule is in its place |
+//! | `derived` | derived atoms that are decided, or have one rule | truth values, and the body of the rule in their place |
 //! | `metric` | metrics | the costs of operators, and objectives |
 //! | `prune` | operators, rules | those that can matter; or why the goal is out of reach |
 //! | `finish` | `GroundTask` | `Task`: variables for atoms, integers for rationals |
@@ -25,15 +25,17 @@ mod instantiate;
 mod metric;
 mod prune;
 mod reach;
+#[cfg(test)]
+mod tests;
 pub(crate) mod vocabulary;
 
-use crate::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::error::Error;
 use crate::lifted::Lifted;
+use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::limits::Limits;
 use crate::normalize::{events, normalize, zero};
 use crate::task::Task;
-use crate::task_number::TaskNumber;
+use crate::task::number::TaskNumber;
 use pddl::ast::{Domain, Problem};
 
 pub use config::Config;

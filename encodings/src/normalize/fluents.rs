@@ -1,6 +1,6 @@
 //! Which predicates and functions change.
 
-use crate::configuration::{is_static, recursive_through_forall};
+use crate::lifted::configuration::{is_static, recursive_through_forall};
 use crate::lifted::{Axiom, Change, Formula, Lifted};
 
 /// A predicate or function is a fluent if some action changes it, and a derived predicate if it depends on a fluent.

@@ -2,7 +2,6 @@
 
 use crate::bounds::Bounds;
 use crate::context::Context;
-use crate::ground_plan::{GroundStep, cost, pass};
 use crate::limits::Interrupted;
 use crate::number::Int;
 use crate::optimize::config::Config;
@@ -10,10 +9,11 @@ use crate::optimize::first::first_plan;
 use crate::optimize::run::{Best, Run, Tightened};
 use crate::optimize::solve::{solve, within};
 use crate::plan::decode;
-use crate::quantity::Quantity;
-use crate::solution::{Improvement, Proof, Solution, Status, Unbounded};
+use crate::plan::ground::{GroundStep, cost, pass};
+use crate::plan::solution::{Improvement, Proof, Solution, Status, Unbounded};
+use crate::task::number::TaskNumber;
+use crate::task::quantity::Quantity;
 use crate::task::{Objective, Operator, Task};
-use crate::task_number::TaskNumber;
 
 /// For a metric that actions improve: fewest steps first, then the best metric among those plans.
 pub(super) fn bounded_reading(asked: Run<'_>) -> Solution {

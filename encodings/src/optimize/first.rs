@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use crate::bounds::Bounds;
 use crate::encode::Semantics;
-use crate::ground_plan::GroundPlan;
 use crate::optimize::run::Run;
+use crate::plan::ground::GroundPlan;
+use crate::plan::solution::{Proof, Solution, Status};
 use crate::sat::Answer;
-use crate::solution::{Proof, Solution, Status};
 use crate::task::Task;
 
 /// Formulas with more operator variables than this are not built.

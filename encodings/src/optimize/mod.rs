@@ -7,30 +7,18 @@
 //! exhaustion may serve; otherwise the answer is a plan that is not proved optimal.
 
 mod bounded;
+mod cheapest;
 mod config;
 mod cores;
 mod first;
+mod objectives;
 mod run;
 mod solve;
 #[cfg(test)]
 mod tests;
 mod tighten;
 
-use crate::solution::{Improvement, Proof, Solution, Status};
-use crate::task::Task;
-use run::Run;
-
 pub(crate) use bounded::can_repeat_reward;
+pub use cheapest::optimize;
 pub use config::{Config, Strategy};
-
-/// Finds a cheapest plan; `report` hears of every improvement.
-pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Solution {
-    let run = Run::new(task, config, report);
-    if let Some(reason) = &task.unreachable {
-        return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.clone())));
-    }
-    if task.operators.iter().any(|operator| operator.cost.minimum() < 0) {
-        return bounded::bounded_reading(run);
-    }
-    solve::solve(run)
-}
+pub use objectives::{Front, Point, lexicographic, pareto};

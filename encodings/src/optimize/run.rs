@@ -6,13 +6,13 @@ use std::time::Instant;
 use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::encode::{CostLimit, Encoding, Plans, Semantics, Symmetry};
-use crate::ground_plan::{GroundPlan, GroundStep, cost, pass};
 use crate::limits::Interrupted;
 use crate::number::Int;
 use crate::optimize::config::Config;
+use crate::plan::ground::{GroundPlan, GroundStep, cost, pass};
+use crate::plan::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::plan::{decode, metric};
 use crate::sat::{Answer, Backend, Lit, Solver};
-use crate::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::task::Task;
 
 /// A task with what has come of it so far.

@@ -4,17 +4,17 @@ use std::time::Instant;
 
 use crate::bounds::Bounds;
 use crate::encode::{CostLimit, Counting, Semantics};
-use crate::ground_plan::GroundPlan;
 use crate::number::Int;
 use crate::optimize::config::Strategy;
 use crate::optimize::cores::raise;
 use crate::optimize::first::first_plan;
 use crate::optimize::run::{Best, Extent, Run, Tightened};
 use crate::optimize::tighten::tighten;
+use crate::plan::ground::GroundPlan;
+use crate::plan::solution::{Proof, Solution, Status};
 use crate::sat::Answer;
+use crate::search::ties;
 use crate::search::{Found, search};
-use crate::solution::{Proof, Solution, Status};
-use crate::ties;
 
 /// Formulas with more operator variables than this are not built.
 const FORMULA_LIMIT: usize = 30_000_000;

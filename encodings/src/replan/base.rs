@@ -7,8 +7,8 @@ use crate::limits::{Interrupted, Limits};
 use crate::replan::layout::Layout;
 use crate::replan::mask;
 use crate::search::Prepared;
+use crate::search::ties;
 use crate::task::{Argument, Task};
-use crate::ties;
 
 /// What holds for all problems.
 pub(super) struct Base {

@@ -8,16 +8,16 @@ use num_rational::BigRational;
 use rustc_hash::FxHashSet;
 
 use crate::context::Context;
-use crate::ground_plan::{GroundPlan, GroundStep, replay_from};
 use crate::lifted::ObjectId;
 use crate::number::{Int, dense};
+use crate::plan::ground::{GroundPlan, GroundStep, replay_from};
 use crate::plan::{decode, resolve};
 use crate::replan::base::{Base, Set};
 use crate::replan::layout::Situation;
 use crate::replan::query::{First, Progress, Query, Replanned};
+use crate::search::ties;
 use crate::search::{Found, Space, search_from};
 use crate::task::{State, Task};
-use crate::ties;
 
 /// Where a plan may begin.
 struct Start {

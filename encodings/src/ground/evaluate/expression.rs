@@ -5,7 +5,7 @@ use crate::ground::vocabulary::atom::{Binding, arguments};
 use crate::ground::vocabulary::failure::Failure;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Expression, Rational};
-use crate::quantity::Linear;
+use crate::task::quantity::Linear;
 
 /// Evaluates an expression that mentions no open slot.
 pub(crate) fn ground(

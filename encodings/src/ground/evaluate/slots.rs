@@ -1,14 +1,14 @@
 //! Expressions with open slots: as tables over the designs that are left for each.
 
-use crate::configuration::{SlotParameter, slots_of_expression};
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
 use crate::ground::vocabulary::atom::Binding;
 use crate::ground::vocabulary::failure::Failure;
 use crate::ground::vocabulary::world::World;
+use crate::lifted::configuration::{SlotParameter, slots_of_expression};
 use crate::lifted::{Expression, ObjectId, Rational};
 use crate::limits::{Limits, Pulse};
-use crate::quantity::{Linear, Quantity, SlotSet, Table};
+use crate::task::quantity::{Linear, Quantity, SlotSet, Table};
 
 /// The open slots of the schema at hand with the designs that are left for each.
 pub(crate) struct Slots<'a> {

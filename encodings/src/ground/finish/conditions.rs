@@ -7,8 +7,8 @@ use crate::ground::vocabulary::axiom::{GroundAxiom, components};
 use crate::ground::vocabulary::condition::GroundCondition;
 use crate::lifted::Rational;
 use crate::number::checked_lcm;
+use crate::task::number::TaskNumber;
 use crate::task::{Axiom, Condition, Fact, Layer};
-use crate::task_number::TaskNumber;
 
 /// A condition of the final task.
 #[expect(clippy::arithmetic_side_effects, reason = "above the least number of its type")]

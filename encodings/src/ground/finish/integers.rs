@@ -8,9 +8,9 @@ use rustc_hash::FxHashMap;
 use crate::error::Error;
 use crate::lifted::Rational;
 use crate::number::{Int, LIMIT, checked_lcm};
-use crate::quantity::Quantity;
-use crate::table_map::TableMap;
-use crate::task_number::TaskNumber;
+use crate::task::number::TaskNumber;
+use crate::task::quantity::Quantity;
+use crate::task::table_map::TableMap;
 
 /// The least factor that makes all numbers of one kind integers.
 #[derive(Debug)]
@@ -100,7 +100,7 @@ mod tests {
     use num_traits::Zero;
 
     use super::*;
-    use crate::quantity::Table;
+    use crate::task::quantity::Table;
 
     /// A quantity of so many tables over slots of their own, each of 0 and a number.
     fn quantity(tables: u32, number: Int) -> Quantity<Rational> {

@@ -23,10 +23,10 @@ use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::Lifted;
 use crate::number::dense;
-use crate::quantity::Quantity;
+use crate::task::number::TaskNumber;
+use crate::task::quantity::Quantity;
+use crate::task::timing::Timing;
 use crate::task::{Condition, Objective, Operator, State, Task};
-use crate::task_number::TaskNumber;
-use crate::timing::Timing;
 
 /// Builds the final task.
 ///

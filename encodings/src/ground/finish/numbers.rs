@@ -8,9 +8,9 @@ use crate::ground::finish::integers::{Denominator, Integers};
 use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::Rational;
-use crate::quantity::{Linear, NumericId};
 use crate::task::NumericEffect;
-use crate::task_number::TaskNumber;
+use crate::task::number::TaskNumber;
+use crate::task::quantity::{Linear, NumericId};
 
 /// The numeric variables that conditions depend on, with the factor that makes all their values integers.
 pub(super) struct Numbers<N> {

@@ -3,8 +3,8 @@
 use rustc_hash::FxHashSet;
 
 use crate::limits::{Interrupted, Limits, Pulse};
-use crate::quantity::SlotSet;
 use crate::task::Forbidden;
+use crate::task::quantity::SlotSet;
 
 /// Adds a combination of designs to those that are forbidden.
 pub(super) fn forbid(forbidden: &mut Vec<Forbidden>, slots: &SlotSet, combination: SlotSet) {

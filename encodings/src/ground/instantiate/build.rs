@@ -13,7 +13,7 @@ use crate::ground::vocabulary::residual::{Residual, compare};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Expression, Formula, Rational, Schema};
 use crate::number::dense;
-use crate::quantity::{Linear, Quantity, SlotSet};
+use crate::task::quantity::{Linear, Quantity, SlotSet};
 use crate::task::{Argument, Forbidden};
 use pddl::ast::Span;
 

@@ -9,8 +9,8 @@ use crate::ground::vocabulary::failure::Failure;
 use crate::ground::vocabulary::numbers::Numbers;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::Rational;
-use crate::quantity::{Linear, NumericId};
 use crate::task::Forbidden;
+use crate::task::quantity::{Linear, NumericId};
 use pddl::ast::Assignment;
 
 /// A change of an atom or of a number.

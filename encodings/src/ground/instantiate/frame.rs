@@ -6,7 +6,6 @@
 
 use std::sync::Arc;
 
-use crate::configuration::{SlotParameter, conjuncts};
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::expression::ground;
 use crate::ground::evaluate::slots::Slots;
@@ -18,10 +17,11 @@ use crate::ground::vocabulary::failure::{Failure, possible};
 use crate::ground::vocabulary::operator::GroundSlots;
 use crate::ground::vocabulary::residual::Residual;
 use crate::ground::vocabulary::world::World;
+use crate::lifted::configuration::{SlotParameter, conjuncts};
 use crate::lifted::{Effect, ObjectId, Rational};
 use crate::number::dense;
-use crate::quantity::{Linear, Quantity};
 use crate::task::Forbidden;
+use crate::task::quantity::{Linear, Quantity};
 
 /// What instances share that agree in the parameters of the key.
 pub(super) struct Frame<'a> {

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::configuration::SlotParameter;
 use crate::ground::evaluate::normal_form::Definitions;
 use crate::ground::evaluate::reads::Reads;
 use crate::ground::instantiate::admit::{admit_some, forbid};
@@ -20,9 +19,10 @@ use crate::ground::vocabulary::numbers::Numbers;
 use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::residual::Residual;
 use crate::ground::vocabulary::world::World;
+use crate::lifted::configuration::SlotParameter;
 use crate::lifted::{Effect, Formula, Joint, Lifted, ObjectId, Schema, Term};
+use crate::task::timing::Timing;
 use crate::task::{Argument, Forbidden};
-use crate::timing::Timing;
 
 /// What all instances are made with.
 pub(super) struct Instantiation<'a> {

@@ -27,7 +27,6 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::configuration::{SlotParameter, depends_on_own_start};
 use crate::error::Error;
 use crate::ground::evaluate::condition::residual;
 use crate::ground::instantiate::axioms::instantiate_axioms;
@@ -43,6 +42,7 @@ use crate::ground::vocabulary::residual::Residual;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::Schema;
+use crate::lifted::configuration::{SlotParameter, depends_on_own_start};
 use crate::number::dense;
 
 /// Turns every reached instance into operators, the goal into a condition, and derived atoms that they mention into rules. For each

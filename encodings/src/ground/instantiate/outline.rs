@@ -1,11 +1,11 @@
 //! Lifted schemas, with what mentions their slots apart from the rest.
 
-use crate::configuration::{
+use crate::ground::vocabulary::atom::{Binding, Row};
+use crate::lifted::configuration::{
     SlotParameter, conjuncts, expression_terms, formula_terms, slots_of_expression, slots_of_formula,
 };
-use crate::ground::vocabulary::atom::{Binding, Row};
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, Schema, Term};
-use crate::quantity::SlotSet;
+use crate::task::quantity::SlotSet;
 
 /// A schema with what mentions its slots apart from the rest.
 pub(super) struct Outline<'a> {

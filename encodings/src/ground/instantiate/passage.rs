@@ -11,8 +11,8 @@ use crate::ground::vocabulary::atom::AtomId;
 use crate::ground::vocabulary::residual::{Residual, constant_comparison};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::Rational;
-use crate::quantity::{Linear, NumericId, Quantity};
-use crate::timing::Timing;
+use crate::task::quantity::{Linear, NumericId, Quantity};
+use crate::task::timing::Timing;
 
 /// When an action starts and ends.
 #[derive(Debug, Clone, Copy)]

@@ -28,8 +28,8 @@ use crate::ground::vocabulary::residual::{Residual, constant_comparison};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{ObjectId, Rational};
 use crate::number::dense;
-use crate::quantity::{Linear, NumericId, Quantity};
-use crate::timing::Timing;
+use crate::task::quantity::{Linear, NumericId, Quantity};
+use crate::task::timing::Timing;
 
 /// The atoms and the numeric variables that stand for time; none of them has a name in the files.
 #[derive(Debug, Clone)]

@@ -7,7 +7,7 @@ use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::Rational;
 use crate::limits::Interrupted;
-use crate::quantity::{NumericId, Quantity};
+use crate::task::quantity::{NumericId, Quantity};
 
 /// Removes effects on numeric variables that no condition depends on; the metric has been made of them already.
 pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {

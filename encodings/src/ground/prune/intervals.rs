@@ -12,7 +12,7 @@ use crate::ground::vocabulary::condition::GroundCondition;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::Rational;
 use crate::limits::Interrupted;
-use crate::quantity::{Linear, NumericId, Quantity};
+use crate::task::quantity::{Linear, NumericId, Quantity};
 
 /// Ends of intervals move freely for this many rounds.
 const ROUNDS: usize = 3;

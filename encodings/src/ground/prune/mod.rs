@@ -7,7 +7,6 @@ mod backward;
 mod forward;
 mod intervals;
 
-use crate::configuration::conjuncts;
 use crate::ground::config::Generality;
 use crate::ground::derived::simplify;
 use crate::ground::prune::backward::{backward, drop_unread_numerics};
@@ -16,6 +15,7 @@ use crate::ground::prune::intervals::{goal_can_hold, prune_by_numbers};
 use crate::ground::vocabulary::atom::{AtomId, arguments};
 use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::Formula;
+use crate::lifted::configuration::conjuncts;
 use crate::limits::Interrupted;
 
 /// Prunes the task in place; returns a reason if the goal cannot be reached even if nothing is ever deleted.

@@ -15,12 +15,12 @@ mod relaxed;
 use rules::{Engine, Interrupt, Program, Symbol};
 use rustc_hash::FxHashMap;
 
-use crate::configuration::SlotParameter;
 use crate::error::Error;
 use crate::ground::reach::program::{add_axiom, add_schema};
 use crate::ground::reach::relaxed::Relaxed;
 use crate::ground::vocabulary::atom::{AtomSet, Binding};
 use crate::ground::vocabulary::reached::Reached;
+use crate::lifted::configuration::SlotParameter;
 use crate::lifted::{Arguments, Lifted, ObjectId, PredicateId};
 use crate::limits::{Interrupted, Limits};
 

@@ -2,8 +2,8 @@
 
 use rules::{Atom, Symbol};
 
-use crate::configuration::{SlotParameter, atoms, conjuncts};
 use crate::ground::reach::relaxed::{Candidates, Relaxed, free, with_bound};
+use crate::lifted::configuration::{SlotParameter, atoms, conjuncts};
 use crate::lifted::{Axiom, Change, Effect, Formula, Lifted, PredicateId, Schema, Term};
 use crate::limits::Interrupted;
 use crate::number::dense;

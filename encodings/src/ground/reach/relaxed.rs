@@ -9,12 +9,12 @@ use std::sync::Arc;
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term as RuleTerm, Variable};
 use rustc_hash::FxHashMap;
 
-use crate::configuration::{formula_terms, has_numbers, is_static};
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::join::each_binding;
 use crate::ground::vocabulary::reached::Reached;
 use crate::ground::vocabulary::residual::Residual;
 use crate::ground::vocabulary::world::World;
+use crate::lifted::configuration::{formula_terms, has_numbers, is_static};
 use crate::lifted::{Arguments, Bound, Formula, Lifted, ObjectId, PredicateId, Term};
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;

@@ -2,7 +2,7 @@
 
 use crate::ground::vocabulary::atom::AtomId;
 use crate::lifted::Rational;
-use crate::quantity::Linear;
+use crate::task::quantity::Linear;
 
 /// An atom or its negation.
 pub(crate) type GroundLiteral = (AtomId, bool);

@@ -1,7 +1,7 @@
 //! What numeric variables become when an operator is applied.
 
 use crate::lifted::Rational;
-use crate::quantity::{Linear, NumericId};
+use crate::task::quantity::{Linear, NumericId};
 
 /// What numeric variables become; a list, because an operator changes few.
 #[derive(Debug, Clone, Default)]

@@ -6,9 +6,9 @@ use crate::ground::vocabulary::atom::AtomId;
 use crate::ground::vocabulary::condition::{GroundCondition, GroundLiteral};
 use crate::ground::vocabulary::numbers::Numbers;
 use crate::lifted::{ObjectId, Rational};
-use crate::quantity::Quantity;
+use crate::task::quantity::Quantity;
+use crate::task::timing::Timing;
 use crate::task::{Argument, Forbidden};
-use crate::timing::Timing;
 
 /// The function and the designs that suit an operator, for each slot.
 pub(crate) type GroundSlots = [(ObjectId, Vec<ObjectId>)];

@@ -2,7 +2,7 @@
 
 use crate::ground::vocabulary::atom::AtomId;
 use crate::lifted::Rational;
-use crate::quantity::Linear;
+use crate::task::quantity::Linear;
 use pddl::ast::Comparison;
 
 /// What is left of a condition once everything static is decided.

@@ -13,7 +13,7 @@ use crate::ground::vocabulary::reached::Reached;
 use crate::lifted::{Arguments, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term};
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 use pddl::ast::Name;
 
 /// The limits are looked at after so many bindings that nothing guards.

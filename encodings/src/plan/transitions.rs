@@ -3,10 +3,10 @@
 //! Every function design is chosen here, so an action appears once for each combination of its designs.
 
 use crate::context::Context;
-use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::limits::Limits;
 use crate::number::Int;
-use crate::plan::{Exact, Step, decode, metric};
+use crate::plan::ground::{GroundPlan, GroundStep};
+use crate::plan::names::{Exact, Step, decode, metric};
 use crate::task::{OperatorId, State, Task};
 
 /// A state of a task, with what was paid on the way to it.

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use crate::ground_plan::GroundPlan;
-use crate::plan::{Exact, Plan};
+use crate::plan::ground::GroundPlan;
+use crate::plan::names::{Exact, Plan};
 
 /// How good the answer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

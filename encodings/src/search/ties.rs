@@ -18,13 +18,13 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::bounds::{Bounds, Projection};
 use crate::context::Context;
-use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::Int;
+use crate::plan::ground::{GroundPlan, GroundStep};
 use crate::plan::resolve;
-use crate::search::is_monotone;
-use crate::successors::{OperatorIndex, undominated};
+use crate::search::astar::is_monotone;
+use crate::search::successors::{OperatorIndex, undominated};
 use crate::task::{OperatorId, State, Task};
 
 /// How many labels are made at most.

@@ -1,8 +1,8 @@
 //! A plan over operators, and what it comes to.
 
 use crate::number::Int;
+use crate::task::number::TaskNumber;
 use crate::task::{OperatorId, State, Task};
-use crate::task_number::TaskNumber;
 
 /// One step of a plan over operators.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

@@ -5,12 +5,12 @@ use std::convert::Infallible;
 use num_rational::BigRational;
 use num_traits::One;
 
-use crate::common_denominator::CommonDenominator;
 use crate::context::Context;
 use crate::limits::Interrupted;
 use crate::number::Rational;
-use crate::quantity::{Linear, Quantity};
-use crate::table_map::TableMap;
+use crate::task::common_denominator::CommonDenominator;
+use crate::task::quantity::{Linear, Quantity};
+use crate::task::table_map::TableMap;
 use crate::task::{Condition, Task};
 
 /// Common denominators of more bits are not looked for.

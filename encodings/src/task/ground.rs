@@ -11,10 +11,9 @@ use std::sync::Arc;
 
 use crate::lifted::ObjectId;
 use crate::number::{Int, dense};
-pub use crate::quantity::NumericId;
-use crate::quantity::{Linear, Quantity, SlotSet};
-use crate::task_number::{TaskNumber, sum_of_products};
-use crate::timing::Timing;
+use crate::task::number::{TaskNumber, sum_of_products};
+use crate::task::quantity::{Linear, NumericId, Quantity, SlotSet};
+use crate::task::timing::Timing;
 
 /// A finite-domain variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -4,7 +4,7 @@ use num_bigint::BigInt;
 use num_traits::Signed;
 
 use crate::number::{GROWTH_LIMIT, Int, LIMIT, Rational};
-use crate::quantity::{Number, Quantity, Table};
+use crate::task::quantity::{Number, Quantity, Table};
 
 /// What the numbers of a quantity come to together, whatever their signs.
 pub(crate) const QUANTITY_LIMIT: Int = 1 << 123;

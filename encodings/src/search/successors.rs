@@ -6,9 +6,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
-use crate::quantity::{Quantity, SlotSet};
+use crate::task::number::TaskNumber;
+use crate::task::quantity::{Quantity, SlotSet};
 use crate::task::{Operator, OperatorId, State, Task};
-use crate::task_number::TaskNumber;
 
 /// Operators by that fact of their condition whose variable has the most values.
 pub(crate) struct OperatorIndex {
@@ -263,7 +263,7 @@ mod tests {
 
     use super::*;
     use crate::number::Int;
-    use crate::quantity::{Linear, NumericId, Table};
+    use crate::task::quantity::{Linear, NumericId, Table};
     use crate::task::{Condition, Forbidden, NumericEffect, SlotId, SlotUse};
 
     const SIZES: [usize; 4] = [2, 3, 2, 2];
@@ -304,7 +304,7 @@ mod tests {
             others: Vec::new(),
             duration: Quantity::constant(0),
             wait: None,
-            timing: crate::timing::Timing::free(),
+            timing: crate::task::timing::Timing::free(),
         }
     }
 

@@ -7,9 +7,9 @@
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 
-use crate::lifted::{Change, Expression, Formula, Lifted, PredicateId, Schema, Term};
+use crate::lifted::task::{Change, Expression, Formula, Lifted, PredicateId, Schema, Term};
 use crate::number::dense;
-use crate::quantity::SlotSet;
+use crate::task::quantity::SlotSet;
 use pddl::ast::Name;
 
 /// A parameter that stands for a function design, and the function that the design solves.

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use crate::error::Place;
-pub(crate) use crate::number::Rational;
+use crate::number::Rational;
 use pddl::ast::{Assignment, Comparison, Direction, Name};
 
 /// An object or constant, by order of declaration.

@@ -8,12 +8,13 @@
 //! and system optimization, IEEE Trans. SMC 1(3), 1971.
 
 use crate::context::Context;
-use crate::ground_plan::GroundPlan;
 use crate::number::{Int, Rational};
-use crate::optimize::{Config, optimize};
+use crate::optimize::cheapest::optimize;
+use crate::optimize::config::Config;
+use crate::plan::ground::GroundPlan;
+use crate::plan::solution::{Improvement, Solution, Status};
 use crate::plan::{Exact, decode};
-use crate::quantity::{Linear, NumericId, Quantity};
-use crate::solution::{Improvement, Solution, Status};
+use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::{NumericEffect, Operator, Task};
 
 /// A point of the Pareto front, or what is known in place of one.
@@ -50,7 +51,7 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
         let point = in_order(task, &[0, 1], &budgets, config, report);
         match (point.solution.status, &point.solution.ground) {
             (Status::Optimal, Some(plan)) => {
-                let by_second = task.cost_by(1, plan).and_then(|cost| cost.checked_sub(1));
+                let by_second = cost_by(task, 1, plan).and_then(|cost| cost.checked_sub(1));
                 points.push(point);
                 // A sum that does not fit is no budget: there may be other points.
                 let Some(budget) = by_second else { return Front { points, status: Status::Feasible } };
@@ -87,16 +88,16 @@ fn in_order(
     for objective in order {
         let mut narrowed = task.clone();
         for (other, budget) in &budgets {
-            narrowed.limit(*other, *budget);
+            limit(&mut narrowed, *other, *budget);
         }
-        narrowed.swap_objective(*objective);
+        swap_objective(&mut narrowed, *objective);
         let solution = optimize(&narrowed, config, report);
         let Some(plan) = &solution.ground else {
             // The plan that was best so far stays a plan; that nothing better was found for the rest is not proved.
             let known = best.map(|known| Solution { status: Status::Feasible, proof: None, ..known });
             return finish(context, known.unwrap_or(solution));
         };
-        let spent = task.cost_by(*objective, plan);
+        let spent = cost_by(task, *objective, plan);
         budgets.extend(spent.map(|spent| (*objective, spent)));
         // A sum that does not fit is no budget for what comes next.
         let proved = solution.status == Status::Optimal && spent.is_some();
@@ -126,9 +127,9 @@ fn finish(context: Context<'_>, mut solution: Solution) -> Point {
         values.extend(
             objectives
                 .enumerate()
-                .map(|(position, objective)| objective.metric(&task.exact_cost_by(position, plan))),
+                .map(|(position, objective)| objective.metric(&exact_cost_by(task, position, plan))),
         );
-        if let Some(cost) = task.cost_by(0, plan) {
+        if let Some(cost) = cost_by(task, 0, plan) {
             let plan = GroundPlan { steps: plan.steps.clone(), cost };
             solution.plan = Some(decode(context, &plan));
             solution.ground = Some(plan);
@@ -137,58 +138,57 @@ fn finish(context: Context<'_>, mut solution: Solution) -> Point {
     Point { solution, values }
 }
 
-impl Task {
-    fn cost(operator: &Operator, objective: usize) -> &Quantity<Int> {
-        objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
-    }
+/// What an operator costs by an objective, by its position.
+fn cost(operator: &Operator, objective: usize) -> &Quantity<Int> {
+    objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
+}
 
-    /// What the steps of a plan cost by an objective, by its position.
-    fn costs_by(&self, objective: usize, plan: &GroundPlan) -> impl Iterator<Item = Int> {
-        plan.steps.iter().map(move |step| {
-            let operator = &self.operators[step.operator.index()];
-            Self::cost(operator, objective).at(&step.choice, &operator.sizes())
-        })
-    }
+/// What the steps of a plan cost by an objective, by its position.
+fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<Item = Int> {
+    plan.steps.iter().map(move |step| {
+        let operator = &task.operators[step.operator.index()];
+        cost(operator, objective).at(&step.choice, &operator.sizes())
+    })
+}
 
-    /// What a plan costs by an objective; none if that does not fit.
-    fn cost_by(&self, objective: usize, plan: &GroundPlan) -> Option<Int> {
-        self.costs_by(objective, plan).try_fold(0, Int::checked_add)
-    }
+/// What a plan costs by an objective; none if that does not fit.
+fn cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Option<Int> {
+    costs_by(task, objective, plan).try_fold(0, Int::checked_add)
+}
 
-    /// What a plan costs by an objective, however much that is.
-    fn exact_cost_by(&self, objective: usize, plan: &GroundPlan) -> Rational {
-        self.costs_by(objective, plan).map(Rational::from_integer).sum()
-    }
+/// What a plan costs by an objective, however much that is.
+fn exact_cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Rational {
+    costs_by(task, objective, plan).map(Rational::from_integer).sum()
+}
 
-    /// Admits only plans that cost at most so much by an objective.
-    fn limit(&mut self, objective: usize, budget: Int) {
-        let variable = NumericId::of(self.initial.numbers.len());
-        self.initial.numbers.push(budget);
-        self.number_names.push(String::new());
-        let always = self.operators.iter().all(|operator| Self::cost(operator, objective).minimum() >= 0);
-        for operator in &mut self.operators {
-            let cost = Self::cost(operator, objective).clone();
-            if cost.is_zero() {
-                continue;
-            }
-            let mut left = Linear::constant(0);
-            left.quantity = cost;
-            let mut left = left.negated();
-            left.add(&Linear::variable(variable));
-            if always {
-                operator.condition.comparisons.push(left.clone());
-            }
-            operator.numeric_effects.push(NumericEffect { variable, value: left });
+/// Admits only plans that cost at most so much by an objective.
+fn limit(task: &mut Task, objective: usize, budget: Int) {
+    let variable = NumericId::of(task.initial.numbers.len());
+    task.initial.numbers.push(budget);
+    task.number_names.push(String::new());
+    let always = task.operators.iter().all(|operator| cost(operator, objective).minimum() >= 0);
+    for operator in &mut task.operators {
+        let cost = cost(operator, objective).clone();
+        if cost.is_zero() {
+            continue;
         }
-        self.goal.comparisons.push(Linear::variable(variable));
-    }
-
-    /// Makes an objective the first one.
-    fn swap_objective(&mut self, objective: usize) {
-        let Some(other) = objective.checked_sub(1) else { return };
-        std::mem::swap(&mut self.objective, &mut self.others[other]);
-        for operator in &mut self.operators {
-            std::mem::swap(&mut operator.cost, &mut operator.others[other]);
+        let mut left = Linear::constant(0);
+        left.quantity = cost;
+        let mut left = left.negated();
+        left.add(&Linear::variable(variable));
+        if always {
+            operator.condition.comparisons.push(left.clone());
         }
+        operator.numeric_effects.push(NumericEffect { variable, value: left });
+    }
+    task.goal.comparisons.push(Linear::variable(variable));
+}
+
+/// Makes an objective the first one.
+fn swap_objective(task: &mut Task, objective: usize) {
+    let Some(other) = objective.checked_sub(1) else { return };
+    std::mem::swap(&mut task.objective, &mut task.others[other]);
+    for operator in &mut task.operators {
+        std::mem::swap(&mut operator.cost, &mut operator.others[other]);
     }
 }

@@ -7,10 +7,10 @@
 use num_traits::Zero;
 
 use crate::context::Context;
-use crate::ground_plan::{GroundPlan, GroundStep, replay};
 use crate::number::Rational;
+use crate::plan::ground::{GroundPlan, GroundStep, replay};
+use crate::task::number::TaskNumber;
 use crate::task::{Operator, OperatorId, Task};
-use crate::task_number::TaskNumber;
 
 /// The same actions, each as early as the ones before it and the rest of the plan admit; as far as the limits let it.
 pub(crate) fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {

@@ -4,6 +4,8 @@
 //! longer than any machine integer. The search needs no integers: it adds and compares. Its estimates are those of the same
 //! task without numbers, whose costs are rounded down to integers, so that no plan is cheaper than estimated.
 
+mod integral;
+
 use std::time::Instant;
 
 use num_bigint::BigInt;
@@ -14,18 +16,18 @@ use num_traits::{One, ToPrimitive, Zero};
 use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::error::Error;
+use crate::exact::integral::Integral;
 use crate::ground::{Config as GroundConfig, Generality, ground_for};
-use crate::ground_plan::GroundPlan;
-use crate::integral::Integral;
 use crate::limits::Interrupted;
 use crate::number::{Int, Rational, dense};
 use crate::optimize::{Config, can_repeat_reward};
+use crate::plan::ground::GroundPlan;
+use crate::plan::solution::{Proof, Solution, Statistics, Status, Unbounded};
 use crate::plan::{Plan, decode, metric};
-use crate::quantity::{Linear, NumericId, Quantity};
 use crate::search::{Estimate, Found, search_states};
-use crate::solution::{Proof, Solution, Statistics, Status, Unbounded};
+use crate::task::quantity::{Linear, NumericId, Quantity};
+use crate::task::timing::Timing;
 use crate::task::{Condition, NumericEffect, Objective, Operator, State, Task};
-use crate::timing::Timing;
 use pddl::ast::{Domain, Problem};
 
 /// How many states are stored at most.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::number::Rational;
-use crate::quantity::{Quantity, Table};
+use crate::task::quantity::{Quantity, Table};
 
 /// The values of a table, and what they are mapped to.
 type Mapped<M> = (Arc<[Rational]>, Arc<[M]>);

@@ -17,12 +17,12 @@ use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
 use crate::context::Context;
-use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::{Int, dense};
-use crate::successors::{OperatorIndex, Priced, undominated};
+use crate::plan::ground::{GroundPlan, GroundStep};
+use crate::search::successors::{OperatorIndex, Priced, undominated};
+use crate::task::number::TaskNumber;
 use crate::task::{Condition, Fact, OperatorId, State, Task};
-use crate::task_number::TaskNumber;
 
 /// How many states are stored at most.
 pub(crate) const STATE_LIMIT: usize = 400_000;

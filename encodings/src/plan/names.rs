@@ -5,12 +5,12 @@ use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
 use crate::context::Context;
-use crate::earliest::{earliest, starts};
-use crate::ground_plan::GroundPlan;
 use crate::lifted::ObjectId;
 use crate::number::{Int, Rational};
+use crate::plan::earliest::{earliest, starts};
+use crate::plan::ground::GroundPlan;
+use crate::task::number::TaskNumber;
 use crate::task::{Argument, Objective, Operator, Task};
-use crate::task_number::TaskNumber;
 use pddl::to_decimal;
 
 /// An exact number of any size, in the units of the PDDL files.

@@ -9,7 +9,7 @@ use num_traits::One;
 use rustc_hash::FxHashMap;
 
 use crate::number::Rational;
-use crate::quantity::Quantity;
+use crate::task::quantity::Quantity;
 
 /// The least common denominator of the numbers so far.
 pub(crate) struct CommonDenominator {
