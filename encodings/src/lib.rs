@@ -22,38 +22,31 @@
 )]
 
 mod error;
-mod exact;
-mod lifted;
-mod normalize;
+mod limits;
 mod number;
 
-mod configuration;
-mod ground;
-mod quantity;
+mod lifted;
+mod normalize;
 mod task;
-mod task_number;
+
+mod ground;
+
+mod bounds;
+mod context;
+mod plan;
+mod search;
+
+mod encode;
+mod sat;
+
+mod optimize;
 
 mod alternatives;
-mod bounds;
-mod certificate;
-mod common_denominator;
 mod concurrent;
-mod earliest;
-mod encode;
-mod ground_plan;
-mod integral;
-mod limits;
-mod objectives;
-mod optimize;
-mod plan;
+mod exact;
 mod replan;
-mod sat;
-mod search;
-mod solution;
-mod successors;
-mod table_map;
-mod ties;
-mod transitions;
+
+mod certificate;
 
 #[cfg(test)]
 mod tests;
@@ -66,11 +59,10 @@ pub use error::{Error, File, Place};
 pub use exact::{ExactTask, ground_exact, optimize_exact};
 pub use ground::{Config as GroundConfig, ground};
 pub use limits::Limits;
-pub use objectives::{Front, Point, lexicographic, pareto};
-pub use optimize::{Config, Strategy, optimize};
+pub use optimize::{Config, Front, Point, Strategy, lexicographic, optimize, pareto};
+pub use plan::solution::{Improvement, Proof, Solution, Statistics, Status, Unbounded};
+pub use plan::transitions::{Situation, Transition};
 pub use plan::{Exact, Plan, Step};
 pub use replan::{First, Progress, Query, Replanned, Replanner};
 pub use sat::{Backend, BackendError};
-pub use solution::{Improvement, Proof, Solution, Statistics, Status, Unbounded};
 pub use task::Task;
-pub use transitions::{Situation, Transition};

@@ -13,11 +13,12 @@ use std::fmt::Write as _;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
-use crate::encode::{CostLimit, Counting, Encoding, Semantics};
+use crate::context::Context;
+use crate::encode::{CostLimit, Counting, Encoding, Plans, Semantics};
 use crate::ground::{Config, ground};
-use crate::ground_plan::replay;
 use crate::limits::Limits;
 use crate::number::Int;
+use crate::plan::ground::replay;
 use crate::sat::{Answer, Backend};
 use crate::task::{State, Task};
 use missions::Mission;
@@ -42,11 +43,16 @@ fn is_solvable(
     semantics: Semantics,
     backend: &Backend,
 ) -> bool {
-    let window = bounds.window(task, Some(limit), Some(steps), &Limits::none()).expect("no limit");
+    let window =
+        bounds.window(Context::new(task, &Limits::none()), Some(limit), Some(steps)).expect("no limit");
     let cost = CostLimit { limit, bounds, counting: Counting::Sum };
-    let encoding =
-        Encoding::new(task, &window.allowed, Some(cost), semantics, &OnceCell::new(), &Limits::none())
-            .expect("no limit");
+    let limits = Limits::none();
+    let encoding = Encoding::new(
+        Context::new(task, &limits),
+        Plans { allowed: &window.allowed, cost: Some(cost), semantics },
+        &OnceCell::new(),
+    )
+    .expect("no limit");
     let mut solver = backend.start(&Limits::none(), u64::MAX);
     for (_, clause) in encoding.formula.clauses() {
         solver.add_clause(clause);
@@ -72,17 +78,20 @@ fn check(seed: u64, backend: &Backend) {
         return;
     }
     let (scale, offset) = (task.objective.scale, task.objective.offset);
-    let bounds = Bounds::new(&task, &Limits::none()).expect("no limit");
+    let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
     let below = optimum.map_or(MUCH, |optimum| optimum * scale - offset - 1);
-    let step_bound =
-        bounds.window(&task, Some(below), None, &Limits::none()).expect("no limit").steps.unwrap_or(STEPS);
+    let step_bound = bounds
+        .window(Context::new(&task, &Limits::none()), Some(below), None)
+        .expect("no limit")
+        .steps
+        .unwrap_or(STEPS);
     let costs = mission.oracle_by_steps(step_bound.clamp(STEPS, MOST_STEPS));
     let costs: Vec<_> = costs.into_iter().map(|cost| cost.map(Int::from)).collect();
     assert!(
         costs.iter().flatten().all(|cost| optimum.is_some_and(|optimum| optimum <= *cost)),
         "seed {seed}"
     );
-    for bounds in [&bounds, &Bounds::trivial(&task, &Limits::none()).expect("no limit")] {
+    for bounds in [&bounds, &Bounds::trivial(Context::new(&task, &Limits::none())).expect("no limit")] {
         for (steps, cost) in costs.iter().enumerate() {
             let solvable = |limit| is_solvable(&task, bounds, steps, limit, Semantics::Sequential, backend);
             let context = || format!("seed {seed}, {backend:?}, {steps} steps: {mission:?}");
@@ -286,8 +295,8 @@ fn check_estimates(text: &(String, String)) -> bool {
         return false;
     }
     let (bounds, alone) = (
-        Bounds::new(&task, &Limits::none()).expect("no limit"),
-        Bounds::of_projections(&task, &Limits::none()).expect("no limit"),
+        Bounds::new(Context::new(&task, &Limits::none())).expect("no limit"),
+        Bounds::of_projections(Context::new(&task, &Limits::none())).expect("no limit"),
     );
     let mut seen = rustc_hash::FxHashSet::from_iter([task.initial.clone()]);
     let mut open = vec![task.initial.clone()];
@@ -334,9 +343,9 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
     }
     let most = 4;
     let (costs, optimum) = (costs_by_steps(&task, most), optimum(&task));
-    let bounds = Bounds::new(&task, &Limits::none()).expect("no limit");
+    let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
     let mut together = false;
-    for bounds in [&bounds, &Bounds::trivial(&task, &Limits::none()).expect("no limit")] {
+    for bounds in [&bounds, &Bounds::trivial(Context::new(&task, &Limits::none())).expect("no limit")] {
         for (steps, cost) in costs.iter().enumerate() {
             let context = |semantics| format!("{backend:?}, {steps} steps, {semantics:?}, {cost:?}: {text}");
             for semantics in [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep] {
@@ -357,8 +366,12 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
         }
     }
     let allowed = vec![vec![true; task.operators.len()]; most];
-    let encoding =
-        Encoding::new(&task, &allowed, None, Semantics::Sequential, &OnceCell::new(), &Limits::none());
+    let limits = Limits::none();
+    let encoding = Encoding::new(
+        Context::new(&task, &limits),
+        Plans { allowed: &allowed, cost: None, semantics: Semantics::Sequential },
+        &OnceCell::new(),
+    );
     let counts = encoding.expect("no limit").formula.counts();
     (together, !counts.contains(&("symmetry", 0)))
 }

@@ -11,13 +11,14 @@
 mod tests;
 
 use crate::bounds::Bounds;
-use crate::encode::{CostLimit, Counting, Encoding, Meaning, Semantics};
-use crate::ground_plan::{GroundPlan, GroundStep, replay};
+use crate::context::Context;
+use crate::encode::{CostLimit, Counting, Encoding, Meaning, Plans, Semantics};
 use crate::number::dense;
 use crate::optimize::Config;
+use crate::plan::ground::{GroundPlan, GroundStep, replay};
+use crate::plan::solution::{Solution, Status};
 use crate::plan::{Plan, decode};
 use crate::sat::{Answer, Backend, Lit, Solver};
-use crate::solution::{Solution, Status};
 use crate::task::{Argument, Task};
 
 /// What is known of the other cheapest plans.
@@ -45,26 +46,27 @@ pub struct Forced {
 /// could not be built within the limits.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
-    let bounds = Bounds::new(task, &config.limits).ok()?;
-    let window = bounds.window(task, Some(first.cost), config.horizon, &config.limits).ok()?;
+    let context = Context::new(task, &config.limits);
+    let bounds = Bounds::new(context).ok()?;
+    let window = bounds.window(context, Some(first.cost), config.horizon).ok()?;
     let is_complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
     // Nobody has checked what a program says of a formula without a model.
     let complete = is_complete && !matches!(config.backend, Backend::Program { .. });
     let allowed = if is_complete || config.horizon.is_some() {
         window.allowed
     } else {
-        bounds.window(task, Some(first.cost), Some(first.steps.len()), &config.limits).ok()?.allowed
+        bounds.window(context, Some(first.cost), Some(first.steps.len())).ok()?.allowed
     };
     let cost = CostLimit { limit: first.cost, bounds: &bounds, counting: Counting::Sum };
-    let encoding = Encoding::with_equals(task, &allowed, Some(cost), Semantics::Sequential, &config.limits)?;
+    let plans = Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential };
+    let encoding = Encoding::with_equals(context, plans)?;
     let mut solver = config.backend.start(&config.limits, u64::MAX);
     for clause in config.limits.watch(encoding.formula.clauses()) {
         solver.add_clause(clause.ok()?.1);
     }
     let mut run = Run { task, encoding, solver };
-    let plan = |steps: &[GroundStep]| {
-        decode(task, &GroundPlan { steps: steps.to_vec(), cost: first.cost }, &config.limits)
-    };
+    let plan =
+        |steps: &[GroundStep]| decode(context, &GroundPlan { steps: steps.to_vec(), cost: first.cost });
     let mut found = vec![first.steps.clone()];
     // What differs in waits only is one plan to its reader.
     let mut plans = vec![plan(&first.steps)];

@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 
 use super::{Forced, alternatives};
+use crate::context::Context;
 use crate::ground::{Config as GroundConfig, ground};
-use crate::ground_plan::{GroundPlan, GroundStep};
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::optimize::{Config, optimize};
+use crate::plan::ground::{GroundPlan, GroundStep};
+use crate::plan::solution::Status;
 use crate::plan::{Plan, decode};
-use crate::solution::Status;
 use crate::task::{State, Task};
 use crate::tests::missions::Mission;
 use pddl::{Source, read};
@@ -82,7 +83,7 @@ fn check(seed: u64) -> usize {
     all(&task, &task.initial, ground.cost, &mut Vec::new(), &mut expected);
     let plans: Vec<Plan> = expected
         .into_iter()
-        .map(|steps| decode(&task, &GroundPlan { steps, cost: ground.cost }, &Limits::none()))
+        .map(|steps| decode(Context::new(&task, &Limits::none()), &GroundPlan { steps, cost: ground.cost }))
         .collect();
     let first = solution.plan.as_ref().expect("a plan");
     let found = alternatives(&task, &solution, 1_000, &config).expect("alternatives");

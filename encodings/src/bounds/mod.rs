@@ -18,10 +18,11 @@ use resources::Resource;
 
 use smallvec::SmallVec;
 
-use crate::limits::{Interrupted, Limits};
+use crate::context::Context;
+use crate::limits::Interrupted;
 use crate::number::Int;
-use crate::quantity::NumericId;
-use crate::task::{State, Task};
+use crate::task::quantity::NumericId;
+use crate::task::{State, VariableId};
 
 /// Longest plan that step bounds are computed for.
 const STEP_LIMIT: usize = 4_000;
@@ -50,10 +51,10 @@ pub(crate) struct Window {
 }
 
 impl Bounds {
-    pub(crate) fn new(task: &Task, limits: &Limits) -> Result<Self, Interrupted> {
-        let mut bounds = Self::of_projections(task, limits)?;
+    pub(crate) fn new(context: Context<'_>) -> Result<Self, Interrupted> {
+        let mut bounds = Self::of_projections(context)?;
         bounds.projections.append(&mut bounds.further);
-        bounds.partitions = partition::partitions(task, &bounds.projections, limits)?;
+        bounds.partitions = partition::partitions(context, &bounds.projections)?;
         let kept = bounds.projections.len().min(KEPT);
         bounds.further = bounds.projections.split_off(kept);
         if bounds.partitions.is_empty() {
@@ -63,11 +64,12 @@ impl Bounds {
     }
 
     /// Bounds that each rest on one projection.
-    pub(crate) fn of_projections(task: &Task, limits: &Limits) -> Result<Self, Interrupted> {
-        let basic = |variable: &crate::task::VariableId| variable.index() < task.basic;
+    pub(crate) fn of_projections(context: Context<'_>) -> Result<Self, Interrupted> {
+        let task = context.task;
+        let basic = |variable: &VariableId| variable.index() < task.basic;
         let goal_variables: Vec<_> = task.goal.facts.iter().map(|fact| fact.variable).filter(basic).collect();
         let mut patterns: Vec<Vec<_>> = goal_variables.iter().map(|variable| vec![*variable]).collect();
-        let mut others: Vec<_> = crate::task::VariableId::all(task.basic).collect();
+        let mut others: Vec<_> = VariableId::all(task.basic).collect();
         others.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
         for other in &others {
             for goal in &goal_variables {
@@ -85,17 +87,17 @@ impl Bounds {
         }
         let mut projections: Vec<Projection> = Vec::new();
         for pattern in patterns {
-            projections.push(Projection::new(task, pattern, limits)?);
+            projections.push(Projection::new(context, pattern)?);
         }
         projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
         let further = projections.split_off(projections.len().min(KEPT));
-        let resources = resources::resources(task, &projections, limits)?;
+        let resources = resources::resources(context, &projections)?;
         Ok(Self { projections, resources, partitions: Vec::new(), further })
     }
 
     /// Bounds that say nothing: the projection to no variable at all.
-    pub(crate) fn trivial(task: &Task, limits: &Limits) -> Result<Self, Interrupted> {
-        let projections = vec![Projection::new(task, Vec::new(), limits)?];
+    pub(crate) fn trivial(context: Context<'_>) -> Result<Self, Interrupted> {
+        let projections = vec![Projection::new(context, Vec::new())?];
         Ok(Self { projections, resources: Vec::new(), partitions: Vec::new(), further: Vec::new() })
     }
 
@@ -131,15 +133,14 @@ impl Bounds {
     /// What is known of plans with cost at most `limit` and at most `horizon` steps, where either is given.
     pub(crate) fn window(
         &self,
-        task: &Task,
+        context: Context<'_>,
         limit: Option<Int>,
         horizon: Option<usize>,
-        limits: &Limits,
     ) -> Result<Window, Interrupted> {
         let mut steps: Option<usize> = None;
         if let Some(limit) = limit {
             for projection in &self.projections {
-                if let Some(bound) = projection.step_bound(limit, STEP_LIMIT, limits)? {
+                if let Some(bound) = projection.step_bound(limit, STEP_LIMIT, context.limits)? {
                     steps = Some(steps.map_or(bound, |known| known.min(bound)));
                 }
             }
@@ -148,9 +149,9 @@ impl Bounds {
             (Some(a), Some(b)) => a.min(b),
             (a, b) => a.or(b).unwrap_or(0),
         };
-        let mut allowed = vec![vec![true; task.operators.len()]; length];
+        let mut allowed = vec![vec![true; context.task.operators.len()]; length];
         for projection in &self.projections {
-            projection.restrict(limit, &mut allowed, limits)?;
+            projection.restrict(limit, &mut allowed, context.limits)?;
         }
         Ok(Window { steps, allowed })
     }

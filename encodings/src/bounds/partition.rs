@@ -12,9 +12,9 @@ use std::cmp::Reverse;
 use num_bigint::BigInt;
 
 use crate::bounds::projection::Projection;
+use crate::context::Context;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{GROWTH_LIMIT, Int};
-use crate::task::Task;
 
 /// How many sums are kept.
 const KEPT: usize = 4;
@@ -60,10 +60,10 @@ impl Partition {
 /// Sums of shares for the projections of a task, the one with the highest estimate of the initial state first; none where one
 /// projection alone is as good.
 pub(super) fn partitions(
-    task: &Task,
+    context: Context<'_>,
     projections: &[Projection],
-    limits: &Limits,
 ) -> Result<Vec<Partition>, Interrupted> {
+    let Context { task, limits } = context;
     let costs: Vec<Int> = task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect();
     let initial: Vec<u32> = projections.iter().map(|projection| projection.state(&task.initial)).collect();
     let alone = |position: usize| projections[position].to_go(initial[position]).unwrap_or(0);

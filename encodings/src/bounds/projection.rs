@@ -3,9 +3,10 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use crate::context::Context;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{GROWTH_LIMIT, Int, dense};
-use crate::task::{ConditionalEffect, Literal, OperatorId, State, Task, VariableId};
+use crate::task::{ConditionalEffect, Literal, OperatorId, State, VariableId};
 
 /// An operator leads from one abstract state to another.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +37,8 @@ fn sum(a: Int, b: Int) -> Int {
 }
 
 impl Projection {
-    pub(crate) fn new(task: &Task, pattern: Vec<VariableId>, limits: &Limits) -> Result<Self, Interrupted> {
+    pub(crate) fn new(context: Context<'_>, pattern: Vec<VariableId>) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
         let sizes: Vec<_> =
             pattern.iter().map(|variable| task.variables[variable.index()].values.len()).collect();
         let mut projection = Self {

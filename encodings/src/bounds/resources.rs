@@ -8,10 +8,11 @@
 //! path problem, Networks 42(3), 2003.
 
 use crate::bounds::projection::Projection;
-use crate::limits::{Interrupted, Limits};
+use crate::context::Context;
+use crate::limits::Interrupted;
 use crate::number::Int;
-use crate::quantity::NumericId;
-use crate::task::{Operator, State, Task};
+use crate::task::quantity::NumericId;
+use crate::task::{Operator, State};
 
 /// A resource, and what each abstract state needs of it, by projection.
 pub(super) struct Resource {
@@ -37,10 +38,10 @@ impl Resource {
     reason = "numbers of a task are above the least number of their type"
 )]
 pub(super) fn resources(
-    task: &Task,
+    context: Context<'_>,
     projections: &[Projection],
-    limits: &Limits,
 ) -> Result<Vec<Resource>, Interrupted> {
+    let Context { task, limits } = context;
     let mut found = Vec::new();
     for variable in limits.watch(NumericId::all(task.initial.numbers.len())) {
         let variable = variable?;

@@ -5,11 +5,11 @@ use num_bigint::BigInt;
 use num_integer::Integer as _;
 use num_traits::{One, Signed};
 
-use crate::common_denominator::CommonDenominator;
 use crate::number::Rational;
-use crate::quantity::Linear;
 use crate::task::Task;
-use crate::task_number::TaskNumber;
+use crate::task::common_denominator::CommonDenominator;
+use crate::task::number::TaskNumber;
+use crate::task::quantity::Linear;
 
 /// A common denominator with more bits is none.
 const MOST_BITS: u64 = 1 << 20;

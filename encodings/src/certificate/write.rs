@@ -12,14 +12,15 @@ use rustc_hash::FxHashMap;
 
 use crate::bounds::{Bounds, Projection};
 use crate::certificate::scales::{Scales, scaled, whole};
+use crate::context::Context;
 use crate::exact::{ExactTask, RoundedBounds};
 use crate::limits::Limits;
 use crate::number::{Int, Rational};
-use crate::quantity::NumericId;
+use crate::plan::solution::{Solution, Status};
 use crate::search::{Estimate, closed_labels};
-use crate::solution::{Solution, Status};
+use crate::task::number::TaskNumber;
+use crate::task::quantity::NumericId;
 use crate::task::{self, Task};
-use crate::task_number::TaskNumber;
 
 /// A certificate of an optimal plan, or of there being none: two JSON documents.
 #[derive(Debug, Clone)]
@@ -34,34 +35,36 @@ pub struct Certificate {
 /// objectives or one that plans improve without bound, or if the search does not end within the limits.
 pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Certificate> {
     let cost = solution.ground.as_ref().map(|plan| plan.cost);
-    let bounds = || Some((Bounds::of_projections(task, limits).ok()?, Scales::one()));
-    certified(task, (solution, cost), limits, &Scales::one(), bounds, |bounds| bounds)
+    let context = Context::new(task, limits);
+    let bounds = || Some((Bounds::of_projections(context).ok()?, Scales::one()));
+    certified(context, (solution, cost), &Scales::one(), bounds, |bounds| bounds)
 }
 
 /// The same for a task in rationals. Nothing either if its numbers have no common denominator.
 pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> Option<Certificate> {
     let task = &task.0;
+    let context = Context::new(task, limits);
     let metric = solution.plan.as_ref().map(|plan| Rational::from_big(plan.cost.to_rational()));
     let cost =
         metric.map(|metric| if task.objective.maximize { -metric } else { metric } - &task.objective.offset);
     let scales = Scales::of(task, &Rational::one())?;
     let bounds = || {
-        let bounds = RoundedBounds::of_projections(task, limits).ok()?;
+        let bounds = RoundedBounds::of_projections(context).ok()?;
         let scales = Scales::of(task, &bounds.unit)?;
         Some((bounds, scales))
     };
-    certified(task, (solution, cost), limits, &scales, bounds, |rounded| &rounded.bounds)
+    certified(context, (solution, cost), &scales, bounds, |rounded| &rounded.bounds)
 }
 
 /// Makes a certificate with some bounds, and the factors that go with them; `plain` are those of them in integers.
 fn certified<N: TaskNumber, E: Estimate<N>>(
-    task: &Task<N>,
+    context: Context<'_, N>,
     (solution, cost): (&Solution, Option<N>),
-    limits: &Limits,
     scales: &Scales,
     bounds: impl FnOnce() -> Option<(E, Scales)>,
     plain: impl Fn(&E) -> &Bounds,
 ) -> Option<Certificate> {
+    let task = context.task;
     if !matches!(solution.status, Status::Optimal | Status::Unsolvable)
         || !task.others.is_empty()
         || task.operators.iter().any(|operator| operator.cost.minimum() < N::zero())
@@ -73,7 +76,7 @@ fn certified<N: TaskNumber, E: Estimate<N>>(
         return written(&model(task, scales), &argument);
     }
     let (bounds, scales) = bounds()?;
-    let labels = closed_labels(task, &bounds, limits, cost.as_ref())?;
+    let labels = closed_labels(context, &bounds, cost.as_ref())?;
     let label = |(values, numbers, cost): (Vec<u32>, Vec<N>, N)| {
         Label(values, integers(&numbers, &scales.numbers), scaled(&cost, &scales.costs))
     };
@@ -245,7 +248,7 @@ impl<N: TaskNumber> Writer<'_, N> {
     }
 
     /// A linear expression, multiplied by a factor besides.
-    fn linear(&mut self, linear: &crate::quantity::Linear<N>, factor: &Integer) -> Linear {
+    fn linear(&mut self, linear: &task::quantity::Linear<N>, factor: &Integer) -> Linear {
         let factors = linear.coefficients.iter();
         let scale = &self.scales.numbers * factor;
         Linear {
@@ -254,7 +257,7 @@ impl<N: TaskNumber> Writer<'_, N> {
         }
     }
 
-    fn quantity(&mut self, quantity: &crate::quantity::Quantity<N>, scale: &Integer) -> Quantity {
+    fn quantity(&mut self, quantity: &task::quantity::Quantity<N>, scale: &Integer) -> Quantity {
         let tables = quantity.tables.iter().map(|table| {
             let key = (table.values.clone(), scale.clone());
             (table.slots.to_vec(), self.tables.position(&key, |(values, scale)| integers(values, scale)))

@@ -7,14 +7,16 @@ use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::keys::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::Unit;
+use crate::context::Context;
 use crate::error::Error;
-use crate::ground::evaluate::{AtomId, Binding, World};
-use crate::ground::reach::Reached;
-use crate::ground::reads::Reads;
+use crate::ground::evaluate::reads::Reads;
+use crate::ground::vocabulary::atom::{AtomId, Binding};
+use crate::ground::vocabulary::reached::Reached;
+use crate::ground::vocabulary::world::World;
 use crate::lifted::{Change, Effect, ObjectId};
 use crate::limits::Limits;
 use crate::number::{Int, dense};
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 use crate::task::{Argument, Operator, OperatorId, Task};
 
 /// The halves of an instance that the ground task has.
@@ -63,10 +65,10 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(super) fn new(split: &'a Split, reached: &'a Reached, separation: Int) -> Self {
+    pub(super) fn new(split: &'a Split, reached: &'a Reached, separation: Int, limits: &'a Limits) -> Self {
         let held = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
         Self {
-            footprints: Footprints::new(World::new(&split.lifted, reached)),
+            footprints: Footprints::new(World::new(&split.lifted, reached, limits)),
             split,
             separation,
             written: Vec::new(),
@@ -78,7 +80,8 @@ impl<'a> Builder<'a> {
     }
 
     /// Pairs the halves of instances, and collects what operators write.
-    pub(super) fn collect(&mut self, task: &Task, limits: &Limits) -> Result<(), Vec<Error>> {
+    pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Vec<Error>> {
+        let Context { task, limits } = context;
         let mut errors = Vec::new();
         let mut refused = FxHashSet::default();
         for item in limits.watch(task.operators.iter().zip((0..).map(OperatorId))) {
@@ -137,11 +140,11 @@ impl<'a> Builder<'a> {
     /// The instances that can be executed, and which operators are their starts and ends.
     pub(super) fn instances(
         &self,
-        task: &Task,
+        context: Context<'_>,
         unit: Unit,
         roles: &mut [Role],
-        limits: &Limits,
     ) -> Result<Vec<Instance>, Error> {
+        let Context { task, limits } = context;
         let mut instances = Vec::new();
         for key in limits.watch(&self.order) {
             let key = key?;
@@ -180,7 +183,8 @@ impl<'a> Builder<'a> {
     }
 
     /// The operators whose start and end are one happening although they interfere.
-    pub(super) fn contradictory(&self, task: &Task, limits: &Limits) -> Result<FxHashSet<OperatorId>, Error> {
+    pub(super) fn contradictory(&self, context: Context<'_>) -> Result<FxHashSet<OperatorId>, Error> {
+        let Context { task, limits } = context;
         let index = self.footprints.index();
         let contradicts = |(id, [start, end]): &(OperatorId, [Footprint; 2])| {
             let operator = &task.operators[id.index()];
@@ -206,11 +210,11 @@ impl<'a> Builder<'a> {
     /// What each operator waits for and lets others wait for, and how many kinds of access there are.
     pub(super) fn happenings(
         mut self,
-        task: &Task,
+        context: Context<'_>,
         roles: &[Role],
         instances: &mut [Instance],
-        limits: &Limits,
     ) -> Result<(Vec<Happening>, usize), Error> {
+        let Context { task, limits } = context;
         let whole = (0..roles.len()).filter(|id| roles[*id] == Role::Whole);
         let whole = whole.flat_map(|id| designs(task, OperatorId(dense(id))));
         let used = instances.iter().flat_map(|instance| instance.designs.iter().copied());

@@ -8,8 +8,9 @@ use crate::concurrent::links::drop_links;
 use crate::concurrent::measure::Measure;
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::Unit;
+use crate::context::Context;
 use crate::error::{Error, File, Place};
-use crate::ground::reach::Reached;
+use crate::ground::vocabulary::reached::Reached;
 use crate::lifted::Rational;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
@@ -45,12 +46,15 @@ pub(super) fn compile(
     let unit = Unit::new(&task, split, separation).map_err(one)?;
     let separation = unit.of(separation).map_err(one)?;
     refuse_rewards(&task, split).map_err(one)?;
-    let mut builder = Builder::new(split, reached, separation);
-    builder.collect(&task, limits)?;
+    // Operators are watched as they are collected, each as a whole.
+    let unlimited = Limits::none();
+    let mut builder = Builder::new(split, reached, separation, &unlimited);
+    let context = Context::new(&task, limits);
+    builder.collect(context)?;
     let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(one)?;
     let mut roles = vec![Role::Never; task.operators.len()];
-    let mut instances = builder.instances(&task, unit, &mut roles, limits).map_err(one)?;
-    let contradictory = builder.contradictory(&task, limits).map_err(one)?;
+    let mut instances = builder.instances(context, unit, &mut roles).map_err(one)?;
+    let contradictory = builder.contradictory(context).map_err(one)?;
     for ((operator, role), id) in task.operators.iter().zip(&mut roles).zip((0..).map(OperatorId)) {
         match split.origins[operator.schema as usize].half {
             Half::Whole if !contradictory.contains(&id) => *role = Role::Whole,
@@ -58,7 +62,7 @@ pub(super) fn compile(
             _ => {}
         }
     }
-    let (happenings, keys) = builder.happenings(&task, &roles, &mut instances, limits).map_err(one)?;
+    let (happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();
     for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
         events.extend(if let Role::Timed(time) = role { Some((*time, id)) } else { None });

@@ -8,12 +8,16 @@
 use rustc_hash::FxHashMap;
 
 use crate::error::Error;
-use crate::ground::evaluate::{AtomId, Binding, Failure, World};
-use crate::ground::reads::{Reads, Slot, fits};
-use crate::ground::residual::Residual;
+use crate::ground::evaluate::condition::residual;
+use crate::ground::evaluate::join::each_binding;
+use crate::ground::evaluate::reads::{Reads, Slot, fits};
+use crate::ground::vocabulary::atom::{AtomId, Binding, arguments};
+use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::residual::Residual;
+use crate::ground::vocabulary::world::World;
 use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId, Schema};
 use crate::number::dense;
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 use pddl::ast::Assignment;
 
 /// How a number changes: two changes of one way commute, unless both assign.
@@ -77,12 +81,12 @@ impl<'a> Footprints<'a> {
         for effect in effects {
             let mut bindings = Vec::new();
             let mut own = binding.clone();
-            self.world.each_binding(&effect.bound, &[], &mut own, &mut |_, binding| {
+            each_binding(&mut self.world, &effect.bound, &[], &mut own, &mut |_, binding| {
                 bindings.push(binding.clone());
                 true
             })?;
             for mut binding in bindings {
-                match self.world.residual(&effect.condition, &mut binding) {
+                match residual(&mut self.world, &effect.condition, &mut binding) {
                     Ok(Residual::True) => self.write(&effect.change, &binding, &mut footprint)?,
                     Ok(Residual::False) | Err(Failure::Undefined) => {}
                     Ok(_) => {
@@ -114,7 +118,7 @@ impl<'a> Footprints<'a> {
     fn write(&mut self, change: &Change, binding: &Binding, into: &mut Footprint) -> Result<(), Error> {
         match change {
             Change::Add(predicate, terms) | Change::Delete(predicate, terms) => {
-                let atom = self.world.atom(*predicate, &World::arguments(terms, binding));
+                let atom = self.world.atom(*predicate, &arguments(terms, binding));
                 let target =
                     if matches!(change, Change::Add(..)) { &mut into.added } else { &mut into.deleted };
                 target.push(atom);
@@ -125,7 +129,7 @@ impl<'a> Footprints<'a> {
                     Assignment::Increase | Assignment::Decrease => Way::Add,
                     Assignment::ScaleUp | Assignment::ScaleDown => Way::Scale,
                 };
-                match self.world.numeric(*function, &World::arguments(terms, binding), *place) {
+                match self.world.numeric(*function, &arguments(terms, binding), *place) {
                     Ok(number) => into.numbers.push((number, way)),
                     Err(Failure::Undefined) => {}
                     Err(Failure::Error(error)) => return Err(error),

@@ -5,10 +5,10 @@ use rustc_hash::{FxBuildHasher, FxHashSet};
 
 use crate::concurrent::clocks::Key;
 use crate::concurrent::footprint::{Footprint, Way};
-use crate::ground::evaluate::AtomId;
+use crate::ground::vocabulary::atom::AtomId;
 use crate::lifted::ObjectId;
 use crate::number::{Int, dense};
-use crate::quantity::NumericId;
+use crate::task::quantity::NumericId;
 
 /// A kind of access.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

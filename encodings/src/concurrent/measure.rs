@@ -6,7 +6,7 @@ use crate::normalize::duration::time_factor;
 use crate::number::{Int, LIMIT, checked_lcm};
 use crate::plan::Exact;
 use crate::task::Objective;
-use crate::task_number::TaskNumber;
+use crate::task::number::TaskNumber;
 use pddl::ast::Direction;
 
 /// The metric in integers: `time` for each unit of time and `cost` for each unit of cost.

@@ -27,14 +27,15 @@ use num_rational::BigRational;
 use num_traits::Signed;
 
 use crate::bounds::Bounds;
+use crate::context::Context;
 use crate::error::{Error, File, Place};
 use crate::ground::{Config as GroundConfig, Generality, ground_lifted};
 use crate::lifted::{Expression, Metric, Rational};
 use crate::limits::Limits;
 use crate::normalize::normalize;
 use crate::number::Int;
+use crate::plan::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::plan::{Plan, Step};
-use crate::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::task::OperatorId;
 use pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
 
@@ -137,8 +138,9 @@ pub fn optimize_concurrent(
         return solution(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())));
     }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
-    let bounds =
-        (costs || !task.initial.numbers.is_empty()).then(|| Bounds::new(task, limits).ok()).flatten();
+    let bounds = (costs || !task.initial.numbers.is_empty())
+        .then(|| Bounds::new(Context::new(task, limits)).ok())
+        .flatten();
     let estimate = Estimate::new(concurrent);
     let mut hear = |sequence: &Sequence, lower: Int| {
         report(Improvement {

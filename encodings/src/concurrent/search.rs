@@ -22,7 +22,7 @@ use crate::concurrent::keys::Accesses;
 use crate::limits::Limits;
 use crate::number::{GROWTH_LIMIT, Int, dense, words};
 use crate::search::is_monotone;
-use crate::successors::OperatorIndex;
+use crate::search::successors::OperatorIndex;
 use crate::task::{OperatorId, State};
 
 /// A plan as the search finds it.

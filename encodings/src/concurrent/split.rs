@@ -7,8 +7,8 @@
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
 
-use crate::configuration::{SlotParameter, conjuncts, design_parameters, is_static};
 use crate::error::{File, Place};
+use crate::lifted::configuration::{SlotParameter, conjuncts, design_parameters, is_static};
 use crate::lifted::{
     Bound, Change, Effect, Event, Expression, Formula, Lifted, ObjectId, Predicate, PredicateId, Rational,
     Schema, Term,

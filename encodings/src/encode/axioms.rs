@@ -10,94 +10,93 @@
 
 use std::collections::BTreeMap;
 
-use crate::encode::Encoding;
 use crate::encode::arithmetic::Bits;
+use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::numeric::is_at_least_zero;
 use crate::number::dense;
 use crate::sat::Lit;
 use crate::task::{Layer, VariableId};
 
-impl Encoding<'_> {
-    /// What derived variables hold before a step; `numbers` are the numeric variables then. None if numbers do not fit.
-    pub(super) fn axioms(&mut self, step: usize, numbers: &[Bits]) -> Option<()> {
-        let task = self.task;
-        for (layer, index) in task.axioms.iter().zip(0..) {
-            let mut bodies: BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>> = BTreeMap::new();
-            let heads: Vec<VariableId> = layer.rules.iter().map(|rule| rule.head.variable).collect();
-            for (rule, position) in layer.rules.iter().zip(0..) {
-                let mut premises: Vec<_> =
-                    rule.body.facts.iter().map(|fact| self.fact(*fact, step)).collect();
-                for clause in &rule.body.clauses {
-                    premises.extend(clause.iter().map(|literal| self.literal(*literal, step)));
-                }
-                for comparison in &rule.body.comparisons {
-                    premises.push(self.is_at_least_zero(comparison, numbers, Family::Axiom)?);
-                }
-                let meaning = Meaning::Body { layer: index, rule: position, step: dense(step) };
-                let body = self.equivalent(meaning, &premises, Family::Axiom);
-                let own = rule.body.facts.iter().filter(|fact| fact.value == 0).map(|fact| fact.variable);
-                let own = own.filter(|variable| heads.contains(variable)).collect();
-                bodies.entry(rule.head.variable).or_default().push((body, own));
+/// What derived variables hold before a step; `numbers` are the numeric variables then. None if numbers do not fit.
+pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -> Option<()> {
+    let task = builder.task;
+    for (layer, index) in task.axioms.iter().zip(0..) {
+        let mut bodies: BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>> = BTreeMap::new();
+        let heads: Vec<VariableId> = layer.rules.iter().map(|rule| rule.head.variable).collect();
+        for (rule, position) in layer.rules.iter().zip(0..) {
+            let mut premises: Vec<_> =
+                rule.body.facts.iter().map(|fact| builder.variables.fact(*fact, step)).collect();
+            for clause in &rule.body.clauses {
+                premises.extend(clause.iter().map(|literal| builder.variables.literal(*literal, step)));
             }
-            for (variable, bodies) in &bodies {
-                let head = self.values[step][variable.index()][0];
-                for (body, _) in bodies {
-                    self.formula.add(Family::Axiom, [!*body, head]);
-                }
-                self.formula.add(Family::Axiom, bodies.iter().map(|(body, _)| *body).chain([!head]));
+            for comparison in &rule.body.comparisons {
+                premises.push(is_at_least_zero(&mut builder.formula, comparison, numbers, Family::Axiom)?);
             }
-            if layer.recursive {
-                self.levels(step, layer, &bodies);
-            }
+            let meaning = Meaning::Body { layer: index, rule: position, step: dense(step) };
+            let body = builder.formula.equivalent(meaning, &premises, Family::Axiom);
+            let own = rule.body.facts.iter().filter(|fact| fact.value == 0).map(|fact| fact.variable);
+            let own = own.filter(|variable| heads.contains(variable)).collect();
+            bodies.entry(rule.head.variable).or_default().push((body, own));
         }
-        Some(())
+        for (variable, bodies) in &bodies {
+            let head = builder.variables.values[step][variable.index()][0];
+            for (body, _) in bodies {
+                builder.formula.add(Family::Axiom, [!*body, head]);
+            }
+            builder.formula.add(Family::Axiom, bodies.iter().map(|(body, _)| *body).chain([!head]));
+        }
+        if layer.recursive {
+            levels(builder, step, layer, &bodies);
+        }
     }
+    Some(())
+}
 
-    /// Variables of a layer must not hold because of each other alone.
-    #[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
-    fn levels(
-        &mut self,
-        step: usize,
-        layer: &Layer,
-        bodies: &BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>>,
-    ) {
-        let rounds = dense(bodies.len());
-        // `later[v][k]`: v follows in more than k + 1 rounds; it follows in at most `rounds`.
-        let mut later: BTreeMap<VariableId, Vec<Lit>> = BTreeMap::new();
-        for variable in bodies.keys() {
-            let literals: Vec<_> = (1..rounds)
-                .map(|rounds| {
-                    self.formula.fresh(Meaning::Later { variable: variable.0, rounds, step: dense(step) })
-                })
-                .collect();
-            for pair in literals.windows(2) {
-                self.formula.add(Family::Axiom, [!pair[1], pair[0]]);
-            }
-            later.insert(*variable, literals);
+/// Variables of a layer must not hold because of each other alone.
+#[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
+fn levels(
+    builder: &mut Builder<'_>,
+    step: usize,
+    layer: &Layer,
+    bodies: &BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>>,
+) {
+    let rounds = dense(bodies.len());
+    // `later[v][k]`: v follows in more than k + 1 rounds; it follows in at most `rounds`.
+    let mut later: BTreeMap<VariableId, Vec<Lit>> = BTreeMap::new();
+    for variable in bodies.keys() {
+        let literals: Vec<_> = (1..rounds)
+            .map(|rounds| {
+                builder.formula.fresh(Meaning::Later { variable: variable.0, rounds, step: dense(step) })
+            })
+            .collect();
+        for pair in literals.windows(2) {
+            builder.formula.add(Family::Axiom, [!pair[1], pair[0]]);
         }
-        debug_assert!(layer.recursive);
-        for (variable, bodies) in bodies {
-            let head = self.values[step][variable.index()][0];
-            let mut supports = vec![!head];
-            for (body, own) in bodies {
-                if own.is_empty() {
-                    supports.push(*body);
-                    continue;
-                }
-                let support = self.formula.fresh(Meaning::Ladder);
-                self.formula.add(Family::Axiom, [!support, *body]);
-                for below in own {
-                    // In one round nothing of the layer can have come before.
-                    let first = later[variable].first().copied().unwrap_or(!Formula::truth());
-                    self.formula.add(Family::Axiom, [!support, first]);
-                    for k in 1..=later[variable].len() {
-                        let above = later[variable].get(k).copied().unwrap_or(!Formula::truth());
-                        self.formula.add(Family::Axiom, [!support, above, !later[below][k - 1]]);
-                    }
-                }
-                supports.push(support);
+        later.insert(*variable, literals);
+    }
+    debug_assert!(layer.recursive);
+    for (variable, bodies) in bodies {
+        let head = builder.variables.values[step][variable.index()][0];
+        let mut supports = vec![!head];
+        for (body, own) in bodies {
+            if own.is_empty() {
+                supports.push(*body);
+                continue;
             }
-            self.formula.add(Family::Axiom, supports);
+            let support = builder.formula.fresh(Meaning::Ladder);
+            builder.formula.add(Family::Axiom, [!support, *body]);
+            for below in own {
+                // In one round nothing of the layer can have come before.
+                let first = later[variable].first().copied().unwrap_or(!Formula::truth());
+                builder.formula.add(Family::Axiom, [!support, first]);
+                for k in 1..=later[variable].len() {
+                    let above = later[variable].get(k).copied().unwrap_or(!Formula::truth());
+                    builder.formula.add(Family::Axiom, [!support, above, !later[below][k - 1]]);
+                }
+            }
+            supports.push(support);
         }
+        builder.formula.add(Family::Axiom, supports);
     }
 }

@@ -3,85 +3,73 @@
 //! - `f@t ↔ o@t ∧ ⋀ l@t` for an effect of operator o whose condition is the literals l;
 //! - `f@t → e@t+1` for each fact that it sets, unless an effect after it sets the variable to something else.
 
-use crate::encode::Encoding;
+use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::number::dense;
 use crate::sat::Lit;
 use crate::task::{Fact, OperatorId};
 
 /// A conditional effect at a step.
-pub(super) struct Fires {
+pub(super) struct Fired<'a> {
     operator: OperatorId,
     position: usize,
+    /// Whether it takes place.
     pub(super) literal: Lit,
-    pub(super) effects: Vec<Fact>,
+    pub(super) effects: &'a [Fact],
 }
 
-impl Encoding<'_> {
-    /// The variables of the conditional effects at a step, and what they set.
+/// The conditional effects of the operators at a step.
+pub(super) struct Fires<'a>(Vec<Fired<'a>>);
+
+impl<'a> Fires<'a> {
+    /// Makes the variables of the conditional effects at a step, and clauses for what they set.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than the horizon, whose formula is in memory"
     )]
-    pub(super) fn conditional(&mut self, step: usize) {
+    pub(super) fn new(builder: &mut Builder<'a>, step: usize) -> Self {
+        let task = builder.task;
         let mut all = Vec::new();
-        for index in 0..self.operators[step].len() {
-            let (id, operator) = self.operators[step][index];
-            for (effect, position) in self.task.operators[id.index()].conditional.iter().zip(0..) {
-                let mut premises = vec![operator];
-                premises.extend(effect.condition.iter().map(|part| self.literal(*part, step)));
+        for (id, operator) in &builder.variables.operators[step] {
+            for (effect, position) in task.operators[id.index()].conditional.iter().zip(0..) {
+                let mut premises = vec![*operator];
+                premises.extend(effect.condition.iter().map(|part| builder.variables.literal(*part, step)));
                 let literal = if premises.contains(&!Formula::truth()) {
                     !Formula::truth()
                 } else {
                     let meaning = Meaning::Fires { operator: id.0, effect: position, step: dense(step) };
-                    self.equivalent(meaning, &premises, Family::Conditional)
+                    builder.formula.equivalent(meaning, &premises, Family::Conditional)
                 };
-                let effects = effect.effects.clone();
-                all.push(Fires { operator: id, position: position as usize, literal, effects });
+                let position = position as usize;
+                all.push(Fired { operator: *id, position, literal, effects: &effect.effects });
             }
         }
-        self.fires.push(all);
-        for index in 0..self.fires[step].len() {
-            let fires = &self.fires[step][index];
-            let (operator, position, literal) = (fires.operator, fires.position, fires.literal);
-            for effect in fires.effects.clone() {
-                let fact = self.fact(effect, step + 1);
-                let others: Vec<_> = self.prevailing(step, operator, position + 1, effect).collect();
-                self.formula.add(Family::Conditional, others.into_iter().chain([!literal, fact]));
+        let fires = Self(all);
+        for Fired { operator, position, literal, effects } in fires.iter() {
+            for effect in *effects {
+                let fact = builder.variables.fact(*effect, step + 1);
+                let others = fires.prevailing(*operator, position + 1, *effect);
+                builder.formula.add(Family::Conditional, others.chain([!*literal, fact]));
             }
         }
+        fires
     }
 
-    /// A literal that is true exactly if all premises are.
-    pub(super) fn equivalent(&mut self, meaning: Meaning, premises: &[Lit], family: Family) -> Lit {
-        let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Formula::truth()).collect();
-        match premises[..] {
-            [] => Formula::truth(),
-            [only] => only,
-            _ => {
-                let literal = self.formula.fresh(meaning);
-                for premise in &premises {
-                    self.formula.add(family, [!literal, *premise]);
-                }
-                self.formula.add(family, premises.iter().map(|premise| !*premise).chain([literal]));
-                literal
-            }
-        }
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Fired<'a>> {
+        self.0.iter()
     }
 
     /// The conditional effects of an operator, from a position on, that set the variable of a fact to something else.
     pub(super) fn prevailing(
         &self,
-        step: usize,
         operator: OperatorId,
         from: usize,
         fact: Fact,
     ) -> impl Iterator<Item = Lit> + '_ {
-        let all = &self.fires[step];
-        let start = all.partition_point(|fires| (fires.operator, fires.position) < (operator, from));
-        all[start..].iter().take_while(move |fires| fires.operator == operator).filter_map(move |fires| {
+        let start = self.0.partition_point(|fired| (fired.operator, fired.position) < (operator, from));
+        self.0[start..].iter().take_while(move |fired| fired.operator == operator).filter_map(move |fired| {
             let other = |effect: &Fact| effect.variable == fact.variable && effect.value != fact.value;
-            fires.effects.iter().any(other).then_some(fires.literal)
+            fired.effects.iter().any(other).then_some(fired.literal)
         })
     }
 }

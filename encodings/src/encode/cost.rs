@@ -10,11 +10,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::encode::arithmetic::{Arithmetic, Bits};
+use crate::bounds::Bounds;
+use crate::encode::arithmetic::{Arithmetic, Bits, width};
+use crate::encode::builder::Builder;
+use crate::encode::designs::combinations;
 use crate::encode::formula::{Family, Formula, Meaning};
-use crate::encode::selection::global;
-use crate::encode::{CostLimit, Counting, Encoding};
-use crate::limits::Limits;
+use crate::encode::interference::Interference;
 use crate::number::{Int, dense};
 use crate::sat::Lit;
 use crate::task::{Operator, OperatorId};
@@ -22,8 +23,32 @@ use crate::task::{Operator, OperatorId};
 /// More amounts than this at one step, and the sum is binary.
 const AMOUNT_LIMIT: usize = 1_000;
 
+/// The cost limit of an encoding: only plans with cost at most `limit` count, by the estimates of `bounds`.
+pub(crate) struct CostLimit<'a> {
+    pub(crate) limit: Int,
+    pub(crate) bounds: &'a Bounds,
+    pub(crate) counting: Counting,
+}
+
+/// What an encoding makes of the costs of steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Counting {
+    /// Their sum, which the limit holds down.
+    Sum,
+    /// Literals with weights, which the solver is to keep false. Only what exceeds the limit by itself is excluded.
+    Apart,
+}
+
 /// What one source adds to the cost of a step: the amount if the premise (a conjunction) holds.
 type Increments = Vec<(Vec<Lit>, Int)>;
+
+/// Where cost comes from at a step: the operator itself, or a table of designs.
+struct Source {
+    step: u32,
+    /// Its position among those of the step.
+    stage: u32,
+    increments: Increments,
+}
 
 /// The spent cost at the end, less its lower bound.
 pub(super) struct Cost {
@@ -40,6 +65,39 @@ enum Spent {
 }
 
 impl Cost {
+    /// Adds up the cost of all steps and limits it; operators stand alone at a step if there is no interference. None if a
+    /// limit of the run was reached meanwhile.
+    pub(super) fn new(
+        builder: &mut Builder<'_>,
+        cost: &CostLimit<'_>,
+        interference: Option<&Interference>,
+    ) -> Option<Self> {
+        let initial = &builder.task.initial;
+        let lower = cost.bounds.estimate(initial);
+        let Some(potential) = cost.bounds.projections.first() else {
+            return Some(Self { lower: 0, spent: Spent::Order(BTreeMap::new()) });
+        };
+        let (Some(_), Some(lower)) = (lower, potential.estimate(initial)) else {
+            builder.formula.add(Family::Bound, []);
+            return Some(Self { lower: Int::MAX, spent: Spent::Order(BTreeMap::new()) });
+        };
+        let gap = cost.limit.saturating_sub(lower);
+        if gap < 0 {
+            builder.formula.add(Family::Bound, []);
+            return Some(Self { lower, spent: Spent::Order(BTreeMap::new()) });
+        }
+        let mut sum = Sum { builder, cost, interference, gap };
+        let sources = sum.sources()?;
+        let spent = if cost.counting == Counting::Apart {
+            Spent::Apart(sources.iter().flat_map(|source| sum.apart(source)).collect())
+        } else if amounts_fit(&sources, gap) {
+            Spent::Order(sum.in_order(&sources)?)
+        } else {
+            Spent::Binary(sum.in_binary(&sources))
+        };
+        Some(Self { lower, spent })
+    }
+
     /// What every plan costs at least, and what it may pay beyond that.
     pub(super) fn payments(&self) -> (Int, &[(Lit, Int)]) {
         match &self.spent {
@@ -68,62 +126,52 @@ impl Cost {
     }
 }
 
-impl Encoding<'_> {
-    /// Adds up the cost of all steps and limits it. None if a limit of the run was reached meanwhile.
-    pub(super) fn accumulate(&mut self, cost: &CostLimit<'_>, limits: &Limits) -> Option<Cost> {
-        let lower = cost.bounds.estimate(&self.task.initial);
-        let Some(potential) = cost.bounds.projections.first() else {
-            return Some(Cost { lower: 0, spent: Spent::Order(BTreeMap::new()) });
-        };
-        let (Some(_), Some(lower)) = (lower, potential.estimate(&self.task.initial)) else {
-            self.formula.add(Family::Bound, []);
-            return Some(Cost { lower: Int::MAX, spent: Spent::Order(BTreeMap::new()) });
-        };
-        let gap = cost.limit.saturating_sub(lower);
-        if gap < 0 {
-            self.formula.add(Family::Bound, []);
-            return Some(Cost { lower, spent: Spent::Order(BTreeMap::new()) });
+/// The sum of costs under construction.
+struct Sum<'s, 'a> {
+    builder: &'s mut Builder<'a>,
+    cost: &'s CostLimit<'s>,
+    interference: Option<&'s Interference>,
+    /// How much more than the lower bound may be spent.
+    gap: Int,
+}
+
+impl Sum<'_, '_> {
+    /// All sources, in the order of steps. None if a limit of the run was reached meanwhile.
+    fn sources(&mut self) -> Option<Vec<Source>> {
+        let mut sources = Vec::new();
+        for step in 0..self.builder.variables.horizon() {
+            if self.builder.limits.reached() {
+                return None;
+            }
+            let own = self.increments(step).into_iter().zip(0..);
+            sources.extend(own.map(|(increments, stage)| Source { step: dense(step), stage, increments }));
         }
-        let running = |step: usize| (!limits.reached()).then_some(step);
-        let steps: Option<Vec<Vec<Increments>>> =
-            (0..self.horizon).map(|step| Some(self.increments(running(step)?, cost))).collect();
-        let steps = steps?;
-        let spent = if cost.counting == Counting::Apart {
-            let sources = steps.iter().enumerate().flat_map(|(step, sources)| {
-                sources.iter().enumerate().map(move |(stage, source)| (source, dense(step), dense(stage)))
-            });
-            Spent::Apart(
-                sources.flat_map(|(source, step, stage)| self.apart(source, gap, step, stage)).collect(),
-            )
-        } else if amounts_fit(&steps, gap) {
-            Spent::Order(self.add_in_order(&steps, gap, limits)?)
-        } else {
-            Spent::Binary(self.add_in_binary(&steps, gap))
-        };
-        Some(Cost { lower, spent })
+        Some(sources)
     }
 
     /// What a step can add, by source: the operator itself, and each table of designs.
-    fn increments(&mut self, step: usize, cost: &CostLimit<'_>) -> Vec<Increments> {
+    fn increments(&mut self, step: usize) -> Vec<Increments> {
         // Of one source at most one amount counts, so operators that can stand together are sources of their own.
         let mut own: BTreeMap<(Option<usize>, Option<OperatorId>), Increments> = BTreeMap::new();
-        for index in 0..self.operators[step].len() {
-            let (id, literal) = self.operators[step][index];
-            let source = match &self.interference {
+        for index in 0..self.builder.variables.operators[step].len() {
+            let (id, literal) = self.builder.variables.operators[step][index];
+            let source = match self.interference {
                 None => (None, None),
                 Some(interference) => {
                     let class = interference.class(id);
                     (class, class.is_none().then_some(id))
                 }
             };
-            self.reduced(step, id, literal, cost, own.entry(source).or_default());
+            self.reduced(step, id, literal, own.entry(source).or_default());
         }
         let mut all: Vec<Increments> = own.into_values().collect();
         let mut by_slots: BTreeMap<Vec<usize>, Increments> = BTreeMap::new();
-        for ((entries, values), members) in self.partition(step, residual_tables) {
-            let group = self.group(step, &members, Family::Cost);
+        for ((entries, values), members) in self.builder.partition(step, residual_tables) {
+            let group = self.builder.group(step, &members, Family::Cost);
             for (combination, value) in entries.iter().zip(values) {
-                let designs = combination.iter().map(|(slot, design)| self.designs[step][*slot][*design]);
+                let designs = combination
+                    .iter()
+                    .map(|(slot, design)| self.builder.variables.designs[step][*slot][*design]);
                 let premise: Vec<_> = designs.chain([group]).collect();
                 let slots = combination.iter().map(|(slot, _)| *slot).collect();
                 by_slots.entry(slots).or_default().push((premise, value));
@@ -138,16 +186,9 @@ impl Encoding<'_> {
         clippy::arithmetic_side_effects,
         reason = "costs to go and the cost of an operator are at most GROWTH_LIMIT; steps are in memory"
     )]
-    fn reduced(
-        &mut self,
-        step: usize,
-        id: OperatorId,
-        literal: Lit,
-        cost: &CostLimit<'_>,
-        out: &mut Increments,
-    ) {
-        let potential = &cost.bounds.projections[0];
-        let operator = &self.task.operators[id.index()];
+    fn reduced(&mut self, step: usize, id: OperatorId, literal: Lit, out: &mut Increments) {
+        let potential = &self.cost.bounds.projections[0];
+        let operator = &self.builder.task.operators[id.index()];
         let least = operator.cost.minimum();
         let transitions = potential.transitions(id);
         if transitions.is_empty() {
@@ -163,18 +204,23 @@ impl Encoding<'_> {
                 .iter()
                 .zip(values)
                 .filter(|(variable, _)| !known(**variable))
-                .map(|(variable, value)| self.values[step][variable.index()][value as usize])
+                .map(|(variable, value)| {
+                    self.builder.variables.values[step][variable.index()][value as usize]
+                })
                 .collect();
             if !operator.conditional.is_empty() {
                 // Where the operator leads to is open: the state after it tells.
                 let after = potential.pattern.iter().zip(potential.values(transition.target));
-                here.extend(
-                    after.map(|(variable, value)| self.values[step + 1][variable.index()][value as usize]),
-                );
+                here.extend(after.map(|(variable, value)| {
+                    self.builder.variables.values[step + 1][variable.index()][value as usize]
+                }));
             }
-            match (potential.to_go(transition.source), potential.to_go(transition.target)) {
-                (Some(before), Some(after)) => alive.push((here, least + after - before)),
-                _ => self.formula.add(Family::Cost, here.iter().map(|state| !*state).chain([!literal])),
+            let to_go = (potential.to_go(transition.source), potential.to_go(transition.target));
+            if let (Some(before), Some(after)) = to_go {
+                alive.push((here, least + after - before));
+            } else {
+                let elsewhere = here.iter().map(|state| !*state);
+                self.builder.formula.add(Family::Cost, elsewhere.chain([!literal]));
             }
         }
         match alive.split_first() {
@@ -188,20 +234,13 @@ impl Encoding<'_> {
         }
     }
 
-    fn add_in_order(
-        &mut self,
-        steps: &[Vec<Increments>],
-        gap: Int,
-        limits: &Limits,
-    ) -> Option<BTreeMap<Int, Lit>> {
+    fn in_order(&mut self, sources: &[Source]) -> Option<BTreeMap<Int, Lit>> {
         let mut spent: BTreeMap<Int, Lit> = BTreeMap::new();
-        for (step, sources) in steps.iter().enumerate() {
-            for (stage, source) in sources.iter().enumerate() {
-                if limits.reached() {
-                    return None;
-                }
-                spent = self.add_amounts(source, &spent, gap, dense(step), dense(stage));
+        for source in sources {
+            if self.builder.limits.reached() {
+                return None;
             }
+            spent = self.add_amounts(source, &spent);
         }
         Some(spent)
     }
@@ -211,64 +250,63 @@ impl Encoding<'_> {
         clippy::arithmetic_side_effects,
         reason = "amounts are at most the gap, which is at most GROWTH_LIMIT; steps are in memory"
     )]
-    fn add_amounts(
-        &mut self,
-        source: &Increments,
-        spent: &BTreeMap<Int, Lit>,
-        gap: Int,
-        step: u32,
-        stage: u32,
-    ) -> BTreeMap<Int, Lit> {
-        let increments = self.amounts(source, gap, step, stage);
+    fn add_amounts(&mut self, source: &Source, spent: &BTreeMap<Int, Lit>) -> BTreeMap<Int, Lit> {
+        let increments = self.amounts(source);
         if increments.is_empty() {
             return spent.clone();
         }
         let amounts: BTreeSet<Int> =
-            next_amounts(&spent.keys().copied().collect(), increments.keys().copied(), gap);
+            next_amounts(&spent.keys().copied().collect(), increments.keys().copied(), self.gap);
         let mut after: BTreeMap<Int, Lit> = BTreeMap::new();
         for amount in amounts {
-            let literal = self.formula.fresh(Meaning::CostAtLeast { amount, step: step + 1, stage });
+            let literal = self.builder.formula.fresh(Meaning::CostAtLeast {
+                amount,
+                step: source.step + 1,
+                stage: source.stage,
+            });
             if let Some((_, smaller)) = after.last_key_value() {
-                self.formula.add(Family::Cost, [!literal, *smaller]);
+                self.builder.formula.add(Family::Cost, [!literal, *smaller]);
             }
             after.insert(amount, literal);
         }
         for (amount, literal) in spent.iter().chain(&increments) {
-            self.formula.add(Family::Cost, [!*literal, after[amount]]);
+            self.builder.formula.add(Family::Cost, [!*literal, after[amount]]);
         }
         for (before, spent) in spent {
             for (amount, increment) in &increments {
                 let sum = after.get(&(before + amount)).copied().unwrap_or(!Formula::truth());
-                self.formula.add(Family::Cost, [!*spent, !*increment, sum]);
+                self.builder.formula.add(Family::Cost, [!*spent, !*increment, sum]);
             }
         }
         after
     }
 
     /// A literal for each positive amount that a source can add, which its premise implies; what is above the gap is a conflict.
-    fn amounts(&mut self, source: &Increments, gap: Int, step: u32, stage: u32) -> BTreeMap<Int, Lit> {
+    fn amounts(&mut self, source: &Source) -> BTreeMap<Int, Lit> {
         let mut increments: BTreeMap<Int, Lit> = BTreeMap::new();
-        for (premise, amount) in source.iter().filter(|(_, amount)| *amount > 0) {
-            let conclusion = if *amount > gap {
+        for (premise, amount) in source.increments.iter().filter(|(_, amount)| *amount > 0) {
+            let conclusion = if *amount > self.gap {
                 !Formula::truth()
             } else {
-                let formula = &mut self.formula;
-                let meaning = Meaning::Increment { amount: *amount, step, stage };
+                let formula = &mut self.builder.formula;
+                let meaning = Meaning::Increment { amount: *amount, step: source.step, stage: source.stage };
                 *increments.entry(*amount).or_insert_with(|| formula.fresh(meaning))
             };
-            self.formula.add(Family::Cost, premise.iter().map(|literal| !*literal).chain([conclusion]));
+            self.builder
+                .formula
+                .add(Family::Cost, premise.iter().map(|literal| !*literal).chain([conclusion]));
         }
         increments
     }
 
     /// The amounts of a source, each implying the next smaller one, and what it has more than that.
     #[expect(clippy::arithmetic_side_effects, reason = "amounts come in ascending order")]
-    fn apart(&mut self, source: &Increments, gap: Int, step: u32, stage: u32) -> Vec<(Lit, Int)> {
+    fn apart(&mut self, source: &Source) -> Vec<(Lit, Int)> {
         let mut weighted: Vec<(Lit, Int)> = Vec::new();
         let mut before = 0;
-        for (amount, literal) in self.amounts(source, gap, step, stage) {
+        for (amount, literal) in self.amounts(source) {
             if let Some((smaller, _)) = weighted.last() {
-                self.formula.add(Family::Cost, [!literal, *smaller]);
+                self.builder.formula.add(Family::Cost, [!literal, *smaller]);
             }
             weighted.push((literal, amount - before));
             before = amount;
@@ -277,22 +315,21 @@ impl Encoding<'_> {
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
-    fn add_in_binary(&mut self, steps: &[Vec<Increments>], gap: Int) -> Bits {
-        let width = crate::encode::arithmetic::width(0, gap) + 2;
+    fn in_binary(&mut self, sources: &[Source]) -> Bits {
+        let gap = self.gap;
+        let width = width(0, gap) + 2;
         let mut spent = Arithmetic::constant(0, 1);
-        for (step, sources) in steps.iter().enumerate() {
-            for source in sources {
-                let possible: Vec<_> = source.iter().filter(|(_, amount)| *amount <= gap).cloned().collect();
-                for (premise, _) in source.iter().filter(|(_, amount)| *amount > gap) {
-                    self.formula.add(Family::Cost, premise.iter().map(|literal| !*literal));
-                }
-                let active = self.busy[step];
-                let mut arithmetic = Arithmetic { formula: &mut self.formula, family: Family::Cost };
-                let more = arithmetic.choose(&possible, active);
-                // Neither summand is above the gap, so their sum fits; then the limit cuts it back.
-                spent = arithmetic.add(&spent, &more, width);
-                arithmetic.at_most(&spent, gap);
+        for Source { step, increments, .. } in sources {
+            let possible: Vec<_> = increments.iter().filter(|(_, amount)| *amount <= gap).cloned().collect();
+            for (premise, _) in increments.iter().filter(|(_, amount)| *amount > gap) {
+                self.builder.formula.add(Family::Cost, premise.iter().map(|literal| !*literal));
             }
+            let active = self.builder.variables.busy[*step as usize];
+            let mut arithmetic = Arithmetic { formula: &mut self.builder.formula, family: Family::Cost };
+            let more = arithmetic.choose(&possible, active);
+            // Neither summand is above the gap, so their sum fits; then the limit cuts it back.
+            spent = arithmetic.add(&spent, &more, width);
+            arithmetic.at_most(&spent, gap);
         }
         spent
     }
@@ -316,25 +353,6 @@ fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<In
         .collect()
 }
 
-/// All combinations of designs of some slots in the order of `Table::values`, in the task's numbering.
-pub(super) fn combinations(operator: &Operator, slots: &[u32]) -> Vec<Vec<(usize, usize)>> {
-    let mut all = vec![Vec::new()];
-    for slot in slots {
-        let designs = 0..dense(operator.slots[*slot as usize].designs.len());
-        all = all
-            .iter()
-            .flat_map(|known: &Vec<(usize, usize)>| {
-                designs.clone().map(move |design| {
-                    let mut longer = known.clone();
-                    longer.push(global(&operator.slots, *slot, design));
-                    longer
-                })
-            })
-            .collect();
-    }
-    all
-}
-
 /// The amounts that can be spent after one more source.
 #[expect(
     clippy::arithmetic_side_effects,
@@ -350,11 +368,15 @@ fn next_amounts(spent: &BTreeSet<Int>, increments: impl Iterator<Item = Int>, ga
 }
 
 /// Whether so few amounts can occur that the order encoding is worth its clauses.
-fn amounts_fit(steps: &[Vec<Increments>], gap: Int) -> bool {
+fn amounts_fit(sources: &[Source], gap: Int) -> bool {
     let mut spent = BTreeSet::new();
-    for source in steps.iter().flatten() {
-        let increments: BTreeSet<Int> =
-            source.iter().map(|(_, amount)| *amount).filter(|amount| (1..=gap).contains(amount)).collect();
+    for source in sources {
+        let increments: BTreeSet<Int> = source
+            .increments
+            .iter()
+            .map(|(_, amount)| *amount)
+            .filter(|amount| (1..=gap).contains(amount))
+            .collect();
         if spent.len().saturating_mul(increments.len()) > AMOUNT_LIMIT * 50 {
             return false;
         }

@@ -7,10 +7,11 @@ use std::hash::{BuildHasher, Hash};
 
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 
-use crate::limits::{Interrupted, Limits};
+use crate::context::Context;
+use crate::limits::Interrupted;
 use crate::number::Int;
-use crate::quantity::{Quantity, SlotSet};
-use crate::task::{Operator, SlotId, Task};
+use crate::task::quantity::{Quantity, SlotSet};
+use crate::task::{Operator, SlotId};
 
 /// Something of a task that may tell designs of a slot apart: it speaks of those that one operator admits, in their order.
 struct Witness<'t> {
@@ -62,8 +63,9 @@ fn hash<T: Hash>(value: &T) -> u64 {
 }
 
 /// Designs of a slot that are equal to an earlier one, ascending.
-pub(super) fn equal_designs(task: &Task, slot: SlotId, limits: &Limits) -> Result<Vec<u32>, Interrupted> {
-    let witnesses = witnesses(task, slot, limits)?;
+pub(super) fn equal_designs(context: Context<'_>, slot: SlotId) -> Result<Vec<u32>, Interrupted> {
+    let Context { task, limits } = context;
+    let witnesses = witnesses(context, slot)?;
     let mut signatures = vec![0_u64; task.slots[slot.index()].designs.len()];
     for (witness, number) in witnesses.iter().zip(0_u64..) {
         for item in limits.watch(witness.designs.iter().enumerate()) {
@@ -84,7 +86,8 @@ pub(super) fn equal_designs(task: &Task, slot: SlotId, limits: &Limits) -> Resul
 
 /// All that speaks of the designs of a slot; what operators share is there once.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
-fn witnesses<'t>(task: &'t Task, slot: SlotId, limits: &Limits) -> Result<Vec<Witness<'t>>, Interrupted> {
+fn witnesses(context: Context<'_>, slot: SlotId) -> Result<Vec<Witness<'_>>, Interrupted> {
+    let Context { task, limits } = context;
     let mut seen: FxHashSet<(*const u32, *const u8, SlotSet)> = FxHashSet::default();
     let mut found = Vec::new();
     for operator in limits.watch(&task.operators) {

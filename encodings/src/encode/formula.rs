@@ -186,6 +186,23 @@ impl Formula {
         }
     }
 
+    /// A literal that is true exactly if all premises are.
+    pub(crate) fn equivalent(&mut self, meaning: Meaning, premises: &[Lit], family: Family) -> Lit {
+        let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Self::truth()).collect();
+        match premises[..] {
+            [] => Self::truth(),
+            [only] => only,
+            _ => {
+                let literal = self.fresh(meaning);
+                for premise in &premises {
+                    self.add(family, [!literal, *premise]);
+                }
+                self.add(family, premises.iter().map(|premise| !*premise).chain([literal]));
+                literal
+            }
+        }
+    }
+
     /// At most one of the literals: pairwise for few, else Sinz's sequential counter [1].
     ///
     /// [1] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.

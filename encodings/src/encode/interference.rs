@@ -19,7 +19,8 @@
 use std::collections::BTreeMap;
 
 use crate::bounds::Projection;
-use crate::encode::Encoding;
+use crate::context::Context;
+use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::limits::{Interrupted, Limits};
 use crate::sat::Lit;
@@ -67,11 +68,11 @@ struct Uses {
 impl Interference {
     /// The interferences of a task; none if operators stand alone. Costs are reduced by the potential.
     pub(super) fn new(
-        task: &Task,
+        context: Context<'_>,
         semantics: Semantics,
         potential: Option<&Projection>,
-        limits: &Limits,
     ) -> Result<Option<Self>, Interrupted> {
+        let Context { task, limits } = context;
         if semantics == Semantics::Sequential {
             return Ok(None);
         }
@@ -133,6 +134,35 @@ impl Interference {
     /// Operators of the same class never stand at the same step; those without one may stand with any.
     pub(super) fn class(&self, operator: OperatorId) -> Option<usize> {
         self.classes[operator.index()]
+    }
+
+    /// The operators at a step do not interfere.
+    pub(super) fn add(&self, builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
+        for group in &self.exclusions {
+            let literals: Vec<_> =
+                group.iter().filter_map(|id| builder.variables.operator(step, *id)).collect();
+            builder.formula.at_most_one(Family::Interference, &literals);
+        }
+        for conflict in builder.limits.watch(&self.conflicts) {
+            let conflict = conflict?;
+            let mut users: BTreeMap<OperatorId, (bool, bool)> = BTreeMap::new();
+            for id in &conflict.erase {
+                users.entry(*id).or_default().0 = true;
+            }
+            for id in &conflict.need {
+                users.entry(*id).or_default().1 = true;
+            }
+            let present = |(id, uses): (&OperatorId, &(bool, bool))| {
+                Some((builder.variables.operator(step, *id)?, *uses))
+            };
+            let mut chain: Vec<_> = users.iter().filter_map(present).collect();
+            ladder(&mut builder.formula, &chain);
+            if self.both_orders {
+                chain.reverse();
+                ladder(&mut builder.formula, &chain);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -225,58 +255,22 @@ fn sorted(numbers: &mut Vec<usize>) -> &[usize] {
     numbers
 }
 
-impl Encoding<'_> {
-    /// The operators at a step do not interfere.
-    pub(super) fn interfere(&mut self, step: usize, limits: &Limits) -> Result<(), Interrupted> {
-        let Some(interference) = self.interference.take() else { return Ok(()) };
-        for group in &interference.exclusions {
-            let literals: Vec<_> = group.iter().filter_map(|id| self.operator(step, *id)).collect();
-            self.formula.at_most_one(Family::Interference, &literals);
+/// After an operator that erases there is none that needs.
+fn ladder(formula: &mut Formula, chain: &[(Lit, (bool, bool))]) {
+    let last = chain.iter().rposition(|(_, (_, needs))| *needs);
+    let mut erased = !Formula::truth();
+    for (index, (literal, (erases, needs))) in chain.iter().enumerate() {
+        if *needs {
+            formula.add(Family::Interference, [!erased, !*literal]);
         }
-        for conflict in limits.watch(&interference.conflicts) {
-            let conflict = conflict?;
-            let mut users: BTreeMap<OperatorId, (bool, bool)> = BTreeMap::new();
-            for id in &conflict.erase {
-                users.entry(*id).or_default().0 = true;
-            }
-            for id in &conflict.need {
-                users.entry(*id).or_default().1 = true;
-            }
-            let mut chain: Vec<_> =
-                users.iter().filter_map(|(id, uses)| Some((self.operator(step, *id)?, *uses))).collect();
-            self.ladder(&chain);
-            if interference.both_orders {
-                chain.reverse();
-                self.ladder(&chain);
-            }
-        }
-        self.interference = Some(interference);
-        Ok(())
-    }
-
-    /// The variable of an operator at a step, if it can stand there.
-    pub(super) fn operator(&self, step: usize, id: OperatorId) -> Option<Lit> {
-        let all = &self.operators[step];
-        all.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| all[index].1)
-    }
-
-    /// After an operator that erases there is none that needs.
-    fn ladder(&mut self, chain: &[(Lit, (bool, bool))]) {
-        let last = chain.iter().rposition(|(_, (_, needs))| *needs);
-        let mut erased = !Formula::truth();
-        for (index, (literal, (erases, needs))) in chain.iter().enumerate() {
-            if *needs {
-                self.formula.add(Family::Interference, [!erased, !*literal]);
-            }
-            if *erases && last.is_some_and(|last| index < last) {
-                if erased == !Formula::truth() {
-                    erased = *literal;
-                } else {
-                    let longer = self.formula.fresh(Meaning::Ladder);
-                    self.formula.add(Family::Interference, [!erased, longer]);
-                    self.formula.add(Family::Interference, [!*literal, longer]);
-                    erased = longer;
-                }
+        if *erases && last.is_some_and(|last| index < last) {
+            if erased == !Formula::truth() {
+                erased = *literal;
+            } else {
+                let longer = formula.fresh(Meaning::Ladder);
+                formula.add(Family::Interference, [!erased, longer]);
+                formula.add(Family::Interference, [!*literal, longer]);
+                erased = longer;
             }
         }
     }

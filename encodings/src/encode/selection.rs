@@ -4,64 +4,58 @@
 //! slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so that an idle slot stays empty. Combinations that only together do not
 //! suit are forbidden one by one: `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
 
-use crate::encode::Encoding;
+use crate::encode::builder::Builder;
+use crate::encode::designs::global;
 use crate::encode::formula::{Family, Formula};
-use crate::limits::{Interrupted, Limits};
+use crate::limits::Interrupted;
 use crate::sat::Lit;
-use crate::task::SlotUse;
 
-impl Encoding<'_> {
-    /// Each function in use has exactly one design, and one that suits.
-    pub(super) fn selection(&mut self, step: usize, limits: &Limits) -> Result<(), Interrupted> {
-        for slot in 0..self.task.slots.len() {
-            let uses = self.partition(step, |operator| {
-                let own = operator.slots.iter().filter(|usage| usage.slot.index() == slot);
-                own.map(|usage| &usage.designs[..]).collect()
-            });
-            let literals = self.designs[step][slot].clone();
-            let mut users: Vec<Vec<Lit>> = vec![Vec::new(); literals.len()];
-            for item in limits.watch(uses) {
-                let (designs, members) = item?;
-                let group = self.group(step, &members, Family::Selection);
-                let suitable = designs.iter().map(|design| literals[*design as usize]);
-                self.formula.add(Family::Selection, suitable.chain([!group]));
-                for design in designs {
-                    users[*design as usize].push(group);
-                }
-            }
-            for (literal, users) in literals.iter().zip(users) {
-                self.formula.add(Family::Selection, users.into_iter().chain([!*literal]));
-            }
-            let falsum = !Formula::truth();
-            let possible: Vec<_> = literals.into_iter().filter(|literal| *literal != falsum).collect();
-            self.formula.at_most_one(Family::Selection, &possible);
-        }
-        self.forbidden(step, limits)
-    }
-
-    fn forbidden(&mut self, step: usize, limits: &Limits) -> Result<(), Interrupted> {
-        let parts = self.partition(step, |operator| {
-            let rules = operator.forbidden.iter().flat_map(|rule| {
-                rule.combinations.iter().map(|combination| {
-                    let pairs = rule.slots.iter().zip(combination);
-                    pairs.map(|(slot, design)| global(&operator.slots, *slot, *design)).collect::<Vec<_>>()
-                })
-            });
-            rules.collect()
+/// Each function in use has exactly one design, and one that suits.
+pub(super) fn selection(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
+    for slot in 0..builder.task.slots.len() {
+        let uses = builder.partition(step, |operator| {
+            let own = operator.slots.iter().filter(|usage| usage.slot.index() == slot);
+            own.map(|usage| &usage.designs[..]).collect()
         });
-        for item in limits.watch(parts) {
-            let (combination, members) = item?;
-            let group = self.group(step, &members, Family::Selection);
-            let chosen: Vec<_> =
-                combination.iter().map(|(slot, design)| !self.designs[step][*slot][*design]).collect();
-            self.formula.add(Family::Selection, chosen.into_iter().chain([!group]));
+        let literals = builder.variables.designs[step][slot].clone();
+        let mut users: Vec<Vec<Lit>> = vec![Vec::new(); literals.len()];
+        for item in builder.limits.watch(uses) {
+            let (designs, members) = item?;
+            let group = builder.group(step, &members, Family::Selection);
+            let suitable = designs.iter().map(|design| literals[*design as usize]);
+            builder.formula.add(Family::Selection, suitable.chain([!group]));
+            for design in designs {
+                users[*design as usize].push(group);
+            }
         }
-        Ok(())
+        for (literal, users) in literals.iter().zip(users) {
+            builder.formula.add(Family::Selection, users.into_iter().chain([!*literal]));
+        }
+        let falsum = !Formula::truth();
+        let possible: Vec<_> = literals.into_iter().filter(|literal| *literal != falsum).collect();
+        builder.formula.at_most_one(Family::Selection, &possible);
     }
+    forbidden(builder, step)
 }
 
-/// Slot and design in the task's numbering, from positions in an operator.
-pub(super) fn global(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {
-    let usage = &slots[slot as usize];
-    (usage.slot.index(), usage.designs[design as usize] as usize)
+fn forbidden(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
+    let parts = builder.partition(step, |operator| {
+        let rules = operator.forbidden.iter().flat_map(|rule| {
+            rule.combinations.iter().map(|combination| {
+                let pairs = rule.slots.iter().zip(combination);
+                pairs.map(|(slot, design)| global(&operator.slots, *slot, *design)).collect::<Vec<_>>()
+            })
+        });
+        rules.collect()
+    });
+    for item in builder.limits.watch(parts) {
+        let (combination, members) = item?;
+        let group = builder.group(step, &members, Family::Selection);
+        let chosen: Vec<_> = combination
+            .iter()
+            .map(|(slot, design)| !builder.variables.designs[step][*slot][*design])
+            .collect();
+        builder.formula.add(Family::Selection, chosen.into_iter().chain([!group]));
+    }
+    Ok(())
 }

@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
-use crate::encode::Encoding;
+use crate::context::Context;
+use crate::encode::builder::Builder;
 use crate::encode::equal_designs::equal_designs;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::lifted::ObjectId;
@@ -37,12 +38,41 @@ pub(crate) struct Symmetry {
 }
 
 impl Symmetry {
-    pub(crate) fn new(task: &Task, limits: &Limits) -> Result<Self, Interrupted> {
+    pub(crate) fn new(context: Context<'_>) -> Result<Self, Interrupted> {
+        let task = context.task;
         let mut designs = Vec::new();
         for slot in SlotId::all(task.slots.len()) {
-            designs.extend(equal_designs(task, slot, limits)?.into_iter().map(|design| (slot, design)));
+            designs.extend(equal_designs(context, slot)?.into_iter().map(|design| (slot, design)));
         }
-        Ok(Self { designs, objects: equal_objects(task, limits)? })
+        Ok(Self { designs, objects: equal_objects(context)? })
+    }
+
+    /// Equal designs and objects are used in their order.
+    pub(super) fn add(&self, builder: &mut Builder<'_>) -> Result<(), Interrupted> {
+        let horizon = builder.variables.horizon();
+        for step in 0..horizon {
+            for design in builder.limits.watch(&self.designs) {
+                let (slot, design) = design?;
+                let literal = builder.variables.designs[step][slot.index()][*design as usize];
+                builder.formula.add(Family::Symmetry, [!literal]);
+            }
+        }
+        for (first, only_second) in &self.objects {
+            let mut seen: Lit = !Formula::truth();
+            for step in builder.limits.watch(0..horizon) {
+                let step = step?;
+                let used = builder.group(step, first, Family::Symmetry);
+                let longer = builder.formula.fresh(Meaning::Ladder);
+                builder.formula.add(Family::Symmetry, [!longer, seen, used]);
+                seen = longer;
+                for id in only_second {
+                    if let Some(literal) = builder.variables.operator(step, *id) {
+                        builder.formula.add(Family::Symmetry, [!literal, seen]);
+                    }
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -51,7 +81,8 @@ type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 
 /// Pairs of neighbours in classes of equal objects.
 #[expect(clippy::arithmetic_side_effects, reason = "work is looked at each time")]
-fn equal_objects(task: &Task, limits: &Limits) -> Result<Pairs, Interrupted> {
+fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
+    let Context { task, limits } = context;
     if !task.axioms.is_empty() {
         return Ok(Vec::new());
     }
@@ -73,7 +104,7 @@ fn equal_objects(task: &Task, limits: &Limits) -> Result<Pairs, Interrupted> {
     if alike.is_empty() || task.operators.len() > WORK_LIMIT {
         return Ok(Vec::new());
     }
-    let parts = Parts::new(task, limits)?;
+    let parts = Parts::new(context)?;
     let mut work = 0;
     let mut pairs = Vec::new();
     for mut rest in alike.into_values() {
@@ -125,7 +156,8 @@ struct Parts<'t> {
 }
 
 impl<'t> Parts<'t> {
-    fn new(task: &'t Task, limits: &Limits) -> Result<Self, Interrupted> {
+    fn new(context: Context<'t>) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
         let mut all_words: FxHashMap<&str, usize> = FxHashMap::default();
         let mut facts = FxHashMap::default();
         let mut words = Vec::with_capacity(task.variables.len());
@@ -309,38 +341,5 @@ impl Exchange {
             })
             .collect();
         image
-    }
-}
-
-impl Encoding<'_> {
-    /// Equal designs and objects are used in their order.
-    pub(super) fn break_symmetries(
-        &mut self,
-        symmetry: &Symmetry,
-        limits: &Limits,
-    ) -> Result<(), Interrupted> {
-        for step in 0..self.horizon {
-            for design in limits.watch(&symmetry.designs) {
-                let (slot, design) = design?;
-                let literal = self.designs[step][slot.index()][*design as usize];
-                self.formula.add(Family::Symmetry, [!literal]);
-            }
-        }
-        for (first, only_second) in &symmetry.objects {
-            let mut seen: Lit = !Formula::truth();
-            for step in limits.watch(0..self.horizon) {
-                let step = step?;
-                let used = self.group(step, first, Family::Symmetry);
-                let longer = self.formula.fresh(Meaning::Ladder);
-                self.formula.add(Family::Symmetry, [!longer, seen, used]);
-                seen = longer;
-                for id in only_second {
-                    if let Some(literal) = self.operator(step, *id) {
-                        self.formula.add(Family::Symmetry, [!literal, seen]);
-                    }
-                }
-            }
-        }
-        Ok(())
     }
 }

@@ -6,8 +6,11 @@ use std::fmt::Write as _;
 use insta::assert_snapshot;
 
 use crate::bounds::Bounds;
-use crate::encode::formula::{Family, Meaning};
-use crate::encode::{CostLimit, Counting, Encoding, Semantics};
+use crate::context::Context;
+use crate::encode::builder::Builder;
+use crate::encode::conditional::Fires;
+use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::{CostLimit, Counting, Encoding, Plans, Semantics, operators, state};
 use crate::ground::{Config, ground};
 use crate::limits::Limits;
 use crate::sat::Lit;
@@ -73,12 +76,12 @@ fn name(task: &Task, meaning: Meaning) -> String {
     }
 }
 
-fn clauses(encoding: &Encoding<'_>, family: Family) -> String {
+fn clauses(task: &Task, formula: &Formula, family: Family) -> String {
     let literal = |literal: &Lit| {
-        let name = name(encoding.task, encoding.formula.meaning(literal.variable()));
+        let name = name(task, formula.meaning(literal.variable()));
         if literal.is_positive() { name } else { format!("¬{name}") }
     };
-    let own = encoding.formula.clauses().filter(|(own, _)| *own == family);
+    let own = formula.clauses().filter(|(own, _)| *own == family);
     let mut lines: Vec<String> = own
         .map(|(_, clause)| {
             let mut literals: Vec<String> = clause.iter().map(literal).collect();
@@ -92,13 +95,17 @@ fn clauses(encoding: &Encoding<'_>, family: Family) -> String {
 
 fn check(family: Family) -> String {
     let task = task();
-    let bounds = Bounds::new(&task, &Limits::none()).expect("no limit");
+    let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
     let allowed = vec![vec![true; task.operators.len()]; 2];
     let cost = CostLimit { limit: 6, bounds: &bounds, counting: Counting::Sum };
-    let encoding =
-        Encoding::new(&task, &allowed, Some(cost), Semantics::Sequential, &OnceCell::new(), &Limits::none())
-            .expect("no limit");
-    clauses(&encoding, family)
+    let limits = Limits::none();
+    let encoding = Encoding::new(
+        Context::new(&task, &limits),
+        Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential },
+        &OnceCell::new(),
+    )
+    .expect("no limit");
+    clauses(&task, &encoding.formula, family)
 }
 
 /// Two equal lamps that need power, and a switch that takes it away: declared after one action that needs it, and before another.
@@ -117,9 +124,14 @@ fn lamps(semantics: Semantics, family: Family) -> String {
         read(&Source::new("domain", LAMPS.0), &Source::new("problem", LAMPS.1)).expect("PDDL");
     let task = ground(&domain, &problem, &Config::default()).expect("a task");
     let allowed = vec![vec![true; task.operators.len()]; 2];
-    let encoding =
-        Encoding::new(&task, &allowed, None, semantics, &OnceCell::new(), &Limits::none()).expect("no limit");
-    clauses(&encoding, family)
+    let limits = Limits::none();
+    let encoding = Encoding::new(
+        Context::new(&task, &limits),
+        Plans { allowed: &allowed, cost: None, semantics },
+        &OnceCell::new(),
+    )
+    .expect("no limit");
+    clauses(&task, &encoding.formula, family)
 }
 
 #[test]
@@ -176,4 +188,34 @@ fn cost() {
 #[test]
 fn goal() {
     assert_snapshot!(check(Family::Goal));
+}
+
+/// What a family writes by itself for both steps of the task.
+fn alone(family: Family, write: impl Fn(&mut Builder<'_>, usize)) -> String {
+    let (task, limits) = (task(), Limits::none());
+    let allowed = vec![vec![true; task.operators.len()]; 2];
+    let mut builder = Builder::new(Context::new(&task, &limits), &allowed).expect("no limit");
+    for step in 0..2 {
+        write(&mut builder, step);
+    }
+    let families: Vec<Family> = builder.formula.clauses_from(1).map(|(own, _)| own).collect();
+    assert!(families.iter().all(|own| *own == family), "{families:?}");
+    clauses(&task, &builder.formula, family)
+}
+
+#[test]
+fn families_are_written_alone_as_among_the_others() {
+    assert_eq!(alone(Family::Condition, operators::conditions), check(Family::Condition));
+    let sequence = |builder: &mut Builder<'_>, step| operators::sequence(builder, step, true);
+    assert_eq!(alone(Family::Sequence, sequence), check(Family::Sequence));
+    let effects = |builder: &mut Builder<'_>, step| {
+        let fires = Fires::new(builder, step);
+        operators::effects(builder, step, &fires);
+    };
+    assert_eq!(alone(Family::Effect, effects), check(Family::Effect));
+    let frame = |builder: &mut Builder<'_>, step| {
+        let fires = Fires::new(builder, step);
+        state::frame(builder, step, &fires);
+    };
+    assert_eq!(alone(Family::Frame, frame), check(Family::Frame));
 }

@@ -6,88 +6,22 @@
 //!
 //! [1] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence 168, 2005.
 
-use petgraph::algo::tarjan_scc;
-use petgraph::graph::DiGraph;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::ground::evaluate::{AtomId, Binding, Failure, World};
-use crate::ground::instantiate::GroundTask;
-use crate::ground::normal_form::{GroundCondition, GroundLiteral};
-use crate::ground::residual::Residual;
-use crate::lifted::{ObjectId, PredicateId};
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::axiom::{GroundAxiom, components};
+use crate::ground::vocabulary::condition::{GroundCondition, GroundLiteral};
+use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// A rule: the head holds where the body does. The body has no clauses.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct GroundAxiom {
-    pub(crate) head: AtomId,
-    pub(crate) body: GroundCondition,
-}
-
-/// Parts of conditions that have a name, and the rules of all derived atoms.
-#[derive(Debug, Default)]
-pub(crate) struct Definitions {
-    named: FxHashMap<Residual, AtomId>,
-    pub(crate) axioms: Vec<GroundAxiom>,
-}
-
-impl Definitions {
-    pub(crate) fn named(&self, residual: &Residual) -> Option<AtomId> {
-        self.named.get(residual).copied()
-    }
-}
-
-impl World<'_> {
-    /// A fresh atom for a part of a condition.
-    pub(crate) fn name(&mut self, residual: Residual) -> AtomId {
-        let predicate = PredicateId(dense(self.lifted.predicates.len()));
-        let number = ObjectId(dense(self.definitions.named.len()));
-        let atom = self.atom(predicate, &[number]);
-        self.definitions.named.insert(residual, atom);
-        atom
-    }
-
-    /// Whether an atom follows from others.
-    pub(crate) fn is_derived(&self, atom: AtomId) -> bool {
-        let predicate = self.atoms.get_index(atom.index()).map(|((predicate, _), ())| *predicate);
-        predicate.is_none_or(|predicate| {
-            self.lifted.predicates.get(predicate.index()).is_none_or(|predicate| predicate.derived)
-        })
-    }
-
-    /// The rules of all derived atoms that have been met, and of those that their bodies lead to.
-    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
-    pub(crate) fn instantiate_axioms(&mut self) -> Result<(), Failure> {
-        let lifted = self.lifted;
-        let limits = self.limits.clone();
-        let mut pulse = limits.pulse();
-        let mut next = 0;
-        while let Some(((predicate, arguments), ())) = self.atoms.get_index(next) {
-            pulse.beat()?;
-            let (predicate, arguments, head) = (*predicate, arguments.clone(), AtomId(dense(next)));
-            next += 1;
-            for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
-                let suits = axiom.parameters.iter().zip(arguments.iter());
-                if !suits.into_iter().all(|(p, object)| p.candidates.binary_search(object).is_ok()) {
-                    continue;
-                }
-                let mut binding: Binding = arguments.iter().map(|object| Some(*object)).collect();
-                binding.resize(axiom.variables, None);
-                let body = self.residual(&axiom.condition, &mut binding)?;
-                self.define(head, &body);
-            }
-        }
-        Ok(())
-    }
-}
-
 /// Folds what is always or never true, and replaces atoms with one rule.
-pub(crate) fn simplify(task: &mut GroundTask<'_>, limits: &Limits) -> Result<(), Interrupted> {
-    let mut axioms = std::mem::take(&mut task.world.definitions.axioms);
+pub(crate) fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
+    let limits = task.world.limits;
+    let mut axioms = std::mem::take(&mut task.axioms);
     let mut seen = FxHashSet::default();
     axioms.retain(|axiom| seen.insert(axiom.clone()));
-    fold(task, &mut axioms, limits)?;
+    fold(task, &mut axioms)?;
     let bodies = single_bodies(&axioms, limits)?;
     let mut kept = Vec::with_capacity(axioms.len());
     for axiom in limits.watch(axioms) {
@@ -104,7 +38,7 @@ pub(crate) fn simplify(task: &mut GroundTask<'_>, limits: &Limits) -> Result<(),
     if task.goal.as_mut().is_some_and(|goal| !inline(goal, &bodies)) {
         task.goal = None;
     }
-    task.world.definitions.axioms = kept;
+    task.axioms = kept;
     Ok(())
 }
 
@@ -123,12 +57,8 @@ fn retain<T>(
 }
 
 /// Whether each derived atom is known to be true or false, as long as that leads to more.
-fn fold(
-    task: &mut GroundTask<'_>,
-    axioms: &mut Vec<GroundAxiom>,
-    limits: &Limits,
-) -> Result<(), Interrupted> {
-    let world = &task.world;
+fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), Interrupted> {
+    let (world, limits) = (&task.world, task.world.limits);
     let derived: Vec<AtomId> =
         (0..dense(world.atoms.len())).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
     let mut known: FxHashMap<AtomId, bool> = FxHashMap::default();
@@ -212,29 +142,6 @@ fn single_bodies(
         }
     }
     Ok(bodies)
-}
-
-/// Derived atoms in components of mutual dependence, what a component depends on before it.
-pub(crate) fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
-    let mut graph: DiGraph<AtomId, ()> = DiGraph::new();
-    let mut nodes: FxHashMap<AtomId, _> = FxHashMap::default();
-    for axiom in axioms {
-        nodes.entry(axiom.head).or_insert_with(|| graph.add_node(axiom.head));
-    }
-    for axiom in axioms {
-        for atom in axiom.body.atoms() {
-            if let Some(node) = nodes.get(&atom) {
-                graph.add_edge(nodes[&axiom.head], *node, ());
-            }
-        }
-    }
-    // Tarjan's algorithm yields components in reverse topological order: what has no successors first.
-    let sorted = |component: Vec<_>| {
-        let mut atoms: Vec<AtomId> = component.into_iter().map(|node| graph[node]).collect();
-        atoms.sort_unstable();
-        atoms
-    };
-    tarjan_scc(&graph).into_iter().map(sorted).collect()
 }
 
 /// Replaces literals over atoms with one rule by its body; false if the condition contradicts itself then.

@@ -10,31 +10,22 @@ use std::convert::Infallible;
 use num_traits::{One, Zero};
 
 use crate::error::{Error, Place};
-use crate::ground::evaluate::{Failure, World};
-use crate::ground::instantiate::{GroundOperator, GroundTask};
-use crate::lifted::{Expression, Lifted, Metric, Rational};
-use crate::limits::Limits;
-use crate::quantity::{Linear, NumericId, Quantity};
-use crate::table_map::TableMap;
+use crate::ground::evaluate::expression::ground;
+use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::operator::GroundOperator;
+use crate::ground::vocabulary::task::{GroundObjective, GroundTask};
+use crate::ground::vocabulary::world::World;
+use crate::lifted::{Expression, Metric, Rational};
+use crate::task::quantity::{Linear, Quantity};
+use crate::task::table_map::TableMap;
 use pddl::ast::Direction;
-
-/// How operator costs relate to the metric.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct GroundObjective {
-    /// The metric of the initial state (negated if to be maximized).
-    pub(crate) offset: Rational,
-    pub(crate) maximize: bool,
-}
 
 /// Gives every operator its costs, and the task the rest of the metrics.
 ///
 /// # Errors
 /// A metric that is not linear, or over a fluent whose change depends on the state.
-pub(crate) fn attach_costs(
-    lifted: &Lifted,
-    task: &mut GroundTask<'_>,
-    limits: &Limits,
-) -> Result<(), Vec<Error>> {
+pub(crate) fn attach_costs(task: &mut GroundTask<'_>) -> Result<(), Vec<Error>> {
+    let lifted = task.world.lifted;
     if lifted.metrics.is_empty() {
         let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
         for operator in &mut task.operators {
@@ -47,13 +38,14 @@ pub(crate) fn attach_costs(
     }
     let mut errors = Vec::new();
     for metric in &lifted.metrics {
-        attach(lifted, task, metric, limits).unwrap_or_else(|error| errors.push(error));
+        attach(task, metric).unwrap_or_else(|error| errors.push(error));
     }
     if errors.is_empty() { Ok(()) } else { Err(errors) }
 }
 
 /// Gives every operator its cost by one metric.
-fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric, limits: &Limits) -> Result<(), Error> {
+fn attach(task: &mut GroundTask<'_>, metric: &Metric) -> Result<(), Error> {
+    let (lifted, limits) = (task.world.lifted, task.world.limits);
     let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
     let maximize = metric.direction == Direction::Maximize;
     if maximize {
@@ -63,7 +55,7 @@ fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric, limits: &
     let initial: Vec<_> = linear
         .coefficients
         .iter()
-        .map(|(variable, factor)| initial_value(&task.world, *variable) * factor)
+        .map(|(variable, factor)| task.world.initial_value(*variable) * factor)
         .collect();
     let offset = initial.into_iter().fold(linear.quantity.constant.clone(), |sum, value| sum + value);
     task.objectives.push(GroundObjective { offset, maximize });
@@ -81,12 +73,6 @@ fn attach(lifted: &Lifted, task: &mut GroundTask<'_>, metric: &Metric, limits: &
         operator.costs.push(cost);
     }
     Ok(())
-}
-
-/// The initial value of a numeric variable; 0 for a `total-cost` to which the file gives none.
-pub(crate) fn initial_value(world: &World<'_>, variable: NumericId) -> Rational {
-    let key = world.numerics.get_index(variable.index()).map(|(key, ())| key);
-    key.and_then(|(function, arguments)| world.value(*function, arguments)).unwrap_or_else(Rational::zero)
 }
 
 /// The part of the metric over fluents, and the factor of total time.
@@ -127,7 +113,7 @@ fn split(
             linear.scale(&constant.recip());
             Ok((linear, time / constant))
         }
-        Expression::Number(_) | Expression::Function(..) => match world.ground(expression, &Vec::new()) {
+        Expression::Number(_) | Expression::Function(..) => match ground(world, expression, &Vec::new()) {
             Ok(linear) => Ok((linear, Rational::zero())),
             Err(Failure::Error(error)) => Err(error),
             Err(Failure::Undefined) => Err(Error::Unsupported {

@@ -4,61 +4,44 @@
 //! schema, without its separable design parameters; each instance becomes one operator with slots; mutex groups become
 //! finite-domain variables; all numbers become exact integers.
 //!
+//! Each pass turns one thing into the next, and what they hand to each other is in `vocabulary`:
+//!
+//! | pass | from | to |
+//! |---|---|---|
+//! | `reach` | `Lifted`, slots | `Reached`: instances of schemas, atoms that can hold |
+//! | `instantiate` | the `World` of these | `GroundTask`: operators, rules and a goal over atoms |
+//! | `derived` | derived atoms that are decided, or have one rule | truth values, and the body of the rule in their place |
+//! | `metric` | metrics | the costs of operators, and objectives |
+//! | `prune` | operators, rules | those that can matter; or why the goal is out of reach |
+//! | `finish` | `GroundTask` | `Task`: variables for atoms, integers for rationals |
+//!
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
-mod admit;
+mod config;
 mod derived;
-mod effects;
 pub(crate) mod evaluate;
-pub(crate) mod events;
 mod finish;
-mod frame;
 mod instantiate;
-mod integers;
-mod intervals;
-mod join;
 mod metric;
-mod mutex;
-mod normal_form;
-mod numbers;
 mod prune;
-pub(crate) mod reach;
-pub(crate) mod reads;
-mod relaxed;
-pub(crate) mod residual;
+mod reach;
+#[cfg(test)]
+mod tests;
+pub(crate) mod vocabulary;
 
-use crate::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::error::Error;
-use crate::ground::reach::Reached;
 use crate::lifted::Lifted;
+use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::limits::Limits;
-use crate::normalize::{normalize, zero};
-use crate::number::Int;
+use crate::normalize::{events, normalize, zero};
 use crate::task::Task;
-use crate::task_number::TaskNumber;
-use pddl::ast::{Domain, Metric, Name, Problem};
+use crate::task::number::TaskNumber;
+use pddl::ast::{Domain, Problem};
 
-/// How the domain's symbols are to be read.
-#[derive(Debug, Clone)]
-pub struct Config {
-    /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
-    pub solves: Vec<Name>,
-    /// What plans are measured by, the most important first, in place of the metric of the problem; none for that metric.
-    pub objectives: Vec<Metric>,
-    /// When to give up.
-    pub limits: Limits,
-}
-
-impl Default for Config {
-    /// The names of the Metaplan paper and of the files of kas-lab.
-    fn default() -> Self {
-        Self {
-            solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec(),
-            objectives: Vec::new(),
-            limits: Limits::none(),
-        }
-    }
-}
+pub use config::Config;
+pub(crate) use config::Generality;
+use vocabulary::reached::Reached;
+use vocabulary::world::World;
 
 /// Grounds a domain and a problem that have passed `pddl::check`.
 ///
@@ -66,14 +49,6 @@ impl Default for Config {
 /// Every construct that the planner does not handle, with its place.
 pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Vec<Error>> {
     ground_for(domain, problem, config, &Generality::default())
-}
-
-/// What a ground task is to be good for beside the problem that it is made of.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Generality {
-    /// If given, numbers of the initial state may be others, too, that are integers when multiplied by this: nothing is
-    /// concluded from those of the problem.
-    pub(crate) numbers: Option<Int>,
 }
 
 /// Grounds a problem so that other initial states can take the place of its own.
@@ -109,14 +84,15 @@ pub(crate) fn ground_lifted<N: TaskNumber>(
     limits: &Limits,
 ) -> Result<(Task<N>, Reached), Vec<Error>> {
     let reached = reach::reach(lifted, slots, limits).map_err(|error| vec![error])?;
-    let mut ground = instantiate::instantiate(lifted, designs, slots, &reached, limits)?;
-    metric::attach_costs(lifted, &mut ground, limits)?;
+    let world = World::new(lifted, &reached, limits);
+    let mut ground = instantiate::instantiate(world, designs, slots)?;
+    derived::simplify(&mut ground).map_err(|interrupted| vec![interrupted.into()])?;
+    metric::attach_costs(&mut ground)?;
     if limits.reached() {
         return Err(vec![Error::Interrupted]);
     }
     let unreachable =
-        prune::prune(lifted, &mut ground, generality, limits).map_err(|error| vec![error.into()])?;
-    let task =
-        finish::finish(lifted, ground, unreachable, generality, limits).map_err(|error| vec![error])?;
+        prune::prune(&mut ground, generality).map_err(|interrupted| vec![interrupted.into()])?;
+    let task = finish::finish(ground, unreachable, generality).map_err(|error| vec![error])?;
     Ok((task, reached))
 }

@@ -5,8 +5,9 @@
 
 use crate::error::File;
 use crate::lifted::{Expression, Formula, Metric, Rational};
-use crate::normalize::{Duration, Normalizer, Scope};
-use pddl::ast::{self, Comparison, Direction};
+use crate::normalize::condition::expression;
+use crate::normalize::names::{Duration, Names, Scope};
+use pddl::ast::{self, Comparison, Direction, Span};
 
 /// Whether the metrics reward time; nothing if that cannot be told from the metrics alone, or if they disagree.
 pub(super) fn is_rewarded(metrics: &[Metric]) -> Option<bool> {
@@ -55,61 +56,58 @@ pub(crate) fn time_factor(expression: &Expression) -> Option<Rational> {
     }
 }
 
-impl Normalizer {
-    /// The duration of an action, chosen if it is not fixed; what the choice rests on joins `conditions`.
-    pub(super) fn duration(
-        &mut self,
-        constraints: &[ast::DurationConstraint],
-        action: &ast::Action,
-        scope: &mut Scope,
-        conditions: &mut Vec<Formula>,
-    ) -> Expression {
-        let mut bounds = [Vec::new(), Vec::new()];
-        let mut fixed = Vec::new();
-        for constraint in constraints {
-            let expression = self.expression(&constraint.expression, scope);
-            match constraint.operator {
-                Comparison::Equal => fixed.push((expression, constraint.span)),
-                Comparison::Greater | Comparison::GreaterOrEqual => bounds[0].push((expression, constraint)),
-                Comparison::Less | Comparison::LessOrEqual => bounds[1].push((expression, constraint)),
-            }
+/// The duration of the action at a place, chosen if it is not fixed, and what the choice rests on. `longest` says whether the metric
+/// rewards time, so that actions should take as long as they may.
+pub(super) fn duration(
+    names: &mut Names,
+    constraints: &[ast::DurationConstraint],
+    span: Span,
+    longest: Option<bool>,
+    scope: &mut Scope,
+) -> (Expression, Vec<Formula>) {
+    let mut bounds = [Vec::new(), Vec::new()];
+    let mut fixed = Vec::new();
+    for constraint in constraints {
+        let value = expression(names, &constraint.expression, scope);
+        match constraint.operator {
+            Comparison::Equal => fixed.push((value, constraint.span)),
+            Comparison::Greater | Comparison::GreaterOrEqual => bounds[0].push((value, constraint)),
+            Comparison::Less | Comparison::LessOrEqual => bounds[1].push((value, constraint)),
         }
-        if let [(duration, _)] = &fixed[..]
-            && bounds.iter().all(Vec::is_empty)
-        {
-            scope.duration = Duration::Fixed(duration.clone());
-            return duration.clone();
-        }
-        scope.duration = Duration::Open;
-        let [lower, upper] = bounds;
-        let span = constraints.first().map_or(action.span, |constraint| constraint.span);
-        let chosen = match self.longest {
-            Some(longest) if fixed.is_empty() => match if longest { &upper[..] } else { &lower[..] } {
-                [(expression, constraint)]
-                    if matches!(
-                        constraint.operator,
-                        Comparison::GreaterOrEqual | Comparison::LessOrEqual
-                    ) =>
-                {
-                    Some(expression.clone())
-                }
-                _ => None,
-            },
-            _ => None,
-        };
-        let Some(chosen) = chosen else {
-            self.unsupported(
-                "a duration without one bound that the metric makes it take",
-                "one `(= ?duration …)`, or one `(>= ?duration …)` and a metric that does not reward time",
-                File::Domain,
-                span,
-            );
-            return Expression::Number(Rational::from_integer(0));
-        };
-        for (bound, constraint) in lower.into_iter().chain(upper) {
-            let place = scope.place(constraint.span);
-            conditions.push(Formula::Compare(constraint.operator, chosen.clone(), bound, place));
-        }
-        chosen
     }
+    if let [(duration, _)] = &fixed[..]
+        && bounds.iter().all(Vec::is_empty)
+    {
+        scope.duration = Duration::Fixed(duration.clone());
+        return (duration.clone(), Vec::new());
+    }
+    scope.duration = Duration::Open;
+    let [lower, upper] = bounds;
+    let span = constraints.first().map_or(span, |constraint| constraint.span);
+    let chosen = match longest {
+        Some(longest) if fixed.is_empty() => match if longest { &upper[..] } else { &lower[..] } {
+            [(expression, constraint)]
+                if matches!(constraint.operator, Comparison::GreaterOrEqual | Comparison::LessOrEqual) =>
+            {
+                Some(expression.clone())
+            }
+            _ => None,
+        },
+        _ => None,
+    };
+    let Some(chosen) = chosen else {
+        names.unsupported(
+            "a duration without one bound that the metric makes it take",
+            "one `(= ?duration …)`, or one `(>= ?duration …)` and a metric that does not reward time",
+            File::Domain,
+            span,
+        );
+        return (Expression::Number(Rational::from_integer(0)), Vec::new());
+    };
+    let conditions = lower.into_iter().chain(upper).map(|(bound, constraint)| {
+        let place = scope.place(constraint.span);
+        Formula::Compare(constraint.operator, chosen.clone(), bound, place)
+    });
+    let conditions = conditions.collect();
+    (chosen, conditions)
 }

@@ -17,8 +17,7 @@ use rustc_hash::FxHashMap;
 
 use crate::encode::{Encoding, Family, Formula, Meaning};
 use crate::number::{Int, dense};
-use crate::optimize::tighten::Live;
-use crate::optimize::{Best, Run, Tightened};
+use crate::optimize::run::{Best, Live, Run, Tightened};
 use crate::sat::{Answer, Lit, Totalizer};
 
 /// A core is given to the solver again this often, as long as a smaller one comes back.
@@ -124,62 +123,60 @@ impl Search {
     }
 }
 
-impl Run<'_> {
-    /// Raises the lower bound of a formula's plans until it is above their limit, or a plan is as cheap.
-    pub(super) fn raise(&mut self, mut encoding: Encoding<'_>, limit: Int, best: &mut Best) -> Tightened {
-        let mut search = Search::new(&encoding);
-        let mut live = self.live(u64::MAX);
-        let mut least = search.lighter(Int::MAX).unwrap_or(Int::MAX);
-        loop {
-            let limit = limit.min(best.plan.below());
-            if search.lower > limit {
-                return Tightened::Exhausted;
-            }
-            search.harden(limit, &mut encoding.formula);
-            match self.call(&mut live, &encoding, &search.assumptions(least)) {
-                (Answer::Unsatisfiable, _) => {
-                    let core = match self.trimmed(&mut live, &encoding) {
-                        Some(core) if core.is_empty() => return Tightened::Exhausted,
-                        Some(core) => core,
-                        None => return Tightened::Interrupted,
-                    };
-                    search.pay(&core, &mut encoding.formula);
-                    if search.lower > best.lower {
-                        best.lower = search.lower.min(limit.saturating_add(1));
-                        self.announce(best, encoding.horizon());
-                    }
+/// Raises the lower bound of a formula's plans until it is above their limit, or a plan is as cheap.
+pub(super) fn raise(run: &mut Run<'_>, mut encoding: Encoding<'_>, limit: Int, best: &mut Best) -> Tightened {
+    let mut search = Search::new(&encoding);
+    let mut live = run.live(u64::MAX);
+    let mut least = search.lighter(Int::MAX).unwrap_or(Int::MAX);
+    loop {
+        let limit = limit.min(best.plan.below());
+        if search.lower > limit {
+            return Tightened::Exhausted;
+        }
+        search.harden(limit, &mut encoding.formula);
+        match run.call(&mut live, &encoding, &search.assumptions(least)) {
+            (Answer::Unsatisfiable, _) => {
+                let core = match trimmed(run, &mut live, &encoding) {
+                    Some(core) if core.is_empty() => return Tightened::Exhausted,
+                    Some(core) => core,
+                    None => return Tightened::Interrupted,
+                };
+                search.pay(&core, &mut encoding.formula);
+                if search.lower > best.lower {
+                    best.lower = search.lower.min(limit.saturating_add(1));
+                    run.announce(best, encoding.horizon());
                 }
-                (_, None) => return Tightened::Interrupted,
-                (_, Some(plan)) => {
-                    if plan.cost < best.plan.cost {
-                        best.plan = plan;
-                        self.announce(best, encoding.horizon());
-                    }
-                    match search.lighter(least) {
-                        Some(lighter) => least = lighter,
-                        None => return Tightened::Exhausted,
-                    }
+            }
+            (_, None) => return Tightened::Interrupted,
+            (_, Some(plan)) => {
+                if plan.cost < best.plan.cost {
+                    best.plan = plan;
+                    run.announce(best, encoding.horizon());
+                }
+                match search.lighter(least) {
+                    Some(lighter) => least = lighter,
+                    None => return Tightened::Exhausted,
                 }
             }
         }
     }
+}
 
-    /// The core that the solver has found, or a part of it that is one, too; none if a limit was reached.
-    fn trimmed(&mut self, live: &mut Live, encoding: &Encoding<'_>) -> Option<Vec<Lit>> {
-        let mut core = live.solver.core().to_vec();
-        for _ in 0..TRIMS {
-            if core.len() < 2 {
-                break;
-            }
-            match self.call(live, encoding, &core) {
-                (Answer::Unsatisfiable, _) if live.solver.core().len() < core.len() => {
-                    core = live.solver.core().to_vec();
-                }
-                (Answer::Unsatisfiable, _) => break,
-                _ => return None,
-            }
+/// The core that the solver has found, or a part of it that is one, too; none if a limit was reached.
+fn trimmed(run: &mut Run<'_>, live: &mut Live, encoding: &Encoding<'_>) -> Option<Vec<Lit>> {
+    let mut core = live.solver.core().to_vec();
+    for _ in 0..TRIMS {
+        if core.len() < 2 {
+            break;
         }
-        core.sort_unstable();
-        Some(core.into_iter().map(|literal| !literal).collect())
+        match run.call(live, encoding, &core) {
+            (Answer::Unsatisfiable, _) if live.solver.core().len() < core.len() => {
+                core = live.solver.core().to_vec();
+            }
+            (Answer::Unsatisfiable, _) => break,
+            _ => return None,
+        }
     }
+    core.sort_unstable();
+    Some(core.into_iter().map(|literal| !literal).collect())
 }

@@ -6,9 +6,9 @@ use std::time::Duration;
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::optimize::{Config, Strategy, optimize};
+use crate::plan::solution::{Solution, Status};
 use crate::plan::{Exact, metric};
 use crate::sat::Backend;
-use crate::solution::{Solution, Status};
 use crate::task::Task;
 use crate::tests::{built_in, depot, fleet, ground_text, optimum};
 

@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits};
 use crate::number::{Int, dense};
-use crate::quantity::{Linear, Quantity, SlotSet, Table};
+use crate::task::quantity::{Linear, Quantity, SlotSet, Table};
 use crate::task::{Argument, Forbidden, NumericEffect, Operator, SlotUse, Task};
 
 /// For each slot of an operator the positions of its designs that are left.

@@ -15,30 +15,28 @@
 //!
 //! - \[1\] N. Eén, N. Sörensson: Temporal induction by incremental SAT solving, ENTCS 89(4), 2003.
 
+mod base;
 mod layout;
 mod mask;
+mod query;
 mod solve;
 mod usage;
 
 use std::fmt;
 use std::sync::Arc;
 
-use num_rational::BigRational;
-
-use crate::bounds::Bounds;
 use crate::ground::{Config, Generality, ground_for};
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
-use crate::plan::Step;
-use crate::search::{Prepared, STATE_LIMIT};
-use crate::task::Task;
-use crate::ties;
+use crate::search::STATE_LIMIT;
+use base::{Base, Set};
 use layout::{Layout, Situation};
 use pddl::TypeHierarchy;
 use pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
-use pddl::validate::Advance;
 use usage::Usage;
+
+pub use query::{First, Progress, Query, Replanned};
 
 /// Numbers of the initial state have at most so many decimals, as a power of ten.
 const PRECISION: Int = 1_000_000;
@@ -55,92 +53,6 @@ pub struct Replanner {
     base: Arc<Base>,
     /// The sets of available designs met last, the latest at the end.
     sets: Vec<(Vec<Vec<ObjectId>>, Arc<Set>)>,
-}
-
-/// What holds for all problems.
-struct Base {
-    /// With everything available.
-    task: Task,
-    layout: Layout,
-    /// For each schema the parameters that must be available, each with the predicate that says so.
-    requirements: Vec<Vec<(usize, usize)>>,
-}
-
-/// What holds for all states in which the same is available.
-struct Set {
-    task: Task,
-    bounds: Bounds,
-    prepared: Option<Prepared>,
-    ties: ties::Prepared,
-}
-
-/// A step that a plan may begin with, whatever the operators of the task are: what is left of an action under way, with one
-/// of the configurations that it can go on with.
-#[derive(Debug, Clone)]
-pub struct First {
-    /// The function and the design chosen for it.
-    pub configuration: Vec<(String, String)>,
-    /// All arguments; of plans that are as good the one whose arguments are declared first is chosen.
-    pub arguments: Vec<String>,
-    /// What the step changes.
-    pub change: Advance,
-    /// The metric of the mission if it ended with the step; without a metric, 1.
-    pub metric: BigRational,
-}
-
-/// What is asked for.
-#[derive(Debug)]
-pub struct Query<'a> {
-    /// With what is available now; of the same domain, and checked.
-    pub problem: &'a Problem,
-    /// If there are any, plans begin with one of them.
-    pub first: &'a [First],
-    /// The metric of the mission if it ended now; without a metric, 0.
-    pub metric: BigRational,
-    /// The plan at hand: names and arguments of its actions after the first step. If it is one still, nothing dearer is looked at.
-    pub old: Option<&'a [(String, Vec<String>)]>,
-    /// Whether of plans that are as good one with most of these actions is chosen.
-    pub stay_close: bool,
-    /// When to stop.
-    pub limits: &'a Limits,
-}
-
-/// What planning has come to.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Replanned {
-    /// A plan; none has a better metric: proved.
-    Optimal {
-        /// Which of the first steps it begins with, if there were any.
-        first: Option<usize>,
-        /// The steps after that.
-        steps: Vec<Step>,
-        /// The metric of the whole mission.
-        metric: BigRational,
-    },
-    /// A limit came first; the best plan known so far, which may be the old one.
-    Feasible {
-        /// Which of the first steps it begins with, if there were any.
-        first: Option<usize>,
-        /// The steps after that.
-        steps: Vec<Step>,
-        /// The metric of the whole mission.
-        metric: BigRational,
-    },
-    /// There is no plan of any length: proved.
-    Unsolvable,
-    /// The problem differs in more than state and availability.
-    Misfit,
-    /// A limit came before any plan.
-    Unknown,
-}
-
-/// How far a search for a plan is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Progress {
-    /// The metric of the mission with the best plan so far, if there is one.
-    pub metric: Option<BigRational>,
-    /// No plan gives the mission a better metric.
-    pub bound: BigRational,
 }
 
 impl Replanner {
@@ -239,49 +151,6 @@ impl Replanner {
         }
         self.sets.push((available.to_vec(), found.clone()));
         Ok(found)
-    }
-}
-
-impl Base {
-    /// The task with what is available.
-    fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {
-        let is_allowed = |schema: u32, position: usize, object: ObjectId| {
-            let mut needed = self.requirements[schema as usize].iter().filter(|(own, _)| *own == position);
-            needed.all(|(_, predicate)| available[*predicate].binary_search(&object).is_ok())
-        };
-        mask::restrict(&self.task, &is_allowed, limits)
-    }
-
-    fn restrict(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Set, Interrupted> {
-        let task = self.masked(available, limits)?;
-        let bounds = Bounds::new(&task, limits)?;
-        let prepared = Prepared::new(&task, limits)?;
-        let ties = ties::Prepared::new(&task, &bounds, limits)?;
-        Ok(Set { task, bounds, prepared, ties })
-    }
-
-    /// For each predicate the objects that some operator needs to be available, sorted.
-    #[expect(clippy::arithmetic_side_effects, reason = "predicates are held in memory")]
-    fn possible(&self) -> Vec<Vec<ObjectId>> {
-        let count = self.requirements.iter().flatten().map(|(_, predicate)| predicate + 1).max().unwrap_or(0);
-        let mut found = vec![Vec::new(); count];
-        for operator in &self.task.operators {
-            for (position, predicate) in &self.requirements[operator.schema as usize] {
-                match operator.arguments[*position] {
-                    crate::task::Argument::Object(object) => found[*predicate].push(object),
-                    crate::task::Argument::Slot(slot) => {
-                        let slot = &operator.slots[slot as usize];
-                        let designs = &self.task.slots[slot.slot.index()].designs;
-                        found[*predicate].extend(slot.designs.iter().map(|index| designs[*index as usize]));
-                    }
-                }
-            }
-        }
-        for objects in &mut found {
-            objects.sort_unstable();
-            objects.dedup();
-        }
-        found
     }
 }
 

@@ -7,16 +7,17 @@
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
 
-use crate::ground_plan::{GroundPlan, GroundStep, replay_from};
+use crate::context::Context;
 use crate::lifted::ObjectId;
-use crate::limits::Limits;
 use crate::number::{Int, dense};
+use crate::plan::ground::{GroundPlan, GroundStep, replay_from};
 use crate::plan::{decode, resolve};
+use crate::replan::base::{Base, Set};
 use crate::replan::layout::Situation;
-use crate::replan::{Base, Progress, Query, Replanned, Set};
-use crate::search::{Found, search_from};
+use crate::replan::query::{First, Progress, Query, Replanned};
+use crate::search::ties;
+use crate::search::{Found, Space, search_from};
 use crate::task::{State, Task};
-use crate::ties;
 
 /// Where a plan may begin.
 struct Start {
@@ -43,6 +44,7 @@ pub(super) fn solve(
         return Replanned::Unsolvable;
     }
     let Some(prepared) = &set.prepared else { return Replanned::Unknown };
+    let context = Context::new(&set.task, query.limits);
     let Some(starts) = starts(base, situation, query) else { return Replanned::Misfit };
     let scale = |cost: Int| BigRational::new(cost.into(), set.task.objective.scale.into());
     let promise = |start: Start| Some((&start.own + scale(set.bounds.estimate(&start.state)?), start));
@@ -74,8 +76,8 @@ pub(super) fn solve(
                 report(Progress { metric: cost.map(signed), bound: signed(bound) });
             }
         };
-        let prepared = (&set.task, &set.bounds, prepared);
-        let found = search_from(prepared, &start.state, limit, most, query.limits, &mut hear);
+        let space = Space { context, bounds: &set.bounds, prepared };
+        let found = search_from(&space, &start.state, limit, most, &mut hear);
         let plan = match found {
             Found::Optimal(plan) => plan,
             Found::None => continue,
@@ -84,7 +86,7 @@ pub(super) fn solve(
                 let ended = winners.into_iter().map(|(start, plan)| Candidate::new(&set.task, &start, plan));
                 let all = known.into_iter().chain(cut_short).chain(ended);
                 let least = all.min_by(|left, right| left.value.cmp(&right.value));
-                return least.map_or(Replanned::Unknown, |least| least.feasible(&set.task, query.limits));
+                return least.map_or(Replanned::Unknown, |least| least.feasible(context));
             }
             Found::Unknown(_) => return Replanned::Unknown,
         };
@@ -103,7 +105,7 @@ pub(super) fn solve(
     let metric = if set.task.objective.maximize { -value } else { value };
     let close_to = if query.stay_close { old.into_iter().flatten().collect() } else { FxHashSet::default() };
     let (first, plan) = choose(set, query, &close_to, winners);
-    Replanned::Optimal { first, steps: decode(&set.task, &plan, query.limits).steps, metric }
+    Replanned::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
 /// The old plan, where it still is one: all that can be said without time to search.
@@ -115,7 +117,7 @@ pub(super) fn keep_old(base: &Base, task: &Task, situation: &Situation, query: &
         old_plan(task, &start.state, query, &old).map(|plan| Candidate::new(task, start, plan))
     });
     let least = known.min_by(|left, right| left.value.cmp(&right.value));
-    least.map_or(Replanned::Unknown, |least| least.feasible(task, query.limits))
+    least.map_or(Replanned::Unknown, |least| least.feasible(Context::new(task, query.limits)))
 }
 
 /// The old plan, if it is one from a state on.
@@ -141,9 +143,9 @@ impl Candidate {
         Self { first: start.first, value: (&start.own + cost, plan.steps.len()), plan }
     }
 
-    fn feasible(self, task: &Task, limits: &Limits) -> Replanned {
-        let metric = if task.objective.maximize { -self.value.0 } else { self.value.0 };
-        Replanned::Feasible { first: self.first, steps: decode(task, &self.plan, limits).steps, metric }
+    fn feasible(self, context: Context<'_>) -> Replanned {
+        let metric = if context.task.objective.maximize { -self.value.0 } else { self.value.0 };
+        Replanned::Feasible { first: self.first, steps: decode(context, &self.plan).steps, metric }
     }
 }
 
@@ -155,7 +157,7 @@ fn starts(base: &Base, situation: &Situation, query: &Query<'_>) -> Option<Vec<S
         let (state, own) = (situation.state.clone(), sign(&query.metric));
         return Some(vec![Start { first: None, state, designs, arguments, own }]);
     }
-    let start = |(index, first): (usize, &super::First)| {
+    let start = |(index, first): (usize, &First)| {
         let pair = |(function, design): &(String, String)| {
             Some((base.layout.object(function)?, base.layout.object(design)?))
         };
@@ -178,14 +180,14 @@ fn choose(
     mut winners: Vec<(Start, GroundPlan)>,
 ) -> (Option<usize>, GroundPlan) {
     winners.sort_by(|left, right| left.0.arguments.cmp(&right.0.arguments));
+    let context = Context::new(&set.task, query.limits);
     let mut chosen = None;
     let mut most = Some((usize::MAX, usize::MAX));
     for (start, plan) in winners {
         // One that comes later in order has to have fewer changes.
         let Some(limit) = most else { break };
         let beginning = ties::Beginning { state: &start.state, designs: &start.designs, close_to };
-        let (plan, changes) =
-            ties::choose_from(&set.task, &set.bounds, &set.ties, query.limits, plan, limit, &beginning);
+        let (plan, changes) = ties::choose_from((context, &set.bounds, &set.ties), plan, limit, &beginning);
         most = match changes {
             Some(changes) => fewer(changes),
             None => most,

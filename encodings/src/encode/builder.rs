@@ -1,0 +1,76 @@
+//! A formula under construction: what each family of clauses gets, and adds to.
+//!
+//! Groups of operators have one variable that says that the operator at the step is one of them: `o@t → g@t` for each member,
+//! and `g@t → ⋁ o@t`. Groups make clauses about designs, costs and consumptions independent of how many operators share them.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
+
+use crate::context::Context;
+use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::variables::Variables;
+use crate::limits::{Interrupted, Limits};
+use crate::number::dense;
+use crate::sat::Lit;
+use crate::task::{Operator, OperatorId, Task};
+
+/// A task, when to stop, its formula as far as it goes, and what stands for what in it.
+pub(super) struct Builder<'a> {
+    pub(super) task: &'a Task,
+    pub(super) limits: &'a Limits,
+    pub(super) formula: Formula,
+    pub(super) variables: Variables,
+    groups: FxHashMap<(usize, Vec<OperatorId>), Lit>,
+}
+
+impl<'a> Builder<'a> {
+    /// A formula with variables and without clauses, for plans with the operators that are allowed at each step.
+    pub(super) fn new(context: Context<'a>, allowed: &[Vec<bool>]) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
+        let mut formula = Formula::new();
+        let variables = Variables::declare(context, &mut formula, allowed)?;
+        Ok(Self { task, limits, formula, variables, groups: FxHashMap::default() })
+    }
+
+    /// The variable of a group of operators at a step; members that cannot be at the step are left out.
+    pub(super) fn group(&mut self, step: usize, members: &[OperatorId], family: Family) -> Lit {
+        let present: Vec<_> = {
+            let candidates = &self.variables.operators[step];
+            let find = |id: &OperatorId| candidates.binary_search_by_key(id, |(id, _)| *id).ok();
+            members.iter().filter_map(|id| find(id).map(|index| candidates[index])).collect()
+        };
+        match present[..] {
+            [] => return !Formula::truth(),
+            [(_, only)] => return only,
+            _ if present.len() == self.variables.operators[step].len() => return self.variables.busy[step],
+            _ => {}
+        }
+        let key = (step, present.iter().map(|(id, _)| *id).collect::<Vec<_>>());
+        if let Some(known) = self.groups.get(&key) {
+            return *known;
+        }
+        let group = self.formula.fresh(Meaning::Group { group: dense(self.groups.len()), step: dense(step) });
+        for (_, literal) in &present {
+            self.formula.add(family, [!*literal, group]);
+        }
+        self.formula.add(family, present.iter().map(|(_, literal)| *literal).chain([!group]));
+        self.groups.insert(key, group);
+        group
+    }
+
+    /// Sorts the operators at a step by a property, in order of the property.
+    pub(super) fn partition<K: Ord>(
+        &self,
+        step: usize,
+        property: impl Fn(&'a Operator) -> Vec<K>,
+    ) -> BTreeMap<K, Vec<OperatorId>> {
+        let mut parts: BTreeMap<K, Vec<OperatorId>> = BTreeMap::new();
+        for (id, _) in &self.variables.operators[step] {
+            for key in property(&self.task.operators[id.index()]) {
+                parts.entry(key).or_default().push(*id);
+            }
+        }
+        parts
+    }
+}

@@ -1,0 +1,29 @@
+//! The designs of operators in the task's numbering.
+
+use crate::number::dense;
+use crate::task::{Operator, SlotUse};
+
+/// Slot and design in the task's numbering, from positions in an operator.
+pub(super) fn global(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {
+    let usage = &slots[slot as usize];
+    (usage.slot.index(), usage.designs[design as usize] as usize)
+}
+
+/// All combinations of designs of some slots in the order of `Table::values`, in the task's numbering.
+pub(super) fn combinations(operator: &Operator, slots: &[u32]) -> Vec<Vec<(usize, usize)>> {
+    let mut all = vec![Vec::new()];
+    for slot in slots {
+        let designs = 0..dense(operator.slots[*slot as usize].designs.len());
+        all = all
+            .iter()
+            .flat_map(|known: &Vec<(usize, usize)>| {
+                designs.clone().map(move |design| {
+                    let mut longer = known.clone();
+                    longer.push(global(&operator.slots, *slot, design));
+                    longer
+                })
+            })
+            .collect();
+    }
+    all
+}

@@ -1,0 +1,137 @@
+//! The variables of a formula by step: for operators, for the values of state variables, and for designs.
+//!
+//! A value that no sequence of allowed operators can produce by a step gets no variable there.
+
+use crate::context::Context;
+use crate::encode::formula::{Formula, Meaning};
+use crate::limits::Interrupted;
+use crate::number::dense;
+use crate::sat::Lit;
+use crate::task::{Fact, Literal, OperatorId, Task};
+
+/// What stands for operators, values and designs.
+#[derive(Default)]
+pub(super) struct Variables {
+    /// For each step the operators that can be there, ascending, with their variables.
+    pub(super) operators: Vec<Vec<(OperatorId, Lit)>>,
+    /// Whether any operator is executed at the step.
+    pub(super) busy: Vec<Lit>,
+    /// `values[step][variable][value]`: the variable has the value before the step.
+    pub(super) values: Vec<Vec<Vec<Lit>>>,
+    /// `designs[step][slot][design]`.
+    pub(super) designs: Vec<Vec<Vec<Lit>>>,
+}
+
+impl Variables {
+    /// Makes the variables for operators, values and designs.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "steps are fewer than the horizon, whose formula is in memory"
+    )]
+    pub(super) fn declare(
+        context: Context<'_>,
+        formula: &mut Formula,
+        allowed: &[Vec<bool>],
+    ) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
+        let mut all = Self::default();
+        let mut possible: Vec<Vec<bool>> =
+            task.variables.iter().map(|v| vec![false; v.values.len()]).collect();
+        for (variable, value) in task.initial.values.iter().enumerate() {
+            possible[variable][*value as usize] = true;
+        }
+        // What derived variables hold follows from the others at every step.
+        for values in &mut possible[task.basic..] {
+            values[1] = true;
+        }
+        for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
+            possible[rule.head.variable.index()][rule.head.value as usize] = true;
+        }
+        all.values.push(values(formula, &possible, 0));
+        for (step, allowed) in allowed.iter().enumerate() {
+            let mut present = Vec::new();
+            for item in limits.watch(task.operators.iter().zip(OperatorId::all(task.operators.len()))) {
+                let (operator, id) = item?;
+                let is_possible = |fact: &Fact| possible[fact.variable.index()][fact.value as usize];
+                if allowed[id.index()] && operator.condition.facts.iter().all(is_possible) {
+                    let meaning = Meaning::Operator { operator: id.0, step: dense(step) };
+                    present.push((id, formula.fresh(meaning)));
+                }
+            }
+            for (id, _) in &present {
+                let operator = &task.operators[id.index()];
+                let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+                for effect in operator.effects.iter().chain(conditional) {
+                    possible[effect.variable.index()][effect.value as usize] = true;
+                }
+            }
+            all.designs.push(designs(task, formula, &present, step));
+            all.operators.push(present);
+            all.values.push(values(formula, &possible, step + 1));
+        }
+        Ok(all)
+    }
+
+    /// So many steps can be executed.
+    pub(super) fn horizon(&self) -> usize {
+        self.operators.len()
+    }
+
+    /// The variable of a fact before a step.
+    pub(super) fn fact(&self, fact: Fact, step: usize) -> Lit {
+        self.values[step][fact.variable.index()][fact.value as usize]
+    }
+
+    /// The variable of a fact before a step, or its negation.
+    pub(super) fn literal(&self, literal: Literal, step: usize) -> Lit {
+        let fact = self.fact(literal.fact, step);
+        if literal.positive { fact } else { !fact }
+    }
+
+    /// The variable of an operator at a step, if it can stand there.
+    pub(super) fn operator(&self, step: usize, id: OperatorId) -> Option<Lit> {
+        let all = &self.operators[step];
+        all.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| all[index].1)
+    }
+}
+
+/// The variables of values before a step.
+fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec<Lit>> {
+    let mut all = Vec::with_capacity(possible.len());
+    for (variable, values) in possible.iter().enumerate() {
+        let single = values.iter().filter(|possible| **possible).count() == 1;
+        let mut literals = Vec::with_capacity(values.len());
+        for (value, possible) in values.iter().enumerate() {
+            literals.push(match (possible, single) {
+                (false, _) => !Formula::truth(),
+                (true, true) => Formula::truth(),
+                (true, false) => {
+                    let (variable, value, step) = (dense(variable), dense(value), dense(step));
+                    formula.fresh(Meaning::Value { variable, value, step })
+                }
+            });
+        }
+        all.push(literals);
+    }
+    all
+}
+
+/// The variables of designs that operators may choose at a step.
+fn designs(task: &Task, formula: &mut Formula, present: &[(OperatorId, Lit)], step: usize) -> Vec<Vec<Lit>> {
+    let mut used: Vec<Vec<bool>> = task.slots.iter().map(|slot| vec![false; slot.designs.len()]).collect();
+    for slot in present.iter().flat_map(|(id, _)| task.operators[id.index()].slots.iter()) {
+        for design in &slot.designs {
+            used[slot.slot.index()][*design as usize] = true;
+        }
+    }
+    let mut all = Vec::with_capacity(used.len());
+    for (slot, used) in used.into_iter().enumerate() {
+        let mut literals = Vec::with_capacity(used.len());
+        for (design, used) in used.into_iter().enumerate() {
+            let meaning = Meaning::Design { slot: dense(slot), design: dense(design), step: dense(step) };
+            literals.push(if used { formula.fresh(meaning) } else { !Formula::truth() });
+        }
+        all.push(literals);
+    }
+    all
+}

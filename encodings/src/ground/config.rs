@@ -1,0 +1,35 @@
+//! How the domain's symbols are to be read, and what a ground task is to be good for.
+
+use crate::limits::Limits;
+use crate::number::Int;
+use pddl::ast::{Metric, Name};
+
+/// How the domain's symbols are to be read.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
+    pub solves: Vec<Name>,
+    /// What plans are measured by, the most important first, in place of the metric of the problem; none for that metric.
+    pub objectives: Vec<Metric>,
+    /// When to give up.
+    pub limits: Limits,
+}
+
+impl Default for Config {
+    /// The names of the Metaplan paper and of the files of kas-lab.
+    fn default() -> Self {
+        Self {
+            solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec(),
+            objectives: Vec::new(),
+            limits: Limits::none(),
+        }
+    }
+}
+
+/// What a ground task is to be good for beside the problem that it is made of.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Generality {
+    /// If given, numbers of the initial state may be others, too, that are integers when multiplied by this: nothing is
+    /// concluded from those of the problem.
+    pub(crate) numbers: Option<Int>,
+}

@@ -1,0 +1,64 @@
+//! The slots of a task: all functions whose design some operator leaves open.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::ground::vocabulary::operator::{GroundOperator, GroundSlots};
+use crate::lifted::ObjectId;
+use crate::number::dense;
+use crate::task::{Slot, SlotId, SlotUse};
+
+/// A function, and which of the operator's slots for this function it is: an action may require one twice.
+type SlotKey = (ObjectId, usize);
+
+fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectId>)> {
+    slots.iter().enumerate().map(|(position, (function, suitable))| {
+        let earlier = slots[..position].iter().filter(|(other, _)| other == function).count();
+        ((*function, earlier), suitable)
+    })
+}
+
+/// All functions whose design some operator leaves open, in the order of the objects, with all their designs.
+pub(super) struct Slots {
+    pub(super) all: Vec<Slot>,
+    ids: FxHashMap<SlotKey, SlotId>,
+    /// How slots are used, by where they lie: operators share them.
+    uses: FxHashMap<*const (ObjectId, Vec<ObjectId>), Arc<[SlotUse]>>,
+}
+
+impl Slots {
+    pub(super) fn new(operators: &[GroundOperator]) -> Self {
+        let mut seen = FxHashSet::default();
+        let distinct = operators.iter().filter(|operator| seen.insert(operator.slots.as_ptr()));
+        let mut designs: BTreeMap<SlotKey, Vec<ObjectId>> = BTreeMap::new();
+        for (key, suitable) in distinct.flat_map(|operator| slot_keys(&operator.slots)) {
+            designs.entry(key).or_default().extend(suitable);
+        }
+        let mut slots = Self { all: Vec::new(), ids: FxHashMap::default(), uses: FxHashMap::default() };
+        for (key, mut designs) in designs {
+            designs.sort_unstable();
+            designs.dedup();
+            slots.ids.insert(key, SlotId::of(slots.all.len()));
+            slots.all.push(Slot { designs });
+        }
+        slots
+    }
+
+    pub(super) fn uses(&mut self, ground: &Arc<GroundSlots>) -> Arc<[SlotUse]> {
+        if let Some(known) = self.uses.get(&ground.as_ptr()) {
+            return known.clone();
+        }
+        let uses: Arc<[SlotUse]> = slot_keys(ground)
+            .map(|(key, suitable)| {
+                let slot = self.ids[&key];
+                let all = &self.all[slot.index()].designs;
+                let designs = suitable.iter().filter_map(|design| all.binary_search(design).ok());
+                SlotUse { slot, designs: designs.map(dense).collect() }
+            })
+            .collect();
+        self.uses.insert(ground.as_ptr(), uses.clone());
+        uses
+    }
+}

@@ -1,0 +1,71 @@
+//! Backwards: effects that no condition reads, then operators that do nothing at all.
+
+use rustc_hash::FxHashSet;
+
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::operator::GroundOperator;
+use crate::ground::vocabulary::task::GroundTask;
+use crate::lifted::Rational;
+use crate::limits::Interrupted;
+use crate::task::quantity::{NumericId, Quantity};
+
+/// Removes effects on numeric variables that no condition depends on; the metric has been made of them already.
+pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
+    let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
+    let bodies = task.axioms.iter().map(|axiom| &axiom.body);
+    let comparisons = conditions.chain(bodies).flat_map(|condition| &condition.comparisons);
+    let mut read: FxHashSet<NumericId> = comparisons
+        .flat_map(|(linear, _)| linear.coefficients.iter().map(|(variable, _)| *variable))
+        .collect();
+    let mut open: Vec<NumericId> = read.iter().copied().collect();
+    while let Some(variable) = open.pop() {
+        let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));
+        for (source, _) in values.flat_map(|value| &value.coefficients) {
+            if read.insert(*source) {
+                open.push(*source);
+            }
+        }
+    }
+    for operator in &mut task.operators {
+        operator.numeric_effects.retain(&|variable| read.contains(&variable));
+    }
+}
+
+/// Removes rules of atoms that nothing reads, effects on such atoms, and operators that do nothing and earn nothing.
+pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
+    loop {
+        task.world.limits.check()?;
+        let read = task.read_atoms();
+        let before = task.operators.len();
+        task.axioms.retain(|axiom| read.contains(&axiom.head));
+        for operator in &mut task.operators {
+            operator.adds.retain(|atom| read.contains(atom));
+            operator.deletes.retain(|atom| read.contains(atom));
+            for effect in &mut operator.conditional {
+                effect.adds.retain(|atom| read.contains(atom));
+                effect.deletes.retain(|atom| read.contains(atom));
+            }
+            operator.conditional.retain(|effect| !effect.adds.is_empty() || !effect.deletes.is_empty());
+        }
+        task.operators.retain(|operator| !is_idle(operator));
+        if task.operators.len() == before {
+            return Ok(());
+        }
+    }
+}
+
+/// Whether the operator changes nothing and cannot lower the cost of a plan.
+fn is_idle(operator: &GroundOperator) -> bool {
+    let known = |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();
+    let lowest = |cost: &Quantity<Rational>| {
+        let tables = cost.tables.iter().filter_map(|table| table.values.iter().min());
+        tables.fold(cost.constant.clone(), |sum, value| sum + value)
+    };
+    operator.adds.iter().all(|atom| known(*atom, true))
+        && operator.deletes.iter().all(|atom| known(*atom, false))
+        && operator.conditional.is_empty()
+        && operator.numeric_effects.iter().all(|(variable, value)| {
+            value.quantity.is_zero() && value.coefficients[..] == [(*variable, Rational::from_integer(1))]
+        })
+        && operator.costs.iter().all(|cost| lowest(cost) >= Rational::from_integer(0))
+}

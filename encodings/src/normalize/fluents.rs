@@ -1,0 +1,51 @@
+//! Which predicates and functions change.
+
+use crate::lifted::configuration::{is_static, recursive_through_forall};
+use crate::lifted::{Axiom, Change, Formula, Lifted};
+
+/// A predicate or function is a fluent if some action changes it, and a derived predicate if it depends on a fluent.
+pub(super) fn mark_fluents(lifted: &mut Lifted) {
+    for effect in
+        lifted.schemas.iter().flat_map(|schema| schema.start_effects.iter().chain(&schema.end_effects))
+    {
+        match &effect.change {
+            Change::Add(predicate, _) | Change::Delete(predicate, _) => {
+                lifted.predicates[predicate.index()].fluent = true;
+            }
+            Change::Assign { function, .. } => lifted.functions[function.index()].fluent = true,
+        }
+    }
+    for (predicate, ..) in lifted.events.iter().flat_map(|event| &event.changes) {
+        lifted.predicates[predicate.index()].fluent = true;
+    }
+    // The rule engine negates only what is complete; what recurs through a quantifier is evaluated by itself.
+    // So is a comparison below one: where a value is missing it does not hold, and neither does its negation.
+    let compares = lifted.axioms.iter().filter(|axiom| compares_for_all(&axiom.condition, false));
+    let compares: Vec<_> = compares.map(|axiom| axiom.predicate).collect();
+    for predicate in recursive_through_forall(lifted).into_iter().chain(compares) {
+        lifted.predicates[predicate.index()].fluent = true;
+    }
+    loop {
+        let depends = |axiom: &&Axiom| {
+            !lifted.predicates[axiom.predicate.index()].fluent && !is_static(lifted, &axiom.condition)
+        };
+        let more: Vec<_> = lifted.axioms.iter().filter(depends).map(|axiom| axiom.predicate).collect();
+        if more.is_empty() {
+            return;
+        }
+        for predicate in more {
+            lifted.predicates[predicate.index()].fluent = true;
+        }
+    }
+}
+
+/// Whether numbers are compared below a universal quantifier.
+fn compares_for_all(formula: &Formula, below: bool) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|part| compares_for_all(part, below)),
+        Formula::Exists(_, body) => compares_for_all(body, below),
+        Formula::ForAll(_, body) => compares_for_all(body, true),
+        Formula::Literal { .. } | Formula::Equal { .. } => false,
+        Formula::Compare(..) => below,
+    }
+}

@@ -1,0 +1,209 @@
+//! Names to ids: objects and their types, predicates, functions, and variables in sight.
+
+use std::sync::Arc;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::error::{Error, File, Place};
+use crate::lifted::{
+    Bound, Expression, Function, FunctionId, ObjectId, Parameter, Predicate, PredicateId, Term,
+};
+use crate::number::dense;
+use pddl::ast::{self, Identifier, Name, Span, TypeExpression, TypedName};
+
+/// What `?duration` stands for.
+pub(super) enum Duration {
+    /// The action has none.
+    Instantaneous,
+    Fixed(Expression),
+    /// The planner chooses it.
+    Open,
+}
+
+/// The variables in sight, each with what it stands for, and the file that is read.
+pub(super) struct Scope {
+    pub(super) file: File,
+    pub(super) variables: Vec<(Name, Term)>,
+    /// How many variables have been bound so far, in sight or not.
+    pub(super) bound: u32,
+    /// What `?duration` stands for.
+    pub(super) duration: Duration,
+}
+
+impl Scope {
+    pub(super) fn new(file: File) -> Self {
+        Self { file, variables: Vec::new(), bound: 0, duration: Duration::Instantaneous }
+    }
+
+    pub(super) fn place(&self, span: Span) -> Place {
+        Place { file: self.file, span }
+    }
+}
+
+/// What the names of the files stand for, and what is wrong with them.
+pub(super) struct Names {
+    pub(super) objects: Vec<Name>,
+    object_ids: FxHashMap<Name, ObjectId>,
+    /// Objects of each type, ascending, subtypes included.
+    members: FxHashMap<Name, Vec<ObjectId>>,
+    pub(super) predicates: Vec<Predicate>,
+    predicate_ids: FxHashMap<Name, PredicateId>,
+    pub(super) functions: Vec<Function>,
+    function_ids: FxHashMap<Name, FunctionId>,
+    pub(super) errors: Vec<Error>,
+}
+
+impl Names {
+    /// The declarations of the files.
+    pub(super) fn new(domain: &ast::Domain, problem: &ast::Problem) -> Self {
+        let predicates: Vec<_> = domain
+            .predicates
+            .iter()
+            .map(|declared| Predicate {
+                name: declared.identifier.name.clone(),
+                arity: declared.parameters.len(),
+                fluent: false,
+                derived: domain
+                    .derived
+                    .iter()
+                    .any(|axiom| axiom.head.identifier.name == declared.identifier.name),
+                running: false,
+            })
+            .collect();
+        let mut functions: Vec<_> = domain
+            .functions
+            .iter()
+            .map(|declared| Function { name: declared.identifier.name.clone(), fluent: false })
+            .collect();
+        let total_cost = Name::new("total-cost");
+        if functions.iter().all(|function| function.name != total_cost) {
+            functions.push(Function { name: total_cost, fluent: false });
+        }
+        let predicate_ids =
+            predicates.iter().zip(0..).map(|(p, id)| (p.name.clone(), PredicateId(id))).collect();
+        let function_ids =
+            functions.iter().zip(0..).map(|(f, id)| (f.name.clone(), FunctionId(id))).collect();
+        let mut names = Self {
+            objects: Vec::new(),
+            object_ids: FxHashMap::default(),
+            members: FxHashMap::default(),
+            predicates,
+            predicate_ids,
+            functions,
+            function_ids,
+            errors: Vec::new(),
+        };
+        names.declare_objects(domain, problem);
+        names
+    }
+
+    #[expect(clippy::arithmetic_side_effects, reason = "an object was pushed before")]
+    fn declare_objects(&mut self, domain: &ast::Domain, problem: &ast::Problem) {
+        let mut parents: FxHashMap<Name, Vec<Name>> = FxHashMap::default();
+        for entry in &domain.types {
+            let above = entry.r#type.alternatives.iter().map(|parent| parent.name.clone());
+            parents.entry(entry.identifier.name.clone()).or_default().extend(above);
+        }
+        for entry in domain.constants.iter().chain(&problem.objects) {
+            let name = &entry.identifier.name;
+            let id = *self.object_ids.entry(name.clone()).or_insert_with(|| {
+                self.objects.push(name.clone());
+                ObjectId(dense(self.objects.len()) - 1)
+            });
+            let mut open: Vec<Name> = entry.r#type.alternatives.iter().map(|t| t.name.clone()).collect();
+            open.push(Name::new("object"));
+            let mut seen = FxHashSet::default();
+            while let Some(name) = open.pop() {
+                if seen.insert(name.clone()) {
+                    open.extend(parents.get(&name).into_iter().flatten().cloned());
+                    self.members.entry(name).or_default().push(id);
+                }
+            }
+        }
+        for members in self.members.values_mut() {
+            members.sort_unstable();
+            members.dedup();
+        }
+    }
+
+    /// The objects of a type, ascending.
+    fn candidates(&self, expression: &TypeExpression) -> Arc<[ObjectId]> {
+        let object = Identifier { name: Name::new("object"), span: Span::default() };
+        let alternatives = if expression.alternatives.is_empty() {
+            std::slice::from_ref(&object)
+        } else {
+            &expression.alternatives
+        };
+        let mut all: Vec<_> =
+            alternatives.iter().filter_map(|t| self.members.get(&t.name)).flatten().copied().collect();
+        all.sort_unstable();
+        all.dedup();
+        all.into()
+    }
+
+    pub(super) fn unsupported(&mut self, construct: &str, instead: &str, file: File, span: Span) {
+        self.errors.push(Error::Unsupported {
+            construct: construct.into(),
+            instead: instead.into(),
+            place: Place { file, span },
+        });
+    }
+
+    pub(super) fn unknown(&mut self, kind: &'static str, identifier: &Identifier, file: File) {
+        let place = Place { file, span: identifier.span };
+        self.errors.push(Error::Unknown { kind, name: identifier.name.to_string(), place });
+    }
+
+    /// Takes variables into sight.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+    pub(super) fn bind(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
+        let mut all = Vec::with_capacity(variables.len());
+        for variable in variables {
+            let candidates = self.candidates(&variable.r#type);
+            scope.variables.push((variable.identifier.name.clone(), Term::Parameter(scope.bound)));
+            all.push(Bound { variable: scope.bound, candidates });
+            scope.bound += 1;
+        }
+        all
+    }
+
+    pub(super) fn parameters(&mut self, written: &[TypedName], scope: &mut Scope) -> Vec<Parameter> {
+        let bound = self.bind(written, scope);
+        bound.into_iter().map(|bound| Parameter { candidates: bound.candidates }).collect()
+    }
+
+    pub(super) fn predicate(&mut self, identifier: &Identifier, file: File) -> PredicateId {
+        self.predicate_ids.get(&identifier.name).copied().unwrap_or_else(|| {
+            self.unknown("predicate", identifier, file);
+            PredicateId(0)
+        })
+    }
+
+    pub(super) fn function(&mut self, identifier: &Identifier, file: File) -> FunctionId {
+        self.function_ids.get(&identifier.name).copied().unwrap_or_else(|| {
+            self.unknown("function", identifier, file);
+            FunctionId(0)
+        })
+    }
+
+    pub(super) fn terms(&mut self, atom: &ast::Atom, scope: &mut Scope) -> Vec<Term> {
+        atom.arguments.iter().map(|term| self.term(term, scope)).collect()
+    }
+
+    pub(super) fn term(&mut self, term: &ast::Term, scope: &mut Scope) -> Term {
+        let (kind, identifier, found) = match term {
+            ast::Term::Variable(identifier) => {
+                let found = scope.variables.iter().rev().find(|(name, _)| *name == identifier.name);
+                ("variable", identifier, found.map(|(_, term)| *term))
+            }
+            ast::Term::Constant(identifier) => {
+                let found = self.object_ids.get(&identifier.name);
+                ("object", identifier, found.map(|object| Term::Object(*object)))
+            }
+        };
+        found.unwrap_or_else(|| {
+            self.unknown(kind, identifier, scope.file);
+            Term::Object(ObjectId(0))
+        })
+    }
+}

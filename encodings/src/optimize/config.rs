@@ -1,0 +1,49 @@
+//! What the user asks of the optimizer.
+
+use crate::encode::Semantics;
+use crate::limits::Limits;
+use crate::sat::Backend;
+
+/// How the SAT solver is made to find a cheapest plan.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Strategy {
+    /// The one that is faster in general.
+    #[default]
+    Auto,
+    /// Cheaper and cheaper plans, until there is none.
+    Tighten,
+    /// A lower bound that rises with each contradiction among assumptions about what a plan does not pay, until a plan costs as
+    /// much. Where the number of steps of a cheapest plan has no bound, it is as `Tighten`.
+    Cores,
+}
+
+/// What the user asks of the optimizer.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Only plans with at most this many steps count.
+    pub horizon: Option<usize>,
+    /// Whether a quick search looks for a first plan; otherwise the SAT solver finds it, horizon by horizon.
+    pub quick_search: bool,
+    /// How many operators stand at a step of the formulas; with a horizon, which counts actions, always one. If not
+    /// given, several while a first plan is looked for, and one for the proof that there is no cheaper one.
+    pub semantics: Option<Semantics>,
+    /// How the SAT solver is made to find a cheapest plan.
+    pub strategy: Strategy,
+    /// The SAT solver.
+    pub backend: Backend,
+    /// When to stop.
+    pub limits: Limits,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            horizon: None,
+            quick_search: true,
+            semantics: None,
+            strategy: Strategy::default(),
+            backend: Backend::default(),
+            limits: Limits::none(),
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{ToPrimitive, Zero};
+
+use crate::context::Context;
+use crate::lifted::ObjectId;
+use crate::number::{Int, Rational};
+use crate::plan::earliest::{earliest, starts};
+use crate::plan::ground::GroundPlan;
+use crate::task::number::TaskNumber;
+use crate::task::{Argument, Objective, Operator, Task};
+use pddl::to_decimal;
+
+/// An exact number of any size, in the units of the PDDL files.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Exact(Rational);
+
+impl Exact {
+    /// A number of a ground task that is so many times what the files write.
+    pub(crate) fn scaled<N: TaskNumber>(value: &N, scale: Int) -> Self {
+        Self(value.to_rational() / Rational::from_integer(scale))
+    }
+
+    /// The numerator of the reduced fraction.
+    pub fn numerator(&self) -> BigInt {
+        self.0.to_big().numer().clone()
+    }
+
+    /// The denominator of the reduced fraction, positive.
+    pub fn denominator(&self) -> BigInt {
+        self.0.to_big().denom().clone()
+    }
+
+    /// Whether it is 0.
+    pub fn is_zero(&self) -> bool {
+        self.0.is_zero()
+    }
+
+    /// As a rational.
+    pub fn to_rational(&self) -> BigRational {
+        self.0.to_big()
+    }
+
+    /// The nearest double.
+    pub fn to_f64(&self) -> f64 {
+        self.to_rational().to_f64().unwrap_or(f64::NAN)
+    }
+}
+
+impl From<BigRational> for Exact {
+    fn from(number: BigRational) -> Self {
+        Self(Rational::from_big(number))
+    }
+}
+
+/// Writes an exact decimal where there is one, else a fraction.
+impl std::fmt::Display for Exact {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let exact = self.to_rational();
+        f.write_str(&to_decimal(&exact).unwrap_or_else(|| exact.to_string()))
+    }
+}
+
+/// One action of a plan as users see it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    /// The name of the action schema.
+    pub action: String,
+    /// All arguments in the order of the schema's parameters, designs among them.
+    pub arguments: Vec<String>,
+    /// The function and the design chosen for it, in the order of the parameters.
+    pub configuration: Vec<(String, String)>,
+    /// Functions whose design differs from the one that the last step with this function used.
+    pub reconfigured: Vec<String>,
+    /// When the action starts, in the domain's time unit, actions executing one after another. There is nothing between
+    /// them but time to wait for timed initial literals.
+    pub start: Exact,
+    /// How long it takes; none for an instantaneous action.
+    pub duration: Exact,
+    /// What it adds to the metric.
+    pub cost: Exact,
+}
+
+/// A plan as users see it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Plan {
+    /// The actions, in order of execution.
+    pub steps: Vec<Step>,
+    /// The metric of the problem file.
+    pub cost: Exact,
+}
+
+/// The plan in the names of the task, each action as early as can be found within the limits.
+pub(crate) fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> Plan {
+    let (task, plan) = (context.task, earliest(context, plan));
+    let mut steps = Vec::new();
+    let mut current: Vec<(String, String)> = Vec::new();
+    let actions = plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none());
+    for (step, start) in actions.zip(starts(task, &plan.steps)) {
+        let operator = &task.operators[step.operator.index()];
+        let sizes = operator.sizes();
+        let duration = operator.duration.at(&step.choice, &sizes).to_rational();
+        let cost = task.objective.signed(&operator.cost.at(&step.choice, &sizes));
+        let mut step = Step::new(task, operator, &step.choice, (start, duration, cost));
+        step.note_reconfigured(&mut current);
+        steps.push(step);
+    }
+    Plan { steps, cost: metric(task, &plan.cost) }
+}
+
+impl Plan {
+    /// When the last action ends, in the domain's time unit.
+    pub fn makespan(&self) -> Exact {
+        let ends = self.steps.iter().map(|step| step.start.0.clone() + &step.duration.0);
+        Exact(ends.max().unwrap_or_default())
+    }
+}
+
+impl Step {
+    /// An operator in names, with its start and duration in the task's time unit and its cost in the task's cost unit.
+    pub(crate) fn new<N: TaskNumber>(
+        task: &Task<N>,
+        operator: &Operator<N>,
+        choice: &[u32],
+        (start, duration, cost): (Rational, Rational, Rational),
+    ) -> Self {
+        Self {
+            action: task.schema_names[operator.schema as usize].clone(),
+            arguments: arguments(task, operator, choice),
+            configuration: configuration(task, operator, choice),
+            reconfigured: Vec::new(),
+            start: Exact::scaled(&start, task.time_scale),
+            duration: Exact::scaled(&duration, task.time_scale),
+            cost: Exact::scaled(&cost, task.objective.scale),
+        }
+    }
+
+    /// Notes the functions whose design is not the one in `current`, which has the last design of each; and updates it.
+    pub(crate) fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
+        for (function, design) in &self.configuration {
+            match current.iter_mut().find(|(known, _)| known == function) {
+                Some((_, known)) if known == design => {}
+                Some((_, known)) => {
+                    known.clone_from(design);
+                    self.reconfigured.push(function.clone());
+                }
+                None => current.push((function.clone(), design.clone())),
+            }
+        }
+    }
+}
+
+/// The metric of the problem file for a sum of operator costs.
+pub(crate) fn metric<N: TaskNumber>(task: &Task<N>, cost: &impl TaskNumber) -> Exact {
+    task.objective.metric(cost)
+}
+
+impl<N: TaskNumber> Objective<N> {
+    /// The metric as the file writes it for a sum of operator costs.
+    pub(crate) fn metric(&self, cost: &impl TaskNumber) -> Exact {
+        Exact::scaled(&self.signed(&(cost.to_rational() + self.offset.to_rational())), self.scale)
+    }
+
+    /// A cost as the file counts it.
+    fn signed(&self, cost: &impl TaskNumber) -> Rational {
+        let cost = cost.to_rational();
+        if self.maximize { -cost } else { cost }
+    }
+}
+
+/// The object that an argument stands for, with a combination of designs.
+pub(crate) fn resolve<N>(
+    task: &Task<N>,
+    operator: &Operator<N>,
+    choice: &[u32],
+    argument: Argument,
+) -> ObjectId {
+    match argument {
+        Argument::Object(object) => object,
+        Argument::Slot(position) => {
+            let slot = &operator.slots[position as usize];
+            let design = slot.designs[choice[position as usize] as usize];
+            task.slots[slot.slot.index()].designs[design as usize]
+        }
+    }
+}
+
+fn argument<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32], argument: Argument) -> String {
+    task.object_names[resolve(task, operator, choice, argument).index()].clone()
+}
+
+fn arguments<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<String> {
+    operator.arguments.iter().map(|a| argument(task, operator, choice, *a)).collect()
+}
+
+fn configuration<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<(String, String)> {
+    let name = |function: ObjectId| task.object_names[function.index()].clone();
+    let pairs = operator.configuration.iter();
+    pairs.map(|(function, design)| (name(*function), argument(task, operator, choice, *design))).collect()
+}
