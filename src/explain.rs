@@ -12,9 +12,10 @@ use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
 use ontology::tomasys::change::Status as Component;
 
-use crate::mapek::{PlannedStep, number, ruled_out};
+use crate::mapek::{PlannedStep, ruled_out};
 use crate::message::Message;
 use crate::mission::Mission;
+use crate::number;
 
 /// How finely values are told apart, as a part of the value.
 const FINENESS: i64 = 1000;

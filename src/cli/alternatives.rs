@@ -7,7 +7,7 @@ use metaplan::mission::Mission;
 use pddl::ast::Problem;
 use serde_json::{Value, json};
 
-use crate::cli::Failure;
+use crate::cli::common::Failure;
 use crate::cli::confirm::{Reading, confirm};
 use crate::cli::plan_json::step_json;
 use crate::cli::plan_text::steps_text;

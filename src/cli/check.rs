@@ -7,15 +7,17 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::source;
 use probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Report, check};
 use probabilistic::explore::Bounds;
 use probabilistic::prism::Settings;
-use probabilistic::{Diagnostic, Error, prism, property};
+use probabilistic::{prism, property};
 use serde_json::{Map, Value, json};
 
-use crate::cli::{Common, Exit, Failure, Format, output, setting};
+use crate::cli::common::{Common, Exit, Failure, Format, in_file, process_failure};
+use crate::cli::output;
+use crate::cli::values::setting;
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -53,7 +55,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let file = source(&arguments.model)?;
     let model = prism::parse(file.text()).map_err(|problems| in_file(&problems, file.name()))?;
-    let property = property::parse(&arguments.property).map_err(|error| failure(error, file.name()))?;
+    let property =
+        property::parse(&arguments.property).map_err(|error| process_failure(error, file.name()))?;
     let bar = progress(common);
     let told = |states: usize| {
         bar.set_message(format!("{states} states"));
@@ -73,7 +76,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let report = check(&model, &property, &options);
     bar.finish_and_clear();
-    let report = report.map_err(|error| failure(error, file.name()))?;
+    let report = report.map_err(|error| process_failure(error, file.name()))?;
     if let Some(path) = &arguments.policy {
         let Some(policy) = &report.policy else {
             let text = "this property has no policy to write; ask for one value with `F`, `G` or `U`";
@@ -104,29 +107,7 @@ fn progress(common: &Common) -> ProgressBar {
 
 fn read_policy(path: &Path) -> Result<PolicyTable, Failure> {
     let file = source(path)?;
-    PolicyTable::from_json(file.text()).map_err(|error| failure(error, file.name()))
-}
-
-fn in_file(problems: &[Diagnostic], file: &str) -> Failure {
-    let message = |problem: &Diagnostic| {
-        let place = Some((problem.place.line, problem.place.column));
-        Message::at(problem.code, file, place, problem.message.clone())
-    };
-    problems.iter().map(message).collect::<Vec<_>>().into()
-}
-
-/// What the library reports, with the file that it is about.
-pub fn failure(error: Error, file: &str) -> Failure {
-    match error {
-        Error::Model(problems) => in_file(&problems, file),
-        Error::Property(problems) => in_file(&problems, "property"),
-        Error::Constant(text) => Failure::usage(Message::error("Q504", text)),
-        Error::StateLimit { .. } | Error::Interrupted { .. } => Failure {
-            exit: Exit::NothingFound,
-            messages: vec![Message::at("Q505", file, None, error.to_string())],
-        },
-        other => Message::at("Q506", file, None, other.to_string()).into(),
-    }
+    PolicyTable::from_json(file.text()).map_err(|error| process_failure(error, file.name()))
 }
 
 fn as_text(report: &Report, verbose: bool) -> String {

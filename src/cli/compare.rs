@@ -15,13 +15,15 @@ use metaplan::comparison::{
 };
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use pddl::ast::Problem;
 
-use crate::cli::check::failure as process_failure;
+use crate::cli::common::{Common, Exit, Failure, process_failure};
 use crate::cli::compare_so_far::{Begun, Shared};
 use crate::cli::compare_table::{Pair, memory_since, published_rows};
-use crate::cli::plan::seconds;
-use crate::cli::{Common, Exit, Failure, Situation as Given, output};
+use crate::cli::output;
+use crate::cli::situation::Situation as Given;
+use crate::cli::values::seconds;
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -88,8 +90,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(time) = arguments.time_limit {
         so_far.show_after(time, common);
     }
-    let mission = arguments.situation.mission(&arguments.inputs)?;
-    let mut roles = mission.roles().clone();
+    let Setup { mission, mut roles, .. } = arguments.situation.setup(&arguments.inputs)?;
     if let Some((component, rate)) = &arguments.loss {
         roles.loss_component = Some(component.clone());
         roles.loss_rate = *rate;

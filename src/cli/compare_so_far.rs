@@ -13,10 +13,11 @@ use metaplan::comparison::{Candidate, Comparison, Costs};
 use metaplan::message::Message;
 use serde_json::{Value, json};
 
+use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::compare_table::{
     Pair, Row, as_json, as_text, begun_json, begun_rows, costs_text, csv, row_json, rows,
 };
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::output;
 
 /// How often the clock is looked at.
 const INTERVAL: Duration = Duration::from_millis(10);

@@ -4,11 +4,12 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use metaplan::comparison::{Candidate, Comparison, Costs, Measures, Stages};
+use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::source;
 use serde_json::{Map, Value, json};
 
-use crate::cli::{Failure, output};
+use crate::cli::common::Failure;
+use crate::cli::output;
 
 /// Start and goal, where a comparison is one of many.
 pub type Pair = (String, String);

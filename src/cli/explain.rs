@@ -9,7 +9,9 @@ use metaplan::explain::{Answer, Change, DesignExplanation, Target, best, design,
 use num_rational::BigRational;
 use serde_json::{Value, json};
 
-use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::Situation;
 
 /// Arguments of `explain`.
 #[derive(Debug, Args)]

@@ -3,14 +3,17 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use metaplan::comparison::{Coadaptation, Risk, Tasked, program, published_program};
+use metaplan::comparison::{Coadaptation, Risk, Roles, Tasked, program, published_program};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use pddl::ast::Problem;
 use pddl::{portable, print_domain, print_problem};
 use serde_json::json;
 
-use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::Situation;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -56,11 +59,11 @@ enum Setting {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let mission = arguments.situation.mission(&arguments.inputs)?;
+    let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
     if !matches!(arguments.target, Target::Pddl) {
-        return process(arguments, common, &mission, &problem);
+        return process(arguments, common, &mission, &problem, &roles);
     }
     let (domain, problem) = portable(mission.domain(), &problem);
     let (domain, problem) = (print_domain(&domain), print_problem(&problem));
@@ -88,8 +91,8 @@ fn process(
     common: &Common,
     mission: &Mission,
     problem: &Problem,
+    roles: &Roles,
 ) -> Result<Exit, Failure> {
-    let roles = mission.roles();
     let coadaptation = if Coadaptation::is_spelt_out(problem, roles) {
         Coadaptation::new(mission, problem, roles)?
     } else {

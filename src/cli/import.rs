@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use metaplan::comparison::{MapOptions, import_map};
+use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::source;
 use serde_json::json;
 
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
 
 /// Arguments of `import`.
 #[derive(Debug, Args)]

@@ -7,7 +7,8 @@ use clap::{Args, Subcommand};
 use metaplan::journal::{Entry, Report};
 use serde_json::{Value, json};
 
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
 
 /// Arguments of `journal`.
 #[derive(Debug, Args)]

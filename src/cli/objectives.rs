@@ -8,11 +8,12 @@ use metaplan::mission::Mission;
 use pddl::ast::{Metric, Problem};
 use serde_json::{Value, json};
 
+use crate::cli::common::Failure;
 use crate::cli::confirm::{Reading, confirm};
+use crate::cli::output;
 use crate::cli::plan_answer::answer_text as plan_text;
 use crate::cli::plan_json::json as plan_json;
 use crate::cli::plan_stages::{Stages, status_word};
-use crate::cli::{Failure, output};
 
 /// The objectives that the user asks for, in order; none for the problem's metric.
 pub(super) struct Objectives {

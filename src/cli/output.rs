@@ -12,7 +12,7 @@ use encodings::Exact;
 use metaplan::message::Message;
 use serde_json::{Value, json};
 
-use crate::cli::{Common, Failure, Format};
+use crate::cli::common::{Common, Failure, Format};
 
 /// Whether an answer could not be written.
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);

@@ -15,6 +15,7 @@ use metaplan::mission::{Blocking, Mission};
 use pddl::ast::Problem;
 use serde_json::json;
 
+use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::concurrent::{self, Overlap};
 use crate::cli::confirm::{Reading, fault};
 use crate::cli::limits::Guard;
@@ -24,7 +25,9 @@ use crate::cli::plan_json::json as plan_json;
 use crate::cli::plan_stages::Stages;
 use crate::cli::plan_text::{PlanFormat, plan_text};
 use crate::cli::plan_verdict::{blocking_text, verdict};
-use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, output, plan_exact};
+use crate::cli::situation::Situation;
+use crate::cli::values::seconds;
+use crate::cli::{alternatives, output, plan_exact};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -117,11 +120,6 @@ impl From<Encoding> for Semantics {
             Encoding::ExistsStep => Self::ExistsStep,
         }
     }
-}
-
-pub(super) fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is no number of seconds"))?;
-    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }
 
 /// What the user asks of the optimizer.

@@ -10,8 +10,11 @@ use ontology::Equality;
 use rules::{DEFAULT_STEP_BUDGET, Delta, Limits, Value};
 use serde_json::json;
 
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
 use crate::cli::reason_ask::Questions;
-use crate::cli::{Common, Exit, Failure, Format, Imports, output, setting};
+use crate::cli::situation::{Imports, consistent};
+use crate::cli::values::setting;
 
 /// Arguments of `reason`.
 #[derive(Debug, Args)]
@@ -80,7 +83,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Format::Text => output::answer(&text(&knowledge, &contradictions)),
     }
     if !contradictions.is_empty() && matches!(common.format, Format::Ntriples | Format::Turtle) {
-        return crate::cli::consistent(Some(&knowledge)).map(|()| Exit::Done);
+        return consistent(Some(&knowledge)).map(|()| Exit::Done);
     }
     Ok(if contradictions.is_empty() { Exit::Done } else { Exit::Inconsistent })
 }

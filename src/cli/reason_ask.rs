@@ -13,7 +13,9 @@ use ontology::vocab::{local_name, rdf};
 use rules::{Atom, Engine, Fact, Literal, Symbol, Term, Value};
 use serde_json::{Value as Json, json};
 
-use crate::cli::{Common, Exit, Failure, Format, Imports, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::Imports;
 
 /// Questions; at most one kind at a time.
 #[derive(Debug, Args)]

@@ -12,10 +12,13 @@ use clap::{Args, ValueEnum};
 use metaplan::journal::{Journal, Policy, Sync};
 use metaplan::mapek::{Answer, Clock as _, FORMAT, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
 use metaplan::message::Message;
+use metaplan::setup::Setup;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::cli::{Common, Exit, Failure, Situation, output};
+use crate::cli::common::{Common, Exit, Failure};
+use crate::cli::output;
+use crate::cli::situation::Situation;
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
@@ -52,9 +55,9 @@ enum Fsync {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let mission = arguments.situation.mission(&arguments.inputs)?;
+    let Setup { mission, settings, .. } = arguments.situation.setup(&arguments.inputs)?;
     output::warnings(common, mission.warnings());
-    let (name, settings) = (mission.name.clone(), mission.settings().clone());
+    let name = mission.name.clone();
     let mut control = Loop::new(mission, settings)?;
     let mut events = Lines::open(&arguments.events)?;
     let mut stdout = io::stdout();
@@ -70,8 +73,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             let policy = Policy { sync, snapshot_every: arguments.snapshot_every };
             let (journal, recovery) = Journal::open(directory, policy, &mut control)?;
             ready["resumed"] = json!(recovery.replayed.is_some());
-            ready["lines"] = json!(control.knowledge().lines());
-            ready["seq"] = json!(control.knowledge().sequence());
+            ready["lines"] = json!(control.beliefs().lines());
+            ready["seq"] = json!(control.beliefs().sequence());
             ready["cut_bytes"] = json!(recovery.cut);
             ready["warnings"] = json!(recovery.warnings.iter().map(|own| &own.message).collect::<Vec<_>>());
             output::warnings(common, &recovery.warnings);
@@ -87,29 +90,29 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Err(error) if is_gone(&error) => return Ok(Exit::Done),
         other => other.map_err(lost)?,
     }
-    let line = Arc::new(AtomicU64::new(control.knowledge().lines()));
+    let line = Arc::new(AtomicU64::new(control.beliefs().lines()));
     heartbeat(control.watch(), Arc::clone(&line));
     let read = Instant::now();
     let answers = match &mut journal {
         None => control.start(),
         Some(journal) => journal.begin(&mut control).map_err(|error| unwritten(&error))?,
     };
-    let number = control.knowledge().lines();
+    let number = control.beliefs().lines();
     match write(&mut stdout, number, &answers, read) {
         Err(error) if is_gone(&error) => return Ok(Exit::Done),
         other => other.map_err(lost)?,
     }
     let mut clock = SystemClock::default();
-    let begun = control.knowledge().now();
+    let begun = control.beliefs().now();
     while let Some(text) = events.next()? {
         let read = Instant::now();
         let now = begun + clock.now();
-        line.store(control.knowledge().lines() + 1, Ordering::Relaxed);
+        line.store(control.beliefs().lines() + 1, Ordering::Relaxed);
         let answers = match &mut journal {
             None => control.handle(&Observation::parse(&text), now),
             Some(journal) => journal.handle(&mut control, &text, now).map_err(|error| unwritten(&error))?,
         };
-        let number = control.knowledge().lines();
+        let number = control.beliefs().lines();
         let written = write(&mut stdout, number, &answers, read);
         match written {
             Err(error) if is_gone(&error) => return Ok(Exit::Done),

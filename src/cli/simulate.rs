@@ -5,13 +5,16 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use indicatif::ProgressBar;
-use metaplan::mapek::{Answer, Observation};
+use metaplan::mapek::{Answer, Observation, Settings};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use metaplan::simulate::{Run, SUAVE_COLUMNS, Sample, Simulation, Strategy, simulate};
 use serde_json::{Value, json};
 
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::consistent;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -67,12 +70,12 @@ impl Who {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let (mut mission, manifest) = Mission::read(&arguments.mission)?;
+    let Setup { mut mission, settings: control, scenarios, .. } = Setup::read(&arguments.mission)?;
     let known = || {
-        let simulated = manifest.scenarios.iter().filter(|(_, scenario)| scenario.simulation.is_some());
+        let simulated = scenarios.iter().filter(|(_, scenario)| scenario.simulation.is_some());
         simulated.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
     };
-    let scenario = manifest.scenarios.get(&arguments.scenario);
+    let scenario = scenarios.get(&arguments.scenario);
     let Some((scenario, settings)) =
         scenario.and_then(|scenario| Some((scenario, scenario.simulation.as_ref()?)))
     else {
@@ -95,14 +98,14 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     mission.apply(scenario)?;
     output::warnings(common, mission.warnings());
-    crate::cli::consistent(mission.knowledge())?;
+    consistent(mission.knowledge())?;
     let strategies: Vec<Strategy> = if arguments.strategy.is_empty() {
         Strategy::ALL.to_vec()
     } else {
         arguments.strategy.iter().map(|who| who.strategy()).collect()
     };
     let mut log = String::new();
-    let runs = play(&mission, settings, &strategies, arguments, common, &mut log)?;
+    let runs = play(&mission, &control, settings, &strategies, arguments, common, &mut log)?;
     if let Some(file) = &arguments.log {
         output::write_file(file, &log)?;
     }
@@ -118,6 +121,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 
 fn play(
     mission: &Mission,
+    control: &Settings,
     settings: &Simulation,
     strategies: &[Strategy],
     arguments: &Arguments,
@@ -135,7 +139,7 @@ fn play(
                     write_log(log, strategy, observation, answers);
                 }
             };
-            runs.push(simulate(mission, settings, strategy, seed, &mut note)?);
+            runs.push(simulate(mission, control, settings, strategy, seed, &mut note)?);
             progress.inc(1);
         }
     }

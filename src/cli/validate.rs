@@ -4,16 +4,18 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::source;
 use num_rational::BigRational;
-use num_traits::Num as _;
 use pddl::Source;
 use pddl::ast::Name;
 use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
 use serde_json::{Value, json};
 
-use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::Situation;
+use crate::cli::values::{decimal, time};
 
 /// Arguments of `validate`.
 #[derive(Debug, Args)]
@@ -30,13 +32,6 @@ pub struct Arguments {
     /// How far times may lie from the exact ones, and how far apart actions that interfere must begin and end.
     #[arg(long, value_name = "TIME", default_value = "0.001", value_parser = time)]
     tolerance: BigRational,
-}
-
-pub(super) fn time(text: &str) -> Result<BigRational, String> {
-    let value = text.parse::<serde_json::Number>().ok().and_then(|number| decimal(&Value::Number(number)));
-    value
-        .filter(|value| *value >= BigRational::default())
-        .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
 /// Runs the command.
@@ -90,12 +85,6 @@ fn json_plan(source: &Source) -> Result<PlanText, Failure> {
         plan.steps.push(PlanStep { action, arguments, start, duration, line: 0 });
     }
     Ok(plan)
-}
-
-fn decimal(value: &Value) -> Option<BigRational> {
-    let text = value.as_number()?.to_string();
-    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
-    BigRational::from_str_radix(&format!("{whole}{fraction}/1{}", "0".repeat(fraction.len())), 10).ok()
 }
 
 fn number(number: &BigRational) -> Value {

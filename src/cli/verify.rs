@@ -11,8 +11,10 @@ use encodings::Limits;
 use metaplan::certificate::{Claim, Part, Report, conditions, verify};
 use serde_json::json;
 
-use crate::cli::plan::seconds;
-use crate::cli::{Common, Exit, Failure, Format, Situation, memory, output, setting};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::situation::Situation;
+use crate::cli::values::{seconds, setting};
+use crate::cli::{memory, output};
 
 /// The process may take so much, in megabytes of 2^20 bytes: a certificate may come from anybody.
 const MEMORY_LIMIT: u64 = 4096;

@@ -6,7 +6,8 @@ use probabilistic::solve::solve;
 use probabilistic::{Direction, Problem};
 
 use crate::comparison::coadaptation::{Coadaptation, Switch, Traversal};
-use crate::comparison::compare::{Failure, Memo, after, time_of};
+use crate::comparison::nominal::{after, time_of};
+use crate::comparison::planned::{Failure, Memo};
 use crate::comparison::process::{Action, Process, Risk, Situation};
 use crate::comparison::referee::Referee;
 

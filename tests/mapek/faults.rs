@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use metaplan::journal::{Journal, Policy, Report, Sync};
 use metaplan::mapek::{Answer, Loop};
-use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use serde_json::Value;
 
 use crate::common::control;
@@ -312,8 +312,8 @@ fn links_and_pipes_are_refused_at_once_and_files_are_private() {
 fn a_journal_belongs_to_all_that_decisions_rest_on() {
     let directory = crate::worlds::own_files(7);
     let read = |directory: &Path| {
-        let (mission, _) = Mission::read(&directory.join("m.toml")).expect("the mission is read");
-        let settings = mission.settings().clone();
+        let Setup { mission, settings, .. } =
+            Setup::read(&directory.join("m.toml")).expect("the mission is read");
         Loop::new(mission, settings).expect("the mission can be planned for")
     };
     let journal = tempfile::tempdir().expect("a directory");
