@@ -6,6 +6,7 @@
 
 pub use {encodings, ontology, rules};
 
+pub mod answers;
 pub mod certificate;
 pub mod comparison;
 pub mod explain;

@@ -7,13 +7,13 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use metaplan::answers::CheckAnswer;
 use metaplan::file::source;
 use metaplan::message::Message;
 use probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Report, check};
 use probabilistic::explore::Bounds;
 use probabilistic::prism::Settings;
 use probabilistic::{prism, property};
-use serde_json::{Map, Value, json};
 
 use crate::cli::common::{Common, Exit, Failure, Format, in_file, process_failure};
 use crate::cli::output;
@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         output::write_file(path, &output::pretty(&policy.to_json()))?;
     }
     match common.format {
-        Format::Json => output::json_answer(&as_json(&arguments.property, &report)),
+        Format::Json => output::json_answer(&CheckAnswer::new(&arguments.property, &report)),
         _ => output::answer(&as_text(&report, common.verbose)),
     }
     Ok(match &report.outcome {
@@ -155,71 +155,4 @@ pub fn shown(answer: &Answer) -> String {
             None => format!("{} (between {} and {})", quantity.value, quantity.lower, quantity.upper),
         },
     }
-}
-
-/// A value for programs: `value`, `lower` and `upper` are null where it is infinite or undefined, which `status` says;
-/// `exact` is a fraction, `inf`, or null.
-pub fn answer_fields(answer: &Answer) -> Map<String, Value> {
-    let number = |value: f64| if value.is_finite() { json!(value) } else { Value::Null };
-    let fields = match answer {
-        Answer::Finite(quantity) => json!({
-            "status": "finite",
-            "value": number(quantity.value),
-            "lower": number(quantity.lower),
-            "upper": number(quantity.upper),
-            "exact": quantity.exact.as_ref().map(ToString::to_string),
-        }),
-        Answer::Infinite => {
-            json!({ "status": "infinite", "value": null, "lower": null, "upper": null, "exact": "inf" })
-        }
-        Answer::Undefined => {
-            json!({ "status": "undefined", "value": null, "lower": null, "upper": null, "exact": null })
-        }
-    };
-    match fields {
-        Value::Object(fields) => fields,
-        _ => Map::new(),
-    }
-}
-
-fn as_json(property: &str, report: &Report) -> Value {
-    let mut fields = Map::new();
-    fields.insert("format".to_owned(), json!("metaplan-check/1"));
-    fields.insert("property".to_owned(), json!(property));
-    match &report.outcome {
-        Outcome::Value(answer) => fields.extend(answer_fields(answer)),
-        Outcome::Truth(holds, answer) => {
-            fields.extend(answer.iter().flat_map(answer_fields));
-            fields.insert("holds".to_owned(), json!(holds));
-        }
-        Outcome::Undecided(answer) => {
-            fields.extend(answer_fields(answer));
-            fields.insert("holds".to_owned(), Value::Null);
-        }
-        Outcome::Front(vertices) => {
-            let pairs: Vec<_> =
-                vertices.iter().map(|pair| json!(pair.each_ref().map(answer_fields))).collect();
-            fields.insert("vertices".to_owned(), json!(pairs));
-        }
-        Outcome::Constrained { randomised, deterministic, proved } => {
-            fields.extend(answer_fields(randomised));
-            fields.insert("randomised".to_owned(), json!(answer_fields(randomised)));
-            let mut deterministic = answer_fields(deterministic);
-            deterministic.insert("proved".to_owned(), json!(proved));
-            fields.insert("deterministic".to_owned(), json!(deterministic));
-        }
-    }
-    let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
-    let milliseconds = json!({ "build": build.as_secs_f64() * 1e3, "solve": solve.as_secs_f64() * 1e3 });
-    fields.insert(
-        "statistics".to_owned(),
-        json!({
-            "states": states,
-            "choices": choices,
-            "transitions": transitions,
-            "deadlocks": deadlocks,
-            "milliseconds": milliseconds,
-        }),
-    );
-    Value::Object(fields)
 }

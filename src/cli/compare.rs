@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use encodings::Limits;
 use indicatif::{ProgressBar, ProgressDrawTarget};
+use metaplan::answers::Pair;
 use metaplan::comparison::{
     Action, Candidate, Coadaptation, Comparison, Config, Costs, Failure as Unfinished, Planned, Report, Risk,
     Roles, Situation, Stages, Tasked, compare,
@@ -20,7 +21,7 @@ use pddl::ast::Problem;
 
 use crate::cli::common::{Common, Exit, Failure, process_failure};
 use crate::cli::compare_so_far::{Begun, Shared};
-use crate::cli::compare_table::{Pair, memory_since, published_rows};
+use crate::cli::compare_table::{memory_since, published_rows};
 use crate::cli::output;
 use crate::cli::situation::Situation as Given;
 use crate::cli::values::seconds;

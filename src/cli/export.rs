@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use metaplan::answers::{MissionExport, ModelExport};
 use metaplan::comparison::{Coadaptation, Risk, Roles, Tasked, program, published_program};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use metaplan::setup::Setup;
 use pddl::ast::Problem;
 use pddl::{portable, print_domain, print_problem};
-use serde_json::json;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
@@ -77,8 +77,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             output::write_file(&directory.join("problem.pddl"), &problem)?;
         }
         None if common.format == Format::Json => {
-            let answer = json!({ "format": "metaplan-export/1", "domain": domain, "problem": problem });
-            output::json_answer(&answer);
+            output::json_answer(&MissionExport::new(domain, problem));
         }
         None => output::document(&format!("{domain}\n{problem}")),
     }
@@ -116,7 +115,7 @@ fn process(
     match &arguments.output {
         Some(file) => output::write_file(file, &text)?,
         None if common.format == Format::Json => {
-            output::json_answer(&json!({ "format": "metaplan-export/1", "model": text }));
+            output::json_answer(&ModelExport::new(text));
         }
         None => output::document(&text),
     }

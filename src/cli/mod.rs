@@ -20,8 +20,6 @@ mod output;
 mod plan;
 mod plan_answer;
 mod plan_exact;
-mod plan_json;
-mod plan_stages;
 mod plan_text;
 mod plan_verdict;
 mod reason;

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use encodings::Limits;
+use metaplan::answers::VerificationAnswer;
 use metaplan::certificate::{Claim, Part, Report, conditions, verify};
-use serde_json::json;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::situation::Situation;
@@ -97,16 +97,7 @@ fn give_up_late(limits: Limits, answered: Arc<AtomicBool>, format: Format) {
 
 fn show(report: &Report, format: Format) -> Exit {
     match format {
-        Format::Json => output::json_answer(&json!({
-            "format": "metaplan-verification/1",
-            "verified": report.verified(),
-            "claim": report.claim,
-            "parts": report.parts.iter().map(|part| json!({
-                "part": part.part,
-                "verified": part.result.is_ok(),
-                "message": part.result.as_ref().unwrap_or_else(|reason| reason),
-            })).collect::<Vec<_>>(),
-        })),
+        Format::Json => output::json_answer(&VerificationAnswer::new(report)),
         _ => output::answer(&text(report)),
     }
     if report.verified() { Exit::Done } else { Exit::Invalid }
