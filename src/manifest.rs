@@ -11,7 +11,7 @@ use crate::number;
 
 /// Where a manifest was read from.
 #[derive(Debug, Clone, Default)]
-pub struct Origin {
+pub struct ManifestPath {
     file: String,
     directory: PathBuf,
 }
@@ -20,7 +20,7 @@ pub struct Origin {
 ///
 /// # Errors
 /// The file cannot be read, is no manifest, or has other sections or keys.
-pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, Origin), Message> {
+pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Message> {
     let source = source(file)?;
     let (name, text) = (source.name().to_owned(), source.text());
     file::expect(Kind::Manifest, &name, text)?;
@@ -28,10 +28,13 @@ pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, Origin), Message> {
         let place = error.span().map(|span| line_and_column(text, span.start));
         Message::at("M104", &name, place, error.message().to_owned() + &meant(error.message()))
     })?;
-    Ok((sections, Origin { file: name, directory: file.parent().map(Path::to_owned).unwrap_or_default() }))
+    Ok((
+        sections,
+        ManifestPath { file: name, directory: file.parent().map(Path::to_owned).unwrap_or_default() },
+    ))
 }
 
-impl Origin {
+impl ManifestPath {
     /// A path of the manifest, from the current directory: in the manifest it is relative to the manifest.
     pub fn path(&self, path: &Path) -> PathBuf {
         self.directory.join(path)

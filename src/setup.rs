@@ -10,7 +10,7 @@ use serde::Deserialize;
 use crate::comparison::Roles;
 use crate::file::source;
 use crate::knowledge::{Knowledge, KnowledgeSection};
-use crate::manifest::{self, Origin};
+use crate::manifest::{self, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::Message;
 use crate::mission::{Bindings, Mission, PlanningSection, Scenario};
@@ -49,7 +49,7 @@ pub struct Setup {
     pub roles: Roles,
     /// Situations by name.
     pub scenarios: BTreeMap<String, Scenario<Simulation>>,
-    origin: Origin,
+    origin: ManifestPath,
 }
 
 impl Setup {
@@ -58,7 +58,7 @@ impl Setup {
     /// # Errors
     /// All that is wrong with the manifest and with the files that it names.
     pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
-        let (sections, origin): (Sections, Origin) =
+        let (sections, origin): (Sections, ManifestPath) =
             manifest::read(manifest).map_err(|message| vec![message])?;
         let knowledge = Knowledge::read(&sections.knowledge.sources(&origin));
         let settings = sections.adaptation.settings(&origin).map_err(|message| vec![message])?;
@@ -86,7 +86,7 @@ impl From<Mission> for Setup {
             settings: Settings::default(),
             roles: Roles::default(),
             scenarios: BTreeMap::new(),
-            origin: Origin::default(),
+            origin: ManifestPath::default(),
         }
     }
 }

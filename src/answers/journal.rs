@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::journal::{Entry, Report};
+use crate::journal::{Entry, JournalReport};
 use crate::message::Message;
 
 /// What is in a journal, and what is wrong with it.
@@ -34,7 +34,7 @@ struct RecordPart<'a> {
 
 impl<'a> JournalAnswer<'a> {
     /// The report, with the records if `shows`.
-    pub fn new(report: &'a Report, shows: bool) -> Self {
+    pub fn new(report: &'a JournalReport, shows: bool) -> Self {
         Self {
             format: "metaplan-journal-report/1",
             sound: report.is_sound(),

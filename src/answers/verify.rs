@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::certificate::{Claim, Part, Report};
+use crate::certificate::{Claim, Verification, VerifiedPart};
 
 /// What a certificate claims, and whether each part of it holds.
 #[derive(Debug, Clone, Serialize)]
@@ -10,11 +10,11 @@ pub struct VerificationAnswer<'a> {
     format: &'static str,
     verified: bool,
     claim: Option<&'a Claim>,
-    parts: Vec<VerifiedPart<'a>>,
+    parts: Vec<PartAnswer<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct VerifiedPart<'a> {
+struct PartAnswer<'a> {
     part: &'static str,
     verified: bool,
     message: &'a str,
@@ -22,8 +22,8 @@ struct VerifiedPart<'a> {
 
 impl<'a> VerificationAnswer<'a> {
     /// What came of a verification.
-    pub fn new(report: &'a Report) -> Self {
-        let part = |part: &'a Part| VerifiedPart {
+    pub fn new(report: &'a Verification) -> Self {
+        let part = |part: &'a VerifiedPart| PartAnswer {
             part: part.part,
             verified: part.result.is_ok(),
             message: part.result.as_ref().unwrap_or_else(|reason| reason),

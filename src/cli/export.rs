@@ -23,7 +23,7 @@ pub struct Arguments {
     inputs: Vec<PathBuf>,
     /// What to write.
     #[arg(long = "to", value_enum, value_name = "FORMAT")]
-    target: Target,
+    target: Language,
     /// Which reading of the probabilistic approach becomes a model.
     #[arg(long, value_enum, default_value_t = Setting::Corrected)]
     setting: Setting,
@@ -37,7 +37,7 @@ pub struct Arguments {
 
 /// What a mission can be written as.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Target {
+enum Language {
     /// The domain and the problem as they are planned, availability and values filled in, in a form that other
     /// planners accept.
     Pddl,
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
-    if !matches!(arguments.target, Target::Pddl) {
+    if !matches!(arguments.target, Language::Pddl) {
         return process(arguments, common, &mission, &problem, &roles);
     }
     let (domain, problem) = portable(mission.domain(), &problem);
@@ -102,7 +102,7 @@ fn process(
         Setting::Published => published_program(&coadaptation),
     };
     let text = match arguments.target {
-        Target::Jani => match probabilistic::jani::write(&mission.name, &model) {
+        Language::Jani => match probabilistic::jani::write(&mission.name, &model) {
             Ok(json) => output::pretty(&json),
             Err(problems) => {
                 let message =

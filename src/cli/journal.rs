@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use metaplan::answers::JournalAnswer;
-use metaplan::journal::{Entry, Report};
+use metaplan::journal::{Entry, JournalReport};
 use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
@@ -37,7 +37,7 @@ enum What {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (What::Check { directory } | What::Show { directory }) = &arguments.what;
-    let report = Report::read(directory)?;
+    let report = JournalReport::read(directory)?;
     let shows = matches!(arguments.what, What::Show { .. });
     if common.format == Format::Json {
         output::json_answer(&JournalAnswer::new(&report, shows));

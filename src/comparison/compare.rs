@@ -9,15 +9,15 @@ use probabilistic::explore::{Bounds, explore};
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::hindsight::{self, Hindsight, LossReport, Spent};
 use crate::comparison::nominal::time_of;
-use crate::comparison::planned::{Costs, Failure, Memo, Planner};
+use crate::comparison::planned::{Costs, PlanFinder, PlanTable, Unfinished};
 use crate::comparison::play::Measures;
-use crate::comparison::process::{Process, REWARDS, Risk, Situation};
+use crate::comparison::process::{Process, REWARDS, Risk, Valuation};
 use crate::comparison::published::{published, shortest_routes};
 use crate::comparison::referee::Referee;
 use crate::comparison::route::best_on_route;
 
 /// Hears of the candidates that have been measured, and of what was taken until then.
-pub type Report<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
+pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 
 /// How a comparison is made.
 #[derive(Clone)]
@@ -94,13 +94,13 @@ impl Comparison {
 pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,
-    planner: &mut Planner<'_>,
-    report: &mut Report<'_>,
-) -> Result<Comparison, Failure> {
+    planner: &mut PlanFinder<'_>,
+    report: &mut Listener<'_>,
+) -> Result<Comparison, Unfinished> {
     // The planner comes first, so that its memory can be told from that of the process.
     (config.memory)();
-    let mut memo = Memo { planner, plans: BTreeMap::new(), costs: Costs::default() };
-    let first = memo.plan(&Situation::start(mission, config.risk))?;
+    let mut memo = PlanTable { planner, plans: BTreeMap::new(), costs: Costs::default() };
+    let first = memo.plan(&Valuation::start(mission, config.risk))?;
     memo.costs.plan_memory = (config.memory)();
     report(&[], &memo.costs);
     let started = Instant::now();

@@ -20,12 +20,12 @@ mod single_way;
 mod task;
 
 pub use coadaptation::{Arc, Battery, Coadaptation, Configuration, Loss, Roles, Switch, Traversal};
-pub use compare::{Candidate, Comparison, Config, Report, compare};
+pub use compare::{Candidate, Comparison, Config, Listener, compare};
 pub use hindsight::{Hindsight, LossAt, LossReport};
 pub use import::{Files, MapOptions, import_map};
-pub use planned::{Costs, Failure, Planned, Planner, Stages};
+pub use planned::{Costs, PlanFinder, Planned, Stages, Unfinished};
 pub use play::Measures;
-pub use process::{Action, Process, REWARDS, Risk, Situation, State};
+pub use process::{Action, Process, REWARDS, Risk, State, Valuation};
 pub use program::program;
 pub use published::{Published, published, shortest_routes};
 pub use single_way::published_program;

@@ -3,7 +3,7 @@
 use num_rational::BigRational;
 
 use crate::comparison::coadaptation::Coadaptation;
-use crate::comparison::process::{Action, Risk, Situation};
+use crate::comparison::process::{Action, Risk, Valuation};
 
 /// The time of a plan on which nothing goes wrong.
 pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
@@ -25,17 +25,17 @@ pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
 }
 
 /// The state after an action on which nothing goes wrong.
-pub(super) fn after(mission: &Coadaptation, at: Situation, action: Action, risk: Risk) -> Situation {
+pub(super) fn after(mission: &Coadaptation, at: Valuation, action: Action, risk: Risk) -> Valuation {
     let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
     match action {
         Action::Change(new) => {
             let energy = mission.switches[at.configuration][new].as_ref().map_or(0, |s| levels(&s.energy));
-            Situation { configuration: new, battery: at.battery.saturating_sub(energy), ..at }
+            Valuation { configuration: new, battery: at.battery.saturating_sub(energy), ..at }
         }
         Action::Move(arc) => {
             let arc = &mission.arcs[arc];
             let energy = arc.by[at.configuration].as_ref().map_or(0, |t| levels(&t.energy));
-            Situation { place: arc.to, battery: at.battery.saturating_sub(energy), ..at }
+            Valuation { place: arc.to, battery: at.battery.saturating_sub(energy), ..at }
         }
     }
 }

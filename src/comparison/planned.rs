@@ -9,7 +9,7 @@ use probabilistic::Error;
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::nominal::after;
 use crate::comparison::play::{Measures, play};
-use crate::comparison::process::{Action, Risk, Situation, State};
+use crate::comparison::process::{Action, Risk, State, Valuation};
 use crate::comparison::referee::Referee;
 use crate::message::Message;
 
@@ -45,7 +45,7 @@ impl Stages {
 }
 
 /// Finds plans; asked once for each situation.
-pub type Planner<'a> = dyn FnMut(&Situation) -> Result<Planned, Vec<Message>> + 'a;
+pub type PlanFinder<'a> = dyn FnMut(&Valuation) -> Result<Planned, Vec<Message>> + 'a;
 
 /// What both sides take.
 #[derive(Debug, Clone, Default)]
@@ -76,36 +76,36 @@ pub struct Costs {
 
 /// Why a comparison has no result.
 #[derive(Debug)]
-pub enum Failure {
+pub enum Unfinished {
     /// Of the process.
     Process(Error),
     /// Of the planner.
     Planner(Vec<Message>),
 }
 
-impl From<Error> for Failure {
+impl From<Error> for Unfinished {
     fn from(error: Error) -> Self {
         Self::Process(error)
     }
 }
 
-impl From<Vec<Message>> for Failure {
+impl From<Vec<Message>> for Unfinished {
     fn from(messages: Vec<Message>) -> Self {
         Self::Planner(messages)
     }
 }
 
 /// Plans by situation, each made once. The collision flag does not matter to a plan.
-pub(super) struct Memo<'a, 'b> {
-    pub(super) planner: &'a mut Planner<'b>,
-    pub(super) plans: BTreeMap<Situation, Option<Vec<Action>>>,
+pub(super) struct PlanTable<'a, 'b> {
+    pub(super) planner: &'a mut PlanFinder<'b>,
+    pub(super) plans: BTreeMap<Valuation, Option<Vec<Action>>>,
     pub(super) costs: Costs,
 }
 
-impl Memo<'_, '_> {
+impl PlanTable<'_, '_> {
     /// The plan from a situation.
-    pub(super) fn plan(&mut self, situation: &Situation) -> Result<Option<Vec<Action>>, Vec<Message>> {
-        let key = Situation { hit: false, ..*situation };
+    pub(super) fn plan(&mut self, situation: &Valuation) -> Result<Option<Vec<Action>>, Vec<Message>> {
+        let key = Valuation { hit: false, ..*situation };
         if let Some(known) = self.plans.get(&key) {
             return Ok(known.clone());
         }
@@ -123,14 +123,14 @@ impl Memo<'_, '_> {
     }
 
     /// Follows plans, and makes a new one wherever the state is not the one that the last plan expects.
-    pub(super) fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, Failure> {
+    pub(super) fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, Unfinished> {
         // What the plan in force wants to do in each state that it expects.
-        let mut expected: BTreeMap<Situation, Action> = BTreeMap::new();
+        let mut expected: BTreeMap<Valuation, Action> = BTreeMap::new();
         let mut failure = None;
         let unexpected = RefCell::new(BTreeSet::new());
         let mission = referee.mission;
         let mut decide = |state: State, _: u32| {
-            let situation = Situation { hit: false, ..state.situation() };
+            let situation = Valuation { hit: false, ..state.situation() };
             if situation.failed || situation.place == mission.goal {
                 return None;
             }
@@ -139,7 +139,7 @@ impl Memo<'_, '_> {
             }
             match self.plan(&situation) {
                 Ok(Some(plan)) => {
-                    if situation != Situation::start(mission, referee.risk) {
+                    if situation != Valuation::start(mission, referee.risk) {
                         unexpected.borrow_mut().insert(situation);
                     }
                     follow(mission, situation, &plan, referee.risk, &mut expected);
@@ -150,7 +150,7 @@ impl Memo<'_, '_> {
             expected.get(&situation).map(|action| action.number())
         };
         let replans =
-            |state: State| unexpected.borrow().contains(&Situation { hit: false, ..state.situation() });
+            |state: State| unexpected.borrow().contains(&Valuation { hit: false, ..state.situation() });
         let (process, reserve) = (referee.exact(), referee.reserve());
         let measures = play(&process, false, referee.penalty, reserve, &replans, &mut decide);
         if let Some(messages) = failure {
@@ -163,10 +163,10 @@ impl Memo<'_, '_> {
 /// Notes what a plan does in each state that it expects.
 fn follow(
     mission: &Coadaptation,
-    mut at: Situation,
+    mut at: Valuation,
     plan: &[Action],
     risk: Risk,
-    expected: &mut BTreeMap<Situation, Action>,
+    expected: &mut BTreeMap<Valuation, Action>,
 ) {
     for action in plan {
         if expected.contains_key(&at) {

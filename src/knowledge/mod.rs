@@ -13,4 +13,4 @@ pub use sources::{COADAPTATION, KnowledgeSection, Sources, TOMASYS};
 pub(crate) use sources::{Stated, rule_text};
 pub use statement::{Part, Statement, Statements};
 pub use waiting::Fault;
-pub(crate) use waiting::{Report, Waiting};
+pub(crate) use waiting::{RobotReport, Waiting};

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rules::{Delta, Fact, Limits, Symbol};
 
 use crate::knowledge::base::Knowledge;
-use crate::knowledge::waiting::{Fault, Report, Waiting, fault};
+use crate::knowledge::waiting::{Fault, RobotReport, Waiting, fault};
 use crate::message::Message;
 
 impl Knowledge {
@@ -23,7 +23,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// There is no such component or attribute.
-    pub(crate) fn take(&mut self, name: &str, report: Report) -> Result<Delta, Message> {
+    pub(crate) fn take(&mut self, name: &str, report: RobotReport) -> Result<Delta, Message> {
         let mut reports = self.waiting.reports.clone();
         reports.retain(|(known, other)| known != name || !other.is_alike(&report));
         reports.push((name.to_owned(), report));
@@ -47,7 +47,7 @@ impl Knowledge {
     }
 
     /// The update that tells several reports at once, of which later ones count.
-    fn update(&mut self, reports: &[(String, Report)]) -> Result<Delta, ontology::Error> {
+    fn update(&mut self, reports: &[(String, RobotReport)]) -> Result<Delta, ontology::Error> {
         let engine = self.runtime.engine_mut();
         if let [(name, report)] = reports {
             return report.update(engine, name);
@@ -57,12 +57,12 @@ impl Knowledge {
         for (name, report) in reports {
             let delta = report.update(engine, name)?;
             let word = match report {
-                Report::Component(_) => None,
-                Report::Measured(value) => engine.symbols().find_literal(value),
+                RobotReport::Component(_) => None,
+                RobotReport::Measured(value) => engine.symbols().find_literal(value),
             };
             for fact in delta.insert {
                 let is_word =
-                    matches!(report, Report::Component(_)) || fact.arguments.get(1) == word.as_ref();
+                    matches!(report, RobotReport::Component(_)) || fact.arguments.get(1) == word.as_ref();
                 if is_word && fact.arguments.len() == 2 {
                     words.insert((fact.predicate, fact.arguments[0]), fact);
                 } else {

@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use crate::file::{self, discreet};
 use crate::knowledge::statement::Statements;
-use crate::manifest::Origin;
+use crate::manifest::ManifestPath;
 use crate::message::Message;
 
 /// The name under which the shipped co-adaptation rules are asked for.
@@ -37,7 +37,7 @@ fn shipped_rules() -> Vec<String> {
 
 impl KnowledgeSection {
     /// The files that it names.
-    pub fn sources(&self, origin: &Origin) -> Sources {
+    pub fn sources(&self, origin: &ManifestPath) -> Sources {
         let all = |paths: &[PathBuf]| paths.iter().map(|path| origin.path(path)).collect();
         let rule = |name: &String| match name.as_str() {
             COADAPTATION | TOMASYS => name.clone(),

@@ -9,7 +9,7 @@ use crate::message::Message;
 
 /// What a robot says.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Report {
+pub(crate) enum RobotReport {
     /// How a component is.
     Component(Status),
     /// What an attribute measures.
@@ -32,12 +32,12 @@ pub struct Fault {
 pub(crate) struct Waiting {
     pub(super) fault: Option<Fault>,
     /// The name of a component or an attribute with the last word on it.
-    pub(super) reports: Vec<(String, Report)>,
+    pub(super) reports: Vec<(String, RobotReport)>,
     /// Functions with their designs, if the objectives could not be told either.
     pub(super) objectives: Option<Vec<(String, String)>>,
 }
 
-impl Report {
+impl RobotReport {
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         matches!(self, Self::Component(_)) == matches!(other, Self::Component(_))
     }
@@ -100,7 +100,7 @@ impl Waiting {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let pair = |pair: &Value| Some((text(pair.get(0)?)?, text(pair.get(1)?)?));
         let report = |report: &Value| {
-            let own = Report::from_record(report.get(1)?.as_str()?, report.get(2)?.as_str()?)?;
+            let own = RobotReport::from_record(report.get(1)?.as_str()?, report.get(2)?.as_str()?)?;
             Some((text(report.get(0)?)?, own))
         };
         let [fault, reports, objectives] = record.as_array()?.as_slice() else { return None };

@@ -7,7 +7,7 @@ use ontology::vocab::local_name;
 use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
-use crate::knowledge::Report;
+use crate::knowledge::RobotReport;
 use crate::mapek::beliefs::{Beliefs, Running};
 use crate::mapek::event::{Event, Refusal};
 use crate::mapek::step::PlannedStep;
@@ -117,7 +117,7 @@ impl Taking<'_> {
                 };
                 let was_known = knowledge.fault().is_none();
                 let delta = knowledge
-                    .take(component, Report::Component(*status))
+                    .take(component, RobotReport::Component(*status))
                     .map_err(|message| fault(&message))?;
                 self.note(&delta, was_known);
                 Ok(())
@@ -162,7 +162,7 @@ impl Taking<'_> {
         if let Some(knowledge) = self.beliefs.mission.knowledge_mut().filter(|_| is_known) {
             let was_known = knowledge.fault().is_none();
             let delta =
-                knowledge.take(attribute, Report::measured(value)).map_err(|message| fault(&message))?;
+                knowledge.take(attribute, RobotReport::measured(value)).map_err(|message| fault(&message))?;
             self.note(&delta, was_known);
             if let Some(function) = self.beliefs.mission.fed_by(local_name(attribute)) {
                 self.changes.facts = true;

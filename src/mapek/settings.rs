@@ -5,7 +5,7 @@ use std::time::Duration;
 use num_rational::BigRational;
 use serde::Deserialize;
 
-use crate::manifest::Origin;
+use crate::manifest::ManifestPath;
 use crate::message::Message;
 use crate::number;
 
@@ -25,7 +25,7 @@ impl AdaptationSection {
     ///
     /// # Errors
     /// A value that is no number, or negative.
-    pub fn settings(&self, origin: &Origin) -> Result<Settings, Message> {
+    pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let mut settings = Settings { stay_close: self.stay_close, ..Settings::default() };
         if let Some(value) = &self.minimum_benefit {
             settings.minimum_benefit = origin.number("minimum_benefit", value)?;

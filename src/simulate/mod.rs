@@ -21,7 +21,7 @@ use crate::mission::Mission;
 
 pub use baseline::Strategy;
 pub use report::{Run, SUAVE_COLUMNS};
-pub use settings::{Disturbance, Failure, Signal, Simulation, Suave};
+pub use settings::{Disturbance, RandomFailure, Signal, Simulation, Suave};
 pub use statistics::Sample;
 
 use baseline::Controller;

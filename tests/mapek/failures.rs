@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use metaplan::setup::Setup;
-use metaplan::simulate::{Disturbance, Failure, Run, Simulation, Strategy, simulate};
+use metaplan::simulate::{Disturbance, RandomFailure, Run, Simulation, Strategy, simulate};
 
 /// A mission with components that can fail.
 struct Robot {
@@ -80,7 +80,7 @@ fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
                 all.push((format!("{name}, {when}, {length}"), simulation(robot, events, Vec::new())));
             }
         }
-        let again = |component: &&str| Failure {
+        let again = |component: &&str| RandomFailure {
             component: (*component).to_owned(),
             mean_time: robot.random.0,
             recovery: Some(robot.random.1),
@@ -110,7 +110,7 @@ fn once(failing: &[&str], time: (f64, f64), recovery: Option<(f64, f64)>) -> Vec
     events
 }
 
-fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<Failure>) -> Simulation {
+fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<RandomFailure>) -> Simulation {
     Simulation {
         step: robot.pace.0,
         time_budget: 200.0 * robot.pace.0,

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use metaplan::journal::{Journal, Policy, Report, Sync};
+use metaplan::journal::{Journal, JournalReport, Policy, Sync};
 use metaplan::mapek::{Answer, Loop};
 use metaplan::setup::Setup;
 use serde_json::Value;
@@ -86,7 +86,7 @@ fn open(files: &Files, pristine: &Loop) -> Outcome {
     let sound = Outcome::Sound(state(&control), answers);
     drop(journal);
     // What was completed is complete, and says so.
-    let again = Report::read(directory.path()).expect("a journal");
+    let again = JournalReport::read(directory.path()).expect("a journal");
     assert!(again.is_sound(), "{:?}", again.messages);
     sound
 }
