@@ -192,3 +192,36 @@ pub(crate) fn local(text: &str) -> String {
     }
     short
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{available, follow};
+    use crate::mapek::answer::Answer;
+    use crate::mapek::beliefs::Beliefs;
+    use crate::mapek::monitor::Base;
+    use crate::setup::Setup;
+
+    #[test]
+    fn what_follows_is_compared_with_what_followed_before() {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let mut beliefs = Beliefs::new(Setup::read(&manifest).expect("the mission is read").mission);
+        beliefs.available = available(beliefs.mission.knowledge().expect("a knowledge base"));
+        let before = beliefs.available.clone();
+        beliefs.mission.fail("c_kinect").expect("a component");
+        let mut answers = Vec::new();
+        let stated = follow(&mut beliefs, Base::Stated, &mut answers);
+        assert!(stated.lost.is_empty() && answers.is_empty(), "nothing that is watched has changed");
+        let findings = follow(&mut beliefs, Base::Watched, &mut answers);
+        assert!(findings.lost.contains("fd_amcl_kinect") && findings.gained.is_empty(), "{findings:?}");
+        assert!(beliefs.available.is_disjoint(&findings.lost));
+        assert_eq!(beliefs.available.union(&findings.lost).cloned().collect::<super::BTreeSet<_>>(), before);
+        let [Answer::Inferred { designs, .. }] = &answers[..] else { panic!("{answers:?}") };
+        assert_eq!(designs.len(), findings.lost.len());
+        assert!(designs.iter().all(|change| !change.available && !change.because.is_empty()), "{designs:?}");
+        answers.clear();
+        let again = follow(&mut beliefs, Base::Watched, &mut answers);
+        assert!(again.lost.is_empty() && answers.is_empty(), "it is said once");
+    }
+}

@@ -86,3 +86,57 @@ pub(super) fn resume_suspended(beliefs: &mut Beliefs, running: &mut Running, ans
         effect(beliefs, running.action, Command::Resume, answers);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use num_rational::BigRational;
+
+    use super::{cancel, finish, request};
+    use crate::mapek::answer::{Answer, Command};
+    use crate::mapek::beliefs::Beliefs;
+    use crate::mapek::step::PlannedStep;
+    use crate::setup::Setup;
+
+    /// The commands among the answers, each in a word.
+    fn words(answers: &[Answer]) -> Vec<String> {
+        let word = |command: &Command| match command {
+            Command::Reconfigure { function, from, to } => format!("{function} {from:?} {to}"),
+            Command::Request { step } => step.action.clone(),
+            Command::Cancel { .. } => "cancel".to_owned(),
+            other => format!("{other:?}"),
+        };
+        answers.iter().filter_map(Answer::effect).map(|effect| word(&effect.command)).collect()
+    }
+
+    #[test]
+    fn designs_come_before_the_action_that_needs_them() {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let mut beliefs = Beliefs::new(Setup::read(&manifest).expect("the mission is read").mission);
+        let step = |design: &str| PlannedStep {
+            action: "move".to_owned(),
+            arguments: vec!["wp1".to_owned(), "wp2".to_owned(), design.to_owned()],
+            written: 3,
+            configuration: vec![("f_localization".to_owned(), design.to_owned())],
+            duration: BigRational::default(),
+            cost: BigRational::default(),
+        };
+        let mut answers = Vec::new();
+        request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
+        assert_eq!(words(&answers), ["f_localization None fd_amcl_kinect", "move"]);
+        assert_eq!(beliefs.outstanding().count(), 2);
+        answers.clear();
+        request(&mut beliefs, step("fd_amcl_kinect"), &mut answers);
+        assert_eq!(words(&answers), ["move"], "the function has the design");
+        let running = beliefs.running.clone().expect("an action is under way");
+        answers.clear();
+        cancel(&mut beliefs, running, "it is lost".to_owned(), &mut answers);
+        assert_eq!(words(&answers), ["cancel"]);
+        assert!(beliefs.cancelling());
+        answers.clear();
+        beliefs.running = None;
+        finish(&mut beliefs, &mut answers);
+        assert!(beliefs.reached() && answers.contains(&Answer::GoalReached), "{answers:?}");
+    }
+}

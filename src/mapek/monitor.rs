@@ -339,3 +339,50 @@ fn fault(message: &Message) -> Refusal {
 fn first(messages: &[Message]) -> Refusal {
     messages.first().map_or_else(|| Refusal::new("M306", "it does not fit the mission"), fault)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{Base, Changes, Monitor};
+    use crate::mapek::beliefs::Beliefs;
+    use crate::mapek::event::Observation;
+    use crate::setup::Setup;
+
+    /// What an event changes in the mission `ugv`; or the code of its refusal.
+    fn check(line: &str, expected: Result<(Base, [bool; 3], &[&str]), &str>) {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let mission = Setup::read(&manifest).expect("the mission is read").mission;
+        let (mut monitor, mut beliefs) = (Monitor::new(&mission), Beliefs::new(mission));
+        let mut changes = Changes::default();
+        let event = Observation::parse(line).events.remove(0).expect("an event");
+        let taken = monitor.take(&mut beliefs, &event, &mut changes);
+        let found = taken.map_err(|refusal| refusal.code);
+        let Changes { base, facts, predicates, goal, must } = &changes;
+        assert_eq!(found.is_err() || line.contains("tick"), !changes.any(), "{line}");
+        let must: Vec<&str> = must.iter().map(String::as_str).collect();
+        let found = found.map(|()| (*base, [*facts, *predicates, *goal], &must[..]));
+        assert_eq!(found, expected, "{line}");
+    }
+
+    #[test]
+    fn events_change_what_is_believed() {
+        let none = [false, false, false];
+        check(
+            r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#,
+            Ok((Base::Watched, none, &[])),
+        );
+        check(r#"{"event":"component_status","component":"c_nothing","status":"FALSE"}"#, Err("M306"));
+        check(
+            r#"{"event":"fact_changed","name":"robot_at","value":"wp2"}"#,
+            Ok((Base::Nothing, [true, true, false], &[])),
+        );
+        check(
+            r#"{"event":"goal_changed","goal":"(robot_at wp2)"}"#,
+            Ok((Base::Nothing, [false, false, true], &["the goal has changed"])),
+        );
+        check(r#"{"event":"action_failed","action":1}"#, Err("M305"));
+        check(r#"{"event":"acknowledged","effect":1}"#, Err("M305"));
+        check(r#"{"event":"tick"}"#, Ok((Base::Nothing, none, &[])));
+    }
+}
