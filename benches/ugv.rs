@@ -5,13 +5,13 @@ use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use encodings::{Config, Limits, Status, optimize};
-use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 
 fn plan(scenario: Option<&str>) {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
-    let (mut mission, manifest) = Mission::read(&manifest).expect("the mission is read");
+    let Setup { mut mission, scenarios, .. } = Setup::read(&manifest).expect("the mission is read");
     if let Some(scenario) = scenario {
-        mission.apply(&manifest.scenarios[scenario]).expect("the scenario fits");
+        mission.apply(&scenarios[scenario]).expect("the scenario fits");
     }
     let (problem, _) = mission.filled().expect("the knowledge base fits the domain");
     let task = mission.ground(&problem, &[], &Limits::none()).expect("the mission is ground");

@@ -12,16 +12,17 @@ use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
 use ontology::tomasys::change::Status as Component;
 
-use crate::mapek::{PlannedStep, number, ruled_out};
+use crate::mapek::{PlannedStep, ruled_out};
 use crate::message::Message;
 use crate::mission::Mission;
+use crate::number;
 
 /// How finely values are told apart, as a part of the value.
 const FINENESS: i64 = 1000;
 
-/// What planning has come to.
+/// The best plan for a mission under some condition.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Answer {
+pub struct BestPlan {
     /// The metric of the best plan, in its unit; none where there is no plan.
     pub cost: Option<BigRational>,
     /// Whether that is proved.
@@ -44,9 +45,9 @@ pub struct DesignExplanation {
     /// The steps of the best plan that use it, from 1.
     pub used: Vec<usize>,
     /// The best plan in which no other design solves its functions; as if it were available if it is not.
-    pub alone: Answer,
+    pub alone: BestPlan,
     /// The best plan without it.
-    pub without: Answer,
+    pub without: BestPlan,
     /// What would have to change for it to be available, or to be so no more.
     pub changes: Vec<Change>,
 }
@@ -61,7 +62,7 @@ pub struct Change {
     /// What it would have to be.
     pub to: Target,
     /// The answer then.
-    pub then: Answer,
+    pub then: BestPlan,
 }
 
 /// What a value would have to be.
@@ -85,7 +86,7 @@ pub enum Target {
 ///
 /// # Errors
 /// The mission cannot be planned for.
-pub fn best(mission: &Mission, limits: &Limits) -> Result<Answer, Vec<Message>> {
+pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Vec<Message>> {
     solve(mission, limits, &|_, available| available)
 }
 
@@ -94,7 +95,7 @@ fn solve(
     mission: &Mission,
     limits: &Limits,
     allowed: &dyn Fn(&str, bool) -> bool,
-) -> Result<Answer, Vec<Message>> {
+) -> Result<BestPlan, Vec<Message>> {
     let (mut problem, _) = mission.filled()?;
     mission.allow(&mut problem, allowed);
     let task = mission.ground(&problem, &[], limits)?;
@@ -103,7 +104,7 @@ fn solve(
     let proved = matches!(solution.status, Status::Optimal | Status::Unsolvable);
     let steps = solution.plan.iter().flat_map(|plan| &plan.steps);
     let steps = steps.map(|step| PlannedStep::new(mission, step)).collect();
-    Ok(Answer { cost: solution.plan.map(|plan| number::of_plan(&plan.cost)), proved, steps })
+    Ok(BestPlan { cost: solution.plan.map(|plan| number::of_plan(&plan.cost)), proved, steps })
 }
 
 /// Explains one design, by its local name.
@@ -174,7 +175,7 @@ pub fn smallest_changes(mission: &Mission, limits: &Limits) -> Result<Vec<Change
 }
 
 /// Whether another plan is the answer.
-fn is_other(one: &Answer, other: &Answer) -> bool {
+fn is_other(one: &BestPlan, other: &BestPlan) -> bool {
     let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
     !one.steps.iter().map(key).eq(other.steps.iter().map(key)) || one.cost.is_some() != other.cost.is_some()
 }
@@ -234,7 +235,7 @@ fn with_value(
     name: &str,
     value: &BigRational,
     limits: &Limits,
-) -> Result<Answer, Vec<Message>> {
+) -> Result<BestPlan, Vec<Message>> {
     let mut other = mission.clone();
     other.set(name, &number::decimal(value)).map_err(|message| vec![message])?;
     best(&other, limits)
@@ -246,7 +247,7 @@ fn bisect(
     function: &str,
     from: &BigRational,
     upwards: bool,
-    base: &Answer,
+    base: &BestPlan,
     limits: &Limits,
 ) -> Result<Option<Change>, Vec<Message>> {
     let zero = BigRational::default();

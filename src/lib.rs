@@ -6,15 +6,20 @@
 
 pub use {encodings, ontology, rules};
 
+pub mod answers;
 pub mod certificate;
 pub mod comparison;
 pub mod explain;
+pub mod file;
 pub mod journal;
 pub mod knowledge;
+pub mod manifest;
 pub mod mapek;
 pub mod measure;
 pub mod message;
 pub mod mission;
+mod number;
+pub mod setup;
 pub mod simulate;
 
 /// The example of the README is compiled and run with the tests.

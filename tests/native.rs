@@ -11,6 +11,7 @@ use encodings::{Config, Limits, Status, lexicographic};
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission};
+use metaplan::setup::Setup;
 use ontology::ReadOptions;
 use pddl::Source;
 use random::Random;
@@ -33,7 +34,7 @@ fn answer(mission: &Mission) -> Answer {
 /// A shipped mission in a situation.
 fn shipped(name: &str, situation: &dyn Fn(&mut Mission)) -> Mission {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
-    let (mut mission, _) = Mission::read(&manifest).unwrap_or_else(|messages| panic!("{messages:#?}"));
+    let mut mission = Setup::read(&manifest).unwrap_or_else(|messages| panic!("{messages:#?}")).mission;
     situation(&mut mission);
     mission
 }

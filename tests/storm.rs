@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use metaplan::comparison::{Battery, Coadaptation, Process, Risk, program};
-use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use probabilistic::explore::{Bounds, explore};
 use probabilistic::prism::ast::{
@@ -292,9 +292,9 @@ fn larger(battery: &str, case: &Case) -> (Coadaptation, Risk) {
     let (battery, unit) = battery.split_once('/').unwrap_or((battery, "1"));
     let (battery, unit) = (number(battery), number(unit));
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (mission, _) = Mission::read(&root.join("missions/camara_like.toml")).expect("a mission");
+    let Setup { mission, mut roles, .. } =
+        Setup::read(&root.join("missions/camara_like.toml")).expect("a mission");
     let (problem, _) = mission.filled().expect("filled");
-    let mut roles = mission.roles().clone();
     roles.battery_unit = unit;
     let mut coadaptation = Coadaptation::new(&mission, &problem, &roles).expect("a process");
     coadaptation.battery = Some(Battery { initial: battery / unit, reserve: 500 / unit, unit });

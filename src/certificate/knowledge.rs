@@ -69,7 +69,7 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
 }
 
 /// What a certificate says about knowledge: the documents, what has changed since, and what follows.
-pub(super) struct Written<'w> {
+pub(super) struct KnowledgeFiles<'w> {
     pub(super) document: &'w str,
     pub(super) origin: &'w str,
     pub(super) derivations: &'w str,
@@ -78,7 +78,7 @@ pub(super) struct Written<'w> {
 /// Replays the derivations, and fills the problem with what they say. It must be the problem that was planned, but for its
 /// metric.
 pub(super) fn check(
-    written: &Written<'_>,
+    written: &KnowledgeFiles<'_>,
     domain: &Domain,
     problem: &Problem,
 ) -> [Result<String, String>; 2] {
@@ -123,7 +123,7 @@ fn provenance(origin: &Origin) -> Result<String, String> {
 
 /// Whether a certificate is about a mission, as its files and the situation are now.
 pub(super) fn about(
-    written: Option<&Written<'_>>,
+    written: Option<&KnowledgeFiles<'_>>,
     (domain, problem): (&str, &str),
     mission: &Mission,
 ) -> Result<String, String> {
@@ -196,7 +196,7 @@ fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
 }
 
 /// What follows, by its derivations alone.
-fn replayed(written: &Written<'_>) -> Result<(Knowledge, String, Origin), String> {
+fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin), String> {
     let origin: Origin =
         serde_json::from_str(written.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
     let mut stated = stated(written.document, &origin)?;

@@ -67,7 +67,7 @@ pub(super) struct File {
 
 /// What came of one part of a verification.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Part {
+pub struct VerifiedPart {
     /// `files`, `derivations`, `knowledge`, `plan`, `task`, `argument`, `formula`, `proof`, `steps` or `mission`; or
     /// `limits`, where time or memory was up.
     pub part: &'static str,
@@ -77,9 +77,9 @@ pub struct Part {
 
 /// What came of a verification.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Report {
+pub struct Verification {
     /// The claim; none if the manifest does not say.
     pub claim: Option<Claim>,
     /// In order; what rests on a part that fails is left out.
-    pub parts: Vec<Part>,
+    pub parts: Vec<VerifiedPart>,
 }

@@ -31,7 +31,7 @@ use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::{print_domain, print_problem};
 
-pub use manifest::{Claim, Part, Report};
+pub use manifest::{Claim, Verification, VerifiedPart};
 pub use verify::{conditions, verify};
 
 use digest::digest_of;
@@ -44,7 +44,7 @@ use manifest::{
 use crate::message::Message;
 use crate::mission::Mission;
 
-impl Report {
+impl Verification {
     /// Whether the claim is proved.
     pub fn verified(&self) -> bool {
         self.claim.is_some() && self.parts.iter().all(|part| part.result.is_ok())

@@ -14,7 +14,8 @@ use pddl::validate::{Options, PlanText, validate};
 
 use super::files::{read, text};
 use super::manifest::{
-    ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Part, Refutation, Report, STREAMED, TASK, WITNESS,
+    ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Refutation, STREAMED, TASK, Verification, VerifiedPart,
+    WITNESS,
 };
 use super::{derivations, knowledge};
 use crate::measure::measure;
@@ -23,23 +24,23 @@ use crate::mission::Mission;
 
 /// Checks a certificate without trusting what wrote it, and whether it is about a mission, if one is given. The comparison of the task
 /// with the files ends when the limits say so.
-pub fn verify(directory: &Path, mission: Option<&Mission>, limits: &Limits) -> Report {
-    let mut report = Report { claim: None, parts: Vec::new() };
+pub fn verify(directory: &Path, mission: Option<&Mission>, limits: &Limits) -> Verification {
+    let mut report = Verification { claim: None, parts: Vec::new() };
     match read(directory) {
         Ok((manifest, contents)) => {
             report.claim = Some(manifest.claim.clone());
             let bytes: u64 = manifest.files.iter().map(|file| file.bytes).sum();
             let files = format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());
-            report.parts.push(Part { part: "files", result: Ok(files) });
+            report.parts.push(VerifiedPart { part: "files", result: Ok(files) });
             report.parts.extend(parts(directory, &manifest, &contents, limits));
             if let Some(mission) = mission {
                 let written = written(&contents);
                 let domain = text(&contents, DOMAIN);
                 let result = knowledge::about(written.as_ref(), (domain, text(&contents, PROBLEM)), mission);
-                report.parts.push(Part { part: "mission", result });
+                report.parts.push(VerifiedPart { part: "mission", result });
             }
         }
-        Err(reason) => report.parts.push(Part { part: "files", result: Err(reason) }),
+        Err(reason) => report.parts.push(VerifiedPart { part: "files", result: Err(reason) }),
     }
     report
 }
@@ -66,25 +67,30 @@ pub fn conditions(directory: &Path, limits: &Limits) -> Result<String, Message> 
         .ok_or_else(|| wrong("a task with derived predicates has no verification conditions".to_owned()))
 }
 
-fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)], limits: &Limits) -> Vec<Part> {
+fn parts(
+    directory: &Path,
+    manifest: &Manifest,
+    contents: &[(String, String)],
+    limits: &Limits,
+) -> Vec<VerifiedPart> {
     let Manifest { claim, refutation, .. } = manifest;
     let text = |name: &str| text(contents, name);
     let (domain, problem) = match read_pddl(text(DOMAIN), text(PROBLEM)) {
         Ok(read) => read,
-        Err(reason) => return vec![Part { part: "files", result: Err(reason) }],
+        Err(reason) => return vec![VerifiedPart { part: "files", result: Err(reason) }],
     };
     let mut parts = Vec::new();
     if let Some(written) = written(contents) {
         let [derivations, filled] = knowledge::check(&written, &domain, &problem);
-        parts.push(Part { part: "derivations", result: derivations });
-        parts.push(Part { part: "knowledge", result: filled });
+        parts.push(VerifiedPart { part: "derivations", result: derivations });
+        parts.push(VerifiedPart { part: "knowledge", result: filled });
     }
     let (same, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), limits) {
         Ok((said, timed)) => (Ok(said), timed),
         // Whatever it is, it is not verified.
         Err(reason) => (Err(reason), false),
     };
-    parts.push(Part { part: "task", result: same });
+    parts.push(VerifiedPart { part: "task", result: same });
     let metric = match claim {
         Claim::Unsolvable => None,
         Claim::Optimal { metric } => {
@@ -93,7 +99,7 @@ fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)], l
                 Ok((said, value)) => (Ok(said), Some(value)),
                 Err(reason) => (Err(reason), None),
             };
-            parts.push(Part { part: "plan", result });
+            parts.push(VerifiedPart { part: "plan", result });
             let Some(value) = value else { return parts };
             Some(value)
         }
@@ -102,12 +108,12 @@ fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)], l
     let result = checked.map_err(|fault| fault.to_string()).map(|Checked { labels, potentials, needs }| {
         format!("no plan is better: induction over {labels} labels, with {potentials} potentials and {needs} needs")
     });
-    parts.push(Part { part: "argument", result });
+    parts.push(VerifiedPart { part: "argument", result });
     let documents = (text(TASK), text(ARGUMENT));
     parts.extend(match refutation {
         Refutation::Steps(steps) => refuted(directory, documents, metric.as_ref(), *steps),
         Refutation::None(reason) => {
-            vec![Part {
+            vec![VerifiedPart {
                 part: "formula",
                 result: Ok(format!("none, the claim rests on the argument: {reason}")),
             }]
@@ -117,8 +123,8 @@ fn parts(directory: &Path, manifest: &Manifest, contents: &[(String, String)], l
 }
 
 /// What a certificate says about knowledge, if it does.
-fn written(contents: &[(String, String)]) -> Option<knowledge::Written<'_>> {
-    contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::Written {
+fn written(contents: &[(String, String)]) -> Option<knowledge::KnowledgeFiles<'_>> {
+    contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::KnowledgeFiles {
         document: text(contents, knowledge::DOCUMENT),
         origin: text(contents, knowledge::ORIGIN),
         derivations: text(contents, derivations::DERIVATIONS),
@@ -130,15 +136,15 @@ fn refuted(
     documents: (&str, &str),
     metric: Option<&BigRational>,
     steps: usize,
-) -> Vec<Part> {
+) -> Vec<VerifiedPart> {
     let open = |name: &str| fs::File::open(directory.join(name)).map(BufReader::new);
     let opened = STREAMED.map(open);
     let [Ok(mut formula), Ok(mut legend), Ok(mut proof), Ok(mut hints)] = opened else {
-        return vec![Part { part: "formula", result: Err("it cannot be read".to_owned()) }];
+        return vec![VerifiedPart { part: "formula", result: Err("it cannot be read".to_owned()) }];
     };
     let inputs = Inputs { formula: &mut formula, legend: &mut legend, proof: &mut proof, hints: &mut hints };
     let checked = check_refutation(documents, metric, steps, inputs).into_iter();
-    checked.map(|(part, result)| Part { part, result }).collect()
+    checked.map(|(part, result)| VerifiedPart { part, result }).collect()
 }
 
 pub(super) fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), String> {

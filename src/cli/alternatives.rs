@@ -2,14 +2,12 @@
 
 use std::fmt::Write as _;
 
-use encodings::{Alternatives, Config, Forced, Solution, Task};
+use encodings::{Alternatives, Config, Solution, Task};
 use metaplan::mission::Mission;
 use pddl::ast::Problem;
-use serde_json::{Value, json};
 
-use crate::cli::Failure;
+use crate::cli::common::Failure;
 use crate::cli::confirm::{Reading, confirm};
-use crate::cli::plan_json::step_json;
 use crate::cli::plan_text::steps_text;
 
 /// Looks for further plans; each is executed by the validator as the first one is.
@@ -27,18 +25,6 @@ pub(super) fn find(
     }
     found.plans = found.plans.into_iter().map(|plan| mission.written(plan)).collect();
     Ok(Some(found))
-}
-
-/// Adds them to a plan in JSON.
-pub(super) fn attach(answer: &mut Value, found: &Alternatives) {
-    let plans = found.plans.iter().map(|plan| plan.steps.iter().map(step_json).collect::<Vec<_>>());
-    let forced = |forced: &Forced| json!({ "action": forced.action, "functions": forced.functions });
-    let forced = found.forced.as_ref().map(|steps| steps.iter().map(forced).collect::<Vec<_>>());
-    if let Some(object) = answer.as_object_mut() {
-        let alternatives =
-            json!({ "plans": plans.collect::<Vec<_>>(), "complete": found.complete, "forced": forced });
-        object.insert("alternatives".into(), alternatives);
-    }
 }
 
 /// The further plans as tables, and for each step of the first one which of its choices are forced.

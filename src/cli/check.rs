@@ -7,15 +7,17 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use metaplan::answers::CheckAnswer;
+use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::source;
 use probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Report, check};
 use probabilistic::explore::Bounds;
 use probabilistic::prism::Settings;
-use probabilistic::{Diagnostic, Error, prism, property};
-use serde_json::{Map, Value, json};
+use probabilistic::{prism, property};
 
-use crate::cli::{Common, Exit, Failure, Format, output, setting};
+use crate::cli::common::{Common, Exit, Failure, Format, in_file, process_failure};
+use crate::cli::output;
+use crate::cli::values::setting;
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -53,7 +55,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let file = source(&arguments.model)?;
     let model = prism::parse(file.text()).map_err(|problems| in_file(&problems, file.name()))?;
-    let property = property::parse(&arguments.property).map_err(|error| failure(error, file.name()))?;
+    let property =
+        property::parse(&arguments.property).map_err(|error| process_failure(error, file.name()))?;
     let bar = progress(common);
     let told = |states: usize| {
         bar.set_message(format!("{states} states"));
@@ -73,7 +76,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let report = check(&model, &property, &options);
     bar.finish_and_clear();
-    let report = report.map_err(|error| failure(error, file.name()))?;
+    let report = report.map_err(|error| process_failure(error, file.name()))?;
     if let Some(path) = &arguments.policy {
         let Some(policy) = &report.policy else {
             let text = "this property has no policy to write; ask for one value with `F`, `G` or `U`";
@@ -82,7 +85,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         output::write_file(path, &output::pretty(&policy.to_json()))?;
     }
     match common.format {
-        Format::Json => output::json_answer(&as_json(&arguments.property, &report)),
+        Format::Json => output::json_answer(&CheckAnswer::new(&arguments.property, &report)),
         _ => output::answer(&as_text(&report, common.verbose)),
     }
     Ok(match &report.outcome {
@@ -104,29 +107,7 @@ fn progress(common: &Common) -> ProgressBar {
 
 fn read_policy(path: &Path) -> Result<PolicyTable, Failure> {
     let file = source(path)?;
-    PolicyTable::from_json(file.text()).map_err(|error| failure(error, file.name()))
-}
-
-fn in_file(problems: &[Diagnostic], file: &str) -> Failure {
-    let message = |problem: &Diagnostic| {
-        let place = Some((problem.place.line, problem.place.column));
-        Message::at(problem.code, file, place, problem.message.clone())
-    };
-    problems.iter().map(message).collect::<Vec<_>>().into()
-}
-
-/// What the library reports, with the file that it is about.
-pub fn failure(error: Error, file: &str) -> Failure {
-    match error {
-        Error::Model(problems) => in_file(&problems, file),
-        Error::Property(problems) => in_file(&problems, "property"),
-        Error::Constant(text) => Failure::usage(Message::error("Q504", text)),
-        Error::StateLimit { .. } | Error::Interrupted { .. } => Failure {
-            exit: Exit::NothingFound,
-            messages: vec![Message::at("Q505", file, None, error.to_string())],
-        },
-        other => Message::at("Q506", file, None, other.to_string()).into(),
-    }
+    PolicyTable::from_json(file.text()).map_err(|error| process_failure(error, file.name()))
 }
 
 fn as_text(report: &Report, verbose: bool) -> String {
@@ -174,71 +155,4 @@ pub fn shown(answer: &Answer) -> String {
             None => format!("{} (between {} and {})", quantity.value, quantity.lower, quantity.upper),
         },
     }
-}
-
-/// A value for programs: `value`, `lower` and `upper` are null where it is infinite or undefined, which `status` says;
-/// `exact` is a fraction, `inf`, or null.
-pub fn answer_fields(answer: &Answer) -> Map<String, Value> {
-    let number = |value: f64| if value.is_finite() { json!(value) } else { Value::Null };
-    let fields = match answer {
-        Answer::Finite(quantity) => json!({
-            "status": "finite",
-            "value": number(quantity.value),
-            "lower": number(quantity.lower),
-            "upper": number(quantity.upper),
-            "exact": quantity.exact.as_ref().map(ToString::to_string),
-        }),
-        Answer::Infinite => {
-            json!({ "status": "infinite", "value": null, "lower": null, "upper": null, "exact": "inf" })
-        }
-        Answer::Undefined => {
-            json!({ "status": "undefined", "value": null, "lower": null, "upper": null, "exact": null })
-        }
-    };
-    match fields {
-        Value::Object(fields) => fields,
-        _ => Map::new(),
-    }
-}
-
-fn as_json(property: &str, report: &Report) -> Value {
-    let mut fields = Map::new();
-    fields.insert("format".to_owned(), json!("metaplan-check/1"));
-    fields.insert("property".to_owned(), json!(property));
-    match &report.outcome {
-        Outcome::Value(answer) => fields.extend(answer_fields(answer)),
-        Outcome::Truth(holds, answer) => {
-            fields.extend(answer.iter().flat_map(answer_fields));
-            fields.insert("holds".to_owned(), json!(holds));
-        }
-        Outcome::Undecided(answer) => {
-            fields.extend(answer_fields(answer));
-            fields.insert("holds".to_owned(), Value::Null);
-        }
-        Outcome::Front(vertices) => {
-            let pairs: Vec<_> =
-                vertices.iter().map(|pair| json!(pair.each_ref().map(answer_fields))).collect();
-            fields.insert("vertices".to_owned(), json!(pairs));
-        }
-        Outcome::Constrained { randomised, deterministic, proved } => {
-            fields.extend(answer_fields(randomised));
-            fields.insert("randomised".to_owned(), json!(answer_fields(randomised)));
-            let mut deterministic = answer_fields(deterministic);
-            deterministic.insert("proved".to_owned(), json!(proved));
-            fields.insert("deterministic".to_owned(), json!(deterministic));
-        }
-    }
-    let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
-    let milliseconds = json!({ "build": build.as_secs_f64() * 1e3, "solve": solve.as_secs_f64() * 1e3 });
-    fields.insert(
-        "statistics".to_owned(),
-        json!({
-            "states": states,
-            "choices": choices,
-            "transitions": transitions,
-            "deadlocks": deadlocks,
-            "milliseconds": milliseconds,
-        }),
-    );
-    Value::Object(fields)
 }

@@ -9,19 +9,22 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use encodings::Limits;
 use indicatif::{ProgressBar, ProgressDrawTarget};
+use metaplan::answers::Pair;
 use metaplan::comparison::{
-    Action, Candidate, Coadaptation, Comparison, Config, Costs, Failure as Unfinished, Planned, Report, Risk,
-    Roles, Situation, Stages, Tasked, compare,
+    Action, Candidate, Coadaptation, Comparison, Config, Costs, Listener, Planned, Risk, Roles, Stages,
+    Tasked, Unfinished, Valuation, compare,
 };
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use pddl::ast::Problem;
 
-use crate::cli::check::failure as process_failure;
+use crate::cli::common::{Common, Exit, Failure, process_failure};
 use crate::cli::compare_so_far::{Begun, Shared};
-use crate::cli::compare_table::{Pair, memory_since, published_rows};
-use crate::cli::plan::seconds;
-use crate::cli::{Common, Exit, Failure, Situation as Given, output};
+use crate::cli::compare_table::{memory_since, published_rows};
+use crate::cli::output;
+use crate::cli::situation::Situation;
+use crate::cli::values::seconds;
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -30,7 +33,7 @@ pub struct Arguments {
     #[arg(required = true, num_args = 1..=2, value_name = "MISSION | DOMAIN PROBLEM")]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
-    situation: Given,
+    situation: Situation,
     /// The component that may be lost on the way, and with which probability at each move.
     #[arg(long, value_name = "COMPONENT=RATE", value_parser = loss)]
     loss: Option<(String, f64)>,
@@ -88,8 +91,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(time) = arguments.time_limit {
         so_far.show_after(time, common);
     }
-    let mission = arguments.situation.mission(&arguments.inputs)?;
-    let mut roles = mission.roles().clone();
+    let Setup { mission, mut roles, .. } = arguments.situation.setup(&arguments.inputs)?;
     if let Some((component, rate)) = &arguments.loss {
         roles.loss_component = Some(component.clone());
         roles.loss_rate = *rate;
@@ -221,7 +223,7 @@ fn one(
     coadaptation: &Coadaptation,
     roles: &Roles,
     tasked: Option<&Tasked>,
-    report: &mut Report<'_>,
+    report: &mut Listener<'_>,
 ) -> Result<Comparison, Failure> {
     let mut risk = Risk::all(coadaptation);
     risk.battery &= !arguments.no_battery;
@@ -232,7 +234,7 @@ fn one(
         states: arguments.state_limit,
         memory: &memory_since,
     };
-    let mut planner = |situation: &Situation| match tasked {
+    let mut planner = |situation: &Valuation| match tasked {
         Some(tasked) => solve(
             mission,
             |mission| tasked.problem(mission, situation),
@@ -252,7 +254,7 @@ fn plan(
     coadaptation: &Coadaptation,
     roles: &Roles,
     risk: Risk,
-    situation: Situation,
+    situation: Valuation,
 ) -> Result<Planned, Vec<Message>> {
     let one = |message| vec![message];
     let mut mission = mission.clone();

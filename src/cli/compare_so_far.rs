@@ -9,14 +9,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use encodings::Limits;
+use metaplan::answers::{CompareAnswer, ComparisonAnswer, Pair, Row, begun_rows, rows};
 use metaplan::comparison::{Candidate, Comparison, Costs};
 use metaplan::message::Message;
-use serde_json::{Value, json};
 
-use crate::cli::compare_table::{
-    Pair, Row, as_json, as_text, begun_json, begun_rows, costs_text, csv, row_json, rows,
-};
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::compare_table::{as_text, costs_text, csv};
+use crate::cli::output;
 
 /// How often the clock is looked at.
 const INTERVAL: Duration = Duration::from_millis(10);
@@ -119,22 +118,18 @@ impl SoFar {
         let measured: Vec<Row> = done.chain(begun).collect();
         let is_empty = measured.is_empty();
         let added = std::mem::take(&mut self.added);
-        let more: Vec<Value> = added.iter().map(row_json).collect();
-        let rows: Vec<Row> = measured.into_iter().chain(added).collect();
+        let rows: Vec<Row> = measured.into_iter().chain(added.iter().cloned()).collect();
         if let Some(path) = self.csv.as_ref().filter(|_| !is_empty) {
             output::write_file(path, &csv(&rows))?;
         }
         if common.format == Format::Json {
-            let done = self.done.iter().map(|(pair, comparison)| as_json(pair.as_ref(), comparison));
+            let done =
+                self.done.iter().map(|(pair, comparison)| ComparisonAnswer::new(pair.as_ref(), comparison));
+            let begun = self.begun.iter();
             let begun =
-                self.begun.iter().map(|own| begun_json(own.pair.as_ref(), &own.candidates, &own.costs));
-            output::json_answer(&json!({
-                "format": "metaplan-compare/1",
-                "complete": message.is_none(),
-                "comparisons": done.chain(begun).collect::<Vec<_>>(),
-                "published": more,
-                "messages": message.iter().collect::<Vec<_>>(),
-            }));
+                begun.map(|own| ComparisonAnswer::begun(own.pair.as_ref(), &own.candidates, &own.costs));
+            let messages: Vec<Message> = message.into_iter().collect();
+            output::json_answer(&CompareAnswer::new(done.chain(begun).collect(), &added, &messages));
             return Ok(());
         }
         if !is_empty {

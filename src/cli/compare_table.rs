@@ -1,86 +1,15 @@
 //! A comparison to a table for people, JSON and CSV; and rows that users add to it.
 
 use std::fmt::Write as _;
-use std::time::Duration;
 
-use metaplan::comparison::{Candidate, Comparison, Costs, Measures, Stages};
+use metaplan::answers::{MEASURES, Pair, Row};
+use metaplan::comparison::{Comparison, Costs, Stages};
+use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::source;
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 
-use crate::cli::{Failure, output};
-
-/// Start and goal, where a comparison is one of many.
-pub type Pair = (String, String);
-
-/// The measures of the table, in its order.
-const MEASURES: [&str; 12] = [
-    "goal",
-    "goal_with_reserve",
-    "no_collision",
-    "collisions",
-    "time",
-    "energy",
-    "reconfigurations",
-    "time_if_successful",
-    "energy_if_successful",
-    "penalised_time",
-    "replans",
-    "states",
-];
-
-fn values(measures: &Measures) -> [Option<f64>; 12] {
-    [
-        Some(measures.goal),
-        Some(measures.goal_with_reserve),
-        Some(measures.no_collision),
-        Some(measures.collisions),
-        measures.time,
-        measures.energy,
-        measures.reconfigurations,
-        measures.time_if_successful,
-        measures.energy_if_successful,
-        measures.penalised_time,
-        Some(measures.replans),
-        Some(measures.states as f64),
-    ]
-}
-
-/// A row of the table.
-#[derive(Debug, Clone)]
-pub struct Row {
-    pair: Option<(String, String)>,
-    pub kind: String,
-    name: String,
-    values: Vec<Option<f64>>,
-}
-
-fn row(pair: Option<&Pair>, kind: char, name: &str, values: Vec<Option<f64>>) -> Row {
-    Row { pair: pair.cloned(), kind: kind.to_string(), name: name.to_owned(), values }
-}
-
-/// The rows of the candidates that have been measured.
-pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
-    let measured = candidates
-        .iter()
-        .map(|candidate| row(pair, candidate.kind, &candidate.name, values(&candidate.measures).to_vec()));
-    measured.collect()
-}
-
-pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
-    let mut rows = begun_rows(pair, &comparison.candidates);
-    let [time, energy] = comparison.hindsight;
-    let bound = |measure: &str| match measure {
-        "time" | "penalised_time" => time.expected,
-        "energy" => energy.expected,
-        "time_if_successful" => time.least,
-        "energy_if_successful" => energy.least,
-        _ => None,
-    };
-    let bounds = MEASURES.iter().map(|measure| bound(measure)).collect();
-    rows.push(row(pair, 'f', "hindsight bound, for the goal reached", bounds));
-    rows
-}
+use crate::cli::common::Failure;
+use crate::cli::output;
 
 pub fn published_rows(path: &std::path::Path) -> Result<Vec<Row>, Failure> {
     let file = source(path)?;
@@ -222,77 +151,4 @@ pub fn csv(rows: &[Row]) -> String {
         let _ = writeln!(text, "{start},{goal},{},\"{name}\",{}", row.kind, values.join(","));
     }
     text
-}
-
-pub fn row_json(row: &Row) -> Value {
-    let mut fields = Map::new();
-    fields.insert("kind".to_owned(), json!(row.kind));
-    fields.insert("name".to_owned(), json!(row.name));
-    fields.extend(MEASURES.iter().zip(&row.values).map(|(name, value)| ((*name).to_owned(), json!(value))));
-    Value::Object(fields)
-}
-
-pub fn as_json(pair: Option<&Pair>, c: &Comparison) -> Value {
-    let loss = c.loss.as_ref().map(|loss| {
-        let steps = loss.steps.iter().map(|step| {
-            json!({
-                "moves": step.moves,
-                "open_loop": step.open_loop,
-                "replanned": step.replanned,
-                "solved_again": step.solved_again,
-                "anticipated": step.anticipated,
-            })
-        });
-        json!({ "component": loss.component, "rate": loss.rate, "steps": steps.collect::<Vec<_>>() })
-    });
-    json!({
-        "start": pair.map(|(start, _)| start),
-        "goal": pair.map(|(_, goal)| goal),
-        "candidates": rows(pair, c).iter().map(row_json).collect::<Vec<_>>(),
-        "front": c.front,
-        "penalty": c.penalty,
-        "price_of_determinism": c.price_of_determinism(),
-        "price_provably_zero": c.no_price,
-        "price_of_open_loop": c.price_of_open_loop(),
-        "value_of_replanning": c.value_of_replanning(),
-        "loss": loss,
-        "complete": true,
-        "costs": costs_json(&c.costs),
-    })
-}
-
-/// A comparison that is not done.
-pub fn begun_json(pair: Option<&Pair>, candidates: &[Candidate], costs: &Costs) -> Value {
-    json!({
-        "start": pair.map(|(start, _)| start),
-        "goal": pair.map(|(_, goal)| goal),
-        "candidates": begun_rows(pair, candidates).iter().map(row_json).collect::<Vec<_>>(),
-        "complete": false,
-        "costs": costs_json(costs),
-    })
-}
-
-fn costs_json(costs: &Costs) -> Value {
-    let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
-    json!({
-        "states": costs.states,
-        "transitions": costs.transitions,
-        "plans": costs.plans,
-        "variables": costs.variables,
-        "clauses": costs.clauses,
-        "decisions": costs.decisions,
-        "milliseconds": {
-            "build": milliseconds(costs.process.build),
-            "solve": milliseconds(costs.process.solve),
-            "extract": milliseconds(costs.process.extract),
-            "first_plan": milliseconds(costs.first_plan.total()),
-            "first_plan_build": milliseconds(costs.first_plan.build),
-            "first_plan_solve": milliseconds(costs.first_plan.solve),
-            "first_plan_extract": milliseconds(costs.first_plan.extract),
-            "more_plans": milliseconds(costs.more_plans),
-        },
-        "peak_memory_mb": costs.process_memory.max(costs.plan_memory),
-        "process_memory_mb": costs.process_memory,
-        "first_plan_memory_mb": costs.plan_memory,
-    })
 }

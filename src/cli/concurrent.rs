@@ -6,9 +6,9 @@ use metaplan::mission::Mission;
 use num_rational::BigRational;
 use pddl::ast::Problem;
 
+use crate::cli::common::{Exit, Failure};
 use crate::cli::objectives::Objectives;
-use crate::cli::validate::time;
-use crate::cli::{Exit, Failure};
+use crate::cli::values::time;
 
 /// Whether and how actions overlap.
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ use num_rational::BigRational;
 use pddl::ast::{Name, Problem};
 use pddl::validate::{Options, PlanStep, PlanText, validate};
 
-use crate::cli::{Exit, Failure};
+use crate::cli::common::{Exit, Failure};
 
 /// How the validator is to read a plan.
 pub(super) struct Reading {

@@ -6,7 +6,9 @@ use clap::{Args, ValueEnum};
 use metaplan::message::Message;
 use ontology::OutputSyntax;
 
-use crate::cli::{Common, Exit, Failure, Imports, output};
+use crate::cli::common::{Common, Exit, Failure};
+use crate::cli::output;
+use crate::cli::situation::Imports;
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use encodings::Limits;
-use metaplan::explain::{Answer, Change, DesignExplanation, Target, best, design, smallest_changes};
-use num_rational::BigRational;
-use serde_json::{Value, json};
+use metaplan::answers::{ChangesAnswer, DesignAnswer};
+use metaplan::explain::{BestPlan, Change, DesignExplanation, Target, best, design, smallest_changes};
 
-use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output::{self, decimal};
+use crate::cli::situation::Situation;
 
 /// Arguments of `explain`.
 #[derive(Debug, Args)]
@@ -37,60 +38,53 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             Failure { exit, messages }
         })?;
         match common.format {
-            Format::Json => output::json_answer(&design_json(name, &answer, &found)),
+            Format::Json => output::json_answer(&DesignAnswer::new(name, &answer, &found)),
             _ => output::answer(&design_text(&answer, &found)),
         }
     } else {
         let changes = smallest_changes(&mission, &limits)?;
         match common.format {
-            Format::Json => output::json_answer(&json!({
-                "format": "metaplan-explain/1", "mission": name, "best": answer_json(&answer),
-                "changes": changes.iter().map(change_json).collect::<Vec<_>>(),
-            })),
+            Format::Json => output::json_answer(&ChangesAnswer::new(name, &answer, &changes)),
             _ => output::answer(&changes_text(&answer, &changes)),
         }
     }
     Ok(Exit::Done)
 }
 
-fn number(value: &BigRational) -> String {
-    rules::Decimal::from_rational(value).to_string()
-}
-
 /// The steps of a plan, each on a line.
-fn plan_text(answer: &Answer) -> String {
+fn plan_text(answer: &BestPlan) -> String {
     answer.steps.iter().fold(String::new(), |text, step| text + "    " + &step.summary() + "\n")
 }
 
 /// A metric, and how it differs from that of the best plan.
-fn cost_text(answer: &Answer, best: &Answer) -> String {
+fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     match (&answer.cost, &best.cost) {
         (None, _) => "there is no plan".to_owned(),
-        (Some(cost), Some(base)) if cost == base => format!("the best plan costs {}, no more", number(cost)),
+        (Some(cost), Some(base)) if cost == base => format!("the best plan costs {}, no more", decimal(cost)),
         (Some(cost), Some(base)) if cost > base => {
-            format!("the best plan costs {}, {} more", number(cost), number(&(cost - base)))
+            format!("the best plan costs {}, {} more", decimal(cost), decimal(&(cost - base)))
         }
         (Some(cost), Some(base)) => {
-            format!("the best plan costs {}, {} less", number(cost), number(&(base - cost)))
+            format!("the best plan costs {}, {} less", decimal(cost), decimal(&(base - cost)))
         }
-        (Some(cost), None) => format!("there is a plan, and the best costs {}", number(cost)),
+        (Some(cost), None) => format!("there is a plan, and the best costs {}", decimal(cost)),
     }
 }
 
 fn target_text(change: &Change) -> String {
-    let now = change.from.as_ref().map(|from| format!(" (now {})", number(from))).unwrap_or_default();
+    let now = change.from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();
     let name = &change.name;
     match &change.to {
-        Target::AtLeast(bound) => format!("{name} at least {}{now}", number(bound)),
-        Target::AtMost(bound) => format!("{name} at most {}{now}", number(bound)),
-        Target::Above(bound) => format!("{name} above {}{now}", number(bound)),
-        Target::Below(bound) => format!("{name} below {}{now}", number(bound)),
+        Target::AtLeast(bound) => format!("{name} at least {}{now}", decimal(bound)),
+        Target::AtMost(bound) => format!("{name} at most {}{now}", decimal(bound)),
+        Target::Above(bound) => format!("{name} above {}{now}", decimal(bound)),
+        Target::Below(bound) => format!("{name} below {}{now}", decimal(bound)),
         Target::Recovered => format!("{name} works again"),
         Target::Failed => format!("{name} fails"),
     }
 }
 
-fn design_text(best: &Answer, found: &DesignExplanation) -> String {
+fn design_text(best: &BestPlan, found: &DesignExplanation) -> String {
     let mut text = String::new();
     let functions = found.functions.join(", ");
     let state = if found.available { "is available" } else { "is not available" };
@@ -103,13 +97,13 @@ fn design_text(best: &Answer, found: &DesignExplanation) -> String {
     match (&best.cost, used.is_empty()) {
         (None, _) => text += "there is no plan\n",
         (Some(cost), true) => {
-            let _ = writeln!(text, "the best plan costs {} and does not use it", number(cost));
+            let _ = writeln!(text, "the best plan costs {} and does not use it", decimal(cost));
         }
         (Some(cost), false) => {
             let _ = writeln!(
                 text,
                 "the best plan costs {} and uses it in steps {}",
-                number(cost),
+                decimal(cost),
                 used.join(", ")
             );
         }
@@ -133,10 +127,10 @@ fn design_text(best: &Answer, found: &DesignExplanation) -> String {
     text
 }
 
-fn changes_text(best: &Answer, changes: &[Change]) -> String {
+fn changes_text(best: &BestPlan, changes: &[Change]) -> String {
     let mut text = match &best.cost {
         None => "there is no plan\n".to_owned(),
-        Some(cost) => format!("the best plan costs {}\n{}", number(cost), plan_text(best)),
+        Some(cost) => format!("the best plan costs {}\n{}", decimal(cost), plan_text(best)),
     };
     if changes.is_empty() {
         return text + "no change of one measurement leads to another plan\n";
@@ -147,46 +141,4 @@ fn changes_text(best: &Answer, changes: &[Change]) -> String {
         text += &plan_text(&change.then);
     }
     text
-}
-
-fn answer_json(answer: &Answer) -> Value {
-    json!({
-        "cost": answer.cost.as_ref().map(output::decimal_number),
-        "proved": answer.proved,
-        "steps": answer.steps,
-    })
-}
-
-fn change_json(change: &Change) -> Value {
-    let (relation, bound) = match &change.to {
-        Target::AtLeast(bound) => ("at_least", Some(bound)),
-        Target::AtMost(bound) => ("at_most", Some(bound)),
-        Target::Above(bound) => ("above", Some(bound)),
-        Target::Below(bound) => ("below", Some(bound)),
-        Target::Recovered => ("recovered", None),
-        Target::Failed => ("failed", None),
-    };
-    json!({
-        "name": change.name,
-        "from": change.from.as_ref().map(output::decimal_number),
-        "relation": relation,
-        "bound": bound.map(output::decimal_number),
-        "then": answer_json(&change.then),
-    })
-}
-
-fn design_json(mission: &str, best: &Answer, found: &DesignExplanation) -> Value {
-    json!({
-        "format": "metaplan-explain/1",
-        "mission": mission,
-        "best": answer_json(best),
-        "design": found.design,
-        "functions": found.functions,
-        "available": found.available,
-        "because": found.because,
-        "used": found.used,
-        "alone": answer_json(&found.alone),
-        "without": answer_json(&found.without),
-        "changes": found.changes.iter().map(change_json).collect::<Vec<_>>(),
-    })
 }

@@ -3,14 +3,17 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use metaplan::comparison::{Coadaptation, Risk, Tasked, program, published_program};
+use metaplan::answers::{MissionExport, ModelExport};
+use metaplan::comparison::{Coadaptation, Risk, Roles, Tasked, program, published_program};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use pddl::ast::Problem;
 use pddl::{portable, print_domain, print_problem};
-use serde_json::json;
 
-use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::Situation;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -20,7 +23,7 @@ pub struct Arguments {
     inputs: Vec<PathBuf>,
     /// What to write.
     #[arg(long = "to", value_enum, value_name = "FORMAT")]
-    target: Target,
+    target: Language,
     /// Which reading of the probabilistic approach becomes a model.
     #[arg(long, value_enum, default_value_t = Setting::Corrected)]
     setting: Setting,
@@ -34,7 +37,7 @@ pub struct Arguments {
 
 /// What a mission can be written as.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Target {
+enum Language {
     /// The domain and the problem as they are planned, availability and values filled in, in a form that other
     /// planners accept.
     Pddl,
@@ -56,11 +59,11 @@ enum Setting {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let mission = arguments.situation.mission(&arguments.inputs)?;
+    let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
-    if !matches!(arguments.target, Target::Pddl) {
-        return process(arguments, common, &mission, &problem);
+    if !matches!(arguments.target, Language::Pddl) {
+        return process(arguments, common, &mission, &problem, &roles);
     }
     let (domain, problem) = portable(mission.domain(), &problem);
     let (domain, problem) = (print_domain(&domain), print_problem(&problem));
@@ -74,8 +77,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             output::write_file(&directory.join("problem.pddl"), &problem)?;
         }
         None if common.format == Format::Json => {
-            let answer = json!({ "format": "metaplan-export/1", "domain": domain, "problem": problem });
-            output::json_answer(&answer);
+            output::json_answer(&MissionExport::new(domain, problem));
         }
         None => output::document(&format!("{domain}\n{problem}")),
     }
@@ -88,8 +90,8 @@ fn process(
     common: &Common,
     mission: &Mission,
     problem: &Problem,
+    roles: &Roles,
 ) -> Result<Exit, Failure> {
-    let roles = mission.roles();
     let coadaptation = if Coadaptation::is_spelt_out(problem, roles) {
         Coadaptation::new(mission, problem, roles)?
     } else {
@@ -100,7 +102,7 @@ fn process(
         Setting::Published => published_program(&coadaptation),
     };
     let text = match arguments.target {
-        Target::Jani => match probabilistic::jani::write(&mission.name, &model) {
+        Language::Jani => match probabilistic::jani::write(&mission.name, &model) {
             Ok(json) => output::pretty(&json),
             Err(problems) => {
                 let message =
@@ -113,7 +115,7 @@ fn process(
     match &arguments.output {
         Some(file) => output::write_file(file, &text)?,
         None if common.format == Format::Json => {
-            output::json_answer(&json!({ "format": "metaplan-export/1", "model": text }));
+            output::json_answer(&ModelExport::new(text));
         }
         None => output::document(&text),
     }

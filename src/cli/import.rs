@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
+use metaplan::answers::ImportAnswer;
 use metaplan::comparison::{MapOptions, import_map};
+use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::source;
-use serde_json::json;
 
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
 
 /// Arguments of `import`.
 #[derive(Debug, Args)]
@@ -125,7 +126,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     let manifest = map.output.join(manifest).display().to_string();
     match common.format {
-        Format::Json => output::json_answer(&json!({ "format": "metaplan-import/1", "mission": manifest })),
+        Format::Json => output::json_answer(&ImportAnswer::new(manifest)),
         _ => output::answer(&format!("{manifest}\n")),
     }
     Ok(Exit::Done)

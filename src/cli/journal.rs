@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use metaplan::journal::{Entry, Report};
-use serde_json::{Value, json};
+use metaplan::answers::JournalAnswer;
+use metaplan::journal::{Entry, JournalReport};
+use serde_json::Value;
 
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
 
 /// Arguments of `journal`.
 #[derive(Debug, Args)]
@@ -35,19 +37,10 @@ enum What {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (What::Check { directory } | What::Show { directory }) = &arguments.what;
-    let report = Report::read(directory)?;
+    let report = JournalReport::read(directory)?;
     let shows = matches!(arguments.what, What::Show { .. });
     if common.format == Format::Json {
-        let mut answer = json!({
-            "format": "metaplan-journal-report/1",
-            "sound": report.is_sound(),
-            "parts": report.parts,
-            "messages": report.messages,
-        });
-        if shows {
-            answer["records"] = report.entries.iter().map(record).collect();
-        }
-        output::json_answer(&answer);
+        output::json_answer(&JournalAnswer::new(&report, shows));
     } else {
         let lines = if shows { report.entries.iter().map(line).collect() } else { report.parts.clone() };
         let mut text = lines.into_iter().fold(String::new(), |text, line| text + &line + "\n");
@@ -59,18 +52,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         output::warnings(common, &report.messages);
     }
     Ok(if report.is_sound() { Exit::Done } else { Exit::BadInput })
-}
-
-fn record(entry: &Entry) -> Value {
-    let content = if entry.kind == "decision" { "answers" } else { "line" };
-    let mut object = json!({ "record": entry.record, "segment": entry.segment, "kind": entry.kind });
-    if let Some(time) = entry.time {
-        object["microseconds"] = json!(time);
-    }
-    if !entry.content.is_null() {
-        object[content] = entry.content.clone();
-    }
-    object
 }
 
 fn line(entry: &Entry) -> String {

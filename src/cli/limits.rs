@@ -11,7 +11,8 @@ use std::time::Duration;
 use encodings::Limits;
 use metaplan::message::Message;
 
-use crate::cli::{Common, Exit, Failure, memory, output};
+use crate::cli::common::{Common, Exit, Failure};
+use crate::cli::{memory, output};
 
 /// How often the reading thread looks at the clock.
 const INTERVAL: Duration = Duration::from_millis(10);

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use metaplan::message::Message;
 
-use crate::cli::Failure;
+use crate::cli::common::Failure;
 
 /// How often the memory is measured. So long the process may go on taking more.
 const INTERVAL: Duration = Duration::from_millis(5);

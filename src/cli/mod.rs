@@ -2,6 +2,7 @@
 
 mod alternatives;
 mod check;
+mod common;
 mod compare;
 mod compare_so_far;
 mod compare_table;
@@ -19,64 +20,23 @@ mod output;
 mod plan;
 mod plan_answer;
 mod plan_exact;
-mod plan_json;
-mod plan_stages;
 mod plan_text;
 mod plan_verdict;
 mod reason;
 mod reason_ask;
 mod run;
 mod simulate;
+mod situation;
 mod validate;
+mod values;
 mod verify;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
-use metaplan::message::{Message, did_you_mean};
-use metaplan::mission::{Bindings, Mission, source};
-use ontology::ReadOptions;
+use clap::{Parser, Subcommand};
+use metaplan::message::Message;
 
-/// Exit statuses; the README lists them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Exit {
-    Done = 0,
-    NotProved = 1,
-    Usage = 2,
-    BadInput = 3,
-    Unsolvable = 10,
-    UnsolvableWithinHorizon = 11,
-    NothingFound = 12,
-    Inconsistent = 20,
-    Invalid = 30,
-    Fault = 70,
-}
-
-/// Why a command has no answer.
-struct Failure {
-    exit: Exit,
-    messages: Vec<Message>,
-}
-
-impl Failure {
-    fn usage(message: Message) -> Self {
-        Self { exit: Exit::Usage, messages: vec![message] }
-    }
-}
-
-impl From<Vec<Message>> for Failure {
-    fn from(messages: Vec<Message>) -> Self {
-        Self { exit: Exit::BadInput, messages }
-    }
-}
-
-impl From<Message> for Failure {
-    fn from(message: Message) -> Self {
-        vec![message].into()
-    }
-}
+use common::{Common, Exit, Failure, Format};
 
 /// Adapts a robot's task plan and its software architecture together, and proves that the result is optimal.
 #[derive(Debug, Parser)]
@@ -86,31 +46,6 @@ struct Cli {
     command: Command,
     #[command(flatten)]
     common: Common,
-}
-
-#[derive(Debug, Clone, Args)]
-struct Common {
-    /// How the answer is written.
-    #[arg(long, global = true, value_enum, default_value_t = Format::Text)]
-    format: Format,
-    /// No warnings and no progress on standard error.
-    #[arg(long, short, global = true)]
-    quiet: bool,
-    /// Statistics besides the answer.
-    #[arg(long, short, global = true)]
-    verbose: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For people.
-    Text,
-    /// For programs; versioned, see the README.
-    Json,
-    /// `reason` only: the inferred assertions, sorted.
-    Ntriples,
-    /// `reason` only: the inferred assertions by subject.
-    Turtle,
 }
 
 #[derive(Debug, Subcommand)]
@@ -141,157 +76,6 @@ enum Command {
     Validate(validate::Arguments),
     /// Checks a certificate without trusting the planner.
     Verify(verify::Arguments),
-}
-
-/// A mission, or a domain and a problem, and the situation to plan for.
-#[derive(Debug, Args)]
-struct Situation {
-    /// A knowledge base for DOMAIN and PROBLEM (OWL; repeatable).
-    #[arg(long = "kb", value_name = "FILE")]
-    knowledge: Vec<PathBuf>,
-    /// Rules for that knowledge base: a file, `coadaptation` or `tomasys` (repeatable; default `coadaptation`).
-    #[arg(long = "rules", value_name = "FILE")]
-    rules: Vec<String>,
-    #[command(flatten)]
-    imports: Imports,
-    /// A scenario of the mission's manifest.
-    #[arg(long, value_name = "NAME")]
-    scenario: Option<String>,
-    /// A measured attribute, a numeric fluent or a fact: `ambient_light=0.9`, `battery=30`, `robot_at=wp2` (repeatable).
-    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
-    set: Vec<(String, String)>,
-    /// A component that has failed (repeatable).
-    #[arg(long, value_name = "COMPONENT")]
-    fail: Vec<String>,
-}
-
-/// Where imports are looked for; never the network.
-#[derive(Debug, Args)]
-struct Imports {
-    /// An OASIS XML catalog that says where imports lie (repeatable).
-    #[arg(long, value_name = "FILE")]
-    catalog: Vec<PathBuf>,
-    /// A directory to look for imports in, with those below it (repeatable).
-    #[arg(long, value_name = "DIR", value_parser = existing_directory)]
-    directory: Vec<PathBuf>,
-    /// Goes on with a warning where an import is found nowhere.
-    #[arg(long)]
-    #[allow(clippy::struct_field_names)]
-    ignore_missing_imports: bool,
-}
-
-impl Imports {
-    fn options(&self) -> ReadOptions {
-        ReadOptions {
-            catalogs: self.catalog.clone(),
-            directories: self.directory.clone(),
-            allow_missing_imports: self.ignore_missing_imports,
-            ..ReadOptions::default()
-        }
-    }
-}
-
-fn existing_directory(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    if path.is_dir() { Ok(path) } else { Err(format!("there is no directory `{text}`")) }
-}
-
-fn setting(text: &str) -> Result<(String, String), String> {
-    let (name, value) =
-        text.split_once('=').ok_or_else(|| format!("`{text}` is not of the form NAME=VALUE"))?;
-    Ok((name.trim().to_owned(), value.trim().to_owned()))
-}
-
-impl Situation {
-    /// A situation of a mission that has a manifest.
-    fn of_mission(scenario: Option<String>, set: Vec<(String, String)>, fail: Vec<String>) -> Self {
-        let imports = Imports { catalog: Vec::new(), directory: Vec::new(), ignore_missing_imports: false };
-        Self { knowledge: Vec::new(), rules: Vec::new(), imports, scenario, set, fail }
-    }
-
-    /// The mission in this situation, from one input (a manifest) or two (domain and problem).
-    fn mission(&self, inputs: &[PathBuf]) -> Result<Mission, Failure> {
-        let mut mission = match inputs {
-            [manifest] => {
-                let imports = &self.imports;
-                let none = self.knowledge.is_empty() && self.rules.is_empty();
-                let here = imports.catalog.is_empty() && imports.directory.is_empty();
-                if !(none && here && !imports.ignore_missing_imports) {
-                    let text = "`--kb`, `--rules` and where imports lie go with DOMAIN and PROBLEM; \
-                                a mission's manifest names its own";
-                    return Err(Failure::usage(Message::error("M107", text)));
-                }
-                let (mut mission, manifest) = Mission::read(manifest)?;
-                if let Some(name) = &self.scenario {
-                    let scenario = manifest.scenarios.get(name).ok_or_else(|| {
-                        let known: Vec<_> = manifest.scenarios.keys().map(String::as_str).collect();
-                        let text = format!(
-                            "the mission has no scenario `{name}`; it has: {}{}",
-                            known.join(", "),
-                            did_you_mean(name, known.iter().copied())
-                        );
-                        Failure::usage(Message::error("M108", text))
-                    })?;
-                    mission.apply(scenario).map_err(|message| {
-                        let text = format!("scenario `{name}`: {}", message.message);
-                        Message::at(&message.code, manifest.file(), None, text)
-                    })?;
-                }
-                mission
-            }
-            [domain, problem] => {
-                if self.scenario.is_some() {
-                    let text = "`--scenario` goes with a mission's manifest";
-                    return Err(Failure::usage(Message::error("M107", text)));
-                }
-                if self.knowledge.is_empty() && !self.rules.is_empty() {
-                    return Err(Failure::usage(Message::error("M107", "`--rules` goes with `--kb`")));
-                }
-                let knowledge = (!self.knowledge.is_empty()).then(|| {
-                    let rules = if self.rules.is_empty() {
-                        vec![COADAPTATION.to_owned()]
-                    } else {
-                        self.rules.clone()
-                    };
-                    Knowledge::read(&Sources {
-                        documents: self.knowledge.clone(),
-                        rules,
-                        options: self.imports.options(),
-                        ..Sources::default()
-                    })
-                });
-                Mission::new("", knowledge, Bindings::default(), source(domain), source(problem))?
-            }
-            _ => {
-                let text = "give a mission's manifest, or a domain and a problem";
-                return Err(Failure::usage(Message::error("M107", text)));
-            }
-        };
-        for component in &self.fail {
-            mission.fail(component).map_err(Failure::usage)?;
-        }
-        for (name, value) in &self.set {
-            mission.set(name, value).map_err(Failure::usage)?;
-        }
-        consistent(mission.knowledge())?;
-        mission.note_doubts();
-        Ok(mission)
-    }
-}
-
-/// Nothing is planned on knowledge that contradicts itself.
-fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Failure> {
-    let contradictions = knowledge.map(Knowledge::contradictions).unwrap_or_default();
-    if contradictions.is_empty() {
-        return Ok(());
-    }
-    let messages = contradictions.iter().map(|c| {
-        Message::error(
-            "M110",
-            format!("the knowledge is inconsistent: {}: {}", c.violated, c.facts.join(", ")),
-        )
-    });
-    Err(Failure { exit: Exit::Inconsistent, messages: messages.collect() })
 }
 
 /// Runs the program.

@@ -3,16 +3,15 @@
 use std::fmt::Write as _;
 
 use encodings::{Front, Point, Status};
+use metaplan::answers::{Objective, ParetoAnswer, Preparation};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use pddl::ast::{Metric, Problem};
-use serde_json::{Value, json};
 
+use crate::cli::common::Failure;
 use crate::cli::confirm::{Reading, confirm};
-use crate::cli::plan_answer::answer_text as plan_text;
-use crate::cli::plan_json::json as plan_json;
-use crate::cli::plan_stages::{Stages, status_word};
-use crate::cli::{Failure, output};
+use crate::cli::plan_answer::answer_text;
+use crate::cli::plan_text::steps_text;
 
 /// The objectives that the user asks for, in order; none for the problem's metric.
 pub(super) struct Objectives {
@@ -73,16 +72,9 @@ impl Objectives {
         Ok(())
     }
 
-    fn values(&self, point: &Point) -> Vec<Value> {
-        let pairs = self.texts.iter().zip(&point.values);
-        pairs.map(|(text, value)| json!({ "minimize": text, "value": output::number(value) })).collect()
-    }
-
-    /// Adds the values by objective to a plan in JSON.
-    pub(super) fn attach(&self, answer: &mut Value, point: &Point) {
-        if let Some(object) = answer.as_object_mut().filter(|_| !self.texts.is_empty()) {
-            object.insert("objectives".into(), self.values(point).into());
-        }
+    /// The values of a plan by objective, for programs.
+    pub(super) fn values(&self, point: &Point) -> Vec<Objective> {
+        Objective::all(&self.texts, point)
     }
 
     /// A line with the values by objective, where there are several.
@@ -103,7 +95,7 @@ impl Objectives {
             let values: Vec<_> = pairs.map(|(text, value)| format!("{text} = {value}")).collect();
             let _ = writeln!(text, "point {number}: {}", values.join(", "));
             if let Some(plan) = &point.solution.plan {
-                text += &crate::cli::plan_text::steps_text(plan);
+                text += &steps_text(plan);
             }
             text.push('\n');
         }
@@ -118,25 +110,14 @@ impl Objectives {
                     solved.len()
                 );
             }
-            (_, Some(point)) => text += &plan_text(name, &point.solution, false, &Stages::default()),
+            (_, Some(point)) => text += &answer_text(name, &point.solution, false, &Preparation::default()),
             (_, None) => {}
         }
         text
     }
 
-    pub(super) fn front_json(&self, name: &str, front: &Front, stages: &Stages) -> Value {
-        let solved = front.points.iter().filter(|point| point.solution.plan.is_some());
-        let points = solved.map(|point| {
-            let mut plan = plan_json(name, &point.solution, stages);
-            self.attach(&mut plan, point);
-            plan
-        });
-        json!({
-            "format": "metaplan-pareto/1",
-            "mission": name,
-            "status": status_word(front.status),
-            "objectives": self.texts,
-            "points": points.collect::<Vec<_>>(),
-        })
+    /// The front for programs.
+    pub(super) fn front_answer(&self, name: &str, front: &Front, preparation: &Preparation) -> ParetoAnswer {
+        ParetoAnswer::new(name, &self.texts, front, preparation)
     }
 }

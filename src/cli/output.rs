@@ -8,11 +8,11 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{ContentArrangement, Table, TableStyle};
-use encodings::Exact;
+use metaplan::answers::ErrorAnswer;
 use metaplan::message::Message;
-use serde_json::{Value, json};
+use serde::Serialize;
 
-use crate::cli::{Common, Failure, Format};
+use crate::cli::common::{Common, Failure, Format};
 
 /// Whether an answer could not be written.
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
@@ -93,14 +93,20 @@ pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
 }
 
-/// Writes a JSON value to standard output.
-pub fn json_answer(value: &Value) {
-    document(&visible_json(&pretty(value)));
+/// Writes an answer for programs to standard output.
+pub fn json_answer(answer: &impl Serialize) {
+    document(&visible_json(&pretty(answer)));
 }
 
-/// A JSON value as text, with a line break at its end.
-pub fn pretty(value: &Value) -> String {
-    format!("{value:#}\n")
+/// An answer for programs as text, with a line break at its end.
+pub fn pretty(answer: &impl Serialize) -> String {
+    // Texts, numbers and lists of them are always data.
+    serde_json::to_string_pretty(answer).unwrap_or_default() + "\n"
+}
+
+/// The same as one line.
+pub fn line(answer: &impl Serialize) -> String {
+    serde_json::to_string(answer).unwrap_or_default() + "\n"
 }
 
 /// A sentence for people beside the answer, on standard error.
@@ -128,7 +134,7 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
 /// Errors: text on standard error, or a JSON object as the answer.
 pub fn failure(common: &Common, messages: &[Message]) {
     if common.format == Format::Json {
-        json_answer(&json!({ "format": "metaplan-error/1", "messages": messages }));
+        json_answer(&ErrorAnswer::new(messages));
         return;
     }
     let mut stderr = std::io::stderr().lock();
@@ -177,19 +183,9 @@ pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> St
     })
 }
 
-/// An exact number as a JSON number; a fraction that is no decimal, rounded to a double.
-pub fn number(exact: &Exact) -> Value {
-    let text = exact.to_string();
-    match text.parse::<serde_json::Number>() {
-        Ok(number) => Value::Number(number),
-        Err(_) => json!(exact.to_f64()),
-    }
-}
-
-/// As [`number`], for numbers of any size.
-pub fn decimal_number(value: &num_rational::BigRational) -> Value {
-    let text = rules::Decimal::from_rational(value).to_string();
-    text.parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
+/// An exact number as decimal text; a fraction that is no decimal is rounded.
+pub fn decimal(value: &num_rational::BigRational) -> String {
+    rules::Decimal::from_rational(value).to_string()
 }
 
 #[cfg(test)]

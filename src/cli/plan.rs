@@ -5,26 +5,27 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use encodings::{
-    Alternatives, Backend, BackendError, Config, Front, Improvement, Limits, Point, Semantics, Solution,
-    Status, Task,
+    Alternatives, Backend, BackendError, Config, Front, Improvement, Limits, Plan, Point, Semantics,
+    Solution, Status, Task,
 };
 use indicatif::{ProgressBar, ProgressStyle};
+use metaplan::answers::{PlanAnswer, Preparation};
 use metaplan::certificate::{self, Ground};
 use metaplan::message::Message;
 use metaplan::mission::{Blocking, Mission};
 use pddl::ast::Problem;
-use serde_json::json;
 
+use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::concurrent::{self, Overlap};
 use crate::cli::confirm::{Reading, fault};
 use crate::cli::limits::Guard;
 use crate::cli::objectives::Objectives;
 use crate::cli::plan_answer::answer_text;
-use crate::cli::plan_json::json as plan_json;
-use crate::cli::plan_stages::Stages;
 use crate::cli::plan_text::{PlanFormat, plan_text};
 use crate::cli::plan_verdict::{blocking_text, verdict};
-use crate::cli::{Common, Exit, Failure, Format, Situation, alternatives, output, plan_exact};
+use crate::cli::situation::Situation;
+use crate::cli::values::seconds;
+use crate::cli::{alternatives, output, plan_exact};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -119,11 +120,6 @@ impl From<Encoding> for Semantics {
     }
 }
 
-pub(super) fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is no number of seconds"))?;
-    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
-}
-
 /// What the user asks of the optimizer.
 fn configuration(arguments: &Arguments, limits: Limits) -> Config {
     let backend = arguments.solver.clone();
@@ -170,9 +166,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let point = concurrent::solve(&mission, &problem, &objectives, separation, &limits, &mut report)?;
         progress.finish_and_clear();
         let ground = started.elapsed().saturating_sub(read + point.solution.statistics.search);
-        let stages = Stages { read, ground };
+        let preparation = Preparation { read, ground };
         objectives.confirm(&mission, &problem, &point, &Reading::concurrent(separation))?;
-        return finish(point, &Beside::default(), &mission, &objectives, &stages, (arguments, common));
+        return finish(point, &Beside::default(), &mission, &objectives, &preparation, (arguments, common));
     }
     let config = configuration(arguments, limits);
     let failed = |messages| {
@@ -180,7 +176,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Failure { exit, messages }
     };
     let ground = mission.ground(&problem, &objectives.metrics, &config.limits);
-    let stages = Stages { read, ground: started.elapsed().saturating_sub(read) };
+    let preparation = Preparation { read, ground: started.elapsed().saturating_sub(read) };
     let task = match ground {
         Ok(task) => task,
         Err(refused) if plan_exact::is_too_large(&refused) && !arguments.asks_for_more() => {
@@ -194,7 +190,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             let subject = (&mission, &problem, Ground::Exact(&task));
             let certified = certify(arguments, subject, &objectives, &point.solution, &config.limits);
             let beside = Beside::default();
-            let exit = finish(point, &beside, &mission, &objectives, &stages, (arguments, common))?;
+            let exit = finish(point, &beside, &mission, &objectives, &preparation, (arguments, common))?;
             return Ok(certified_or(certified, exit));
         }
         Err(messages) => return Err(failed(messages)),
@@ -202,7 +198,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if arguments.pareto.is_some() {
         let front = encodings::pareto(&task, &config, &mut report);
         progress.finish_and_clear();
-        return show_front(front, (&mission, &problem, &task), &objectives, &stages, (arguments, common));
+        return show_front(
+            front,
+            (&mission, &problem, &task),
+            &objectives,
+            &preparation,
+            (arguments, common),
+        );
     }
     let point = encodings::lexicographic(&task, &config, &mut report);
     progress.finish_and_clear();
@@ -225,7 +227,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         _ => None,
     };
     let beside = Beside { others, blocking };
-    let exit = finish(point, &beside, &mission, &objectives, &stages, (arguments, common))?;
+    let exit = finish(point, &beside, &mission, &objectives, &preparation, (arguments, common))?;
     Ok(certified_or(certified, exit))
 }
 
@@ -246,7 +248,7 @@ fn finish(
     beside: &Beside,
     mission: &Mission,
     objectives: &Objectives,
-    stages: &Stages,
+    preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
     // What `validate` executes has the designs, what the user's own domain has no place for them has not.
@@ -254,7 +256,10 @@ fn finish(
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let status = point.solution.status;
-    match (show(&point, beside, &mission.name, objectives, stages, (arguments, common)), &arguments.output) {
+    match (
+        show(&point, beside, &mission.name, objectives, preparation, (arguments, common)),
+        &arguments.output,
+    ) {
         (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
             output::note(&verdict(&point.solution));
@@ -279,27 +284,22 @@ fn show(
     beside: &Beside,
     name: &str,
     objectives: &Objectives,
-    stages: &Stages,
+    preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Option<String> {
     let solution = &point.solution;
     match (arguments.plan_format, common.format) {
         (Some(PlanFormat::Json), _) | (None, Format::Json) => {
-            let mut answer = plan_json(name, solution, stages);
-            objectives.attach(&mut answer, point);
-            if let Some(others) = &beside.others {
-                alternatives::attach(&mut answer, others);
-            }
-            if let (Some(_), Some(plan)) = (arguments.overlap.separation(), &solution.plan) {
-                answer["makespan"] = output::number(&plan.makespan());
-            }
-            if let Some(Blocking::Designs(designs)) = &beside.blocking {
-                answer["blocking"] = json!(designs);
-            }
+            let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
+            let answer = PlanAnswer::new(name, solution, preparation)
+                .with_objectives(objectives.values(point))
+                .with_alternatives(beside.others.as_ref())
+                .with_makespan(overlaps.map(Plan::makespan).as_ref())
+                .with_blocking(beside.blocking.as_ref());
             Some(output::pretty(&answer))
         }
         (None, _) => {
-            let plan = answer_text(name, solution, common.verbose, stages);
+            let plan = answer_text(name, solution, common.verbose, preparation);
             let others = beside.others.as_ref().map(|others| alternatives::text(others, solution));
             let blocking = beside.blocking.as_ref().map(blocking_text);
             let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
@@ -333,7 +333,7 @@ fn show_front(
     mut front: Front,
     (mission, problem, task): (&Mission, &Problem, &Task),
     objectives: &Objectives,
-    stages: &Stages,
+    preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
     for point in &mut front.points {
@@ -341,7 +341,7 @@ fn show_front(
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let text = match common.format {
-        Format::Json => output::pretty(&objectives.front_json(&mission.name, &front, stages)),
+        Format::Json => output::pretty(&objectives.front_answer(&mission.name, &front, preparation)),
         _ => objectives.front_text(&mission.name, &front),
     };
     match &arguments.output {

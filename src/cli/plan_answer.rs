@@ -3,12 +3,17 @@
 use std::fmt::Write as _;
 
 use encodings::{Solution, Status};
+use metaplan::answers::{Preparation, milliseconds};
 
-use crate::cli::plan_stages::{Stages, milliseconds};
 use crate::cli::plan_text::steps_text;
 use crate::cli::plan_verdict::verdict;
 
-pub(super) fn answer_text(name: &str, solution: &Solution, verbose: bool, stages: &Stages) -> String {
+pub(super) fn answer_text(
+    name: &str,
+    solution: &Solution,
+    verbose: bool,
+    preparation: &Preparation,
+) -> String {
     let mut text = String::new();
     if let Some(plan) = &solution.plan {
         if plan.steps.is_empty() {
@@ -28,12 +33,12 @@ pub(super) fn answer_text(name: &str, solution: &Solution, verbose: bool, stages
     }
     text += &verdict(solution);
     if verbose {
-        text += &statistics_text(solution, stages);
+        text += &statistics_text(solution, preparation);
     }
     text
 }
 
-fn statistics_text(solution: &Solution, stages: &Stages) -> String {
+fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
     let statistics = &solution.statistics;
     let families: Vec<_> =
         statistics.families.iter().map(|(family, count)| format!("{family} {count}")).collect();
@@ -46,8 +51,8 @@ fn statistics_text(solution: &Solution, stages: &Stages) -> String {
         families.join(", "),
         statistics.conflicts,
         statistics.calls,
-        milliseconds(stages.read),
-        milliseconds(stages.ground),
+        milliseconds(preparation.read),
+        milliseconds(preparation.ground),
         milliseconds(statistics.search),
         milliseconds(statistics.encode),
         milliseconds(statistics.solve),

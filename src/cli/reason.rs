@@ -4,14 +4,17 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use metaplan::answers::{ReasonAnswer, statuses};
 use metaplan::knowledge::{Contradiction, Knowledge, Sources};
 use metaplan::message::Message;
 use ontology::Equality;
-use rules::{DEFAULT_STEP_BUDGET, Delta, Limits, Value};
-use serde_json::json;
+use rules::{DEFAULT_STEP_BUDGET, Delta, Limits};
 
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
 use crate::cli::reason_ask::Questions;
-use crate::cli::{Common, Exit, Failure, Format, Imports, output, setting};
+use crate::cli::situation::{Imports, consistent};
+use crate::cli::values::setting;
 
 /// Arguments of `reason`.
 #[derive(Debug, Args)]
@@ -76,11 +79,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             let triples = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
             output::document(&ontology::turtle(&triples).map_err(|error| Message::from_ontology(&error))?);
         }
-        Format::Json => output::json_answer(&json(&knowledge, &contradictions)),
+        Format::Json => output::json_answer(&ReasonAnswer::new(&knowledge, &contradictions)),
         Format::Text => output::answer(&text(&knowledge, &contradictions)),
     }
     if !contradictions.is_empty() && matches!(common.format, Format::Ntriples | Format::Turtle) {
-        return crate::cli::consistent(Some(&knowledge)).map(|()| Exit::Done);
+        return consistent(Some(&knowledge)).map(|()| Exit::Done);
     }
     Ok(if contradictions.is_empty() { Exit::Done } else { Exit::Inconsistent })
 }
@@ -91,65 +94,6 @@ fn read(arguments: &Arguments) -> Result<Knowledge, Failure> {
     let limits = Limits { steps: arguments.step_limit, ..Limits::default() };
     let sources = Sources { documents, rules, options: arguments.imports.options(), limits };
     Ok(Knowledge::read_as(&sources, equality)?)
-}
-
-/// Individuals with a property whose local name is given, and its values: `o_status` of objectives.
-fn statuses(knowledge: &Knowledge, property: &str) -> Vec<(String, String)> {
-    let symbols = knowledge.engine().symbols();
-    let mut found: Vec<_> = knowledge
-        .engine()
-        .facts()
-        .filter(|fact| match symbols.value(fact.predicate) {
-            Value::Name(iri) => fact.arguments.len() == 2 && ontology::vocab::local_name(iri) == property,
-            Value::Literal(_) => false,
-        })
-        .map(|fact| {
-            let subject = symbols.value(fact.arguments[0]).to_string();
-            let value = match symbols.value(fact.arguments[1]) {
-                Value::Literal(literal) => literal.lexical(),
-                Value::Name(name) => name.to_string(),
-            };
-            (ontology::vocab::local_name(subject.trim_matches(['<', '>'])).to_owned(), value)
-        })
-        .collect();
-    found.sort();
-    found
-}
-
-fn json(knowledge: &Knowledge, contradictions: &[Contradiction]) -> serde_json::Value {
-    let view = knowledge.view();
-    let names =
-        |all: &[ontology::tomasys::Individual]| all.iter().map(|i| i.name.clone()).collect::<Vec<_>>();
-    let designs: Vec<_> = view
-        .function_designs()
-        .iter()
-        .map(|design| {
-            json!({
-                "name": design.individual.name,
-                "iri": design.individual.iri,
-                "solves": names(&design.solves),
-                "components": names(&design.components),
-                "available": design.available,
-            })
-        })
-        .collect();
-    let objectives: Vec<_> = statuses(knowledge, "o_status")
-        .iter()
-        .map(|(o, status)| json!({ "objective": o, "status": status }))
-        .collect();
-    let contradictions: Vec<_> =
-        contradictions.iter().map(|c| json!({ "violated": c.violated, "facts": c.facts })).collect();
-    let triples = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
-    json!({
-        "format": "metaplan-reason/1",
-        "consistent": contradictions.is_empty(),
-        "rules": knowledge.rule_count(),
-        "inferred": triples.lines().collect::<Vec<_>>(),
-        "designs": designs,
-        "objectives": objectives,
-        "contradictions": contradictions,
-        "warnings": knowledge.warnings(),
-    })
 }
 
 fn text(knowledge: &Knowledge, contradictions: &[Contradiction]) -> String {
@@ -182,7 +126,7 @@ fn text(knowledge: &Knowledge, contradictions: &[Contradiction]) -> String {
         text.push('\n');
         text += &output::table(&["function", "design", "", "components"], rows);
     }
-    let objectives = statuses(knowledge, "o_status");
+    let objectives = statuses(knowledge);
     if !objectives.is_empty() {
         text.push('\n');
         let rows = objectives.into_iter().map(|(objective, status)| vec![objective, status]);

@@ -6,14 +6,16 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use metaplan::answers::{AssertionAnswer, EntailmentAnswer, ReasonsAnswer, SchemaAnswer};
 use metaplan::knowledge::Knowledge;
 use metaplan::message::Message;
-use ontology::entail::{Answer, Schema, SchemaEntity, annotations, entailments, schema};
+use ontology::entail::{Answer, Schema, annotations, entailments, schema};
 use ontology::vocab::{local_name, rdf};
 use rules::{Atom, Engine, Fact, Literal, Symbol, Term, Value};
-use serde_json::{Value as Json, json};
 
-use crate::cli::{Common, Exit, Failure, Format, Imports, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::Imports;
 
 /// Questions; at most one kind at a time.
 #[derive(Debug, Args)]
@@ -45,7 +47,7 @@ impl Questions {
         } else if self.schema {
             let schema = schema(knowledge.engine(), knowledge.entities())
                 .map_err(|error| Message::from_rules(&error))?;
-            (schema_text(&schema), schema_json(&schema), Exit::Done)
+            (schema_text(&schema), output::pretty(&SchemaAnswer::new(&schema)), Exit::Done)
         } else if !self.why.is_empty() {
             reasons(knowledge, &self.why, why)?
         } else if !self.why_not.is_empty() {
@@ -54,13 +56,13 @@ impl Questions {
             return Ok(None);
         };
         match common.format {
-            Format::Json => output::json_answer(&json),
+            Format::Json => output::document(&output::visible_json(&json)),
             _ => output::answer(&text),
         }
         Ok(Some(exit))
     }
 
-    fn follows(&self, knowledge: &Knowledge, imports: &Imports) -> Result<(String, Json, Exit), Failure> {
+    fn follows(&self, knowledge: &Knowledge, imports: &Imports) -> Result<(String, String, Exit), Failure> {
         let known = knowledge.entities().to_vec();
         let options = ontology::ReadOptions { allow_missing_imports: true, known, ..imports.options() };
         let conclusions = ontology::read_files(&self.entails, &options)
@@ -85,18 +87,7 @@ impl Questions {
         }
         let count = found.iter().filter(|one| matches!(one.answer, Answer::Follows(_))).count();
         let _ = writeln!(text, "{count} of {} statements follow", found.len());
-        let statements: Vec<Json> = found
-            .iter()
-            .map(|one| match &one.answer {
-                Answer::Follows(reason) => {
-                    json!({ "statement": one.statement, "follows": true, "reason": reason })
-                }
-                Answer::Open(reason) => {
-                    json!({ "statement": one.statement, "follows": false, "reason": reason })
-                }
-            })
-            .collect();
-        let json = json!({ "format": "metaplan-entails/1", "entailed": all, "statements": statements });
+        let json = output::pretty(&EntailmentAnswer::new(&found));
         Ok((text, json, if all { Exit::Done } else { Exit::NotProved }))
     }
 }
@@ -106,16 +97,16 @@ fn reasons(
     knowledge: &mut Knowledge,
     assertions: &[String],
     answer: impl Fn(&Engine, &Fact) -> (bool, String),
-) -> Result<(String, Json, Exit), Failure> {
+) -> Result<(String, String, Exit), Failure> {
     let (mut text, mut answers, mut all) = (String::new(), Vec::new(), true);
     for assertion in assertions {
         let fact = read(knowledge, assertion).map_err(Failure::usage)?;
         let (is_answer, reason) = answer(knowledge.engine(), &fact);
         all &= is_answer;
         text += &reason;
-        answers.push(json!({ "assertion": assertion, "answered": is_answer, "reason": reason }));
+        answers.push(AssertionAnswer { assertion: assertion.clone(), answered: is_answer, reason });
     }
-    let json = json!({ "format": "metaplan-reasons/1", "answers": answers });
+    let json = output::pretty(&ReasonsAnswer::new(answers));
     Ok((text, json, if all { Exit::Done } else { Exit::NotProved }))
 }
 
@@ -284,15 +275,4 @@ fn schema_text(schema: &Schema) -> String {
         }
     }
     text
-}
-
-fn schema_json(schema: &Schema) -> Json {
-    let entity = |entity: &SchemaEntity| json!({ "iri": entity.iri, "direct": entity.direct, "above": entity.above, "empty": entity.empty });
-    let all = |entities: &[SchemaEntity]| entities.iter().map(entity).collect::<Vec<_>>();
-    json!({
-        "format": "metaplan-schema/1",
-        "classes": all(&schema.classes),
-        "object_properties": all(&schema.object_properties),
-        "data_properties": all(&schema.data_properties),
-    })
 }

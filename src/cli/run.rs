@@ -1,6 +1,5 @@
 //! `metaplan run`: lines of events to lines of adaptations.
 
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -9,13 +8,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
+use metaplan::answers::{HandledLine, NumberedAnswer, PlanningLine, ReadyLine};
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::mapek::{Answer, Clock as _, FORMAT, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
+use metaplan::mapek::{Answer, Clock as _, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
 use metaplan::message::Message;
-use serde::Serialize;
-use serde_json::json;
+use metaplan::setup::Setup;
 
-use crate::cli::{Common, Exit, Failure, Situation, output};
+use crate::cli::common::{Common, Exit, Failure};
+use crate::cli::output;
+use crate::cli::situation::Situation;
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
@@ -52,13 +53,13 @@ enum Fsync {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let mission = arguments.situation.mission(&arguments.inputs)?;
+    let Setup { mission, settings, .. } = arguments.situation.setup(&arguments.inputs)?;
     output::warnings(common, mission.warnings());
-    let (name, settings) = (mission.name.clone(), mission.settings().clone());
+    let name = mission.name.clone();
     let mut control = Loop::new(mission, settings)?;
     let mut events = Lines::open(&arguments.events)?;
     let mut stdout = io::stdout();
-    let mut ready = json!({ "answer": "ready", "format": FORMAT, "mission": name });
+    let mut ready = ReadyLine::new(name);
     let mut journal = match &arguments.journal {
         None => None,
         Some(directory) => {
@@ -69,11 +70,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             };
             let policy = Policy { sync, snapshot_every: arguments.snapshot_every };
             let (journal, recovery) = Journal::open(directory, policy, &mut control)?;
-            ready["resumed"] = json!(recovery.replayed.is_some());
-            ready["lines"] = json!(control.knowledge().lines());
-            ready["seq"] = json!(control.knowledge().sequence());
-            ready["cut_bytes"] = json!(recovery.cut);
-            ready["warnings"] = json!(recovery.warnings.iter().map(|own| &own.message).collect::<Vec<_>>());
+            ready.resume(control.beliefs(), &recovery);
             output::warnings(common, &recovery.warnings);
             Some(journal)
         }
@@ -81,35 +78,35 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let lost = |error: io::Error| Message::error("M109", format!("the answer cannot be written: {error}"));
     let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
     let first =
-        writeln!(stdout, "{}", output::visible_json(&ready.to_string())).and_then(|()| stdout.flush());
+        write!(stdout, "{}", output::visible_json(&output::line(&ready))).and_then(|()| stdout.flush());
     match first {
         // Who does not read any more has had enough.
         Err(error) if is_gone(&error) => return Ok(Exit::Done),
         other => other.map_err(lost)?,
     }
-    let line = Arc::new(AtomicU64::new(control.knowledge().lines()));
+    let line = Arc::new(AtomicU64::new(control.beliefs().lines()));
     heartbeat(control.watch(), Arc::clone(&line));
     let read = Instant::now();
     let answers = match &mut journal {
         None => control.start(),
         Some(journal) => journal.begin(&mut control).map_err(|error| unwritten(&error))?,
     };
-    let number = control.knowledge().lines();
+    let number = control.beliefs().lines();
     match write(&mut stdout, number, &answers, read) {
         Err(error) if is_gone(&error) => return Ok(Exit::Done),
         other => other.map_err(lost)?,
     }
     let mut clock = SystemClock::default();
-    let begun = control.knowledge().now();
+    let begun = control.beliefs().now();
     while let Some(text) = events.next()? {
         let read = Instant::now();
         let now = begun + clock.now();
-        line.store(control.knowledge().lines() + 1, Ordering::Relaxed);
+        line.store(control.beliefs().lines() + 1, Ordering::Relaxed);
         let answers = match &mut journal {
             None => control.handle(&Observation::parse(&text), now),
             Some(journal) => journal.handle(&mut control, &text, now).map_err(|error| unwritten(&error))?,
         };
-        let number = control.knowledge().lines();
+        let number = control.beliefs().lines();
         let written = write(&mut stdout, number, &answers, read);
         match written {
             Err(error) if is_gone(&error) => return Ok(Exit::Done),
@@ -144,37 +141,22 @@ fn heartbeat(watch: Watch, line: Arc<AtomicU64>) {
             known = Some((planning.number, begun, said));
             if now - said >= HEARTBEAT {
                 known = Some((planning.number, begun, now));
-                let object = json!({
-                    "answer": "planning",
-                    "seconds": (now - begun).as_secs(),
-                    "cost": planning.cost.as_ref().map(output::decimal_number),
-                    "lower_bound": planning.lower_bound.as_ref().map(output::decimal_number),
-                    "line": line.load(Ordering::Relaxed),
-                });
+                let line =
+                    PlanningLine::new(&planning, (now - begun).as_secs(), line.load(Ordering::Relaxed));
                 // Who does not read any more will be noticed when the answers are written.
-                let _ = io::stdout().write_all(format!("{object}\n").as_bytes());
+                let _ = io::stdout().write_all(output::line(&line).as_bytes());
             }
         }
     });
-}
-
-/// An answer with the number of the line that it is about.
-#[derive(Serialize)]
-struct Numbered<'a> {
-    #[serde(flatten)]
-    answer: &'a Answer,
-    line: u64,
 }
 
 /// Writes the answers to a line, each with the line's number, and that it was handled.
 fn write(stdout: &mut impl io::Write, line: u64, answers: &[Answer], read: Instant) -> io::Result<()> {
     let mut text = String::new();
     for answer in answers {
-        text += &serde_json::to_string(&Numbered { answer, line })?;
-        text.push('\n');
+        text += &output::line(&NumberedAnswer::new(answer, line));
     }
-    let micros = read.elapsed().as_micros();
-    let _ = writeln!(text, r#"{{"answer":"handled","line":{line},"microseconds":{micros}}}"#);
+    text += &output::line(&HandledLine::new(line, read.elapsed().as_micros()));
     // At once, so that no other thread's line comes in between.
     stdout.write_all(output::visible_json(&text).as_bytes())?;
     stdout.flush()

@@ -5,13 +5,17 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use indicatif::ProgressBar;
-use metaplan::mapek::{Answer, Observation};
+use metaplan::answers::{LogLine, SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
+use metaplan::mapek::{Answer, Observation, Settings};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use metaplan::simulate::{Run, SUAVE_COLUMNS, Sample, Simulation, Strategy, simulate};
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use crate::cli::{Common, Exit, Failure, Format, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::consistent;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -67,12 +71,12 @@ impl Who {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let (mut mission, manifest) = Mission::read(&arguments.mission)?;
+    let Setup { mut mission, settings: control, scenarios, .. } = Setup::read(&arguments.mission)?;
     let known = || {
-        let simulated = manifest.scenarios.iter().filter(|(_, scenario)| scenario.simulation.is_some());
+        let simulated = scenarios.iter().filter(|(_, scenario)| scenario.simulation.is_some());
         simulated.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
     };
-    let scenario = manifest.scenarios.get(&arguments.scenario);
+    let scenario = scenarios.get(&arguments.scenario);
     let Some((scenario, settings)) =
         scenario.and_then(|scenario| Some((scenario, scenario.simulation.as_ref()?)))
     else {
@@ -95,14 +99,14 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     mission.apply(scenario)?;
     output::warnings(common, mission.warnings());
-    crate::cli::consistent(mission.knowledge())?;
+    consistent(mission.knowledge())?;
     let strategies: Vec<Strategy> = if arguments.strategy.is_empty() {
         Strategy::ALL.to_vec()
     } else {
         arguments.strategy.iter().map(|who| who.strategy()).collect()
     };
     let mut log = String::new();
-    let runs = play(&mission, settings, &strategies, arguments, common, &mut log)?;
+    let runs = play(&mission, &control, settings, &strategies, arguments, common, &mut log)?;
     if let Some(file) = &arguments.log {
         output::write_file(file, &log)?;
     }
@@ -110,7 +114,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         output::write_file(file, &csv(&runs))?;
     }
     match common.format {
-        Format::Json => output::json_answer(&to_json(&mission.name, &arguments.scenario, &strategies, &runs)),
+        Format::Json => {
+            output::json_answer(&SimulateAnswer::new(&mission.name, &arguments.scenario, &strategies, &runs));
+        }
         _ => output::answer(&text(&strategies, &runs)),
     }
     Ok(Exit::Done)
@@ -118,6 +124,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 
 fn play(
     mission: &Mission,
+    control: &Settings,
     settings: &Simulation,
     strategies: &[Strategy],
     arguments: &Arguments,
@@ -135,7 +142,7 @@ fn play(
                     write_log(log, strategy, observation, answers);
                 }
             };
-            runs.push(simulate(mission, settings, strategy, seed, &mut note)?);
+            runs.push(simulate(mission, control, settings, strategy, seed, &mut note)?);
             progress.inc(1);
         }
     }
@@ -144,38 +151,11 @@ fn play(
 }
 
 fn write_log(log: &mut String, strategy: Strategy, observation: &Observation, answers: &[Answer]) {
-    let mut line = |mut object: Value| {
-        object["strategy"] = json!(strategy.name());
-        // Writing to a string does not fail.
-        let _ = writeln!(log, "{object}");
-    };
+    let mut line = |object: Value| *log += &output::line(&LogLine::new(object, strategy));
     line(observation.to_json());
     for answer in answers {
         line(answer.to_json());
     }
-}
-
-/// The runs of a strategy.
-fn of(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> + Clone {
-    runs.iter().filter(move |run| run.strategy == strategy)
-}
-
-/// Missions in which a strategy did better than the loop, and in which it did worse.
-fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> {
-    let mut joint = of(runs, Strategy::Joint).peekable();
-    joint.peek()?;
-    let pairs = of(runs, strategy).zip(joint);
-    Some(pairs.fold((0, 0), |(better, worse), (run, joint)| {
-        (better + usize::from(run.is_better_than(joint)), worse + usize::from(joint.is_better_than(run)))
-    }))
-}
-
-fn sample(runs: &[Run], strategy: Strategy, figure: impl Fn(&Run) -> Option<f64>) -> Option<Sample> {
-    Sample::of(&of(runs, strategy).filter_map(figure).collect::<Vec<_>>())
-}
-
-fn accomplished_cost(run: &Run) -> Option<f64> {
-    run.accomplished.then_some(run.cost)
 }
 
 fn text(strategies: &[Strategy], runs: &[Run]) -> String {
@@ -192,7 +172,7 @@ fn text(strategies: &[Strategy], runs: &[Run]) -> String {
         )
     };
     let rows = strategies.iter().map(|&strategy| {
-        let mine = of(runs, strategy);
+        let mine = runs_of(runs, strategy);
         let (count, done) = (mine.clone().count(), mine.filter(|run| run.accomplished).count());
         let beside = beside_joint(runs, strategy).filter(|_| strategy != Strategy::Joint);
         vec![
@@ -243,42 +223,4 @@ fn csv(runs: &[Run]) -> String {
         );
     }
     text
-}
-
-fn to_json(mission: &str, scenario: &str, strategies: &[Strategy], runs: &[Run]) -> Value {
-    let sample_json = |sample: Option<Sample>| {
-        sample.map(|s| json!({ "mean": s.mean, "deviation": s.deviation, "half_width_95": s.half_width }))
-    };
-    let summary: Vec<Value> = strategies
-        .iter()
-        .map(|&strategy| {
-            let beside = beside_joint(runs, strategy);
-            json!({
-                "strategy": strategy.name(),
-                "runs": of(runs, strategy).count(),
-                "accomplished": of(runs, strategy).filter(|run| run.accomplished).count(),
-                "cost": sample_json(sample(runs, strategy, accomplished_cost)),
-                "reaction": sample_json(sample(runs, strategy, Run::mean_reaction)),
-                "reconfigurations": sample_json(sample(runs, strategy, |run| Some(run.reconfigurations as f64))),
-                "configurations": sample_json(sample(runs, strategy, |run| Some(run.distinct as f64))),
-                "better_than_joint": beside.map(|(better, _)| better),
-                "worse_than_joint": beside.map(|(_, worse)| worse),
-            })
-        })
-        .collect();
-    let each: Vec<Value> = runs
-        .iter()
-        .map(|run| {
-            json!({
-                "strategy": run.strategy.name(), "seed": run.seed, "accomplished": run.accomplished, "lost": run.lost,
-                "cost": run.cost, "time": run.time, "actions": run.actions, "failed": run.failed,
-                "cancelled": run.cancelled, "plans": run.plans, "reconfigurations": run.reconfigurations,
-                "configurations": run.distinct, "reaction": run.mean_reaction(), "found": run.found,
-                "distance": run.distance,
-            })
-        })
-        .collect();
-    json!({
-        "format": "metaplan-simulate/1", "mission": mission, "scenario": scenario, "strategies": summary, "runs": each,
-    })
 }

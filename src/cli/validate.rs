@@ -4,16 +4,19 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use metaplan::answers::VerdictAnswer;
+use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::source;
 use num_rational::BigRational;
-use num_traits::Num as _;
 use pddl::Source;
 use pddl::ast::Name;
 use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use crate::cli::{Common, Exit, Failure, Format, Situation, output};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::Situation;
+use crate::cli::values::{decimal, time};
 
 /// Arguments of `validate`.
 #[derive(Debug, Args)]
@@ -30,13 +33,6 @@ pub struct Arguments {
     /// How far times may lie from the exact ones, and how far apart actions that interfere must begin and end.
     #[arg(long, value_name = "TIME", default_value = "0.001", value_parser = time)]
     tolerance: BigRational,
-}
-
-pub(super) fn time(text: &str) -> Result<BigRational, String> {
-    let value = text.parse::<serde_json::Number>().ok().and_then(|number| decimal(&Value::Number(number)));
-    value
-        .filter(|value| *value >= BigRational::default())
-        .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
 /// Runs the command.
@@ -57,7 +53,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let options = Options { concurrent: arguments.concurrent, tolerance: arguments.tolerance.clone() };
     let verdict = validate(mission.domain(), &problem, &plan, &options);
     match common.format {
-        Format::Json => output::json_answer(&json(&verdict)),
+        Format::Json => output::json_answer(&VerdictAnswer::new(&verdict)),
         _ => output::answer(&text(&verdict)),
     }
     Ok(if verdict.valid { Exit::Done } else { Exit::Invalid })
@@ -92,60 +88,15 @@ fn json_plan(source: &Source) -> Result<PlanText, Failure> {
     Ok(plan)
 }
 
-fn decimal(value: &Value) -> Option<BigRational> {
-    let text = value.as_number()?.to_string();
-    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
-    BigRational::from_str_radix(&format!("{whole}{fraction}/1{}", "0".repeat(fraction.len())), 10).ok()
-}
-
-fn number(number: &BigRational) -> Value {
-    output::decimal_number(number)
-}
-
-fn json(verdict: &Verdict) -> Value {
-    let violation = verdict.violation.as_ref().map(|violation| {
-        let unmet: Vec<_> = violation
-            .unmet
-            .iter()
-            .map(|unmet| {
-                let values: serde_json::Map<String, Value> = unmet
-                    .values
-                    .iter()
-                    .map(|(name, value)| (name.clone(), value.as_ref().map_or(Value::Null, number)))
-                    .collect();
-                json!({ "condition": unmet.condition, "values": values })
-            })
-            .collect();
-        json!({
-            "step": violation.step,
-            "action": violation.action,
-            "time": number(&violation.time),
-            "kind": violation.kind.as_str(),
-            "message": violation.message,
-            "unmet": unmet,
-        })
-    });
-    let values: serde_json::Map<String, Value> =
-        verdict.values.iter().map(|(name, value)| (name.clone(), number(value))).collect();
-    json!({
-        "format": "metaplan-verdict/1",
-        "valid": verdict.valid,
-        "metric": verdict.metric.as_ref().map(number),
-        "total_time": number(&verdict.total_time),
-        "values": values,
-        "violation": violation,
-    })
-}
-
 fn text(verdict: &Verdict) -> String {
     let mut text = String::new();
     match &verdict.violation {
         None => {
             let _ = write!(text, "valid");
             if let Some(metric) = &verdict.metric {
-                let _ = write!(text, ", metric {}", number(metric));
+                let _ = write!(text, ", metric {}", output::decimal(metric));
             }
-            let _ = writeln!(text, ", total time {}", number(&verdict.total_time));
+            let _ = writeln!(text, ", total time {}", output::decimal(&verdict.total_time));
         }
         Some(violation) => {
             let _ = write!(text, "invalid: ");
@@ -156,8 +107,7 @@ fn text(verdict: &Verdict) -> String {
             for unmet in &violation.unmet {
                 let _ = writeln!(text, "    {}", unmet.condition);
                 for (name, value) in &unmet.values {
-                    let value =
-                        value.as_ref().map_or("undefined".to_owned(), |value| number(value).to_string());
+                    let value = value.as_ref().map_or("undefined".to_owned(), output::decimal);
                     let _ = writeln!(text, "        {name} = {value}");
                 }
             }

@@ -8,11 +8,13 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use encodings::Limits;
-use metaplan::certificate::{Claim, Part, Report, conditions, verify};
-use serde_json::json;
+use metaplan::answers::VerificationAnswer;
+use metaplan::certificate::{Claim, Verification, VerifiedPart, conditions, verify};
 
-use crate::cli::plan::seconds;
-use crate::cli::{Common, Exit, Failure, Format, Situation, memory, output, setting};
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::situation::Situation;
+use crate::cli::values::{seconds, setting};
+use crate::cli::{memory, output};
 
 /// The process may take so much, in megabytes of 2^20 bytes: a certificate may come from anybody.
 const MEMORY_LIMIT: u64 = 4096;
@@ -70,7 +72,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let mut report = verify(&arguments.directory, mission.as_ref(), &limits);
     if started.elapsed() > arguments.time_limit {
-        report.parts.push(Part { part: "limits", result: Err(LATE.to_owned()) });
+        report.parts.push(VerifiedPart { part: "limits", result: Err(LATE.to_owned()) });
     }
     while answered.swap(true, Ordering::Relaxed) {
         std::thread::park();
@@ -87,30 +89,24 @@ fn give_up_late(limits: Limits, answered: Arc<AtomicBool>, format: Format) {
         std::thread::sleep(GRACE);
         if !answered.swap(true, Ordering::Relaxed) {
             let reason = format!("{LATE}, or more than {MEMORY_LIMIT} MB");
-            let report = Report { claim: None, parts: vec![Part { part: "limits", result: Err(reason) }] };
+            let report = Verification {
+                claim: None,
+                parts: vec![VerifiedPart { part: "limits", result: Err(reason) }],
+            };
             std::process::exit(show(&report, format) as i32);
         }
     });
 }
 
-fn show(report: &Report, format: Format) -> Exit {
+fn show(report: &Verification, format: Format) -> Exit {
     match format {
-        Format::Json => output::json_answer(&json!({
-            "format": "metaplan-verification/1",
-            "verified": report.verified(),
-            "claim": report.claim,
-            "parts": report.parts.iter().map(|part| json!({
-                "part": part.part,
-                "verified": part.result.is_ok(),
-                "message": part.result.as_ref().unwrap_or_else(|reason| reason),
-            })).collect::<Vec<_>>(),
-        })),
+        Format::Json => output::json_answer(&VerificationAnswer::new(report)),
         _ => output::answer(&text(report)),
     }
     if report.verified() { Exit::Done } else { Exit::Invalid }
 }
 
-fn text(report: &Report) -> String {
+fn text(report: &Verification) -> String {
     let mut text = String::new();
     for part in &report.parts {
         let _ = match &part.result {

@@ -1,59 +1,23 @@
 //! Both approaches in one referee: policies of model checking, and plans with and without re-planning, are played in the
 //! same decision process, and measured exactly there.
 
-use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
-use std::time::{Duration, Instant};
+use std::collections::BTreeMap;
+use std::time::Instant;
 
-use num_rational::BigRational;
-use probabilistic::Error;
 use probabilistic::explore::{Bounds, explore};
 
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::hindsight::{self, Hindsight, LossReport, Spent};
-use crate::comparison::play::{Measures, play};
-use crate::comparison::process::{Action, Process, REWARDS, Risk, Situation, State};
+use crate::comparison::nominal::time_of;
+use crate::comparison::planned::{Costs, PlanFinder, PlanTable, Unfinished};
+use crate::comparison::play::Measures;
+use crate::comparison::process::{Process, REWARDS, Risk, Valuation};
 use crate::comparison::published::{published, shortest_routes};
 use crate::comparison::referee::Referee;
 use crate::comparison::route::best_on_route;
-use crate::message::Message;
-
-/// A plan from a situation, and what it cost to find it.
-#[derive(Debug, Clone, Default)]
-pub struct Planned {
-    /// What to do; none if there is no plan.
-    pub actions: Option<Vec<Action>>,
-    /// Variables of the largest formula.
-    pub variables: u64,
-    /// Its clauses.
-    pub clauses: u64,
-    /// How long it took.
-    pub time: Stages,
-}
-
-/// How long the parts of an answer took.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Stages {
-    /// To build what is solved: the process, or the ground task and its formulas.
-    pub build: Duration,
-    /// To solve it.
-    pub solve: Duration,
-    /// To read out what to do.
-    pub extract: Duration,
-}
-
-impl Stages {
-    /// All of it.
-    pub fn total(&self) -> Duration {
-        self.build + self.solve + self.extract
-    }
-}
-
-/// Finds plans; asked once for each situation.
-pub type Planner<'a> = dyn FnMut(&Situation) -> Result<Planned, Vec<Message>> + 'a;
 
 /// Hears of the candidates that have been measured, and of what was taken until then.
-pub type Report<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
+pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 
 /// How a comparison is made.
 #[derive(Clone)]
@@ -79,33 +43,6 @@ pub struct Candidate {
     pub name: String,
     /// What comes of it.
     pub measures: Measures,
-}
-
-/// What both sides take.
-#[derive(Debug, Clone, Default)]
-pub struct Costs {
-    /// Of the process.
-    pub states: usize,
-    /// Of the process.
-    pub transitions: usize,
-    /// What the policies of single objectives decide, in all states that they get to.
-    pub decisions: usize,
-    /// The process, for all objectives together.
-    pub process: Stages,
-    /// The greatest memory in megabytes until the process was solved, with what the planner has left.
-    pub process_memory: Option<u64>,
-    /// How many plans were made.
-    pub plans: usize,
-    /// The first one (cold).
-    pub first_plan: Stages,
-    /// The greatest memory in megabytes while the first one was made.
-    pub plan_memory: Option<u64>,
-    /// The other ones together (warm).
-    pub more_plans: Duration,
-    /// Of the largest formula.
-    pub variables: u64,
-    /// Of the largest formula.
-    pub clauses: u64,
 }
 
 /// The table.
@@ -157,13 +94,13 @@ impl Comparison {
 pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,
-    planner: &mut Planner<'_>,
-    report: &mut Report<'_>,
-) -> Result<Comparison, Failure> {
+    planner: &mut PlanFinder<'_>,
+    report: &mut Listener<'_>,
+) -> Result<Comparison, Unfinished> {
     // The planner comes first, so that its memory can be told from that of the process.
     (config.memory)();
-    let mut memo = Memo { planner, plans: BTreeMap::new(), costs: Costs::default() };
-    let first = memo.plan(&Situation::start(mission, config.risk))?;
+    let mut memo = PlanTable { planner, plans: BTreeMap::new(), costs: Costs::default() };
+    let first = memo.plan(&Valuation::start(mission, config.risk))?;
     memo.costs.plan_memory = (config.memory)();
     report(&[], &memo.costs);
     let started = Instant::now();
@@ -230,142 +167,4 @@ pub fn compare(
     let price = comparison.price_of_determinism();
     comparison.no_price = no_price.filter(|_| price.is_some_and(|price| price.abs() <= 1e-9 * penalty));
     Ok(comparison)
-}
-
-/// Why a comparison has no result.
-#[derive(Debug)]
-pub enum Failure {
-    /// Of the process.
-    Process(Error),
-    /// Of the planner.
-    Planner(Vec<Message>),
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self::Process(error)
-    }
-}
-
-impl From<Vec<Message>> for Failure {
-    fn from(messages: Vec<Message>) -> Self {
-        Self::Planner(messages)
-    }
-}
-
-/// The time of a plan on which nothing goes wrong.
-pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
-    use probabilistic::Number;
-    let (mut configuration, mut time) = (mission.initial, 0.0);
-    for action in plan {
-        match action {
-            Action::Change(new) => {
-                time +=
-                    mission.switches[configuration][*new].as_ref().map_or(0.0, |switch| switch.time.to_f64());
-                configuration = *new;
-            }
-            Action::Move(arc) => {
-                time += mission.arcs[*arc].by[configuration].as_ref().map_or(0.0, |t| t.time.to_f64());
-            }
-        }
-    }
-    time
-}
-
-/// Plans by situation, each made once. The collision flag does not matter to a plan.
-pub(super) struct Memo<'a, 'b> {
-    planner: &'a mut Planner<'b>,
-    plans: BTreeMap<Situation, Option<Vec<Action>>>,
-    pub costs: Costs,
-}
-
-impl Memo<'_, '_> {
-    /// The plan from a situation.
-    pub fn plan(&mut self, situation: &Situation) -> Result<Option<Vec<Action>>, Vec<Message>> {
-        let key = Situation { hit: false, ..*situation };
-        if let Some(known) = self.plans.get(&key) {
-            return Ok(known.clone());
-        }
-        let planned = (self.planner)(&key)?;
-        if self.costs.plans == 0 {
-            self.costs.first_plan = planned.time;
-        } else {
-            self.costs.more_plans += planned.time.total();
-        }
-        self.costs.plans += 1;
-        self.costs.variables = self.costs.variables.max(planned.variables);
-        self.costs.clauses = self.costs.clauses.max(planned.clauses);
-        self.plans.insert(key, planned.actions.clone());
-        Ok(planned.actions)
-    }
-
-    /// Follows plans, and makes a new one wherever the state is not the one that the last plan expects.
-    fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, Failure> {
-        // What the plan in force wants to do in each state that it expects.
-        let mut expected: BTreeMap<Situation, Action> = BTreeMap::new();
-        let mut failure = None;
-        let unexpected = RefCell::new(BTreeSet::new());
-        let mission = referee.mission;
-        let mut decide = |state: State, _: u32| {
-            let situation = Situation { hit: false, ..state.situation() };
-            if situation.failed || situation.place == mission.goal {
-                return None;
-            }
-            if let Some(action) = expected.get(&situation) {
-                return Some(action.number());
-            }
-            match self.plan(&situation) {
-                Ok(Some(plan)) => {
-                    if situation != Situation::start(mission, referee.risk) {
-                        unexpected.borrow_mut().insert(situation);
-                    }
-                    follow(mission, situation, &plan, referee.risk, &mut expected);
-                }
-                Ok(None) => return None,
-                Err(messages) => failure = Some(messages),
-            }
-            expected.get(&situation).map(|action| action.number())
-        };
-        let replans =
-            |state: State| unexpected.borrow().contains(&Situation { hit: false, ..state.situation() });
-        let (process, reserve) = (referee.exact(), referee.reserve());
-        let measures = play(&process, false, referee.penalty, reserve, &replans, &mut decide);
-        if let Some(messages) = failure {
-            return Err(messages.into());
-        }
-        Ok(measures?)
-    }
-}
-
-/// Notes what a plan does in each state that it expects.
-fn follow(
-    mission: &Coadaptation,
-    mut at: Situation,
-    plan: &[Action],
-    risk: Risk,
-    expected: &mut BTreeMap<Situation, Action>,
-) {
-    for action in plan {
-        if expected.contains_key(&at) {
-            return;
-        }
-        expected.insert(at, *action);
-        at = after(mission, at, *action, risk);
-    }
-}
-
-/// The state after an action on which nothing goes wrong.
-pub(super) fn after(mission: &Coadaptation, at: Situation, action: Action, risk: Risk) -> Situation {
-    let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
-    match action {
-        Action::Change(new) => {
-            let energy = mission.switches[at.configuration][new].as_ref().map_or(0, |s| levels(&s.energy));
-            Situation { configuration: new, battery: at.battery.saturating_sub(energy), ..at }
-        }
-        Action::Move(arc) => {
-            let arc = &mission.arcs[arc];
-            let energy = arc.by[at.configuration].as_ref().map_or(0, |t| levels(&t.energy));
-            Situation { place: arc.to, battery: at.battery.saturating_sub(energy), ..at }
-        }
-    }
 }

@@ -6,8 +6,9 @@ use probabilistic::solve::solve;
 use probabilistic::{Direction, Problem};
 
 use crate::comparison::coadaptation::{Coadaptation, Switch, Traversal};
-use crate::comparison::compare::{Failure, Memo, after, time_of};
-use crate::comparison::process::{Action, Process, Risk, Situation};
+use crate::comparison::nominal::{after, time_of};
+use crate::comparison::planned::{PlanTable, Unfinished};
+use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
 /// What happens when the component is lost after some move of the nominal run.
@@ -40,17 +41,17 @@ pub(super) fn report(
     referee: &Referee<'_>,
     plan: &[Action],
     anticipating: &[u32],
-    memo: &mut Memo<'_, '_>,
-) -> Result<LossReport, Failure> {
+    memo: &mut PlanTable<'_, '_>,
+) -> Result<LossReport, Unfinished> {
     let mission = referee.mission;
     let loss = mission.loss.as_ref();
     let mut steps = Vec::new();
-    let mut at = Situation::start(mission, referee.risk);
+    let mut at = Valuation::start(mission, referee.risk);
     let (start, mut moves) = (at, 0);
     for done in 0..=plan.len() {
         let moved = done == 0 || matches!(plan[done - 1], Action::Move(_));
         if moved {
-            let lost = Situation { lost: true, ..at };
+            let lost = Valuation { lost: true, ..at };
             let spent = time_of(mission, &plan[..done]);
             let rest = &plan[done..];
             let open_loop = carries_on(mission, at.configuration, rest).then(|| time_of(mission, plan));
@@ -80,7 +81,7 @@ pub(super) fn report(
 const LONGEST: usize = 100_000;
 
 /// The time of a policy when the component is lost after so many moves and nothing else goes wrong.
-fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Situation, moves: usize) -> Option<f64> {
+fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: usize) -> Option<f64> {
     let mission = referee.mission;
     let (mut at, mut left, mut time) = (start, moves, 0.0);
     for _ in 0..LONGEST {
@@ -114,7 +115,7 @@ fn time_from(mission: &Coadaptation, configuration: usize, plan: &[Action]) -> f
 }
 
 /// The least time to the goal from a situation, when nothing else goes wrong.
-fn solved_again(referee: &Referee<'_>, from: Situation, spent: f64) -> Result<Option<f64>, Failure> {
+fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Option<f64>, Unfinished> {
     let risk = Risk { collisions: false, failures: false, ..referee.risk };
     let process =
         Process::<f64>::new(referee.mission, Risk { loss: true, ..risk }, &["time"]).starting(from.into());

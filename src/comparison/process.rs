@@ -47,7 +47,7 @@ pub struct State(u64);
 /// What a state says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[allow(missing_docs, reason = "the names say it")]
-pub struct Situation {
+pub struct Valuation {
     pub place: usize,
     pub configuration: usize,
     pub hit: bool,
@@ -56,7 +56,7 @@ pub struct Situation {
     pub battery: u32,
 }
 
-impl Situation {
+impl Valuation {
     /// Where a mission begins.
     pub(super) fn start(mission: &Coadaptation, risk: Risk) -> Self {
         Self {
@@ -72,8 +72,8 @@ impl Situation {
 
 impl State {
     /// What it says.
-    pub fn situation(self) -> Situation {
-        Situation {
+    pub fn situation(self) -> Valuation {
+        Valuation {
             place: (self.0 & 0xFFFF) as usize,
             configuration: (self.0 >> 16 & 0xFFF) as usize,
             hit: self.0 >> 28 & 1 == 1,
@@ -84,8 +84,8 @@ impl State {
     }
 }
 
-impl From<Situation> for State {
-    fn from(s: Situation) -> Self {
+impl From<Valuation> for State {
+    fn from(s: Valuation) -> Self {
         let flags = u64::from(s.hit) << 28 | u64::from(s.failed) << 29 | u64::from(s.lost) << 30;
         Self(s.place as u64 | (s.configuration as u64) << 16 | flags | u64::from(s.battery) << 32)
     }
@@ -103,7 +103,7 @@ struct Move<N> {
 }
 
 #[derive(Debug, Clone)]
-struct Change<N> {
+struct Reconfiguration<N> {
     action: u32,
     to: usize,
     levels: u32,
@@ -121,7 +121,7 @@ pub struct Process<N> {
     /// For each place and configuration.
     moves: Vec<Vec<Vec<Move<N>>>>,
     /// For each configuration.
-    changes: Vec<Vec<Change<N>>>,
+    changes: Vec<Vec<Reconfiguration<N>>>,
     /// Which configurations the loss takes away.
     lost: Vec<bool>,
     risk: Risk,
@@ -172,7 +172,7 @@ impl<N: Number> Process<N> {
         let change = |old: usize, new: usize| {
             let switch =
                 mission.switches[old][new].as_ref().filter(|_| mission.configurations[new].available)?;
-            Some(Change {
+            Some(Reconfiguration {
                 action: Action::Change(new).number(),
                 to: new,
                 levels: levels(&switch.energy),
@@ -191,7 +191,7 @@ impl<N: Number> Process<N> {
             (0..designs).map(|old| (0..designs).filter_map(|new| change(old, new)).collect()).collect();
         Self {
             goal: mission.goal,
-            initial: Situation::start(mission, risk).into(),
+            initial: Valuation::start(mission, risk).into(),
             reserve: mission.battery.filter(|_| risk.battery).map_or(0, |battery| battery.reserve),
             moves,
             changes,
@@ -291,8 +291,8 @@ impl<N: Number> Generator<N> for Process<N> {
             if s.lost && self.lost[change.to] {
                 continue;
             }
-            choices.to(Situation { configuration: change.to, battery, ..s }.into(), change.success.clone());
-            choices.to(Situation { battery, ..s }.into(), change.failure.clone());
+            choices.to(Valuation { configuration: change.to, battery, ..s }.into(), change.success.clone());
+            choices.to(Valuation { battery, ..s }.into(), change.failure.clone());
             choices.end(change.action, change.rewards.iter().cloned());
         }
         if s.lost && self.lost[s.configuration] {
@@ -300,14 +300,14 @@ impl<N: Number> Generator<N> for Process<N> {
         }
         for step in &self.moves[s.place][s.configuration] {
             let Some(battery) = self.enough(s.battery, step.levels) else { continue };
-            let arrived = Situation { place: step.to, battery, ..s };
+            let arrived = Valuation { place: step.to, battery, ..s };
             // Failed missions are over: where the battery and the collisions stood does not matter any more.
-            let failed = Situation { failed: true, battery, ..s };
+            let failed = Valuation { failed: true, battery, ..s };
             for (lost, ends) in [s.lost, true].into_iter().zip(&step.outcomes) {
                 let ways = [
-                    Situation { lost, ..arrived },
-                    Situation { lost, hit: true, ..arrived },
-                    Situation { lost, ..failed },
+                    Valuation { lost, ..arrived },
+                    Valuation { lost, hit: true, ..arrived },
+                    Valuation { lost, ..failed },
                 ];
                 for (situation, probability) in ways.into_iter().zip(ends) {
                     choices.to(situation.into(), probability.clone());

@@ -1,4 +1,4 @@
-//! A co-adaptation mission to a model in the PRISM language, the same process as [`Process`](super::Process) builds.
+//! A co-adaptation mission to a model in the PRISM language, the same process as [`Process`](crate::comparison::Process) builds.
 
 use std::collections::BTreeSet;
 
@@ -11,8 +11,8 @@ use probabilistic::prism::ast::{
 };
 use probabilistic::prism::identifier;
 
-use crate::comparison::coadaptation::{Coadaptation, Traversal};
-use crate::comparison::process::Risk;
+use crate::comparison::coadaptation::{Battery, Coadaptation, Traversal};
+use crate::comparison::process::{REWARDS, Risk};
 
 /// The mission as a model: `l` is the place, `c` the configuration, `b` the battery; `hit`, `failed` and `lost` are flags.
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
@@ -101,7 +101,7 @@ impl Writer<'_> {
         format!("A co-adaptation mission.\nl, the place: {places}\nc, the configuration: {designs}")
     }
 
-    fn battery(&self) -> Option<crate::comparison::Battery> {
+    fn battery(&self) -> Option<Battery> {
         self.mission.battery.filter(|_| self.risk.battery)
     }
 
@@ -240,7 +240,7 @@ impl Writer<'_> {
         let sets = once((0..self.mission.configurations.len()).map(|design| self.set(design)).collect());
         let moves = once((0..self.mission.arcs.len()).map(|arc| self.go(arc)).collect());
         let all = [time, energy, collisions, sets, moves];
-        let named = super::REWARDS.iter().zip(all);
+        let named = REWARDS.iter().zip(all);
         named
             .map(|(name, items)| Rewards { name: (*name).to_owned(), items, place: Place::default() })
             .collect()

@@ -10,7 +10,7 @@ use probabilistic::{Direction, Error, Problem};
 
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::play::{Measures, play};
-use crate::comparison::process::{Action, Process, REWARDS, Risk, Situation, State};
+use crate::comparison::process::{Action, Process, REWARDS, Risk, State, Valuation};
 
 /// A policy and what it is best at.
 pub type NamedPolicy = (String, Vec<u32>);
@@ -25,7 +25,7 @@ pub struct Referee<'a> {
 }
 
 impl Referee<'_> {
-    pub fn set(&self, holds: impl Fn(Situation) -> bool) -> FixedBitSet {
+    pub fn set(&self, holds: impl Fn(Valuation) -> bool) -> FixedBitSet {
         let mut set = FixedBitSet::with_capacity(self.explored.mdp.states());
         for (number, state) in self.explored.states.iter().enumerate() {
             set.set(number, holds(state.situation()));
@@ -118,7 +118,7 @@ impl Referee<'_> {
     }
 
     /// What a policy does in a situation.
-    pub fn decision(&self, policy: &[u32], situation: Situation) -> Option<Action> {
+    pub fn decision(&self, policy: &[u32], situation: Valuation) -> Option<Action> {
         let state = State::from(situation);
         let number = self.explored.states.number(self.process.code(&state), &state)?;
         let choice = policy.get(number).filter(|choice| **choice != NONE)?;
@@ -126,7 +126,7 @@ impl Referee<'_> {
     }
 
     /// What a policy does in each state that it gets to.
-    pub fn decisions(&self, policy: &[u32]) -> Vec<(Situation, Action)> {
+    pub fn decisions(&self, policy: &[u32]) -> Vec<(Valuation, Action)> {
         let mdp = &self.explored.mdp;
         let mut seen = FixedBitSet::with_capacity(mdp.states());
         let (mut queue, mut decisions, mut at) = (vec![0_usize], Vec::new(), 0);

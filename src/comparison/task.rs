@@ -16,7 +16,7 @@ use pddl::validate::{PlanStep, advance};
 use crate::comparison::coadaptation::{
     Arc, Coadaptation, Configuration, Facts, Loss, Roles, Switch, Traversal, components, fits,
 };
-use crate::comparison::process::{Action, Situation};
+use crate::comparison::process::{Action, Valuation};
 use crate::message::Message;
 use crate::mission::Mission;
 
@@ -78,7 +78,7 @@ impl Tasked {
     ///
     /// # Errors
     /// The mission with the component lost does not fit its domain.
-    pub fn problem(&self, mission: &Mission, situation: &Situation) -> Result<Problem, Vec<Message>> {
+    pub fn problem(&self, mission: &Mission, situation: &Valuation) -> Result<Problem, Vec<Message>> {
         let mut way = Vec::new();
         let mut place = situation.place;
         while let Some((before, act)) = &self.origins[place] {
@@ -112,7 +112,7 @@ impl Tasked {
     }
 
     /// What the steps of a plan do from a situation.
-    pub fn actions(&self, situation: &Situation, steps: &[Step]) -> Option<Vec<Action>> {
+    pub fn actions(&self, situation: &Valuation, steps: &[Step]) -> Option<Vec<Action>> {
         let (mut place, mut configuration) = (situation.place, situation.configuration);
         let mut actions = Vec::new();
         for step in steps {

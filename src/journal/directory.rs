@@ -47,7 +47,7 @@ impl Segment {
 
 /// A snapshot.
 #[derive(Debug)]
-pub(super) struct Snapshot {
+pub(super) struct SnapshotFile {
     /// After what it was made; the segment with its number begins there.
     pub(super) before: Link,
     pub(super) data: Value,
@@ -55,13 +55,13 @@ pub(super) struct Snapshot {
 
 /// What is in a directory.
 #[derive(Debug, Default)]
-pub(super) struct Contents {
+pub(super) struct JournalFiles {
     /// Segments by number, or what is wrong with them as a whole.
     pub(super) segments: BTreeMap<u64, Result<Segment, String>>,
-    pub(super) snapshots: BTreeMap<u64, Result<Snapshot, String>>,
+    pub(super) snapshots: BTreeMap<u64, Result<SnapshotFile, String>>,
 }
 
-impl Contents {
+impl JournalFiles {
     /// Reads a directory.
     ///
     /// # Errors
@@ -87,7 +87,7 @@ impl Contents {
     }
 
     /// A sound snapshot with which the segment of its number begins.
-    pub(super) fn start(&self, number: u64) -> Result<&Snapshot, String> {
+    pub(super) fn start(&self, number: u64) -> Result<&SnapshotFile, String> {
         let name = name("snapshot", number);
         let missing = || Err(format!("{name} is missing"));
         let found = self.snapshots.get(&number).map_or_else(missing, |found| match found {
@@ -187,11 +187,11 @@ fn after_length(line: &[u8], at: &Link) -> usize {
     if at.read(line).is_some() { line.len() } else { line.len() - 1 }
 }
 
-fn snapshot(bytes: &[u8], number: u64) -> Result<Snapshot, String> {
+fn snapshot(bytes: &[u8], number: u64) -> Result<SnapshotFile, String> {
     let line = bytes.strip_suffix(b"\n").filter(|line| !line.contains(&b'\n')).unwrap_or_default();
     let (record, before, _) = opening(line, "snapshot").ok_or("is damaged")?;
     check_opening(&record, number)?;
-    Ok(Snapshot { before, data: record.fields.get(4).cloned().unwrap_or_default() })
+    Ok(SnapshotFile { before, data: record.fields.get(4).cloned().unwrap_or_default() })
 }
 
 fn check_opening(record: &Record, number: u64) -> Result<(), String> {

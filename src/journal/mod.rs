@@ -36,12 +36,12 @@ use crate::mapek::{Answer, Decision, Loop, Observation, Snapshot};
 use crate::message::Message;
 pub use recovery::Recovery;
 
-use directory::{Contents, broken, closing, name, path};
+use directory::{JournalFiles, broken, closing, name, path};
 use lock::Lock;
 use record::{Link, header};
 use recover::{Replay, Unfinished, settle, usable};
 
-pub use report::{Entry, Report};
+pub use report::{Entry, JournalReport};
 
 /// When the operating system is made to write to the disk itself. A program that is killed loses nothing either way;
 /// a machine that loses power may lose what was not yet written.
@@ -99,7 +99,7 @@ impl Journal {
         let failed = |error: io::Error| broken(directory, &error.to_string());
         directory::make_directory(directory).map_err(failed)?;
         let lock = Lock::take(directory)?;
-        let contents = Contents::read(directory).map_err(failed)?;
+        let contents = JournalFiles::read(directory).map_err(failed)?;
         let digest = control.digest();
         let mut recovery = Recovery::default();
         let directory = directory.to_owned();

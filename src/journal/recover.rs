@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::directory::{Contents, End, OLD_FORMAT, Segment, broken, closing, open_private, path};
+use super::directory::{End, JournalFiles, OLD_FORMAT, Segment, broken, closing, open_private, path};
 use super::record::{Link, Record};
 use super::recovery::Recovery;
 use crate::mapek::{Answer, Loop, Observation};
@@ -28,7 +28,7 @@ pub(super) enum Unfinished {
 /// # Errors
 /// All that is wrong with what is needed.
 pub(super) fn usable<'a>(
-    contents: &'a Contents,
+    contents: &'a JournalFiles,
     warnings: &mut Vec<Message>,
 ) -> Result<(u64, Vec<&'a Segment>), String> {
     let mut problems = Vec::new();

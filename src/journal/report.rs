@@ -4,13 +4,13 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::directory::{Contents, End, Segment, broken, name};
+use super::directory::{End, JournalFiles, Segment, broken, name};
 use super::recover::usable;
 use crate::message::Message;
 
 /// What is in a journal.
 #[derive(Debug)]
-pub struct Report {
+pub struct JournalReport {
     /// One sentence for each segment and snapshot.
     pub parts: Vec<String>,
     /// What is wrong: an error where the journal cannot be used, a warning otherwise.
@@ -34,13 +34,14 @@ pub struct Entry {
     pub content: Value,
 }
 
-impl Report {
+impl JournalReport {
     /// Reads the journal in a directory.
     ///
     /// # Errors
     /// The directory cannot be read, or there is no journal in it.
     pub fn read(directory: &Path) -> Result<Self, Message> {
-        let contents = Contents::read(directory).map_err(|error| broken(directory, &error.to_string()))?;
+        let contents =
+            JournalFiles::read(directory).map_err(|error| broken(directory, &error.to_string()))?;
         if contents.segments.is_empty() && contents.snapshots.is_empty() {
             return Err(broken(directory, "there is none"));
         }

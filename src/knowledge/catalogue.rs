@@ -145,14 +145,14 @@ mod tests {
 
     use ontology::tomasys::change::Status;
 
-    use crate::mission::Mission;
+    use crate::setup::Setup;
 
     /// Whatever is reported and pursued, the catalogue is what the view reads.
     #[test]
     fn the_catalogue_keeps_in_step() {
         for name in ["ugv", "uuv", "ugv_plain", "camara_like"] {
             let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
-            let (mission, _) = Mission::read(&manifest).expect("the mission is read");
+            let mission = Setup::read(&manifest).expect("the mission is read").mission;
             let mut own = mission.knowledge().expect("a knowledge base").clone();
             let components =
                 own.view().components().into_iter().map(|known| known.individual.name).collect::<Vec<_>>();

@@ -3,18 +3,22 @@
 //! The paper plans when the available designs have changed or an objective is in error. Here a plan that is still valid and
 //! that uses none of the lost designs is kept, because it is still the best: of fewer choices none is better. Where a
 //! design of the action under way is lost, that action and the rest of the plan are configured anew together, see
-//! [`super::resume`]; if that is impossible or bad, the action is suspended or cancelled, see [`super::interrupt`].
+//! [`crate::mapek::resume`]; if that is impossible or bad, the action is suspended or cancelled, see [`crate::mapek::interrupt`].
 
-use pddl::validate::{Options, Verdict, Violation, advance, validate};
+use num_rational::BigRational;
+use pddl::ast::Direction;
 
-use super::Loop;
-use super::analyze::{Findings, unknown};
-use super::answer::Answer;
-use super::knowledge::Running;
-use super::monitor::{Base, Changes};
-use super::number;
-use super::plan::{Ask, Outcome};
-use super::step::{PlannedStep, plan_text};
+use crate::mapek::analyze::{Findings, unknown};
+use crate::mapek::answer::Answer;
+use crate::mapek::ask::{Ask, Outcome};
+use crate::mapek::beliefs::{Beliefs, Running};
+use crate::mapek::effects::{cancel, reconfigure, resume_suspended, suspend};
+use crate::mapek::interrupt::{Interruption, weigh};
+use crate::mapek::monitor::Changes;
+use crate::mapek::plan::Planner;
+use crate::mapek::settings::Settings;
+use crate::mapek::step::PlannedStep;
+use crate::number;
 
 /// How often one step may fail in a row before something has to change.
 const FAILURES: u32 = 3;
@@ -22,20 +26,23 @@ const FAILURES: u32 = 3;
 /// What stands among designs for facts that have changed.
 const FACTS: &str = "facts";
 
-impl Loop {
-    /// Reacts to what has changed, up to a plan.
-    pub(super) fn adapt(&mut self, mut changes: Changes, answers: &mut Vec<Answer>) {
-        if changes.base > Base::Nothing {
-            self.contradict(answers);
-        }
-        let findings =
-            if changes.base == Base::Watched { self.analyze(answers) } else { Findings::default() };
+/// The station between what has changed and a plan that fits: it decides, and the planner makes the plans.
+#[derive(Debug)]
+pub(super) struct Adapting<'a> {
+    pub(super) beliefs: &'a mut Beliefs,
+    pub(super) planner: &'a mut Planner,
+    pub(super) settings: &'a Settings,
+}
+
+impl Adapting<'_> {
+    /// Reacts to what has changed and to what the analysis has found in it, up to a plan.
+    pub(super) fn adapt(&mut self, mut changes: Changes, findings: Findings, answers: &mut Vec<Answer>) {
         self.chances(&findings, &changes);
         let is_change = changes.facts || !changes.must.is_empty() || !findings.gained.is_empty();
         if self.gave_up(&changes, answers) {
             return;
         }
-        if let Some(running) = self.knowledge.running.clone() {
+        if let Some(running) = self.beliefs.running.clone() {
             if running.cancelling {
                 return;
             }
@@ -46,38 +53,39 @@ impl Loop {
                 return;
             }
         }
-        let lost: Vec<&String> = self.planned().filter(|design| !self.is_available(design)).collect();
+        let lost: Vec<&String> =
+            self.beliefs.planned().filter(|design| !self.beliefs.is_available(design)).collect();
         if let Some(design) = lost.first() {
             changes.must.push(format!("{design}, which the plan uses, is not available any more"));
         }
         changes.must.extend(findings.errors);
-        if changes.must.is_empty() && changes.facts && self.knowledge.plan.is_some() {
-            changes.must.extend(self.violation());
+        if changes.must.is_empty() && changes.facts && self.beliefs.plan.is_some() {
+            changes.must.extend(self.beliefs.violation());
         }
-        if changes.must.is_empty() && self.knowledge.stuck && is_change {
+        if changes.must.is_empty() && self.beliefs.stuck && is_change {
             changes.must.push("the situation has changed, and there is no plan".to_owned());
         }
         if changes.must.is_empty() {
-            if !findings.lost.is_empty() && self.knowledge.plan.is_some() {
+            if !findings.lost.is_empty() && self.beliefs.plan.is_some() {
                 let because = "it uses none of the designs that are not available any more".to_owned();
                 answers.push(Answer::PlanKept { because });
             }
             self.improve(answers);
         } else {
-            self.knowledge.reached = false;
+            self.beliefs.reached = false;
             self.replan(changes.must, true, answers);
         }
     }
 
     /// After the same failure again and again no plan is looked for until something else happens.
     fn gave_up(&mut self, changes: &Changes, answers: &mut Vec<Answer>) -> bool {
-        match &self.knowledge.failures {
+        match &self.beliefs.failures {
             Some((step, count)) if *count >= FAILURES && !changes.must.is_empty() => {
                 let because = format!("`{}` has failed {count} times in a row", step.summary());
                 answers.push(Answer::PlanNone { status: "failed", because, blocking: Vec::new() });
-                self.knowledge.failures = None;
-                self.knowledge.plan = None;
-                self.knowledge.stuck = true;
+                self.beliefs.failures = None;
+                self.beliefs.plan = None;
+                self.beliefs.stuck = true;
                 true
             }
             _ => false,
@@ -86,32 +94,22 @@ impl Loop {
 
     /// Notes what may lead to a better plan.
     fn chances(&mut self, findings: &Findings, changes: &Changes) {
-        let hopes = &mut self.knowledge.hopes;
+        let hopes = &mut self.beliefs.hopes;
         hopes.retain(|design| !findings.lost.contains(design));
         let before = hopes.len();
         hopes.extend(findings.gained.iter().cloned());
         hopes.extend(changes.predicates.then(|| FACTS.to_owned()));
         // Time was up when the plan was made, and now the question is another one.
         let is_news = changes.facts || !findings.gained.is_empty() || !findings.lost.is_empty();
-        hopes.extend((is_news && self.knowledge.unproved).then(|| FACTS.to_owned()));
+        hopes.extend((is_news && self.beliefs.unproved).then(|| FACTS.to_owned()));
         if hopes.len() > before {
-            self.knowledge.hoped = self.knowledge.now;
+            self.beliefs.hoped = self.beliefs.now;
         }
-    }
-
-    pub(super) fn is_available(&self, design: &str) -> bool {
-        self.knowledge.mission.knowledge().is_none() || self.knowledge.available.contains(design)
-    }
-
-    /// The designs of the steps that are still to be requested.
-    fn planned(&self) -> impl Iterator<Item = &String> {
-        let steps = self.knowledge.plan.iter().flatten();
-        steps.flat_map(|step| step.configuration.iter().map(|(_, design)| design))
     }
 
     /// Why the action under way cannot go on as it is.
     fn trouble(&self, running: &Running, changes: &Changes) -> Option<String> {
-        let lost = running.step.configuration.iter().find(|(_, design)| !self.is_available(design));
+        let lost = running.step.configuration.iter().find(|(_, design)| !self.beliefs.is_available(design));
         if let Some((_, design)) = lost {
             return Some(format!(
                 "{design}, which action {} uses, is not available any more",
@@ -121,38 +119,18 @@ impl Loop {
         if !changes.facts {
             return None;
         }
-        self.obstacle(running).map(|obstacle| format!("action {}: {obstacle}", running.action))
-    }
-
-    /// What the validator says of the plan, the action under way included.
-    fn verdict(&self) -> Verdict {
-        let running = self.knowledge.running.iter().map(|running| &running.step);
-        let steps = running.chain(self.knowledge.plan.iter().flatten());
-        let (domain, problem) = self.left();
-        validate(&domain, &problem, &plan_text(steps), &Options::default())
-    }
-
-    /// Why what is left of the action under way cannot be done.
-    pub(super) fn obstacle(&self, running: &Running) -> Option<String> {
-        let (domain, problem) = self.left();
-        let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;
-        Some(violation.message.clone())
-    }
-
-    /// Why the plan, with what is left of the action under way, does not fit the situation as it is believed.
-    pub fn violation(&self) -> Option<String> {
-        self.verdict().violation.map(|violation| sentence(&violation))
+        self.beliefs.obstacle(running).map(|obstacle| format!("action {}: {obstacle}", running.action))
     }
 
     /// Looks for a better plan if there may be one, and there has been for long enough.
     fn improve(&mut self, answers: &mut Vec<Answer>) {
-        let has_plan = self.knowledge.plan.is_some() && !self.knowledge.reached;
+        let has_plan = self.beliefs.plan.is_some() && !self.beliefs.reached;
         if !has_plan {
-            self.knowledge.hopes.clear();
-        } else if self.knowledge.fault.is_some() {
+            self.beliefs.hopes.clear();
+        } else if self.beliefs.fault.is_some() {
             // It is not known what there is to hope for.
-        } else if !self.knowledge.hopes.is_empty()
-            && self.knowledge.now >= self.knowledge.hoped + self.settings.settle
+        } else if !self.beliefs.hopes.is_empty()
+            && self.beliefs.now >= self.beliefs.hoped + self.settings.settle
         {
             self.replan(vec!["there may be a better plan".to_owned()], false, answers);
         }
@@ -162,7 +140,7 @@ impl Loop {
     pub(super) fn replan(&mut self, because: Vec<String>, must: bool, answers: &mut Vec<Answer>) {
         let reason = because.first().cloned().unwrap_or_default();
         answers.push(Answer::PlanRequested { because });
-        self.knowledge.hopes.clear();
+        self.beliefs.hopes.clear();
         let outcome = self.plan(true);
         if must && self.interrupt(&reason, &outcome, answers) {
             return;
@@ -171,7 +149,7 @@ impl Loop {
             self.without_plan(must, outcome, answers);
             return;
         };
-        self.knowledge.stuck = false;
+        self.beliefs.stuck = false;
         if self.is_current(steps) {
             answers.push(Answer::PlanKept { because: "it is still the best".to_owned() });
         } else if let Some(because) = (!must).then(|| self.not_worth_it(&outcome)).flatten() {
@@ -181,19 +159,50 @@ impl Loop {
         }
     }
 
+    /// Cancels or suspends the action under way if that is better than `going_on`, the plan that begins with what is left of
+    /// it. Returns whether it did.
+    fn interrupt(&mut self, reason: &str, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
+        let Some(running) = self.beliefs.running.clone() else { return false };
+        let can_go_on = self.can_go_on(&running);
+        if can_go_on && (going_on.steps.is_some() || !going_on.proved) {
+            return false;
+        }
+        let without = self.plan(false);
+        let gained = benefit(self.beliefs, self.settings, &going_on.cost, &without.cost);
+        match weigh(reason, can_go_on, going_on, without, gained) {
+            Interruption::None => false,
+            Interruption::Cancel { because } => {
+                cancel(self.beliefs, running, because, answers);
+                true
+            }
+            Interruption::Suspend { status, because, blocking } => {
+                suspend(self.beliefs, running, reason, answers);
+                answers.push(Answer::PlanNone { status, because, blocking });
+                true
+            }
+        }
+    }
+
+    /// Whether the designs of an action are available, and what is left of it can be done with them.
+    fn can_go_on(&self, running: &Running) -> bool {
+        let designs = running.step.configuration.iter();
+        designs.into_iter().all(|(_, design)| self.beliefs.is_available(design))
+            && self.beliefs.obstacle(running).is_none()
+    }
+
     /// The best plan, with what is left of the action under way as its first step or as though there was none.
     pub(super) fn plan(&mut self, goes_on: bool) -> Outcome {
-        if let Some(fault) = &self.knowledge.fault {
-            let (because, cost) = (unknown(fault), num_rational::BigRational::default());
+        if let Some(fault) = &self.beliefs.fault {
+            let (because, cost) = (unknown(fault), BigRational::default());
             return Outcome { steps: None, cost, proved: false, because, blocking: Vec::new() };
         }
-        let problem = self.filled();
-        let running = self.knowledge.running.as_ref().filter(|_| goes_on);
-        let steps = running.is_some() || self.knowledge.running.is_none();
+        let problem = self.beliefs.filled();
+        let running = self.beliefs.running.as_ref().filter(|_| goes_on);
+        let steps = running.is_some() || self.beliefs.running.is_none();
         let old: Option<Vec<PlannedStep>> =
-            self.knowledge.plan.as_ref().filter(|_| steps).map(|plan| plan.iter().cloned().collect());
+            self.beliefs.plan.as_ref().filter(|_| steps).map(|plan| plan.iter().cloned().collect());
         let ask = Ask {
-            mission: &self.knowledge.mission,
+            mission: &self.beliefs.mission,
             problem: &problem,
             running,
             old: old.as_deref(),
@@ -201,7 +210,10 @@ impl Loop {
         };
         let outcome = self.planner.plan(&ask);
         let unavailable = |step: &PlannedStep| {
-            step.configuration.iter().find(|(_, design)| !self.is_available(design)).map(|(_, d)| d.clone())
+            step.configuration
+                .iter()
+                .find(|(_, design)| !self.beliefs.is_available(design))
+                .map(|(_, d)| d.clone())
         };
         match outcome.steps.iter().flatten().find_map(unavailable) {
             // The domain does not ask for what the knowledge base says.
@@ -218,39 +230,39 @@ impl Loop {
     /// Whether these are the action under way and the plan at hand.
     fn is_current(&self, steps: &[PlannedStep]) -> bool {
         let key = |step: &PlannedStep| (step.action.clone(), step.arguments.clone());
-        let Some(plan) = &self.knowledge.plan else { return false };
-        let running = self.knowledge.running.iter().map(|running| &running.step);
+        let Some(plan) = &self.beliefs.plan else { return false };
+        let running = self.beliefs.running.iter().map(|running| &running.step);
         running.chain(plan).map(key).eq(steps.iter().map(key))
     }
 
     /// Why a plan that need not be adopted is not.
     fn not_worth_it(&self, outcome: &Outcome) -> Option<String> {
-        let kept = self.verdict().metric?;
-        if self.benefit(&kept, &outcome.cost).is_some() {
+        let kept = self.beliefs.verdict().metric?;
+        if benefit(self.beliefs, self.settings, &kept, &outcome.cost).is_some() {
             return None;
         }
-        let benefit = self.gain(&kept, &outcome.cost);
-        let (benefit, minimum) = (number::decimal(&benefit), number::decimal(&self.settings.minimum_benefit));
+        let gain = gain(self.beliefs, &kept, &outcome.cost);
+        let (benefit, minimum) = (number::decimal(&gain), number::decimal(&self.settings.minimum_benefit));
         Some(format!("the benefit of another plan is {benefit}, the minimum is {minimum}"))
     }
 
     /// Takes a plan over; the action under way gets its designs.
     fn adopt(&mut self, outcome: Outcome, answers: &mut Vec<Answer>) {
         let Outcome { steps, proved, .. } = outcome;
-        self.knowledge.unproved = !proved;
+        self.beliefs.unproved = !proved;
         let steps = steps.unwrap_or_default();
         let cost = steps.iter().map(|step| step.cost.clone()).sum();
         answers.push(Answer::PlanFound { cost, optimal: proved, steps: steps.clone() });
         let mut steps: std::collections::VecDeque<PlannedStep> = steps.into();
-        if let Some(mut running) = self.knowledge.running.take() {
+        if let Some(mut running) = self.beliefs.running.take() {
             if let Some(first) = steps.pop_front() {
                 running.step = first;
             }
-            self.reconfigure(running.action, &running.step.clone(), answers);
-            self.resume_suspended(&mut running, answers);
-            self.knowledge.running = Some(running);
+            reconfigure(self.beliefs, running.action, &running.step.clone(), answers);
+            resume_suspended(self.beliefs, &mut running, answers);
+            self.beliefs.running = Some(running);
         }
-        self.knowledge.plan = Some(steps);
+        self.beliefs.plan = Some(steps);
     }
 
     /// There is no plan, and the action under way goes on.
@@ -258,14 +270,26 @@ impl Loop {
         let status = if outcome.proved { "unsolvable" } else { "unknown" };
         answers.push(Answer::PlanNone { status, because: outcome.because, blocking: outcome.blocking });
         if must {
-            self.knowledge.plan = None;
-            self.knowledge.stuck = true;
+            self.beliefs.plan = None;
+            self.beliefs.stuck = true;
         }
     }
 }
 
-/// What is wrong with a plan.
-fn sentence(violation: &Violation) -> String {
-    let unmet = violation.unmet.first().map(|unmet| format!(": {}", unmet.condition)).unwrap_or_default();
-    format!("the plan does not fit the situation: {}{unmet}", violation.message)
+/// By how much another metric is better than one; below zero if it is worse.
+fn gain(beliefs: &Beliefs, metric: &BigRational, other: &BigRational) -> BigRational {
+    let declared = beliefs.mission.problem().metric.as_ref();
+    let maximize = declared.is_some_and(|metric| metric.direction == Direction::Maximize);
+    if maximize { other - metric } else { metric - other }
+}
+
+/// The same, if it is more than nothing and at least the minimum benefit.
+fn benefit(
+    beliefs: &Beliefs,
+    settings: &Settings,
+    metric: &BigRational,
+    other: &BigRational,
+) -> Option<BigRational> {
+    let is_enough = |gain: &BigRational| *gain > BigRational::default() && *gain >= settings.minimum_benefit;
+    Some(gain(beliefs, metric, other)).filter(is_enough)
 }

@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rules::{Fact, Literal, Reason, Symbols, Value};
 
-use super::Loop;
-use super::answer::{Answer, DesignChange, ObjectiveChange};
 use crate::knowledge::{Fault, Knowledge};
+use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
+use crate::mapek::beliefs::Beliefs;
+use crate::mapek::monitor::Base;
 
 /// What the analysis has found.
 #[derive(Debug, Default)]
@@ -28,69 +29,76 @@ pub(super) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
     designs.map(|design| design.individual.name.clone()).collect()
 }
 
-impl Loop {
-    /// Reports what contradicts itself, and that it is not known what follows, where that has changed; what was observed stays.
-    pub(super) fn contradict(&mut self, answers: &mut Vec<Answer>) {
-        let Some(knowledge) = self.knowledge.mission.knowledge() else { return };
-        if knowledge.fault() != self.knowledge.fault.as_ref() {
-            self.knowledge.fault = knowledge.fault().cloned();
-            answers.push(Answer::Unconcluded { fault: self.knowledge.fault.clone() });
-        }
-        let mut contradictions = knowledge.contradictions();
-        for fact in contradictions.iter_mut().flat_map(|own| own.facts.iter_mut()) {
-            *fact = local(fact);
-        }
-        let violated: BTreeSet<String> = contradictions.iter().map(|own| own.violated.clone()).collect();
-        if violated != self.knowledge.violated {
-            self.knowledge.violated = violated;
-            answers.push(Answer::Contradicted { contradictions });
-        }
+/// Reports what contradicts itself, and that it is not known what follows, where that has changed; what was observed stays.
+pub(super) fn contradict(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
+    let Some(knowledge) = beliefs.mission.knowledge() else { return };
+    if knowledge.fault() != beliefs.fault.as_ref() {
+        beliefs.fault = knowledge.fault().cloned();
+        answers.push(Answer::Unconcluded { fault: beliefs.fault.clone() });
     }
+    let mut contradictions = knowledge.contradictions();
+    for fact in contradictions.iter_mut().flat_map(|own| own.facts.iter_mut()) {
+        *fact = local(fact);
+    }
+    let violated: BTreeSet<String> = contradictions.iter().map(|own| own.violated.clone()).collect();
+    if violated != beliefs.violated {
+        beliefs.violated = violated;
+        answers.push(Answer::Contradicted { contradictions });
+    }
+}
 
-    /// Compares what follows now with what followed before, and reports the difference.
-    pub(super) fn analyze(&mut self, answers: &mut Vec<Answer>) -> Findings {
-        let mut findings = Findings::default();
-        let Some(knowledge) = self.knowledge.mission.knowledge() else { return findings };
-        let now = available(knowledge);
-        let changed: Vec<String> = self.knowledge.available.symmetric_difference(&now).cloned().collect();
-        let designs: Vec<DesignChange> = changed
-            .into_iter()
-            .map(|design| {
-                let available = now.contains(&design);
-                let because = match knowledge.fault() {
-                    _ if available => Vec::new(),
-                    Some(fault) => vec![unknown(fault)],
-                    None => ruled_out(knowledge, &design),
-                };
-                DesignChange { design, available, because }
-            })
-            .collect();
-        for change in &designs {
-            let set = if change.available { &mut findings.gained } else { &mut findings.lost };
-            set.insert(change.design.clone());
-        }
-        let statuses = statuses(knowledge);
-        let mut objectives = Vec::new();
-        let names: BTreeSet<&String> = statuses.keys().chain(self.knowledge.statuses.keys()).collect();
-        for name in names {
-            let (before, after) = (self.knowledge.statuses.get(name), statuses.get(name));
-            if before == after {
-                continue;
-            }
-            let statuses = after.cloned().unwrap_or_default();
-            if !statuses.is_empty() {
-                findings.errors.push(format!("{name} is {}", statuses.join(", ")));
-            }
-            let because = why_objective(knowledge, name);
-            objectives.push(ObjectiveChange { objective: name.clone(), statuses, because });
-        }
-        self.knowledge.available = now;
-        self.knowledge.statuses = statuses;
-        if !designs.is_empty() || !objectives.is_empty() {
-            answers.push(Answer::Inferred { designs, objectives });
-        }
-        findings
+/// What a change of the knowledge base has led to: contradictions are reported, and where what is watched has changed, what
+/// follows is compared with what followed before.
+pub(super) fn follow(beliefs: &mut Beliefs, base: Base, answers: &mut Vec<Answer>) -> Findings {
+    if base > Base::Nothing {
+        contradict(beliefs, answers);
     }
+    if base == Base::Watched { analyze(beliefs, answers) } else { Findings::default() }
+}
+
+/// Compares what follows now with what followed before, and reports the difference.
+pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findings {
+    let mut findings = Findings::default();
+    let Some(knowledge) = beliefs.mission.knowledge() else { return findings };
+    let now = available(knowledge);
+    let changed: Vec<String> = beliefs.available.symmetric_difference(&now).cloned().collect();
+    let designs: Vec<DesignChange> = changed
+        .into_iter()
+        .map(|design| {
+            let available = now.contains(&design);
+            let because = match knowledge.fault() {
+                _ if available => Vec::new(),
+                Some(fault) => vec![unknown(fault)],
+                None => ruled_out(knowledge, &design),
+            };
+            DesignChange { design, available, because }
+        })
+        .collect();
+    for change in &designs {
+        let set = if change.available { &mut findings.gained } else { &mut findings.lost };
+        set.insert(change.design.clone());
+    }
+    let statuses = statuses(knowledge);
+    let mut objectives = Vec::new();
+    let names: BTreeSet<&String> = statuses.keys().chain(beliefs.statuses.keys()).collect();
+    for name in names {
+        let (before, after) = (beliefs.statuses.get(name), statuses.get(name));
+        if before == after {
+            continue;
+        }
+        let statuses = after.cloned().unwrap_or_default();
+        if !statuses.is_empty() {
+            findings.errors.push(format!("{name} is {}", statuses.join(", ")));
+        }
+        let because = why_objective(knowledge, name);
+        objectives.push(ObjectiveChange { objective: name.clone(), statuses, because });
+    }
+    beliefs.available = now;
+    beliefs.statuses = statuses;
+    if !designs.is_empty() || !objectives.is_empty() {
+        answers.push(Answer::Inferred { designs, objectives });
+    }
+    findings
 }
 
 /// Why nothing counts as available, and no plan is looked for.
@@ -183,4 +191,37 @@ pub(crate) fn local(text: &str) -> String {
         }
     }
     short
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{available, follow};
+    use crate::mapek::answer::Answer;
+    use crate::mapek::beliefs::Beliefs;
+    use crate::mapek::monitor::Base;
+    use crate::setup::Setup;
+
+    #[test]
+    fn what_follows_is_compared_with_what_followed_before() {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let mut beliefs = Beliefs::new(Setup::read(&manifest).expect("the mission is read").mission);
+        beliefs.available = available(beliefs.mission.knowledge().expect("a knowledge base"));
+        let before = beliefs.available.clone();
+        beliefs.mission.fail("c_kinect").expect("a component");
+        let mut answers = Vec::new();
+        let stated = follow(&mut beliefs, Base::Stated, &mut answers);
+        assert!(stated.lost.is_empty() && answers.is_empty(), "nothing that is watched has changed");
+        let findings = follow(&mut beliefs, Base::Watched, &mut answers);
+        assert!(findings.lost.contains("fd_amcl_kinect") && findings.gained.is_empty(), "{findings:?}");
+        assert!(beliefs.available.is_disjoint(&findings.lost));
+        assert_eq!(beliefs.available.union(&findings.lost).cloned().collect::<super::BTreeSet<_>>(), before);
+        let [Answer::Inferred { designs, .. }] = &answers[..] else { panic!("{answers:?}") };
+        assert_eq!(designs.len(), findings.lost.len());
+        assert!(designs.iter().all(|change| !change.available && !change.because.is_empty()), "{designs:?}");
+        answers.clear();
+        let again = follow(&mut beliefs, Base::Watched, &mut answers);
+        assert!(again.lost.is_empty() && answers.is_empty(), "it is said once");
+    }
 }

@@ -4,9 +4,9 @@ use num_rational::BigRational;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::Value;
 
-use super::number;
-use super::step::PlannedStep;
 use crate::knowledge::{Contradiction, Fault};
+use crate::mapek::step::PlannedStep;
+use crate::number;
 
 /// One line of output.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,9 @@
 use std::io;
 use std::time::{Duration, Instant};
 
-use super::{Answer, Loop, Observation};
+use crate::mapek::answer::Answer;
+use crate::mapek::control::Loop;
+use crate::mapek::event::Observation;
 
 /// What reports to the loop.
 pub trait Observer {

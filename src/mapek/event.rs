@@ -1,7 +1,7 @@
 //! Text to events: what the managed system reports, one JSON object each, in the format `metaplan-events/1`.
 //!
 //! Objects of the shape of `diagnostic_msgs/DiagnosticArray`, as the MROS observers publish them, are taken as they are
-//! \[1\]. What is not understood is a [`Fault`], which changes nothing.
+//! \[1\]. What is not understood is a [`Refusal`], which changes nothing.
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
@@ -11,8 +11,11 @@ use num_rational::BigRational;
 use ontology::tomasys::change::Status;
 use serde_json::{Map, Value, json};
 
-use super::number;
 use crate::message::did_you_mean;
+use crate::number;
+
+/// The version of events and answers.
+pub const FORMAT: &str = "metaplan-events/1";
 
 /// Lines of more bytes are not read as events.
 pub const LONGEST_LINE: usize = 1 << 20;
@@ -87,14 +90,14 @@ pub enum Event {
 
 /// Why a line, or a part of it, is no event.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Fault {
+pub struct Refusal {
     /// A stable code.
     pub code: &'static str,
     /// One sentence.
     pub message: String,
 }
 
-impl Fault {
+impl Refusal {
     pub(crate) fn new(code: &'static str, message: impl Into<String>) -> Self {
         Self { code, message: message.into() }
     }
@@ -108,7 +111,7 @@ pub struct Observation {
     /// When it was made, since the start of the mission, if the sender says so.
     pub time: Option<Duration>,
     /// What it says; a diagnostic array says several things.
-    pub events: Vec<Result<Event, Fault>>,
+    pub events: Vec<Result<Event, Refusal>>,
 }
 
 impl From<Event> for Observation {
@@ -128,17 +131,17 @@ impl Observation {
         observation
     }
 
-    fn read(&mut self, text: &str) -> Result<Vec<Result<Event, Fault>>, Fault> {
+    fn read(&mut self, text: &str) -> Result<Vec<Result<Event, Refusal>>, Refusal> {
         if text.len() > LONGEST_LINE {
-            return Err(Fault::new("M301", format!("a line of {} bytes is too long", text.len())));
+            return Err(Refusal::new("M301", format!("a line of {} bytes is too long", text.len())));
         }
         let value: Value = serde_json::from_str(text)
-            .map_err(|error| Fault::new("M301", format!("this is no JSON: {error}")))?;
+            .map_err(|error| Refusal::new("M301", format!("this is no JSON: {error}")))?;
         if let Some(key) = doubled_key(text) {
-            return Err(Fault::new("M302", format!("the field `{key}` is there twice")));
+            return Err(Refusal::new("M302", format!("the field `{key}` is there twice")));
         }
         let Value::Object(mut fields) = value else {
-            return Err(Fault::new("M301", "an event is a JSON object"));
+            return Err(Refusal::new("M301", "an event is a JSON object"));
         };
         if fields.contains_key("status") && !fields.contains_key("event") {
             return diagnostics(&fields);
@@ -192,12 +195,12 @@ fn take<T>(
     name: &str,
     wanted: &str,
     read: impl Fn(&Value) -> Option<T>,
-) -> Result<Option<T>, Fault> {
+) -> Result<Option<T>, Refusal> {
     match fields.remove(name) {
         None => Ok(None),
         Some(value) => match read(&value) {
             Some(read) => Ok(Some(read)),
-            None => Err(Fault::new("M302", format!("`{name}` is {value}, but should be {wanted}"))),
+            None => Err(Refusal::new("M302", format!("`{name}` is {value}, but should be {wanted}"))),
         },
     }
 }
@@ -207,8 +210,8 @@ fn need<T>(
     name: &str,
     wanted: &str,
     read: impl Fn(&Value) -> Option<T>,
-) -> Result<T, Fault> {
-    let missing = || Fault::new("M302", format!("the field `{name}` is missing; it should be {wanted}"));
+) -> Result<T, Refusal> {
+    let missing = || Refusal::new("M302", format!("the field `{name}` is missing; it should be {wanted}"));
     take(fields, name, wanted, read)?.ok_or_else(missing)
 }
 
@@ -232,7 +235,7 @@ fn word(value: &Value) -> Option<String> {
     }
 }
 
-fn event(fields: &mut Map<String, Value>) -> Result<Event, Fault> {
+fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
     let kind = need(fields, "event", "the kind of the event", text)?;
     let number = "the number of a requested action";
     let event = match kind.as_str() {
@@ -267,12 +270,12 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Fault> {
         other => {
             let meant = did_you_mean(other, KINDS);
             let text = format!("there is no event `{other}`; there are: {}{meant}", KINDS.join(", "));
-            return Err(Fault::new("M303", text));
+            return Err(Refusal::new("M303", text));
         }
     };
     match fields.keys().next() {
         None => Ok(event),
-        Some(field) => Err(Fault::new("M302", format!("`{kind}` has no field `{field}`"))),
+        Some(field) => Err(Refusal::new("M302", format!("`{kind}` has no field `{field}`"))),
     }
 }
 
@@ -303,9 +306,9 @@ fn status(text: &str) -> Option<Status> {
 }
 
 /// The statuses of a diagnostic array that are about attributes and components; others are of no concern here.
-fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Fault>>, Fault> {
+fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>>, Refusal> {
     let Some(statuses) = fields.get("status").and_then(Value::as_array) else {
-        return Err(Fault::new("M304", "`status` of a diagnostic array is a list"));
+        return Err(Refusal::new("M304", "`status` of a diagnostic array is a list"));
     };
     let mut events = Vec::new();
     for entry in statuses {
@@ -317,7 +320,7 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Fault>>,
         for pair in values {
             let part = |name: &str| pair.get(name).and_then(Value::as_str).map(str::trim);
             let (Some(key), Some(value)) = (part("key"), part("value")) else {
-                events.push(Err(Fault::new(
+                events.push(Err(Refusal::new(
                     "M304",
                     "a value of a diagnostic status has a `key` and a `value`",
                 )));
@@ -337,14 +340,14 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Fault>>,
     Ok(events)
 }
 
-fn measured(attribute: &str, value: &str) -> Result<Event, Fault> {
-    let wrong = || Fault::new("M304", format!("the value `{value}` of {attribute} is no decimal number"));
+fn measured(attribute: &str, value: &str) -> Result<Event, Refusal> {
+    let wrong = || Refusal::new("M304", format!("the value `{value}` of {attribute} is no decimal number"));
     Ok(Event::Measured { attribute: attribute.to_owned(), value: number::exact(value).ok_or_else(wrong)? })
 }
 
-fn component(component: &str, value: &str) -> Result<Event, Fault> {
+fn component(component: &str, value: &str) -> Result<Event, Refusal> {
     let wrong = || {
-        Fault::new("M304", format!("the status `{value}` of {component} is none; it should be {STATUSES}"))
+        Refusal::new("M304", format!("the status `{value}` of {component} is none; it should be {STATUSES}"))
     };
     Ok(Event::Component { component: component.to_owned(), status: status(value).ok_or_else(wrong)? })
 }

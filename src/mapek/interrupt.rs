@@ -8,98 +8,100 @@
 //! cancelled.
 
 use num_rational::BigRational;
-use pddl::ast::Direction;
 
-use super::Loop;
-use super::answer::{Answer, Command};
-use super::knowledge::Running;
-use super::number;
-use super::plan::Outcome;
+use crate::mapek::ask::Outcome;
+use crate::number;
 
-impl Loop {
-    /// Cancels or suspends the action under way if that is better than `going_on`, the plan that begins with what is left of
-    /// it. Returns whether it did.
-    pub(super) fn interrupt(&mut self, reason: &str, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
-        let Some(running) = self.knowledge.running.clone() else { return false };
-        let is_possible = self.can_go_on(&running);
-        if is_possible && (going_on.steps.is_some() || !going_on.proved) {
-            return false;
-        }
-        let without = self.plan(false);
-        match (&going_on.steps, &without.steps) {
-            (Some(_), Some(_)) => match self.benefit(&going_on.cost, &without.cost) {
-                Some(benefit) => {
-                    let benefit = number::decimal(&benefit);
-                    self.cancel(
-                        running,
-                        format!("{reason}; the mission is better without it by {benefit}"),
-                        answers,
-                    );
-                    true
-                }
-                None => false,
-            },
-            (Some(_), None) => false,
-            (None, Some(_)) => {
-                let because = if is_possible { "no plan goes on with it" } else { "no other design serves" };
-                self.cancel(running, format!("{reason}; {because}"), answers);
-                true
+/// What becomes of the action under way.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Interruption {
+    /// It goes on.
+    None,
+    /// It is brought to a safe end.
+    Cancel {
+        /// Why, in a sentence.
+        because: String,
+    },
+    /// It stands still, and there is no plan.
+    Suspend {
+        /// `unsolvable` or `unknown`.
+        status: &'static str,
+        /// Why there is no plan.
+        because: String,
+        /// Designs by which alone there is none.
+        blocking: Vec<String>,
+    },
+}
+
+/// Weighs the plan that begins with what is left of the action under way against the plan as though it had been cancelled, which
+/// is better by `gained` if that is enough. `reason` is why the action cannot stay as it is; `can_go_on` says whether its designs
+/// are available, and what is left of it can be done with them.
+pub(super) fn weigh(
+    reason: &str,
+    can_go_on: bool,
+    going_on: &Outcome,
+    without: Outcome,
+    gained: Option<BigRational>,
+) -> Interruption {
+    match (&going_on.steps, &without.steps) {
+        (Some(_), Some(_)) => gained.map_or(Interruption::None, |gained| {
+            let gained = number::decimal(&gained);
+            Interruption::Cancel {
+                because: format!("{reason}; the mission is better without it by {gained}"),
             }
-            (None, None) if is_possible => false,
-            (None, None) => {
-                self.suspend(running, reason, answers);
-                let status = if without.proved { "unsolvable" } else { "unknown" };
-                answers.push(Answer::PlanNone {
-                    status,
-                    because: without.because,
-                    blocking: without.blocking,
-                });
-                true
-            }
+        }),
+        (Some(_), None) => Interruption::None,
+        (None, Some(_)) => {
+            let because = if can_go_on { "no plan goes on with it" } else { "no other design serves" };
+            Interruption::Cancel { because: format!("{reason}; {because}") }
+        }
+        (None, None) if can_go_on => Interruption::None,
+        (None, None) => Interruption::Suspend {
+            status: if without.proved { "unsolvable" } else { "unknown" },
+            because: without.because,
+            blocking: without.blocking,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+
+    use super::{Interruption, weigh};
+    use crate::mapek::ask::Outcome;
+
+    /// A plan without steps, or none.
+    fn outcome(is_plan: bool) -> Outcome {
+        Outcome {
+            steps: is_plan.then(Vec::new),
+            cost: BigRational::default(),
+            proved: true,
+            because: "nothing serves".to_owned(),
+            blocking: vec!["fd_a".to_owned()],
         }
     }
 
-    /// By how much another metric is better than one; below zero if it is worse.
-    pub(super) fn gain(&self, metric: &BigRational, other: &BigRational) -> BigRational {
-        let declared = self.knowledge.mission.problem().metric.as_ref();
-        let maximize = declared.is_some_and(|metric| metric.direction == Direction::Maximize);
-        if maximize { other - metric } else { metric - other }
+    fn check(can_go_on: bool, goes_on: bool, without: bool, gained: Option<i64>, expected: &Interruption) {
+        let gained = gained.map(|gained| BigRational::from_integer(gained.into()));
+        let found = weigh("it is lost", can_go_on, &outcome(goes_on), outcome(without), gained);
+        assert_eq!(&found, expected, "{can_go_on} {goes_on} {without}");
     }
 
-    /// The same, if it is more than nothing and at least the minimum benefit.
-    pub(super) fn benefit(&self, metric: &BigRational, other: &BigRational) -> Option<BigRational> {
-        let is_enough =
-            |gain: &BigRational| *gain > BigRational::default() && *gain >= self.settings.minimum_benefit;
-        Some(self.gain(metric, other)).filter(is_enough)
-    }
-
-    /// Whether the designs of an action are available, and what is left of it can be done with them.
-    fn can_go_on(&self, running: &Running) -> bool {
-        let designs = running.step.configuration.iter();
-        designs.into_iter().all(|(_, design)| self.is_available(design)) && self.obstacle(running).is_none()
-    }
-
-    fn cancel(&mut self, running: Running, because: String, answers: &mut Vec<Answer>) {
-        self.knowledge.plan = None;
-        self.effect(running.action, Command::Cancel { because }, answers);
-        self.knowledge.running = Some(Running { cancelling: true, ..running });
-    }
-
-    fn suspend(&mut self, running: Running, reason: &str, answers: &mut Vec<Answer>) {
-        self.knowledge.plan = None;
-        self.knowledge.stuck = true;
-        if running.suspended {
-            return;
-        }
-        let because = format!("{reason}; no other design serves, and there is no plan without it");
-        self.effect(running.action, Command::Suspend { because }, answers);
-        self.knowledge.running = Some(Running { suspended: true, ..running });
-    }
-
-    /// Lets a suspended action go on.
-    pub(super) fn resume_suspended(&mut self, running: &mut Running, answers: &mut Vec<Answer>) {
-        if std::mem::take(&mut running.suspended) {
-            self.effect(running.action, Command::Resume, answers);
-        }
+    #[test]
+    fn an_action_is_interrupted_only_for_something() {
+        let cancel = |because: &str| Interruption::Cancel { because: format!("it is lost; {because}") };
+        let suspend = Interruption::Suspend {
+            status: "unsolvable",
+            because: "nothing serves".to_owned(),
+            blocking: vec!["fd_a".to_owned()],
+        };
+        check(false, true, true, None, &Interruption::None);
+        check(false, true, true, Some(3), &cancel("the mission is better without it by 3"));
+        check(false, true, false, None, &Interruption::None);
+        check(false, false, true, None, &cancel("no other design serves"));
+        check(true, false, true, None, &cancel("no plan goes on with it"));
+        check(true, false, false, None, &Interruption::None);
+        check(false, false, false, None, &suspend);
     }
 }

@@ -7,10 +7,10 @@ use encodings::{First, Limits, Progress, Query, Replanned, Replanner};
 use num_rational::BigRational;
 use pddl::validate::advance_each;
 
-use super::plan::{Ask, Outcome};
-use super::resume::{GATE, resume};
-use super::step::PlannedStep;
-use super::watch::Watch;
+use crate::mapek::ask::{Ask, Outcome};
+use crate::mapek::resume::{GATE, resume};
+use crate::mapek::step::PlannedStep;
+use crate::mapek::watch::Watch;
 
 /// So many configurations of the action under way are tried at most.
 const CONFIGURATIONS: usize = 256;
@@ -102,17 +102,6 @@ fn none(blocking: Vec<String>) -> Outcome {
         proved: true,
         because: "no plan reaches the goal".to_owned(),
         blocking,
-    }
-}
-
-impl Ask<'_> {
-    /// The metric of the mission if it ended now; without a metric, 0.
-    fn metric(&self) -> Option<BigRational> {
-        let zero = BigRational::default();
-        if self.problem.metric.is_none() {
-            return Some(zero);
-        }
-        pddl::validate::metric_after(self.mission.domain(), self.problem, &zero)
     }
 }
 

@@ -7,20 +7,20 @@ use std::collections::VecDeque;
 
 use pddl::ast::{Atom, InitialElement, Problem, Term};
 
-use super::knowledge::Running;
-use super::plan::{Ask, Outcome};
-use super::step::PlannedStep;
+use crate::mapek::ask::{Ask, Outcome};
+use crate::mapek::beliefs::Running;
+use crate::mapek::step::PlannedStep;
 
 /// So many situations are remembered.
 const SITUATIONS: usize = 16;
 
 /// Situations with their plans, the one that was last asked for first.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Memo(VecDeque<(Situation, Outcome)>);
+pub(crate) struct Memo(VecDeque<(Asked, Outcome)>);
 
 /// What a plan depends on. The domain and the metric stay; for another goal there is another memo.
 #[derive(Debug, Clone)]
-struct Situation {
+struct Asked {
     problem: Problem,
     running: Option<Running>,
     /// The plan at hand, where the choice depends on it.
@@ -41,7 +41,7 @@ impl Memo {
     pub(super) fn note(&mut self, ask: &Ask<'_>, outcome: &Outcome) {
         if outcome.proved {
             let old = ask.old.filter(|_| ask.stay_close).map(<[_]>::to_vec);
-            let situation = Situation { problem: ask.problem.clone(), running: ask.running.cloned(), old };
+            let situation = Asked { problem: ask.problem.clone(), running: ask.running.cloned(), old };
             self.0.push_front((situation, outcome.clone()));
             self.0.truncate(SITUATIONS);
         }
@@ -53,7 +53,7 @@ impl Memo {
     }
 }
 
-impl Situation {
+impl Asked {
     fn is(&self, ask: &Ask<'_>) -> bool {
         let (own, other) = (&self.problem, ask.problem);
         let objects = |problem: &Problem| problem.objects.len();

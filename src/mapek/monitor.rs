@@ -1,18 +1,19 @@
 //! Monitor: events to changes of what is believed.
 
+use std::collections::{BTreeSet, HashSet};
+
 use num_rational::BigRational;
 use ontology::vocab::local_name;
-use pddl::ast::{InitialElement, Problem};
 use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
-use super::Loop;
-use super::event::{Event, Fault};
-use super::knowledge::Running;
-use super::number;
-use super::step::PlannedStep;
-use crate::knowledge::Report;
+use crate::knowledge::RobotReport;
+use crate::mapek::beliefs::{Beliefs, Running};
+use crate::mapek::event::{Event, Refusal};
+use crate::mapek::step::PlannedStep;
 use crate::message::{Message, did_you_mean};
+use crate::mission::Mission;
+use crate::number;
 
 /// What a line has changed, for the analysis.
 #[derive(Debug, Default)]
@@ -23,6 +24,8 @@ pub(super) struct Changes {
     pub(super) facts: bool,
     /// Facts of the problem, and not only values.
     pub(super) predicates: bool,
+    /// What is to be reached: plans for another goal are of no use any more.
+    pub(super) goal: bool,
     /// Reasons to plan whatever the plan is like: sentences.
     pub(super) must: Vec<String>,
 }
@@ -64,24 +67,59 @@ const PLANNED: [&str; 9] = [
 /// Values, by local name: those that were not reported are estimations.
 const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 
-impl Loop {
-    /// Takes an event over.
+/// What events are held against.
+#[derive(Debug, Clone)]
+pub(super) struct Monitor {
+    /// Attributes of the knowledge base, by local name and by IRI.
+    attributes: BTreeSet<String>,
+    /// Facts and functions that were found to fit the domain, as text.
+    checked: HashSet<String>,
+}
+
+impl Monitor {
+    /// For the reports of a robot with this mission.
+    pub(super) fn new(mission: &Mission) -> Self {
+        let kinds =
+            mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
+        let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
+        Self { attributes, checked: HashSet::new() }
+    }
+
+    /// Takes an event over into what is believed, and notes what that changes.
     ///
     /// # Errors
     /// Why it changes nothing.
-    pub(super) fn monitor(&mut self, event: &Event, changes: &mut Changes) -> Result<(), Fault> {
+    pub(super) fn take(
+        &mut self,
+        beliefs: &mut Beliefs,
+        event: &Event,
+        changes: &mut Changes,
+    ) -> Result<(), Refusal> {
+        Taking { monitor: self, beliefs, changes }.take(event)
+    }
+}
+
+/// One event being taken over.
+struct Taking<'a> {
+    monitor: &'a mut Monitor,
+    beliefs: &'a mut Beliefs,
+    changes: &'a mut Changes,
+}
+
+impl Taking<'_> {
+    fn take(&mut self, event: &Event) -> Result<(), Refusal> {
         match event {
-            Event::Measured { attribute, value } => self.measured(attribute, value, changes),
+            Event::Measured { attribute, value } => self.measured(attribute, value),
             Event::Component { component, status } => {
-                let Some(knowledge) = self.knowledge.mission.knowledge_mut() else {
+                let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
                     let text = format!("there is no knowledge base that has a component `{component}`");
-                    return Err(Fault::new("M306", text));
+                    return Err(Refusal::new("M306", text));
                 };
                 let was_known = knowledge.fault().is_none();
                 let delta = knowledge
-                    .take(component, Report::Component(*status))
+                    .take(component, RobotReport::Component(*status))
                     .map_err(|message| fault(&message))?;
-                self.note(&delta, was_known, changes);
+                self.note(&delta, was_known);
                 Ok(())
             }
             Event::Started { action } => self.running(*action).map(|_| ()),
@@ -89,58 +127,58 @@ impl Loop {
                 self.running(*action)?;
                 self.progress(fraction)
             }
-            Event::Succeeded { action } => self.succeeded(*action, changes),
+            Event::Succeeded { action } => self.succeeded(*action),
             Event::Failed { action, reason } => {
                 let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
-                self.failed(*action, changes)?;
-                changes.must.push(format!("action {action} has failed{reason}"));
+                self.failed(*action)?;
+                self.changes.must.push(format!("action {action} has failed{reason}"));
                 Ok(())
             }
             Event::Cancelled { action } => {
-                self.ended_early(*action, changes)?;
-                changes.must.push(format!("action {action} was cancelled"));
+                self.ended_early(*action)?;
+                self.changes.must.push(format!("action {action} was cancelled"));
                 Ok(())
             }
             Event::Goal { goal } => {
-                let condition = self.knowledge.mission.goal(goal).map_err(|messages| first(&messages))?;
-                self.knowledge.mission.set_goal(condition);
-                self.knowledge.goal = Some(goal.clone());
-                self.planner.memo.forget();
-                changes.must.push("the goal has changed".to_owned());
+                let condition = self.beliefs.mission.goal(goal).map_err(|messages| first(&messages))?;
+                self.beliefs.mission.set_goal(condition);
+                self.beliefs.goal = Some(goal.clone());
+                self.changes.goal = true;
+                self.changes.must.push("the goal has changed".to_owned());
                 Ok(())
             }
-            Event::Fact { name, value } => self.fact(name, value, changes),
-            Event::Acknowledged { effect } => match self.knowledge.outstanding.remove(effect) {
+            Event::Fact { name, value } => self.fact(name, value),
+            Event::Acknowledged { effect } => match self.beliefs.outstanding.remove(effect) {
                 Some(_) => Ok(()),
-                None if *effect >= 1 && *effect <= self.knowledge.effects => Ok(()),
-                None => Err(Fault::new("M305", format!("there was no effect {effect}"))),
+                None if *effect >= 1 && *effect <= self.beliefs.effects => Ok(()),
+                None => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
             },
             Event::Tick => Ok(()),
         }
     }
 
-    fn measured(&mut self, attribute: &str, value: &BigRational, changes: &mut Changes) -> Result<(), Fault> {
-        let is_known = self.attributes.contains(attribute);
-        if let Some(knowledge) = self.knowledge.mission.knowledge_mut().filter(|_| is_known) {
+    fn measured(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
+        let is_known = self.monitor.attributes.contains(attribute);
+        if let Some(knowledge) = self.beliefs.mission.knowledge_mut().filter(|_| is_known) {
             let was_known = knowledge.fault().is_none();
             let delta =
-                knowledge.take(attribute, Report::measured(value)).map_err(|message| fault(&message))?;
-            self.note(&delta, was_known, changes);
-            if let Some(function) = self.knowledge.mission.fed_by(local_name(attribute)) {
-                changes.facts = true;
-                if self.value(&function).is_some() {
-                    self.fact(&function, &number::decimal(value), changes)?;
+                knowledge.take(attribute, RobotReport::measured(value)).map_err(|message| fault(&message))?;
+            self.note(&delta, was_known);
+            if let Some(function) = self.beliefs.mission.fed_by(local_name(attribute)) {
+                self.changes.facts = true;
+                if self.beliefs.mission.value(&function).is_some() {
+                    self.fact(&function, &number::decimal(value))?;
                 }
             }
             return Ok(());
         }
-        if self.knowledge.mission.is_function(attribute) {
-            return self.fact(attribute, &number::decimal(value), changes);
+        if self.beliefs.mission.is_function(attribute) {
+            return self.fact(attribute, &number::decimal(value));
         }
         let known: Vec<&str> =
-            self.attributes.iter().map(String::as_str).filter(|name| !name.contains(':')).collect();
+            self.monitor.attributes.iter().map(String::as_str).filter(|name| !name.contains(':')).collect();
         let functions: Vec<&str> = self
-            .knowledge
+            .beliefs
             .mission
             .domain()
             .functions
@@ -153,22 +191,23 @@ impl Loop {
             "there is no attribute or function `{attribute}`; attributes are: {}{meant}",
             known.join(", ")
         );
-        Err(Fault::new("M306", text))
+        Err(Refusal::new("M306", text))
     }
 
     /// What a change of the knowledge base matters for; and whether it was known before what follows.
-    fn note(&self, delta: &Delta, was_known: bool, changes: &mut Changes) {
-        let Some(knowledge) = self.knowledge.mission.knowledge() else { return };
+    fn note(&mut self, delta: &Delta, was_known: bool) {
+        let Some(knowledge) = self.beliefs.mission.knowledge() else { return };
         let is_known = knowledge.fault().is_none();
-        changes.base = changes.base.max(if was_known && is_known { Base::Stated } else { Base::Watched });
+        self.changes.base =
+            self.changes.base.max(if was_known && is_known { Base::Stated } else { Base::Watched });
         let engine = knowledge.engine();
         let name = |fact: &Fact| engine.symbols().value(fact.predicate).as_name().map_or("", local_name);
         for fact in delta.insert.iter().chain(&delta.delete) {
             let name = name(fact);
             if WATCHED.contains(&name) {
-                changes.base = Base::Watched;
+                self.changes.base = Base::Watched;
             }
-            changes.facts |= PLANNED.contains(&name);
+            self.changes.facts |= PLANNED.contains(&name);
         }
         let is_concluded = |fact: &Fact| VALUES.contains(&name(fact)) && !engine.is_asserted(fact);
         let is_replaced = |gone: &Fact| {
@@ -176,73 +215,73 @@ impl Loop {
             delta.insert.iter().any(same)
         };
         let is_lost = |fact: &Fact| VALUES.contains(&name(fact)) && !is_replaced(fact);
-        changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
+        self.changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
     }
 
     /// The action with that number, which must be under way; whatever was asked for it has arrived, then.
-    fn running(&mut self, action: u64) -> Result<&mut Running, Fault> {
-        let running = self.knowledge.running.as_mut().filter(|running| running.action == action);
+    fn running(&mut self, action: u64) -> Result<&mut Running, Refusal> {
+        let running = self.beliefs.running.as_mut().filter(|running| running.action == action);
         let Some(running) = running else {
-            return Err(Fault::new("M305", format!("no action {action} is under way")));
+            return Err(Refusal::new("M305", format!("no action {action} is under way")));
         };
-        self.knowledge
+        self.beliefs
             .outstanding
             .retain(|_, effect| effect.action > action || effect.command.is_about_going_on());
         Ok(running)
     }
 
     /// Ends the action with that number; nothing about it is outstanding any more.
-    fn end(&mut self, action: u64) -> Result<Running, Fault> {
+    fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
-        self.knowledge.outstanding.retain(|_, effect| effect.action > action);
-        let none = || Fault::new("M305", format!("no action {action} is under way"));
-        self.knowledge.running.take().ok_or_else(none)
+        self.beliefs.outstanding.retain(|_, effect| effect.action > action);
+        let none = || Refusal::new("M305", format!("no action {action} is under way"));
+        self.beliefs.running.take().ok_or_else(none)
     }
 
-    fn succeeded(&mut self, action: u64, changes: &mut Changes) -> Result<(), Fault> {
+    fn succeeded(&mut self, action: u64) -> Result<(), Refusal> {
         self.running(action)?;
         // What it has not used up yet is used up now; the robot knows better than our conditions whether it has succeeded.
         self.progress(&BigRational::from_integer(1.into()))?;
         let running = self.end(action)?;
         if let Some(mut advance) = self.advance(&running.step) {
             advance.values.retain(|change| change.assigned);
-            let mut init = self.knowledge.mission.problem().init.clone();
+            let mut init = self.beliefs.mission.problem().init.clone();
             advance.apply(&mut init);
-            self.knowledge.mission.set_init(init);
+            self.beliefs.mission.set_init(init);
         }
-        self.knowledge.failures = None;
+        self.beliefs.failures = None;
         if running.cancelling || running.suspended {
             let what = if running.cancelling { "cancelled" } else { "suspended" };
-            changes.must.push(format!("action {action} was to be {what}, but has succeeded"));
+            self.changes.must.push(format!("action {action} was to be {what}, but has succeeded"));
         }
         Ok(())
     }
 
-    fn failed(&mut self, action: u64, changes: &mut Changes) -> Result<(), Fault> {
-        let step = self.ended_early(action, changes)?.step;
-        let before = self.knowledge.failures.take().filter(|(failed, _)| *failed == step);
+    fn failed(&mut self, action: u64) -> Result<(), Refusal> {
+        let step = self.ended_early(action)?.step;
+        let before = self.beliefs.failures.take().filter(|(failed, _)| *failed == step);
         let count = before.map_or(1, |(_, count)| count + 1);
-        self.knowledge.failures = Some((step, count));
+        self.beliefs.failures = Some((step, count));
         Ok(())
     }
 
     /// An action has ended before its end: what it has used up is gone, and its other effects have not taken place.
-    fn ended_early(&mut self, action: u64, changes: &mut Changes) -> Result<Running, Fault> {
+    fn ended_early(&mut self, action: u64) -> Result<Running, Refusal> {
         let running = self.end(action)?;
-        changes.facts = true;
+        self.changes.facts = true;
         Ok(running)
     }
 
     /// So much of the action under way is done, and what that uses up is used up.
-    fn progress(&mut self, fraction: &BigRational) -> Result<(), Fault> {
-        let Some(running) = &mut self.knowledge.running else { return Ok(()) };
+    fn progress(&mut self, fraction: &BigRational) -> Result<(), Refusal> {
+        let Some(running) = &mut self.beliefs.running else { return Ok(()) };
         let more = fraction - &running.progress;
         running.progress.clone_from(fraction);
         let step = running.step.clone();
         let Some(advance) = self.advance(&step) else { return Ok(()) };
         for change in advance.values.into_iter().filter(|change| !change.assigned) {
             let name = change.text.trim_matches(['(', ')']).to_owned();
-            if let (Some(now), Some(before)) = (self.value(&name), change.before) {
+            if let (Some(now), Some(before)) = (self.beliefs.mission.value(&name), change.before) {
                 let value = number::rounded(&(now + (change.after - before) * &more));
                 self.set(&name, &number::decimal(&value))?;
             }
@@ -252,77 +291,98 @@ impl Loop {
 
     /// What a whole action changes, whether or not its conditions hold.
     fn advance(&self, step: &PlannedStep) -> Option<Advance> {
-        let mission = &self.knowledge.mission;
-        advance(mission.domain(), &self.filled(), &step.to_plan_step(), true).ok()
-    }
-
-    /// The value of a function of the problem, by name and arguments.
-    pub(super) fn value(&self, name: &str) -> Option<BigRational> {
-        value_of(self.knowledge.mission.problem(), name)
+        let mission = &self.beliefs.mission;
+        advance(mission.domain(), &self.beliefs.filled(), &step.to_plan_step(), true).ok()
     }
 
     /// A fact or a value of the problem is reported.
-    fn fact(&mut self, name: &str, value: &str, changes: &mut Changes) -> Result<(), Fault> {
+    fn fact(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
         let mut words = name.split_whitespace();
         let name = words.by_ref().collect::<Vec<_>>().join(" ");
-        if !self.knowledge.mission.is_function(&name) {
+        if !self.beliefs.mission.is_function(&name) {
             self.set(&name, value)?;
-            changes.predicates = true;
-            changes.facts = true;
+            self.changes.predicates = true;
+            self.changes.facts = true;
             return Ok(());
         }
-        let wrong = || Fault::new("M302", format!("the value `{value}` of {name} is no decimal number"));
+        let wrong = || Refusal::new("M302", format!("the value `{value}` of {name} is no decimal number"));
         let value = number::rounded(&number::exact(value).ok_or_else(wrong)?);
-        if self.value(&name).as_ref() != Some(&value) {
+        if self.beliefs.mission.value(&name).as_ref() != Some(&value) {
             self.set(&name, &number::decimal(&value))?;
-            changes.facts = true;
+            self.changes.facts = true;
         }
         Ok(())
     }
 
     /// Sets a fact or value of the problem, if the problem is still right then.
-    fn set(&mut self, name: &str, value: &str) -> Result<(), Fault> {
-        let mission = &mut self.knowledge.mission;
+    fn set(&mut self, name: &str, value: &str) -> Result<(), Refusal> {
+        let mission = &mut self.beliefs.mission;
         let before = mission.problem().init.clone();
         mission.set_in_problem(name, value).map_err(|message| fault(&message))?;
         let key = if mission.is_function(name) { name.to_owned() } else { format!("{name} {value}") };
-        if self.checked.contains(&key) {
+        if self.monitor.checked.contains(&key) {
             return Ok(());
         }
         if let Err(messages) = mission.filled() {
             mission.set_init(before);
             return Err(first(&messages));
         }
-        self.checked.insert(key);
+        self.monitor.checked.insert(key);
         Ok(())
     }
 }
 
-/// The value of a function that a problem states, by name and arguments.
-pub(crate) fn value_of(problem: &Problem, name: &str) -> Option<BigRational> {
-    let words: Vec<&str> = name.split_whitespace().collect();
-    problem.init.iter().find_map(|element| match element {
-        InitialElement::Value(atom, value, _) if is_named(atom, &words) => Some(value.clone()),
-        _ => None,
-    })
+fn fault(message: &Message) -> Refusal {
+    Refusal::new("M306", message.message.clone())
 }
 
-fn is_named(atom: &pddl::ast::Atom, words: &[&str]) -> bool {
-    use pddl::ast::{Name, Term};
-    let same = |(term, word): (&Term, &&str)| match term {
-        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(word),
-    };
-    words.split_first().is_some_and(|(symbol, arguments)| {
-        atom.predicate.name == Name::new(symbol)
-            && atom.arguments.len() == arguments.len()
-            && atom.arguments.iter().zip(arguments).all(same)
-    })
+fn first(messages: &[Message]) -> Refusal {
+    messages.first().map_or_else(|| Refusal::new("M306", "it does not fit the mission"), fault)
 }
 
-fn fault(message: &Message) -> Fault {
-    Fault::new("M306", message.message.clone())
-}
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
 
-fn first(messages: &[Message]) -> Fault {
-    messages.first().map_or_else(|| Fault::new("M306", "it does not fit the mission"), fault)
+    use super::{Base, Changes, Monitor};
+    use crate::mapek::beliefs::Beliefs;
+    use crate::mapek::event::Observation;
+    use crate::setup::Setup;
+
+    /// What an event changes in the mission `ugv`; or the code of its refusal.
+    fn check(line: &str, expected: Result<(Base, [bool; 3], &[&str]), &str>) {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+        let mission = Setup::read(&manifest).expect("the mission is read").mission;
+        let (mut monitor, mut beliefs) = (Monitor::new(&mission), Beliefs::new(mission));
+        let mut changes = Changes::default();
+        let event = Observation::parse(line).events.remove(0).expect("an event");
+        let taken = monitor.take(&mut beliefs, &event, &mut changes);
+        let found = taken.map_err(|refusal| refusal.code);
+        let Changes { base, facts, predicates, goal, must } = &changes;
+        assert_eq!(found.is_err() || line.contains("tick"), !changes.any(), "{line}");
+        let must: Vec<&str> = must.iter().map(String::as_str).collect();
+        let found = found.map(|()| (*base, [*facts, *predicates, *goal], &must[..]));
+        assert_eq!(found, expected, "{line}");
+    }
+
+    #[test]
+    fn events_change_what_is_believed() {
+        let none = [false, false, false];
+        check(
+            r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#,
+            Ok((Base::Watched, none, &[])),
+        );
+        check(r#"{"event":"component_status","component":"c_nothing","status":"FALSE"}"#, Err("M306"));
+        check(
+            r#"{"event":"fact_changed","name":"robot_at","value":"wp2"}"#,
+            Ok((Base::Nothing, [true, true, false], &[])),
+        );
+        check(
+            r#"{"event":"goal_changed","goal":"(robot_at wp2)"}"#,
+            Ok((Base::Nothing, [false, false, true], &["the goal has changed"])),
+        );
+        check(r#"{"event":"action_failed","action":1}"#, Err("M305"));
+        check(r#"{"event":"acknowledged","effect":1}"#, Err("M305"));
+        check(r#"{"event":"tick"}"#, Ok((Base::Nothing, none, &[])));
+    }
 }

@@ -6,13 +6,12 @@ use std::time::Duration;
 use pddl::ast::{Atom, Identifier, InitialElement, Name, Span, Term};
 use serde_json::{Value, json};
 
-use super::answer::{Answer, Command, Effect};
-use super::knowledge::Running;
-use super::plan::Outcome;
-use super::sequence::Numbers;
-use super::step::PlannedStep;
-use super::{Loop, Observation, analyze};
-use crate::knowledge::{Part, Statement, Statements, Waiting};
+use crate::knowledge::{Knowledge, Part, Statement, Statements, Waiting};
+use crate::mapek::analyze::available;
+use crate::mapek::answer::{Command, Effect};
+use crate::mapek::beliefs::{Beliefs, Running};
+use crate::mapek::sequence::Numbers;
+use crate::mapek::step::PlannedStep;
 use crate::message::Message;
 
 /// What one observation has led to.
@@ -28,154 +27,121 @@ pub struct Decision {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot(pub Value);
 
-impl Loop {
-    /// The decision of which these are the answers, to be called once after each step.
-    pub fn decision(&mut self, answers: &[Answer]) -> Decision {
-        let made = std::mem::take(&mut self.planner.made);
-        Decision {
-            answers: answers.iter().map(Answer::to_json).collect(),
-            plans: made.iter().map(Outcome::to_record).collect(),
-        }
-    }
+/// All that a loop knows, as data.
+pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
+    let statements = known.mission.knowledge().map(Knowledge::statements).unwrap_or_default();
+    let steps = |steps: &VecDeque<PlannedStep>| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>();
+    let running = known.running.as_ref().map(|running| {
+        json!([
+            running.action,
+            running.step.to_record(),
+            running.progress.to_string(),
+            running.cancelling,
+            running.suspended
+        ])
+    });
+    Snapshot(json!({
+        "goal": known.goal,
+        "init": known.mission.problem().init.iter().filter_map(element_to_record).collect::<Vec<_>>(),
+        "added": statements.added.iter().map(statement_to_record).collect::<Vec<_>>(),
+        "removed": statements.removed.iter().map(statement_to_record).collect::<Vec<_>>(),
+        "available": known.available,
+        "statuses": known.statuses,
+        "violated": known.violated,
+        "waiting": known.mission.knowledge().map(|base| base.waiting().to_record()),
+        "configuration": known.configuration,
+        "plan": known.plan.as_ref().map(steps),
+        "running": running,
+        "reached": known.reached,
+        "stuck": known.stuck,
+        "unproved": known.unproved,
+        "failures": known.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
+        "hopes": known.hopes,
+        "hoped": micros(known.hoped),
+        "actions": known.actions,
+        "effects": known.effects,
+        "outstanding": known.outstanding.values().map(effect_to_record).collect::<Vec<_>>(),
+        "lines": known.lines,
+        "numbers": known.numbers.to_record(),
+        "now": micros(known.now),
+    }))
+}
 
-    /// As [`Loop::start`], with the plans that were made then.
-    pub fn start_again(&mut self, plans: &[Value]) -> Vec<Answer> {
-        self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
-        let answers = self.start();
-        self.planner.recorded.clear();
-        answers
+/// Takes over what a loop of the same mission knew.
+///
+/// # Errors
+/// The snapshot is damaged, or belongs to another mission.
+pub(super) fn restore(known: &mut Beliefs, snapshot: &Snapshot) -> Result<(), Message> {
+    let wrong = |what: &str| Message::error("M320", format!("the snapshot does not fit the mission: {what}"));
+    restore_mission(known, &snapshot.0).ok_or_else(|| wrong("facts or statements"))?;
+    restore_work(known, &snapshot.0).ok_or_else(|| wrong("plan or effects"))?;
+    if let Some(base) = known.mission.knowledge()
+        && available(base) != known.available
+    {
+        return Err(wrong("other designs are available"));
     }
+    Ok(())
+}
 
-    /// As [`Loop::handle`], with the plans that were made then.
-    pub fn handle_again(&mut self, observation: &Observation, now: Duration, plans: &[Value]) -> Vec<Answer> {
-        self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
-        let answers = self.handle(observation, now);
-        self.planner.recorded.clear();
-        answers
+/// What is known of the mission: statements, facts and goal.
+fn restore_mission(known: &mut Beliefs, data: &Value) -> Option<()> {
+    let records = |name: &str| data.get(name).and_then(Value::as_array);
+    let statements =
+        |name: &str| records(name)?.iter().map(statement_from_record).collect::<Option<Vec<_>>>();
+    let statements = Statements { added: statements("added")?, removed: statements("removed")? };
+    if let Some(base) = known.mission.knowledge_mut() {
+        base.restore(&statements).ok()?;
+        base.set_waiting(Waiting::from_record(data.get("waiting").unwrap_or(&Value::Null))?);
+        known.fault = base.fault().cloned();
     }
+    let timed = known.mission.problem().init.iter().filter(|e| matches!(e, InitialElement::Timed(..)));
+    let mut init: Vec<InitialElement> = timed.cloned().collect();
+    init.extend(records("init")?.iter().map(element_from_record).collect::<Option<Vec<_>>>()?);
+    known.mission.set_init(init);
+    known.goal = data.get("goal")?.as_str().map(ToOwned::to_owned);
+    if let Some(goal) = &known.goal {
+        let goal = known.mission.goal(goal).ok()?;
+        known.mission.set_goal(goal);
+    }
+    Some(())
+}
 
-    /// All that the loop knows.
-    pub fn snapshot(&self) -> Snapshot {
-        let known = &self.knowledge;
-        let statements =
-            known.mission.knowledge().map(crate::knowledge::Knowledge::statements).unwrap_or_default();
-        let steps =
-            |steps: &VecDeque<PlannedStep>| steps.iter().map(PlannedStep::to_record).collect::<Vec<_>>();
-        let running = known.running.as_ref().map(|running| {
-            json!([
-                running.action,
-                running.step.to_record(),
-                running.progress.to_string(),
-                running.cancelling,
-                running.suspended
-            ])
-        });
-        Snapshot(json!({
-            "goal": known.goal,
-            "init": known.mission.problem().init.iter().filter_map(element_to_record).collect::<Vec<_>>(),
-            "added": statements.added.iter().map(statement_to_record).collect::<Vec<_>>(),
-            "removed": statements.removed.iter().map(statement_to_record).collect::<Vec<_>>(),
-            "available": known.available,
-            "statuses": known.statuses,
-            "violated": known.violated,
-            "waiting": known.mission.knowledge().map(|base| base.waiting().to_record()),
-            "configuration": known.configuration,
-            "plan": known.plan.as_ref().map(steps),
-            "running": running,
-            "reached": known.reached,
-            "stuck": known.stuck,
-            "unproved": known.unproved,
-            "failures": known.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
-            "hopes": known.hopes,
-            "hoped": micros(known.hoped),
-            "actions": known.actions,
-            "effects": known.effects,
-            "outstanding": known.outstanding.values().map(effect_to_record).collect::<Vec<_>>(),
-            "lines": known.lines,
-            "numbers": known.numbers.to_record(),
-            "now": micros(known.now),
-        }))
-    }
-
-    /// Takes over what a loop of the same mission knew.
-    ///
-    /// # Errors
-    /// The snapshot is damaged, or belongs to another mission.
-    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
-        let wrong =
-            |what: &str| Message::error("M320", format!("the snapshot does not fit the mission: {what}"));
-        self.planner.memo.forget();
-        self.restore_mission(&snapshot.0).ok_or_else(|| wrong("facts or statements"))?;
-        self.restore_work(&snapshot.0).ok_or_else(|| wrong("plan or effects"))?;
-        if let Some(base) = self.knowledge.mission.knowledge()
-            && analyze::available(base) != self.knowledge.available
-        {
-            return Err(wrong("other designs are available"));
-        }
-        Ok(())
-    }
-
-    fn restore_mission(&mut self, data: &Value) -> Option<()> {
-        let records = |name: &str| data.get(name).and_then(Value::as_array);
-        let statements =
-            |name: &str| records(name)?.iter().map(statement_from_record).collect::<Option<Vec<_>>>();
-        let known = &mut self.knowledge;
-        let statements = Statements { added: statements("added")?, removed: statements("removed")? };
-        if let Some(base) = known.mission.knowledge_mut() {
-            base.restore(&statements).ok()?;
-            base.set_waiting(Waiting::from_record(data.get("waiting").unwrap_or(&Value::Null))?);
-            known.fault = base.fault().cloned();
-        }
-        let timed = known.mission.problem().init.iter().filter(|e| matches!(e, InitialElement::Timed(..)));
-        let mut init: Vec<InitialElement> = timed.cloned().collect();
-        init.extend(records("init")?.iter().map(element_from_record).collect::<Option<Vec<_>>>()?);
-        known.mission.set_init(init);
-        known.goal = data.get("goal")?.as_str().map(ToOwned::to_owned);
-        if let Some(goal) = &known.goal {
-            let goal = known.mission.goal(goal).ok()?;
-            known.mission.set_goal(goal);
-        }
-        Some(())
-    }
-
-    fn restore_work(&mut self, data: &Value) -> Option<()> {
-        let known = &mut self.knowledge;
-        let number = |name: &str| data.get(name).and_then(Value::as_u64);
-        let truth = |name: &str| data.get(name).and_then(Value::as_bool);
-        let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
-        let texts = |value: &Value| value.as_array()?.iter().map(text).collect::<Option<Vec<_>>>();
-        let pairs = |name: &str| data.get(name).and_then(Value::as_object);
-        known.available = texts(data.get("available")?)?.into_iter().collect();
-        let status = |(name, value): (&String, &Value)| Some((name.clone(), texts(value)?));
-        known.statuses = pairs("statuses")?.iter().map(status).collect::<Option<BTreeMap<_, _>>>()?;
-        known.violated = texts(data.get("violated")?)?.into_iter().collect();
-        let pair = |(name, value): (&String, &Value)| Some((name.clone(), text(value)?));
-        known.configuration = pairs("configuration")?.iter().map(pair).collect::<Option<BTreeMap<_, _>>>()?;
-        known.plan = match data.get("plan")? {
-            Value::Null => None,
-            steps => Some(steps.as_array()?.iter().map(PlannedStep::from_record).collect::<Option<_>>()?),
-        };
-        known.running = match data.get("running")? {
-            Value::Null => None,
-            record => Some(running_from_record(record)?),
-        };
-        known.failures = match data.get("failures")? {
-            Value::Null => None,
-            record => Some((PlannedStep::from_record(record.get(0)?)?, record.get(1)?.as_u64()? as u32)),
-        };
-        (known.reached, known.stuck) = (truth("reached")?, truth("stuck")?);
-        known.unproved = truth("unproved")?;
-        known.hopes = texts(data.get("hopes")?)?.into_iter().collect();
-        known.hoped = Duration::from_micros(number("hoped")?);
-        (known.actions, known.effects, known.lines) =
-            (number("actions")?, number("effects")?, number("lines")?);
-        known.numbers = Numbers::from_record(data.get("numbers")?)?;
-        known.now = Duration::from_micros(number("now")?);
-        let effects = data.get("outstanding")?.as_array()?.iter().map(effect_from_record);
-        known.outstanding =
-            effects.collect::<Option<Vec<_>>>()?.into_iter().map(|effect| (effect.number, effect)).collect();
-        Some(())
-    }
+/// What is planned and asked for.
+fn restore_work(known: &mut Beliefs, data: &Value) -> Option<()> {
+    let number = |name: &str| data.get(name).and_then(Value::as_u64);
+    let truth = |name: &str| data.get(name).and_then(Value::as_bool);
+    let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
+    let texts = |value: &Value| value.as_array()?.iter().map(text).collect::<Option<Vec<_>>>();
+    let pairs = |name: &str| data.get(name).and_then(Value::as_object);
+    known.available = texts(data.get("available")?)?.into_iter().collect();
+    let status = |(name, value): (&String, &Value)| Some((name.clone(), texts(value)?));
+    known.statuses = pairs("statuses")?.iter().map(status).collect::<Option<BTreeMap<_, _>>>()?;
+    known.violated = texts(data.get("violated")?)?.into_iter().collect();
+    let pair = |(name, value): (&String, &Value)| Some((name.clone(), text(value)?));
+    known.configuration = pairs("configuration")?.iter().map(pair).collect::<Option<BTreeMap<_, _>>>()?;
+    known.plan = match data.get("plan")? {
+        Value::Null => None,
+        steps => Some(steps.as_array()?.iter().map(PlannedStep::from_record).collect::<Option<_>>()?),
+    };
+    known.running = match data.get("running")? {
+        Value::Null => None,
+        record => Some(running_from_record(record)?),
+    };
+    known.failures = match data.get("failures")? {
+        Value::Null => None,
+        record => Some((PlannedStep::from_record(record.get(0)?)?, record.get(1)?.as_u64()? as u32)),
+    };
+    (known.reached, known.stuck) = (truth("reached")?, truth("stuck")?);
+    known.unproved = truth("unproved")?;
+    known.hopes = texts(data.get("hopes")?)?.into_iter().collect();
+    known.hoped = Duration::from_micros(number("hoped")?);
+    (known.actions, known.effects, known.lines) = (number("actions")?, number("effects")?, number("lines")?);
+    known.numbers = Numbers::from_record(data.get("numbers")?)?;
+    known.now = Duration::from_micros(number("now")?);
+    let effects = data.get("outstanding")?.as_array()?.iter().map(effect_from_record);
+    known.outstanding =
+        effects.collect::<Option<Vec<_>>>()?.into_iter().map(|effect| (effect.number, effect)).collect();
+    Some(())
 }
 
 fn micros(time: Duration) -> u64 {

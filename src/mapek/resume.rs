@@ -13,7 +13,7 @@ use pddl::ast::{
     Domain, DurationConstraint, Effect, EffectTime, Expression, Identifier, Name, Span, Term,
 };
 
-use super::step::PlannedStep;
+use crate::mapek::step::PlannedStep;
 
 /// Of the duration of an action that has done all it should and has not ended, so much is taken to be left: one part of so
 /// many. Progress comes in hundredths.

@@ -6,8 +6,8 @@ use pddl::validate::{PlanStep, PlanText};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value, json};
 
-use super::number;
 use crate::mission::Mission;
+use crate::number;
 
 /// An action with its configuration.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,10 +6,10 @@ use num_rational::BigRational;
 
 /// A look at the planner of a loop; copies look at the same one.
 #[derive(Debug, Clone, Default)]
-pub struct Watch(Arc<Mutex<State>>);
+pub struct Watch(Arc<Mutex<Looked>>);
 
 #[derive(Debug, Default)]
-struct State {
+struct Looked {
     begun: u64,
     planning: Option<Planning>,
 }
@@ -50,7 +50,7 @@ impl Watch {
         self.state(|state| state.planning = None);
     }
 
-    fn state<T>(&self, use_it: impl FnOnce(&mut State) -> T) -> T {
+    fn state<T>(&self, use_it: impl FnOnce(&mut Looked) -> T) -> T {
         use_it(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }

@@ -10,8 +10,8 @@
 use encodings::{Config, Status, optimize};
 use pddl::ast::{InitialElement, Name, Problem};
 
-use crate::mission::Mission;
 use crate::mission::binding::atom;
+use crate::mission::joined::Mission;
 
 /// What keeps an unsolvable mission from having a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -8,9 +8,9 @@ use pddl::ast::{ActionBody, Assignment, Effect, InitialElement, Name};
 use pddl::{Diagnostic, Severity, print_domain};
 use rules::{Engine, Fact};
 
-use super::Mission;
 use crate::knowledge::Knowledge;
 use crate::message::{Message, nearest};
+use crate::mission::joined::Mission;
 
 impl Mission {
     /// Warnings about names of the knowledge base that nothing stands for, and about values that nothing gives.

@@ -3,12 +3,13 @@
 use encodings::{GroundConfig, Limits, Replanner, Task};
 use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
-use pddl::ast::{Condition, Declaration, Domain, InitialElement, Metric, Name, Problem, Term};
+use pddl::ast::{Atom, Condition, Declaration, Domain, InitialElement, Metric, Name, Problem, Term};
 use pddl::{self, Severity, Source};
 
-use super::{Mission, binding};
 use crate::knowledge::Knowledge;
 use crate::message::Message;
+use crate::mission::binding;
+use crate::mission::joined::Mission;
 
 impl Mission {
     /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
@@ -71,6 +72,15 @@ impl Mission {
             _ => None,
         });
         values.collect()
+    }
+
+    /// The value of a function that the problem states, by name and arguments.
+    pub(crate) fn value(&self, name: &str) -> Option<BigRational> {
+        let words: Vec<&str> = name.split_whitespace().collect();
+        self.problem.init.iter().find_map(|element| match element {
+            InitialElement::Value(atom, value, _) if is_named(atom, &words) => Some(value.clone()),
+            _ => None,
+        })
     }
 
     /// Says anew which designs of a filled problem are available: those that `allowed` answers with yes, asked with the
@@ -162,4 +172,15 @@ impl Mission {
     pub(super) fn config(&self, objectives: &[Metric], limits: &Limits) -> GroundConfig {
         GroundConfig { solves: self.solves(), objectives: objectives.to_vec(), limits: limits.clone() }
     }
+}
+
+fn is_named(atom: &Atom, words: &[&str]) -> bool {
+    let same = |(term, word): (&Term, &&str)| match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(word),
+    };
+    words.split_first().is_some_and(|(symbol, arguments)| {
+        atom.predicate.name == Name::new(symbol)
+            && atom.arguments.len() == arguments.len()
+            && atom.arguments.iter().zip(arguments).all(same)
+    })
 }

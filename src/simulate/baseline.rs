@@ -60,7 +60,7 @@ impl Strategy {
 #[derive(Debug)]
 pub(super) struct Controller {
     strategy: Strategy,
-    knowledge: Loop,
+    control: Loop,
     plan: VecDeque<PlannedStep>,
     random: fastrand::Rng,
     gave_up: bool,
@@ -71,11 +71,11 @@ pub(super) struct Controller {
 }
 
 impl Controller {
-    pub(super) fn new(strategy: Strategy, knowledge: Loop, seed: u64) -> Self {
+    pub(super) fn new(strategy: Strategy, control: Loop, seed: u64) -> Self {
         let random = fastrand::Rng::with_seed(seed ^ 0x5eed);
         Self {
             strategy,
-            knowledge,
+            control,
             plan: VecDeque::new(),
             random,
             gave_up: false,
@@ -91,7 +91,7 @@ impl Controller {
 
     pub(super) fn start(&mut self) -> Vec<Answer> {
         if self.strategy == Strategy::Joint {
-            let answers = self.knowledge.start();
+            let answers = self.control.start();
             self.count(&answers);
             return answers;
         }
@@ -105,11 +105,11 @@ impl Controller {
         let is_failure = matches!(event, Event::Failed { .. });
         let observation = Observation::from(event);
         if self.strategy == Strategy::Joint {
-            let answers = self.knowledge.handle(&observation, now);
+            let answers = self.control.handle(&observation, now);
             self.count(&answers);
             return answers;
         }
-        self.knowledge.observe(&observation, now);
+        self.control.observe(&observation, now);
         let mut answers = Vec::new();
         if is_failure && self.strategy == Strategy::None {
             self.gave_up = true;
@@ -124,27 +124,27 @@ impl Controller {
     }
 
     fn count(&mut self, answers: &[Answer]) {
-        let _ = self.knowledge.decision(answers);
+        let _ = self.control.decision(answers);
         self.plans += answers.iter().filter(|answer| matches!(answer, Answer::PlanRequested { .. })).count();
     }
 
     fn replan(&mut self) {
         self.plans += 1;
-        self.planned_with.clone_from(self.knowledge.knowledge().available());
-        self.plan = self.knowledge.plan_anew().unwrap_or_default().into();
+        self.planned_with.clone_from(self.control.beliefs().available());
+        self.plan = self.control.plan_anew().unwrap_or_default().into();
     }
 
     /// Requests the next action if none is under way.
     fn go_on(&mut self, answers: &mut Vec<Answer>) {
-        if self.gave_up || self.knowledge.knowledge().running().is_some() {
+        if self.gave_up || self.control.beliefs().running().is_some() {
             return;
         }
         if let Some(step) = self.plan.pop_front() {
             let step = if self.strategy.chooses_designs() { self.choose(&step, |_| true) } else { step };
-            self.knowledge.request_now(step, answers);
+            self.control.request_now(step, answers);
         } else if self.strategy != Strategy::None
-            && self.planned_with != *self.knowledge.knowledge().available()
-            && !self.knowledge.is_goal()
+            && self.planned_with != *self.control.beliefs().available()
+            && !self.control.is_goal()
         {
             // There was no plan; with other designs there may be one.
             self.replan();
@@ -162,7 +162,7 @@ impl Controller {
             if !concerns(function) {
                 continue;
             }
-            let designs = self.knowledge.designs_for(function);
+            let designs = self.control.designs_for(function);
             let design = match self.strategy {
                 Strategy::Random if !designs.is_empty() => {
                     Some(designs[self.random.usize(..designs.len())].clone())
@@ -179,7 +179,7 @@ impl Controller {
 
     /// The design with which the action costs least by itself, whether or not it can be done; of equals the first.
     fn cheapest(&self, step: &PlannedStep, function: &str, designs: &[String]) -> Option<String> {
-        let mission = self.knowledge.knowledge().mission();
+        let mission = self.control.beliefs().mission();
         let mut problem = mission.problem().clone();
         mission.fill(&mut problem);
         let maximize = problem.metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize);
@@ -197,7 +197,7 @@ impl Controller {
 
     /// Chooses anew where the action under way has lost a design.
     fn replace_lost(&mut self, answers: &mut Vec<Answer>) {
-        let known = self.knowledge.knowledge();
+        let known = self.control.beliefs();
         let Some((_, step)) = known.running() else { return };
         let step = step.clone();
         let available = known.available().clone();
@@ -205,7 +205,7 @@ impl Controller {
             |function: &str| step.design(function).is_some_and(|design| !available.contains(design));
         if step.configuration.iter().any(|(function, _)| is_lost(function)) {
             let chosen = self.choose(&step, is_lost);
-            self.knowledge.reconfigure_now(chosen, answers);
+            self.control.reconfigure_now(chosen, answers);
         }
     }
 }

@@ -15,13 +15,13 @@ mod world;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use crate::mapek::{Answer, Command, Event, Loop, Observation};
+use crate::mapek::{Answer, Command, Event, Loop, Observation, Settings};
 use crate::message::Message;
 use crate::mission::Mission;
 
 pub use baseline::Strategy;
 pub use report::{Run, SUAVE_COLUMNS};
-pub use settings::{Disturbance, Failure, Signal, Simulation, Suave};
+pub use settings::{Disturbance, RandomFailure, Signal, Simulation, Suave};
 pub use statistics::Sample;
 
 use baseline::Controller;
@@ -30,12 +30,13 @@ use world::World;
 /// The seconds of a loop's clock in a unit of the domain's time: a minute, as the shipped missions have it.
 const SECONDS: f64 = 60.0;
 
-/// Runs one mission; `log` hears of every observation and every answer, at its time in seconds.
+/// Runs one mission with a loop that is as eager as `control` says; `log` hears of every observation and every answer, at its time in seconds.
 ///
 /// # Errors
 /// The mission or the scenario does not fit.
 pub fn simulate(
     mission: &Mission,
+    control: &Settings,
     settings: &Simulation,
     strategy: Strategy,
     seed: u64,
@@ -44,7 +45,7 @@ pub fn simulate(
     if let Some(mistake) = settings.mistake() {
         return Err(vec![Message::error("M111", format!("the simulation cannot be run: {mistake}"))]);
     }
-    let control = Loop::new(mission.clone(), mission.settings().clone())?;
+    let control = Loop::new(mission.clone(), control.clone())?;
     let mut stage = Stage {
         world: World::new(mission.clone(), settings.clone(), seed),
         controller: Controller::new(strategy, control, seed),

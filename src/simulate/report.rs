@@ -1,6 +1,6 @@
 //! The figures of one simulated mission, also in the columns of SUAVE.
 
-use super::baseline::Strategy;
+use crate::simulate::baseline::Strategy;
 
 /// The columns that SUAVE writes, as it names them; its seconds are the domain's time units here.
 pub const SUAVE_COLUMNS: [&str; 4] =

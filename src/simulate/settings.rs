@@ -28,7 +28,7 @@ pub struct Simulation {
     pub signals: Vec<Signal>,
     /// Components that fail at random.
     #[serde(default)]
-    pub failures: Vec<Failure>,
+    pub failures: Vec<RandomFailure>,
     /// How the figures of SUAVE are found.
     #[serde(default)]
     pub suave: Option<Suave>,
@@ -78,7 +78,7 @@ pub struct Signal {
 /// A component that fails at random.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Failure {
+pub struct RandomFailure {
     /// The component.
     pub component: String,
     /// The mean time to a failure.

@@ -12,10 +12,11 @@ use ontology::tomasys::change::Status;
 use pddl::ast::Problem;
 use pddl::validate::{advance, metric_after};
 
-use super::settings::{Disturbance, Simulation};
-use crate::mapek::{Command, Effect, Event, PlannedStep, number};
+use crate::mapek::{Command, Effect, Event, PlannedStep, resume};
 use crate::message::Message;
 use crate::mission::Mission;
+use crate::number;
+use crate::simulate::settings::{Disturbance, Simulation};
 
 /// Times and shares are rounded to this part of a unit.
 const GRAIN: f64 = 1e6;
@@ -171,7 +172,7 @@ impl World {
         if job.suspended {
             return None;
         }
-        let domain = crate::mapek::resume(self.truth.domain(), &job.step, &exact(job.progress));
+        let domain = resume(self.truth.domain(), &job.step, &exact(job.progress));
         let advance = advance(&domain, self.filled(), &job.step.to_plan_step(), false).ok()?;
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
     }
@@ -356,7 +357,7 @@ impl World {
     /// How much was inspected, in the unit of the length; none where the mission does not inspect.
     pub fn distance(&self) -> Option<f64> {
         let suave = self.settings.suave.as_ref()?;
-        let length = crate::mapek::value_of(self.truth.problem(), &suave.length)?;
+        let length = self.truth.value(&suave.length)?;
         Some(number::to_f64(&length) * self.inspected)
     }
 }

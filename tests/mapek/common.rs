@@ -4,18 +4,17 @@ use std::path::Path;
 use std::time::Duration;
 
 use metaplan::mapek::{Answer, Loop, Observation};
-use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 
 /// A loop for one of the shipped missions.
 pub fn control(name: &str) -> Loop {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
-    let (mission, _) = Mission::read(&manifest).expect("the mission is read");
-    let settings = mission.settings().clone();
+    let Setup { mission, settings, .. } = Setup::read(&manifest).expect("the mission is read");
     Loop::new(mission, settings).expect("the mission can be planned for")
 }
 
 /// Feeds a line, some milliseconds after the one before.
 pub fn feed(control: &mut Loop, line: &str) -> Vec<Answer> {
-    let now = control.knowledge().now() + Duration::from_millis(100);
+    let now = control.beliefs().now() + Duration::from_millis(100);
     control.handle(&Observation::parse(line), now)
 }

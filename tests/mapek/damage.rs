@@ -30,7 +30,7 @@ type Statuses = BTreeMap<String, Vec<String>>;
 
 /// Fresh knowledge that is told the last words in a random order; what is available, and what is in error.
 fn fresh(place: &Place, told: &Told, control: &Loop, random: &mut Rng) -> (BTreeSet<String>, Statuses) {
-    let mission = place.begun.knowledge().mission();
+    let mission = place.begun.beliefs().mission();
     let mut knowledge: Knowledge = mission.knowledge().expect("a knowledge base").clone();
     let mut words: Vec<(bool, &str, &str)> = Vec::new();
     words.extend(told.components.iter().map(|(name, status)| (true, name.as_str(), *status)));
@@ -67,7 +67,7 @@ fn fresh(place: &Place, told: &Told, control: &Loop, random: &mut Rng) -> (BTree
 
 /// Which function has which design, as the loop has told its knowledge base.
 fn at_work(control: &Loop) -> Vec<(String, String)> {
-    let knowledge = control.knowledge().mission().knowledge().expect("a knowledge base");
+    let knowledge = control.beliefs().mission().knowledge().expect("a knowledge base");
     let mut pairs = Vec::new();
     for objective in knowledge.runtime().objectives() {
         let design = objective.groundings.first().and_then(|grounding| grounding.design.clone());
@@ -155,7 +155,7 @@ impl<'a> Life<'a> {
     }
 
     fn line(&mut self) -> String {
-        let known = self.control.knowledge();
+        let known = self.control.beliefs();
         let running = known.running().map(|(action, _)| action);
         let (cancelling, choice) = (known.cancelling(), self.random.u32(..10));
         match (running, choice) {
@@ -184,7 +184,7 @@ impl<'a> Life<'a> {
             context()
         );
         let (available, statuses) = fresh(self.place, &self.told, &self.control, &mut self.random.clone());
-        let known = self.control.knowledge();
+        let known = self.control.beliefs();
         assert_eq!(*known.available(), available, "{}", context());
         assert_eq!(*known.statuses(), statuses, "{}", context());
         if self.place.is_plain {
@@ -281,7 +281,7 @@ fn a_second_fault_while_an_action_waits_for_its_cancellation_is_kept() {
     let bright = r#"{"event":"measured","attribute":"ambient_light","value":0.95}"#;
     assert_eq!(said(&feed(&mut ugv, bright)), [""; 0]);
     let both = vec!["IN_ERROR_COMPONENT".to_owned(), "IN_ERROR_NFR".to_owned()];
-    assert_eq!(ugv.knowledge().statuses().get("o_f_localization"), Some(&both));
+    assert_eq!(ugv.beliefs().statuses().get("o_f_localization"), Some(&both));
     let lidar = "move wp2 wp3 (f_localization = fd_amcl_lidar)";
     let answers = feed(&mut ugv, r#"{"event":"action_cancelled","action":2}"#);
     assert_eq!(said(&answers), ["fd_amcl_lidar", lidar]);
@@ -309,7 +309,7 @@ fn a_failure_that_contradicts_what_rules_conclude_is_kept() {
     };
     let found = answers.iter().find_map(contradicted).expect("it is said");
     assert!(found.iter().any(|one| one.facts.iter().any(|fact| fact.contains(&own))), "{found:?}");
-    let knowledge = control.knowledge().mission().knowledge().expect("a knowledge base");
+    let knowledge = control.beliefs().mission().knowledge().expect("a knowledge base");
     let components = knowledge.view().components();
     let status =
         |name: &str| components.iter().find(|c| c.individual.name == name).and_then(|c| c.status.clone());
@@ -317,7 +317,7 @@ fn a_failure_that_contradicts_what_rules_conclude_is_kept() {
     for design in
         place.designs.iter().filter(|d| d.components.contains(&own) || d.components.contains(&other))
     {
-        assert!(!control.knowledge().available().contains(&design.name), "{}", design.name);
+        assert!(!control.beliefs().available().contains(&design.name), "{}", design.name);
     }
     let answers = report(&mut control, &other, "RECOVERED");
     assert_eq!(answers.iter().find_map(contradicted), Some(Vec::new()), "{answers:?}");

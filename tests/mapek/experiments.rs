@@ -190,7 +190,7 @@ fn an_action_that_is_all_done_is_not_cancelled() {
         let mut control = control(mission);
         control.start();
         feed(&mut control, r#"{"event":"action_progress","action":1,"fraction":1}"#);
-        assert_eq!(control.violation(), None, "{mission}");
+        assert_eq!(control.beliefs().violation(), None, "{mission}");
         let answers = feed(&mut control, change);
         let commands = answers.iter().filter_map(Answer::effect).map(|effect| &effect.command);
         for command in commands {
@@ -239,7 +239,7 @@ fn a_better_design_returns() {
     // From `wp3` the Kinect saves 2 percent of battery for each of two moves.
     let detour = |benefit: i64, settle: u64| {
         let mut ugv = control("ugv");
-        let mission = ugv.knowledge().mission().clone();
+        let mission = ugv.beliefs().mission().clone();
         let settings = metaplan::mapek::Settings {
             minimum_benefit: num_rational::BigRational::from_integer(benefit.into()),
             settle: std::time::Duration::from_secs(settle),

@@ -5,8 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use metaplan::mission::Mission;
-use metaplan::simulate::{Disturbance, Failure, Run, Simulation, Strategy, simulate};
+use metaplan::setup::Setup;
+use metaplan::simulate::{Disturbance, RandomFailure, Run, Simulation, Strategy, simulate};
 
 /// A mission with components that can fail.
 struct Robot {
@@ -80,7 +80,7 @@ fn scenarios(robot: &Robot) -> Vec<(String, Simulation)> {
                 all.push((format!("{name}, {when}, {length}"), simulation(robot, events, Vec::new())));
             }
         }
-        let again = |component: &&str| Failure {
+        let again = |component: &&str| RandomFailure {
             component: (*component).to_owned(),
             mean_time: robot.random.0,
             recovery: Some(robot.random.1),
@@ -110,7 +110,7 @@ fn once(failing: &[&str], time: (f64, f64), recovery: Option<(f64, f64)>) -> Vec
     events
 }
 
-fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<Failure>) -> Simulation {
+fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<RandomFailure>) -> Simulation {
     Simulation {
         step: robot.pace.0,
         time_budget: 200.0 * robot.pace.0,
@@ -136,10 +136,12 @@ struct Comparison {
 }
 
 /// Plays a scenario with all ways of control: the loop's figures, and the comparison with each other way.
-fn play(mission: &Mission, settings: &Simulation, seeds: u64) -> (String, Vec<Comparison>) {
+fn play(setup: &Setup, settings: &Simulation, seeds: u64) -> (String, Vec<Comparison>) {
     let runs = |strategy: Strategy| -> Vec<Run> {
-        let run =
-            |seed| simulate(mission, settings, strategy, seed, &mut |_, _| {}).expect("it is simulated");
+        let run = |seed| {
+            simulate(&setup.mission, &setup.settings, settings, strategy, seed, &mut |_, _| {})
+                .expect("it is simulated")
+        };
         (1..=seeds).map(run).collect()
     };
     let joint = runs(Strategy::Joint);
@@ -158,9 +160,9 @@ fn play(mission: &Mission, settings: &Simulation, seeds: u64) -> (String, Vec<Co
     (figures(&joint), others.map(compare).collect())
 }
 
-fn mission(robot: &Robot) -> Mission {
+fn setup(robot: &Robot) -> Setup {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{}.toml", robot.mission));
-    Mission::read(&manifest).expect("the mission is read").0
+    Setup::read(&manifest).expect("the mission is read")
 }
 
 /// The mean cost of accomplished missions, and how many they are.
@@ -175,11 +177,11 @@ fn figures(runs: &[Run]) -> String {
 /// Plays all scenarios of a robot with so many seeds and prints the table; for each strategy in how many missions the loop did
 /// better, and in how many worse.
 fn table(robot: &Robot, seeds: u64) -> BTreeMap<&'static str, (usize, usize)> {
-    let mission = mission(robot);
+    let setup = setup(robot);
     let mut total: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     println!("scenario: joint; others with the numbers of missions in which the loop did better and worse");
     for (name, settings) in scenarios(robot) {
-        let (joint, others) = play(&mission, &settings, seeds);
+        let (joint, others) = play(&setup, &settings, seeds);
         let cell = |other: &Comparison| {
             let Comparison { strategy, figures, better, worse } = other;
             let seeds = if worse.is_empty() { String::new() } else { format!(" {worse:?}") };

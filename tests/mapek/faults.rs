@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use metaplan::journal::{Journal, Policy, Report, Sync};
+use metaplan::journal::{Journal, JournalReport, Policy, Sync};
 use metaplan::mapek::{Answer, Loop};
-use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use serde_json::Value;
 
 use crate::common::control;
@@ -86,7 +86,7 @@ fn open(files: &Files, pristine: &Loop) -> Outcome {
     let sound = Outcome::Sound(state(&control), answers);
     drop(journal);
     // What was completed is complete, and says so.
-    let again = Report::read(directory.path()).expect("a journal");
+    let again = JournalReport::read(directory.path()).expect("a journal");
     assert!(again.is_sound(), "{:?}", again.messages);
     sound
 }
@@ -312,8 +312,8 @@ fn links_and_pipes_are_refused_at_once_and_files_are_private() {
 fn a_journal_belongs_to_all_that_decisions_rest_on() {
     let directory = crate::worlds::own_files(7);
     let read = |directory: &Path| {
-        let (mission, _) = Mission::read(&directory.join("m.toml")).expect("the mission is read");
-        let settings = mission.settings().clone();
+        let Setup { mission, settings, .. } =
+            Setup::read(&directory.join("m.toml")).expect("the mission is read");
         Loop::new(mission, settings).expect("the mission can be planned for")
     };
     let journal = tempfile::tempdir().expect("a directory");

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use metaplan::mapek::{Answer, Loop, Observation};
-use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 
 use crate::soak::{processor_time, resident};
 
@@ -76,8 +76,8 @@ pub fn files() -> Option<tempfile::TempDir> {
 
 fn fleet() -> Option<Vec<Loop>> {
     let directory = files()?;
-    let (mission, _) = Mission::read(&directory.path().join("m.toml")).expect("the mission is read");
-    let settings = mission.settings().clone();
+    let Setup { mission, settings, .. } =
+        Setup::read(&directory.path().join("m.toml")).expect("the mission is read");
     let first = Loop::new(mission, settings).expect("the mission can be planned for");
     Some(vec![first; ROBOTS])
 }

@@ -96,7 +96,7 @@ impl Fuzz {
         if random.u32(..10) == 0 {
             return ((*pick(random, &INVALID)).to_owned(), false);
         }
-        let running = control.knowledge().running().map(|(action, _)| action);
+        let running = control.beliefs().running().map(|(action, _)| action);
         let event = match random.u32(..20) {
             0..=2 => {
                 let status = *pick(random, &["FALSE", "RECOVERED", "TRUE", "ERROR", "OK"]);
@@ -110,7 +110,7 @@ impl Fuzz {
                 let (name, values) = *pick(random, self.world.facts);
                 json!({ "event": "fact_changed", "name": name, "value": pick(random, values) })
             }
-            9 if random.u32(..4) == 0 || control.knowledge().reached() => {
+            9 if random.u32(..4) == 0 || control.beliefs().reached() => {
                 json!({ "event": "goal_changed", "goal": pick(random, self.world.goals) })
             }
             3 | 9 => self.burst(),
@@ -192,7 +192,7 @@ fn without_counters(control: &Loop) -> Value {
 }
 
 fn invariants(control: &Loop, context: &dyn Fn() -> String) {
-    let known = control.knowledge();
+    let known = control.beliefs();
     let mission = known.mission();
     let base = mission.knowledge().expect("a knowledge base");
     let designs = base.view().function_designs();
@@ -212,11 +212,11 @@ fn invariants(control: &Loop, context: &dyn Fn() -> String) {
             assert!(available.contains(design), "{design} is not available: {}", context());
         }
     }
-    assert_eq!(control.violation(), None, "{}", context());
+    assert_eq!(control.beliefs().violation(), None, "{}", context());
 }
 
 fn incremental_is_from_scratch(control: &Loop, context: &dyn Fn() -> String) {
-    let engine = control.knowledge().mission().knowledge().expect("a knowledge base").engine();
+    let engine = control.beliefs().mission().knowledge().expect("a knowledge base").engine();
     let stated: Vec<Fact> = engine.facts().filter(|fact| engine.is_asserted(fact)).collect();
     let scratch =
         Engine::new(engine.symbols().clone(), engine.program().clone(), stated).expect("it comes to an end");
@@ -230,7 +230,7 @@ fn restored_is_equal(loop_: &Loop, mut other: Loop, context: &dyn Fn() -> String
     other.restore(&loop_.snapshot()).expect("the snapshot fits");
     assert_eq!(other.snapshot(), loop_.snapshot(), "{}", context());
     let facts = |loop_: &Loop| {
-        let engine = loop_.knowledge().mission().knowledge().expect("a knowledge base").engine();
+        let engine = loop_.beliefs().mission().knowledge().expect("a knowledge base").engine();
         let facts: BTreeSet<String> =
             engine.facts().map(|fact| fact.display(engine.symbols()).to_string()).collect();
         facts

@@ -90,7 +90,7 @@ impl Robot {
             assert!(before.is_none() || effect.repeated, "{effect:?} comes twice without a word");
             assert!(before.is_none_or(|before| before == plain), "{effect:?} has changed");
             if effect.repeated {
-                let waiting = control.knowledge().outstanding().any(|other| other.number == effect.number);
+                let waiting = control.beliefs().outstanding().any(|other| other.number == effect.number);
                 assert!(waiting, "{effect:?} was acknowledged");
             }
         }
@@ -107,7 +107,7 @@ fn open(directory: &Path, pristine: &Loop) -> (Journal, Loop, Recovery, Vec<Answ
 /// Sends all lines that were not handled yet.
 fn go_on(journal: &mut Journal, control: &mut Loop, robot: &mut Robot) {
     for (index, line) in script().iter().enumerate() {
-        if control.knowledge().sequence() < Some(index as u64 + 1) {
+        if control.beliefs().sequence() < Some(index as u64 + 1) {
             let answers = journal.handle(control, line, Duration::ZERO).expect("written");
             robot.take(control, &answers);
         }
@@ -128,7 +128,7 @@ fn undisturbed(pristine: &Loop) -> (serde_json::Value, Robot, tempfile::TempDir)
     let mut robot = Robot::default();
     robot.take(&control, &answers);
     go_on(&mut journal, &mut control, &mut robot);
-    assert!(control.knowledge().reached(), "{:?}", control.snapshot());
+    assert!(control.beliefs().reached(), "{:?}", control.snapshot());
     (state(&control), robot, directory)
 }
 
@@ -169,7 +169,7 @@ fn check(cuts: usize) {
         let keep = random.usize(sound..=text.len());
         std::fs::write(&last, &text[..keep]).expect("cut");
         let (mut journal, mut control, recovery, answers) = open(directory.path(), &pristine);
-        let known = control.knowledge().sequence().unwrap_or(0);
+        let known = control.beliefs().sequence().unwrap_or(0);
         let mut robot = Robot { effects: received[known.saturating_sub(1) as usize].clone() };
         let torn = keep > sound && text[keep - 1] != b'\n' && text.get(keep) != Some(&b'\n');
         assert_eq!(recovery.cut > 0, torn);

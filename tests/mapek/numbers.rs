@@ -30,10 +30,10 @@ fn a_line_that_comes_late_is_not_lost() {
     check(&mut ugv, r#"{"event":"tick","seq":5}"#, None);
     let late = r#"{"event":"component_status","component":"c_kinect","status":"FALSE","seq":4}"#;
     check(&mut ugv, late, None);
-    assert!(!ugv.knowledge().available().contains("fd_amcl_kinect"));
+    assert!(!ugv.beliefs().available().contains("fd_amcl_kinect"));
     check(&mut ugv, late, Some("duplicate"));
     check(&mut ugv, r#"{"event":"tick","seq":5}"#, Some("duplicate"));
-    assert_eq!(ugv.knowledge().sequence(), Some(5));
+    assert_eq!(ugv.beliefs().sequence(), Some(5));
 }
 
 #[test]
@@ -43,7 +43,7 @@ fn a_number_that_is_far_ahead_spoils_nothing() {
     check(&mut ugv, r#"{"event":"tick","seq":1}"#, None);
     check(&mut ugv, r#"{"event":"tick","seq":18446744073709551615}"#, Some("M307"));
     check(&mut ugv, r#"{"event":"tick","seq":2}"#, None);
-    assert_eq!(ugv.knowledge().sequence(), Some(2));
+    assert_eq!(ugv.beliefs().sequence(), Some(2));
 }
 
 #[test]
@@ -91,13 +91,13 @@ fn nothing_grows_while_nobody_listens() {
     let (first, last) = (sizes[0], sizes[3]);
     assert!(last < first + 200, "{sizes:?}");
     assert!(
-        ugv.knowledge().outstanding().count() <= 2,
+        ugv.beliefs().outstanding().count() <= 2,
         "{:?}",
-        ugv.knowledge().outstanding().collect::<Vec<_>>()
+        ugv.beliefs().outstanding().collect::<Vec<_>>()
     );
     // Plans of earlier lines are not kept for the journal that is not there.
     assert!(ugv.decision(&[]).plans.len() <= 2);
-    let superseded: usize = ugv.knowledge().outstanding().map(|effect| effect.supersedes.len()).sum();
+    let superseded: usize = ugv.beliefs().outstanding().map(|effect| effect.supersedes.len()).sum();
     assert!(superseded > 0);
 }
 
@@ -123,7 +123,7 @@ fn memory_over_ten_million_events() {
             }
             number += 1;
             if acknowledging {
-                let waiting: Vec<u64> = ugv.knowledge().outstanding().map(|effect| effect.number).collect();
+                let waiting: Vec<u64> = ugv.beliefs().outstanding().map(|effect| effect.number).collect();
                 for effect in waiting {
                     feed(&mut ugv, &json!({ "event": "acknowledged", "effect": effect }).to_string());
                     number += 1;

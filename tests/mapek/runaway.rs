@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use metaplan::journal::{Journal, Policy, Sync};
 use metaplan::mapek::{Answer, Command, Loop};
-use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use serde_json::json;
 
 use crate::common::feed;
@@ -16,8 +16,8 @@ const RUNAWAY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://m
     [counting] t:c_status(:c_0, \"FALSE\") ^ :counts(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> :counts(?x, ?m) .\n";
 
 fn read(directory: &Path) -> Loop {
-    let (mission, _) = Mission::read(&directory.join("m.toml")).expect("the mission is read");
-    let settings = mission.settings().clone();
+    let Setup { mission, settings, .. } =
+        Setup::read(&directory.join("m.toml")).expect("the mission is read");
     Loop::new(mission, settings).expect("the mission can be planned for")
 }
 
@@ -62,11 +62,11 @@ fn a_rule_that_runs_away_refuses_no_report() {
     let mut wild = read(directory.path());
     tame.start();
     wild.start();
-    assert_eq!(wild.knowledge().available(), tame.knowledge().available());
+    assert_eq!(wild.beliefs().available(), tame.beliefs().available());
     let answers = feed(&mut wild, &component(0, "FALSE"));
     assert_eq!(faults(&answers), [Some("counting".to_owned())], "{answers:?}");
     nothing_begins(&answers);
-    assert!(wild.knowledge().available().is_empty());
+    assert!(wild.beliefs().available().is_empty());
     for (number, status) in [(1, "FALSE"), (2, "FALSE"), (1, "TRUE"), (2, "TRUE")] {
         let answers = feed(&mut wild, &component(number, status));
         assert_eq!(faults(&answers), [], "it is said once: {answers:?}");
@@ -84,9 +84,9 @@ fn a_rule_that_runs_away_refuses_no_report() {
     }
     feed(&mut tame, &component(0, "TRUE"));
     for control in [&wild, &again] {
-        assert_eq!(control.knowledge().available(), tame.knowledge().available());
-        assert_eq!(control.knowledge().statuses(), tame.knowledge().statuses());
-        assert!(control.knowledge().running().is_some() && !control.knowledge().suspended());
+        assert_eq!(control.beliefs().available(), tame.beliefs().available());
+        assert_eq!(control.beliefs().statuses(), tame.beliefs().statuses());
+        assert!(control.beliefs().running().is_some() && !control.beliefs().suspended());
     }
 }
 
@@ -107,5 +107,5 @@ fn a_journal_comes_back_to_where_a_rule_ran_away() {
     journal.begin(&mut again).expect("written");
     assert!(recovery.warnings.is_empty(), "{:?}", recovery.warnings);
     assert_eq!(again.snapshot(), control.snapshot());
-    assert!(again.knowledge().available().is_empty());
+    assert!(again.beliefs().available().is_empty());
 }

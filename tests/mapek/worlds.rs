@@ -5,7 +5,7 @@ use std::path::Path;
 
 use fastrand::Rng;
 use metaplan::mapek::{Loop, Settings};
-use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use num_rational::BigRational;
 
 /// What a design needs, as its knowledge base states it.
@@ -34,11 +34,12 @@ pub struct Place {
 
 impl Place {
     fn new(name: &str, manifest: &Path, depends: Vec<(String, String)>, is_plain: bool) -> Self {
-        let (mission, _) = Mission::read(manifest).unwrap_or_else(|errors| panic!("{name}: {errors:?}"));
-        let settings = Settings { time_limit: None, ..mission.settings().clone() };
+        let Setup { mission, settings, .. } =
+            Setup::read(manifest).unwrap_or_else(|errors| panic!("{name}: {errors:?}"));
+        let settings = Settings { time_limit: None, ..settings };
         let mut begun = Loop::new(mission, settings).expect("the mission can be planned for");
         begun.start();
-        let knowledge = begun.knowledge().mission().knowledge().expect("a knowledge base");
+        let knowledge = begun.beliefs().mission().knowledge().expect("a knowledge base");
         let view = knowledge.view();
         let components = view.components().into_iter().map(|component| component.individual.name).collect();
         let designs: Vec<Design> = view

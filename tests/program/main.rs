@@ -12,6 +12,7 @@ mod explain;
 mod export;
 mod journal;
 mod limits;
+mod manifest;
 mod mutation;
 mod probabilistic;
 mod real;

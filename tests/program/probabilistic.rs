@@ -8,6 +8,7 @@ use metaplan::comparison::{
     Coadaptation, MapOptions, Process, Risk, import_map, program, published, shortest_routes,
 };
 use metaplan::mission::Mission;
+use metaplan::setup::Setup;
 use num_rational::BigRational;
 use probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use probabilistic::explore::{Bounds, explore};
@@ -26,7 +27,7 @@ pub fn shared(path: &str) -> Option<PathBuf> {
 }
 
 /// The mission that an imported map becomes, in a directory of its own.
-pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Mission) {
+pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Setup) {
     let files = import_map("map", map, options).expect("a map");
     let directory = tempfile::tempdir().expect("a directory");
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).expect("written");
@@ -34,13 +35,13 @@ pub fn mission(map: &str, options: &MapOptions) -> (tempfile::TempDir, Mission) 
     write("camara.ttl", &files.knowledge);
     write("domain.pddl", &files.domain);
     write("problem.pddl", &files.problem);
-    let (mission, _) = Mission::read(&directory.path().join("camara.toml")).expect("a mission");
-    (directory, mission)
+    let setup = Setup::read(&directory.path().join("camara.toml")).expect("a mission");
+    (directory, setup)
 }
 
-pub fn coadaptation(mission: &Mission) -> Coadaptation {
-    let (problem, _) = mission.filled().expect("filled");
-    Coadaptation::new(mission, &problem, mission.roles()).expect("a process")
+pub fn coadaptation(setup: &Setup) -> Coadaptation {
+    let (problem, _) = setup.mission.filled().expect("filled");
+    Coadaptation::new(&setup.mission, &problem, &setup.roles).expect("a process")
 }
 
 pub fn places(start: &str, goal: &str) -> MapOptions {
@@ -102,7 +103,7 @@ fn known_results(map: &str, speeds: bool, configurations: usize) {
         return; // Safe speed hits nothing, so the front is another one.
     }
     let (_directory, mut without_kinect) = mission(map, &places("l25", "l7"));
-    without_kinect.fail("c_kinect").expect("a component");
+    without_kinect.mission.fail("c_kinect").expect("a component");
     let question = "multi(R{\"time\"}min=? [ F \"goal\" ], Pmax=? [ F \"safe_goal\" ])";
     let risk = Risk { collisions: true, ..nothing };
     let Outcome::Front(front) = answer(&coadaptation(&without_kinect), risk, question) else {
@@ -136,8 +137,8 @@ fn planned(mission: &Mission) -> Option<f64> {
 }
 
 /// Both engines say the same: whether there is a plan.
-fn agree(what: &str, mission: &Mission, risk: Risk) -> bool {
-    let (process, plan) = (least_time(&coadaptation(mission), risk), planned(mission));
+fn agree(what: &str, setup: &Setup, risk: Risk) -> bool {
+    let (process, plan) = (least_time(&coadaptation(setup), risk), planned(&setup.mission));
     let close = match (&process, plan) {
         (Some(time), Some(cost)) => (Number::to_f64(time) - cost).abs() < 1e-9,
         (None, None) => true,
@@ -163,8 +164,8 @@ impl Agreed {
 /// So many pairs of places that a plan leads between; none where the map is missing.
 fn pairs_of_the_map(count: usize) -> Option<Agreed> {
     let map = std::fs::read_to_string(shared("real/map/map-p2cp3.json")?).expect("readable");
-    let (_directory, mission) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
-    let names = coadaptation(&mission).places;
+    let (_directory, setup) = mission(&map, &MapOptions { dark: dark(), ..places("l1", "l18") });
+    let names = coadaptation(&setup).places;
     let mut random = Random(7);
     let (mut agreed, mut seen) = (Agreed::default(), std::collections::BTreeSet::new());
     while agreed.solved < count {
@@ -172,11 +173,11 @@ fn pairs_of_the_map(count: usize) -> Option<Agreed> {
         if start == goal || !seen.insert((start, goal)) {
             continue;
         }
-        let mut mission = mission.clone();
-        mission.set("robot_at", &names[start]).expect("a place");
-        mission.aim("robot_at", &names[goal]);
+        let mut setup = setup.clone();
+        setup.mission.set("robot_at", &names[start]).expect("a place");
+        setup.mission.aim("robot_at", &names[goal]);
         let what = format!("{} to {}", names[start], names[goal]);
-        agreed.count(agree(&what, &mission, Risk::default()));
+        agreed.count(agree(&what, &setup, Risk::default()));
     }
     Some(agreed)
 }
@@ -240,16 +241,16 @@ fn generated_missions(count: usize) -> Agreed {
         let mut manifest = std::fs::read_to_string(directory.path().join("camara.toml")).expect("readable");
         manifest = manifest.replace("battery_unit = 100", "battery_unit = 1");
         std::fs::write(directory.path().join("camara.toml"), manifest).expect("written");
-        let mission = match Mission::read(&directory.path().join("camara.toml")) {
-            Ok((mission, _)) => mission,
+        let setup = match Setup::read(&directory.path().join("camara.toml")) {
+            Ok(setup) => setup,
             Err(messages) => panic!("{messages:?}"),
         };
-        let (problem, _) = mission.filled().expect("filled");
-        if Coadaptation::new(&mission, &problem, mission.roles()).is_err() {
+        let (problem, _) = setup.mission.filled().expect("filled");
+        if Coadaptation::new(&setup.mission, &problem, &setup.roles).is_err() {
             continue; // no arc at all
         }
         let risk = Risk { battery: binds, ..Risk::default() };
-        agreed.count(agree(&format!("mission {number}"), &mission, risk));
+        agreed.count(agree(&format!("mission {number}"), &setup, risk));
     }
     agreed
 }
@@ -359,9 +360,10 @@ fn a_mission_without_places_is_compared() {
 #[test]
 fn what_is_no_process_is_refused() {
     use pddl::ast::{InitialElement, Name, Problem as Pddl, Term};
-    let (mission, _) = Mission::read(&root().join("missions/camara_like.toml")).expect("a mission");
+    let Setup { mission, roles, .. } =
+        Setup::read(&root().join("missions/camara_like.toml")).expect("a mission");
     let (problem, _) = mission.filled().expect("filled");
-    let codes = |problem: &Pddl| match Coadaptation::new(&mission, problem, mission.roles()) {
+    let codes = |problem: &Pddl| match Coadaptation::new(&mission, problem, &roles) {
         Ok(_) => Vec::new(),
         Err(messages) => messages.iter().map(|message| message.code.clone()).collect::<Vec<_>>(),
     };
@@ -392,8 +394,8 @@ fn what_is_no_process_is_refused() {
 
 #[test]
 fn the_published_setting_is_exported_as_it_is_carried_out() {
-    let (mission, _) = Mission::read(&root().join("missions/camara_like.toml")).expect("a mission");
-    let mission = coadaptation(&mission);
+    let setup = Setup::read(&root().join("missions/camara_like.toml")).expect("a mission");
+    let mission = coadaptation(&setup);
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("model.prism");
     let file = file.to_str().expect("UTF-8");
@@ -435,8 +437,8 @@ fn what_is_exported_is_the_process_itself() {
     let file = file.to_str().expect("UTF-8");
     let outcome = metaplan(&["export", mission, "--to", "prism", "-o", file]);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
-    let (mission, _) = Mission::read(&root().join(mission)).expect("a mission");
-    let native = coadaptation(&mission);
+    let setup = Setup::read(&root().join(mission)).expect("a mission");
+    let native = coadaptation(&setup);
     let risk = Risk::all(&native);
     let native = explore(&Process::<f64>::new(&native, risk, &[]), &Bounds::default()).expect("explored");
     let checked = metaplan(&["check", file, "Pmax=? [ F \"safe_goal\" ]", "--format", "json"]);

@@ -11,11 +11,11 @@ use petgraph::graphmap::DiGraphMap;
 use syn::visit::{self, Visit};
 
 /// Crates without circles.
-const CRATES: [&str; 6] =
-    ["pddl/src", "certificate/src", "rules/src", "ontology/src", "encodings/src", "probabilistic/src"];
+const CRATES: [&str; 7] =
+    ["pddl/src", "certificate/src", "rules/src", "ontology/src", "encodings/src", "probabilistic/src", "src"];
 
 /// A module as its path below the crate, without `crate`.
-type Module = Vec<String>;
+pub type Module = Vec<String>;
 
 /// The module that a file holds.
 fn module(path: &str, folder: &str) -> Module {
@@ -38,10 +38,11 @@ impl Paths<'_> {
     fn add(&mut self, segments: &[String]) {
         let mut rest = segments;
         let mut path = match rest.first().map(String::as_str) {
-            Some("crate") => Vec::new(),
+            // The command line calls the library by its name.
+            Some("crate" | "metaplan") => Vec::new(),
             _ => self.own.clone(),
         };
-        while let Some(first @ ("crate" | "self" | "super")) = rest.first().map(String::as_str) {
+        while let Some(first @ ("crate" | "metaplan" | "self" | "super")) = rest.first().map(String::as_str) {
             if first == "super" {
                 path.pop();
             }
@@ -105,20 +106,20 @@ impl<'a> Visit<'a> for Paths<'_> {
 }
 
 /// For each file of a crate the files from which it imports.
-fn imports(files: &[(String, String)], folder: &str) -> BTreeMap<Module, BTreeSet<Module>> {
+pub fn imports(files: &[(String, String)], folder: &str) -> BTreeMap<Module, BTreeSet<Module>> {
     let own: Vec<_> = files.iter().filter(|(path, _)| Path::new(path).starts_with(folder)).collect();
     let known: BTreeSet<Module> = own.iter().map(|(path, _)| module(path, folder)).collect();
     let is_tests = |path: &str| path.ends_with("/tests.rs") || path.contains("/tests/");
-    own.iter()
-        .filter(|(path, _)| !is_tests(path))
-        .map(|(path, text)| {
-            let own = module(path, folder);
-            let mut paths = Paths { own: &own, known: &known, found: BTreeSet::new() };
-            paths.visit_file(&syn::parse_file(text).unwrap_or_else(|error| panic!("{path}: {error}")));
-            let found = paths.found;
-            (own, found)
-        })
-        .collect()
+    let mut imports: BTreeMap<Module, BTreeSet<Module>> = BTreeMap::new();
+    for (path, text) in own.iter().filter(|(path, _)| !is_tests(path)) {
+        let own = module(path, folder);
+        let mut paths = Paths { own: &own, known: &known, found: BTreeSet::new() };
+        paths.visit_file(&syn::parse_file(text).unwrap_or_else(|error| panic!("{path}: {error}")));
+        let found = paths.found;
+        // A library and a program of one crate are one root.
+        imports.entry(own).or_default().extend(found);
+    }
+    imports
 }
 
 /// One circle through each group of files that import each other.

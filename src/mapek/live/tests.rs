@@ -6,9 +6,11 @@ use std::time::{Duration, Instant};
 
 use encodings::Limits;
 
-use crate::mapek::plan::{Ask, from_scratch};
-use crate::mapek::{Loop, Observation, PlannedStep, Watch};
+use crate::mapek::ask::Ask;
+use crate::mapek::plan::from_scratch;
+use crate::mapek::{Loop, Observation, PlannedStep, Settings, Watch};
 use crate::mission::Mission;
+use crate::setup::Setup;
 
 /// A mission, and what can happen in it.
 struct World {
@@ -20,7 +22,7 @@ struct World {
 
 fn shipped(name: &str) -> Mission {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
-    Mission::read(&manifest).expect("the mission is read").0
+    Setup::read(&manifest).expect("the mission is read").mission
 }
 
 const ACTIONS: [&str; 6] = [
@@ -121,7 +123,7 @@ fn map(width: usize, height: usize, seed: u64) -> World {
          domain = \"{root}/encodings/ugv/domain.pddl\"\nproblem = \"problem.pddl\"\n"
     );
     std::fs::write(directory.path().join("map.toml"), manifest).expect("a manifest");
-    let (mission, _) = Mission::read(&directory.path().join("map.toml")).expect("the mission is read");
+    let mission = Setup::read(&directory.path().join("map.toml")).expect("the mission is read").mission;
     ugv(&format!("map of {count} places"), mission, count)
 }
 
@@ -138,10 +140,10 @@ struct Tally {
 impl Tally {
     /// Plans for the situation in both ways.
     fn compare(&mut self, control: &mut Loop, goes_on: bool, context: &dyn Fn() -> String) {
-        let problem = control.filled();
-        let running = control.knowledge.running.as_ref().filter(|_| goes_on);
+        let problem = control.beliefs.filled();
+        let running = control.beliefs.running.as_ref().filter(|_| goes_on);
         let ask = Ask {
-            mission: &control.knowledge.mission,
+            mission: &control.beliefs.mission,
             problem: &problem,
             running,
             old: None,
@@ -169,21 +171,20 @@ impl Tally {
 /// Lets so many things happen, and plans after each, with and without the action under way.
 fn check(world: &World, seed: u64, count: usize) -> Tally {
     let mut random = fastrand::Rng::with_seed(seed);
-    let settings = world.mission.settings().clone();
-    let mut control = Loop::new(world.mission.clone(), settings).expect("a loop");
+    let mut control = Loop::new(world.mission.clone(), Settings::default()).expect("a loop");
     control.start();
     let mut tally = Tally::default();
     for number in 0..count {
-        let action = control.knowledge().running().map_or(0, |(action, _)| action);
+        let action = control.beliefs().running().map_or(0, |(action, _)| action);
         let share = format!("0.{:02}", random.u32(..100));
         let line = world.events[random.usize(..world.events.len())].replace("{a}", &action.to_string());
         let line = line.replace("{x}", &share);
-        let now = control.knowledge().now() + Duration::from_millis(100);
+        let now = control.beliefs().now() + Duration::from_millis(100);
         control.handle(&Observation::parse(&line), now);
         control.planner.made.clear();
         let context = || format!("{}, seed {seed}, event {number}: {line}", world.name);
         tally.compare(&mut control, true, &context);
-        if control.knowledge().running().is_some() {
+        if control.beliefs().running().is_some() {
             tally.compare(&mut control, false, &context);
         }
     }

@@ -5,8 +5,8 @@ use pddl::ast::{InitialElement, Name, Span, Term};
 
 use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean};
-use crate::mission::Mission;
 use crate::mission::binding::atom;
+use crate::mission::joined::Mission;
 
 impl Mission {
     /// Sets a value, by the first of these that fits:

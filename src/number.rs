@@ -51,6 +51,11 @@ pub(crate) fn to_json(value: &BigRational) -> Value {
     decimal(value).parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
 }
 
+/// An exact number of the planner as a number of JSON; a fraction that is no decimal, rounded to a double.
+pub(crate) fn exact_to_json(value: &encodings::Exact) -> Value {
+    value.to_string().parse::<serde_json::Number>().map_or_else(|_| value.to_f64().into(), Value::Number)
+}
+
 /// The nearest double.
 pub(crate) fn to_f64(value: &BigRational) -> f64 {
     if value.is_zero() { 0.0 } else { value.to_f64().unwrap_or(f64::MAX) }

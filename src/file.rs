@@ -4,10 +4,12 @@
 use std::io::{self, Read as _};
 use std::path::Path;
 
+use pddl::Source;
+
 use crate::message::Message;
 
 /// The code of the message that a file is of another kind.
-pub(super) const CODE: &str = "M131";
+pub(crate) const CODE: &str = "M131";
 
 /// Files with more bytes are not read.
 const LARGEST: u64 = 1 << 28;
@@ -32,9 +34,27 @@ pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Reads a text file; `-` is standard input.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn source(path: &Path) -> Result<Source, Message> {
+    let name = path.display().to_string();
+    let bytes = if name == "-" {
+        let mut bytes = Vec::new();
+        io::stdin().read_to_end(&mut bytes).map(|_| bytes)
+    } else {
+        read(path)
+    };
+    match bytes {
+        Ok(bytes) => Ok(Source::from_bytes(name, &bytes)),
+        Err(error) => Err(Message::at("M101", &name, None, format!("cannot be read: {error}"))),
+    }
+}
+
 /// What a text may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// A mission's manifest, in TOML.
     Manifest,
     /// A PDDL domain.
@@ -94,7 +114,7 @@ fn is_toml(line: &str) -> bool {
 ///
 /// # Errors
 /// What it is instead, and what to do; nothing of the text is quoted.
-pub(super) fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
+pub(crate) fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
     let found = Kind::of(text);
     // What has a parenthesis first may be meant as PDDL, and the parser knows better what is wrong with it.
     let trimmed = text.lines().map(str::trim_start).find(|line| !line.is_empty() && !line.starts_with(';'));

@@ -1,22 +1,27 @@
-//! Knowledge: what the loop believes and what it has asked for. All of it, and nothing else, makes two loops equal.
+//! The loop's knowledge of the situation: what it believes and what it has asked for. All of it, and nothing else, makes two loops
+//! equal. All stations of the loop share it.
 //!
 //! While an action is under way, values that it increases or decreases change with its progress; its other effects
 //! take place when it has succeeded.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
+use pddl::validate::{Options, Verdict, Violation, advance, validate};
 
-use super::answer::Effect;
-use super::sequence::Numbers;
-use super::step::PlannedStep;
 use crate::knowledge::Fault;
+use crate::mapek::answer::Effect;
+use crate::mapek::resume::{resume, resumed_goal};
+use crate::mapek::sequence::Numbers;
+use crate::mapek::step::{PlannedStep, plan_text};
 use crate::mission::Mission;
 
 /// Everything that the loop knows.
 #[derive(Debug, Clone)]
-pub struct Knowledge {
+pub struct Beliefs {
     /// Knowledge base and problem, as they are believed to be.
     pub(super) mission: Mission,
     /// The text of the goal, if it is not the problem's.
@@ -76,7 +81,7 @@ pub(super) struct Running {
     pub(super) suspended: bool,
 }
 
-impl Knowledge {
+impl Beliefs {
     pub(super) fn new(mission: Mission) -> Self {
         Self {
             mission,
@@ -167,4 +172,60 @@ impl Knowledge {
     pub fn reached(&self) -> bool {
         self.reached
     }
+
+    /// Whether a design can be used, as far as is known; all can without a knowledge base.
+    pub(super) fn is_available(&self, design: &str) -> bool {
+        self.mission.knowledge().is_none() || self.available.contains(design)
+    }
+
+    /// The designs of the steps that are still to be requested.
+    pub(super) fn planned(&self) -> impl Iterator<Item = &String> {
+        let steps = self.plan.iter().flatten();
+        steps.flat_map(|step| step.configuration.iter().map(|(_, design)| design))
+    }
+
+    /// The problem as it is believed now, with what the knowledge base contributes.
+    pub(super) fn filled(&self) -> Problem {
+        let mut problem = self.mission.problem().clone();
+        self.mission.fill(&mut problem);
+        problem
+    }
+
+    /// What is left to be done: the domain, in which the action under way comes first, and the filled problem.
+    fn left(&self) -> (Cow<'_, Domain>, Problem) {
+        let (domain, mut problem) = (self.mission.domain(), self.filled());
+        match &self.running {
+            Some(running) => {
+                problem.goal = resumed_goal(&problem.goal);
+                (Cow::Owned(resume(domain, &running.step, &running.progress)), problem)
+            }
+            None => (Cow::Borrowed(domain), problem),
+        }
+    }
+
+    /// What the validator says of the plan, the action under way included.
+    pub(super) fn verdict(&self) -> Verdict {
+        let running = self.running.iter().map(|running| &running.step);
+        let steps = running.chain(self.plan.iter().flatten());
+        let (domain, problem) = self.left();
+        validate(&domain, &problem, &plan_text(steps), &Options::default())
+    }
+
+    /// Why what is left of the action under way cannot be done.
+    pub(super) fn obstacle(&self, running: &Running) -> Option<String> {
+        let (domain, problem) = self.left();
+        let violation = advance(&domain, &problem, &running.step.to_plan_step(), false).err()?;
+        Some(violation.message.clone())
+    }
+
+    /// Why the plan, with what is left of the action under way, does not fit the situation as it is believed.
+    pub fn violation(&self) -> Option<String> {
+        self.verdict().violation.map(|violation| sentence(&violation))
+    }
+}
+
+/// What is wrong with a plan.
+fn sentence(violation: &Violation) -> String {
+    let unmet = violation.unmet.first().map(|unmet| format!(": {}", unmet.condition)).unwrap_or_default();
+    format!("the plan does not fit the situation: {}{unmet}", violation.message)
 }

@@ -1,114 +1,42 @@
 //! A knowledge base at run time: OWL documents and rule files in an engine, kept in step with the robot.
 
-mod catalogue;
-mod reports;
-mod statement;
-
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::View;
 use ontology::tomasys::change::Status;
-use ontology::{Annotation, EntityKind, Equality, Iri, Ontology, ReadOptions};
-use rules::{Delta, Engine, Fact, Limits, Literal, Prefixes, Program, Rule, Symbols, Syntax};
+use ontology::{Annotation, EntityKind, Equality, Iri, ReadOptions};
+use rules::{Delta, Engine, Fact, Literal, Program, Symbols};
 
+use crate::knowledge::catalogue::Catalogue;
+use crate::knowledge::sources::{Sources, Stated};
+use crate::knowledge::statement::{Statement, Statements};
+use crate::knowledge::waiting::Waiting;
 use crate::message::Message;
-pub(crate) use catalogue::Catalogue;
-pub use reports::Fault;
-pub(crate) use reports::{Report, Waiting};
-pub use statement::{Part, Statement, Statements};
 
-/// The name under which the shipped co-adaptation rules are asked for.
-pub const COADAPTATION: &str = "coadaptation";
 /// From so many names of one individual on, not all of their pairs are listed.
 const MANY_NAMES: usize = 32;
-
-/// The name under which the shipped rules of the TOMASys metamodel are asked for.
-pub const TOMASYS: &str = "tomasys";
-
-/// What an engine is built from.
-#[derive(Debug, Clone, Default)]
-pub struct Sources {
-    /// OWL documents (`-` is standard input); their imports are followed.
-    pub documents: Vec<PathBuf>,
-    /// Rule files in SWRL's human-readable syntax; `coadaptation` and `tomasys` name the shipped ones.
-    pub rules: Vec<String>,
-    /// Where imports are looked for.
-    pub options: ReadOptions,
-    /// How far conclusions are drawn, at once and after each update.
-    pub limits: Limits,
-}
 
 /// Knowledge about a robot: what is stated, and what follows.
 #[derive(Debug, Clone)]
 pub struct Knowledge {
-    runtime: Runtime,
+    pub(super) runtime: Runtime,
     /// What was last read of `runtime`, in step with it.
-    catalogue: OnceLock<Arc<Catalogue>>,
+    pub(super) catalogue: OnceLock<Arc<Catalogue>>,
     /// What was told and nothing follows from yet.
-    waiting: Waiting,
+    pub(super) waiting: Waiting,
     /// As it was read; shares with `runtime` what has not changed since.
     origin: Runtime,
     rule_count: usize,
     warnings: Vec<Message>,
-    sources: Sources,
+    pub(super) sources: Sources,
     entities: Arc<[(EntityKind, Iri)]>,
     /// The names of all documents, those that are imported among them.
     documents: Arc<[String]>,
     annotations: Arc<[(Iri, Annotation)]>,
-}
-
-/// What documents and rule files say, before anything is concluded.
-pub(crate) struct Stated {
-    pub(crate) symbols: Symbols,
-    pub(crate) program: Program,
-    pub(crate) facts: Vec<Fact>,
-    ontology: Ontology,
-    /// As [`Knowledge::rule_count`] has it.
-    pub(crate) rule_count: usize,
-    warnings: Vec<Message>,
-}
-
-impl Stated {
-    /// Reads documents and rules.
-    ///
-    /// # Errors
-    /// All that is wrong with them.
-    pub(crate) fn read(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
-        let read = ontology::read_files(&sources.documents, &sources.options);
-        let mut errors = Vec::new();
-        let mut symbols = Symbols::new();
-        let mut own = Vec::new();
-        match parse_rule_files(&sources.rules, &mut symbols) {
-            Ok(rules) => own.extend(rules),
-            Err(more) => errors.extend(more),
-        }
-        let ontology = match read {
-            Ok(ontology) if errors.is_empty() => ontology,
-            Ok(_) => return Err(errors),
-            Err(more) => {
-                let more = more.iter().map(Message::from_ontology).collect();
-                errors.extend(crate::mission::discreet(more));
-                return Err(errors);
-            }
-        };
-        let rule_count = ontology.rules.len() + own.len();
-        let lowered = ontology::lower_together(&ontology, own, equality, &mut symbols);
-        let warnings =
-            ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
-        Ok(Self { symbols, program: lowered.program, facts: lowered.facts, ontology, rule_count, warnings })
-    }
-
-    /// Changes what is stated.
-    pub(crate) fn change(&mut self, statements: &Statements) {
-        let symbols = &mut self.symbols;
-        let removed: BTreeSet<Fact> = statements.removed.iter().map(|own| own.intern(symbols)).collect();
-        self.facts.retain(|fact| !removed.contains(fact));
-        self.facts.extend(statements.added.iter().map(|own| own.intern(symbols)));
-    }
 }
 
 /// Something that the knowledge contradicts.
@@ -240,7 +168,7 @@ impl Knowledge {
     }
 
     /// Keeps the catalogue in step with what holds.
-    fn follow(&mut self, delta: &Delta) {
+    pub(super) fn follow(&mut self, delta: &Delta) {
         let engine = self.runtime.engine();
         if self.catalogue.get_mut().is_some_and(|own| !Arc::make_mut(own).follow(delta, engine)) {
             self.catalogue = OnceLock::new();
@@ -309,7 +237,7 @@ impl Knowledge {
         self.pursue_now(configuration).map_err(|error| Message::from_ontology(&error))
     }
 
-    fn pursue_now(&mut self, configuration: &[(String, String)]) -> Result<(), ontology::Error> {
+    pub(super) fn pursue_now(&mut self, configuration: &[(String, String)]) -> Result<(), ontology::Error> {
         let name = |function: &str| format!("o_{function}");
         let objectives = self.runtime.objectives();
         for objective in &objectives {
@@ -445,35 +373,5 @@ fn shown(fact: &Fact, symbols: &Symbols) -> String {
             format!("{} is member {number} of those that exclude each other", symbols.value(member))
         }
         _ => fact.display(symbols).to_string(),
-    }
-}
-
-/// The text of a rule file, or of shipped rules by their name.
-pub(crate) fn rule_text(file: &str) -> Result<String, Message> {
-    let text = match file {
-        COADAPTATION => Ok(rules::COADAPTATION_RULES.to_owned()),
-        TOMASYS => Ok(rules::TOMASYS_RULES.to_owned()),
-        "-" => std::io::read_to_string(std::io::stdin()),
-        path => crate::mission::read(Path::new(path)).and_then(|bytes| {
-            String::from_utf8(bytes).map_err(|_| std::io::Error::other("it is no UTF-8 text"))
-        }),
-    };
-    text.map_err(|error| Message::at("M101", file, None, format!("cannot be read: {error}")))
-}
-
-/// The rules of all files. What one file asks for, another may conclude.
-fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Vec<Message>> {
-    let (mut texts, mut errors) = (Vec::new(), Vec::new());
-    for file in files {
-        match rule_text(file) {
-            Ok(text) => texts.push((file, text)),
-            Err(error) => errors.push(error),
-        }
-    }
-    let texts: Vec<(&str, &str)> = texts.iter().map(|(file, text)| (file.as_str(), text.as_str())).collect();
-    match rules::parse_rules_together(&texts, symbols, &Prefixes::default(), &Syntax::default()) {
-        Ok(program) if errors.is_empty() => Ok(program.rules),
-        Ok(_) => Err(errors),
-        Err(more) => Err(errors.into_iter().chain(more.iter().map(Message::from_rules)).collect()),
     }
 }

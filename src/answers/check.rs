@@ -1,0 +1,126 @@
+//! What `metaplan check` answers.
+
+use probabilistic::check::{Answer, Outcome, Report};
+use serde::Serialize;
+
+/// A value of a property, its policy's size, and what it took.
+#[derive(Debug, Clone, Serialize)]
+pub struct CheckAnswer<'a> {
+    format: &'static str,
+    property: &'a str,
+    #[serde(flatten)]
+    found: Found,
+    statistics: StatisticsPart,
+}
+
+/// What stands in the middle, by the kind of property.
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+enum Found {
+    Value(ValuePart),
+    Truth {
+        #[serde(flatten)]
+        value: Option<ValuePart>,
+        /// Null where it is not decided.
+        holds: Option<bool>,
+    },
+    Front {
+        vertices: Vec<[ValuePart; 2]>,
+    },
+    Constrained {
+        #[serde(flatten)]
+        value: ValuePart,
+        randomised: ValuePart,
+        deterministic: ProvedPart,
+    },
+}
+
+/// A value: `value`, `lower` and `upper` are null where it is infinite or undefined, which `status` says; `exact` is a fraction,
+/// `inf`, or null.
+#[derive(Debug, Clone, Serialize)]
+struct ValuePart {
+    status: &'static str,
+    value: Option<f64>,
+    lower: Option<f64>,
+    upper: Option<f64>,
+    exact: Option<String>,
+}
+
+/// A value, and whether it is proved to be the best.
+#[derive(Debug, Clone, Serialize)]
+struct ProvedPart {
+    #[serde(flatten)]
+    value: ValuePart,
+    proved: bool,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct StatisticsPart {
+    states: usize,
+    choices: usize,
+    transitions: usize,
+    deadlocks: usize,
+    milliseconds: MillisecondsPart,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct MillisecondsPart {
+    build: f64,
+    solve: f64,
+}
+
+impl ValuePart {
+    fn of(answer: &Answer) -> Self {
+        let without = |status: &'static str, exact: Option<String>| Self {
+            status,
+            value: None,
+            lower: None,
+            upper: None,
+            exact,
+        };
+        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        match answer {
+            Answer::Finite(quantity) => Self {
+                status: "finite",
+                value: finite(quantity.value),
+                lower: finite(quantity.lower),
+                upper: finite(quantity.upper),
+                exact: quantity.exact.as_ref().map(ToString::to_string),
+            },
+            Answer::Infinite => without("infinite", Some("inf".to_owned())),
+            Answer::Undefined => without("undefined", None),
+        }
+    }
+}
+
+impl<'a> CheckAnswer<'a> {
+    /// The answer to a property.
+    pub fn new(property: &'a str, report: &Report) -> Self {
+        let found = match &report.outcome {
+            Outcome::Value(answer) => Found::Value(ValuePart::of(answer)),
+            Outcome::Truth(holds, answer) => {
+                Found::Truth { value: answer.as_ref().map(ValuePart::of), holds: Some(*holds) }
+            }
+            Outcome::Undecided(answer) => Found::Truth { value: Some(ValuePart::of(answer)), holds: None },
+            Outcome::Front(vertices) => Found::Front {
+                vertices: vertices.iter().map(|pair| pair.each_ref().map(ValuePart::of)).collect(),
+            },
+            Outcome::Constrained { randomised, deterministic, proved } => Found::Constrained {
+                value: ValuePart::of(randomised),
+                randomised: ValuePart::of(randomised),
+                deterministic: ProvedPart { value: ValuePart::of(deterministic), proved: *proved },
+            },
+        };
+        let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
+        let milliseconds =
+            MillisecondsPart { build: build.as_secs_f64() * 1e3, solve: solve.as_secs_f64() * 1e3 };
+        let statistics = StatisticsPart {
+            states: *states,
+            choices: *choices,
+            transitions: *transitions,
+            deadlocks: *deadlocks,
+            milliseconds,
+        };
+        Self { format: "metaplan-check/1", property, found, statistics }
+    }
+}

@@ -1,0 +1,252 @@
+//! What `metaplan compare` answers, and the rows of its table.
+
+use std::time::Duration;
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use crate::comparison::{Candidate, Comparison, Costs, LossAt, LossReport, Measures};
+use crate::message::Message;
+
+/// Start and goal, where a comparison is one of many.
+pub type Pair = (String, String);
+
+/// The measures of the table, in its order.
+pub const MEASURES: [&str; 12] = [
+    "goal",
+    "goal_with_reserve",
+    "no_collision",
+    "collisions",
+    "time",
+    "energy",
+    "reconfigurations",
+    "time_if_successful",
+    "energy_if_successful",
+    "penalised_time",
+    "replans",
+    "states",
+];
+
+/// A row of the table.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// What it is about, if there are several comparisons.
+    pub pair: Option<Pair>,
+    /// Which kind of candidate it is: `a` to `f`, or `+`.
+    pub kind: String,
+    /// What it is.
+    pub name: String,
+    /// By measure.
+    pub values: Vec<Option<f64>>,
+}
+
+impl Serialize for Row {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_map(None)?;
+        object.serialize_entry("kind", &self.kind)?;
+        object.serialize_entry("name", &self.name)?;
+        for (measure, value) in MEASURES.iter().zip(&self.values) {
+            object.serialize_entry(measure, value)?;
+        }
+        object.end()
+    }
+}
+
+fn row(pair: Option<&Pair>, kind: char, name: &str, values: Vec<Option<f64>>) -> Row {
+    Row { pair: pair.cloned(), kind: kind.to_string(), name: name.to_owned(), values }
+}
+
+fn values(measures: &Measures) -> [Option<f64>; 12] {
+    [
+        Some(measures.goal),
+        Some(measures.goal_with_reserve),
+        Some(measures.no_collision),
+        Some(measures.collisions),
+        measures.time,
+        measures.energy,
+        measures.reconfigurations,
+        measures.time_if_successful,
+        measures.energy_if_successful,
+        measures.penalised_time,
+        Some(measures.replans),
+        Some(measures.states as f64),
+    ]
+}
+
+/// The rows of the candidates that have been measured.
+pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
+    let measured = candidates
+        .iter()
+        .map(|candidate| row(pair, candidate.kind, &candidate.name, values(&candidate.measures).to_vec()));
+    measured.collect()
+}
+
+/// The rows of a comparison, bounds among them.
+pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
+    let mut rows = begun_rows(pair, &comparison.candidates);
+    let [time, energy] = comparison.hindsight;
+    let bound = |measure: &str| match measure {
+        "time" | "penalised_time" => time.expected,
+        "energy" => energy.expected,
+        "time_if_successful" => time.least,
+        "energy_if_successful" => energy.least,
+        _ => None,
+    };
+    let bounds = MEASURES.iter().map(|measure| bound(measure)).collect();
+    rows.push(row(pair, 'f', "hindsight bound, for the goal reached", bounds));
+    rows
+}
+
+/// All comparisons, or as many as there were when time was up.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct CompareAnswer<'a> {
+    format: &'static str,
+    complete: bool,
+    comparisons: Vec<ComparisonAnswer>,
+    published: &'a [Row],
+    messages: &'a [Message],
+}
+
+impl<'a> CompareAnswer<'a> {
+    /// With rows that the user adds; not complete if there is a message.
+    pub fn new(comparisons: Vec<ComparisonAnswer>, published: &'a [Row], messages: &'a [Message]) -> Self {
+        let complete = messages.is_empty();
+        Self { format: "metaplan-compare/1", complete, comparisons, published, messages }
+    }
+}
+
+/// One comparison.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct ComparisonAnswer {
+    start: Option<String>,
+    goal: Option<String>,
+    candidates: Vec<Row>,
+    #[serde(flatten)]
+    figures: Option<Figures>,
+    complete: bool,
+    costs: CostsPart,
+}
+
+/// What a comparison has that is done.
+#[derive(Debug, Clone, serde::Serialize)]
+struct Figures {
+    front: Vec<[f64; 2]>,
+    penalty: f64,
+    price_of_determinism: Option<f64>,
+    price_provably_zero: Option<&'static str>,
+    price_of_open_loop: Option<f64>,
+    value_of_replanning: Option<f64>,
+    loss: Option<LossPart>,
+}
+
+#[derive(Debug, Clone, serde::Serialize)]
+struct LossPart {
+    component: String,
+    rate: f64,
+    steps: Vec<LossStep>,
+}
+
+#[derive(Debug, Clone, serde::Serialize)]
+struct LossStep {
+    moves: usize,
+    open_loop: Option<f64>,
+    replanned: Option<f64>,
+    solved_again: Option<f64>,
+    anticipated: Option<f64>,
+}
+
+#[derive(Debug, Clone, serde::Serialize)]
+struct CostsPart {
+    states: usize,
+    transitions: usize,
+    plans: usize,
+    variables: u64,
+    clauses: u64,
+    decisions: usize,
+    milliseconds: Milliseconds,
+    peak_memory_mb: Option<u64>,
+    process_memory_mb: Option<u64>,
+    first_plan_memory_mb: Option<u64>,
+}
+
+#[derive(Debug, Clone, serde::Serialize)]
+struct Milliseconds {
+    build: f64,
+    solve: f64,
+    extract: f64,
+    first_plan: f64,
+    first_plan_build: f64,
+    first_plan_solve: f64,
+    first_plan_extract: f64,
+    more_plans: f64,
+}
+
+impl ComparisonAnswer {
+    /// A comparison that is done.
+    pub fn new(pair: Option<&Pair>, comparison: &Comparison) -> Self {
+        let figures = Figures {
+            front: comparison.front.clone(),
+            penalty: comparison.penalty,
+            price_of_determinism: comparison.price_of_determinism(),
+            price_provably_zero: comparison.no_price,
+            price_of_open_loop: comparison.price_of_open_loop(),
+            value_of_replanning: comparison.value_of_replanning(),
+            loss: comparison.loss.as_ref().map(LossPart::of),
+        };
+        Self::of(pair, rows(pair, comparison), Some(figures), &comparison.costs)
+    }
+
+    /// A comparison that is not done.
+    pub fn begun(pair: Option<&Pair>, candidates: &[Candidate], costs: &Costs) -> Self {
+        Self::of(pair, begun_rows(pair, candidates), None, costs)
+    }
+
+    fn of(pair: Option<&Pair>, candidates: Vec<Row>, figures: Option<Figures>, costs: &Costs) -> Self {
+        let (start, goal) = pair.cloned().unzip();
+        let complete = figures.is_some();
+        Self { start, goal, candidates, figures, complete, costs: CostsPart::of(costs) }
+    }
+}
+
+impl LossPart {
+    fn of(loss: &LossReport) -> Self {
+        let step = |step: &LossAt| LossStep {
+            moves: step.moves,
+            open_loop: step.open_loop,
+            replanned: step.replanned,
+            solved_again: step.solved_again,
+            anticipated: step.anticipated,
+        };
+        Self {
+            component: loss.component.clone(),
+            rate: loss.rate,
+            steps: loss.steps.iter().map(step).collect(),
+        }
+    }
+}
+
+impl CostsPart {
+    fn of(costs: &Costs) -> Self {
+        let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
+        Self {
+            states: costs.states,
+            transitions: costs.transitions,
+            plans: costs.plans,
+            variables: costs.variables,
+            clauses: costs.clauses,
+            decisions: costs.decisions,
+            milliseconds: Milliseconds {
+                build: milliseconds(costs.process.build),
+                solve: milliseconds(costs.process.solve),
+                extract: milliseconds(costs.process.extract),
+                first_plan: milliseconds(costs.first_plan.total()),
+                first_plan_build: milliseconds(costs.first_plan.build),
+                first_plan_solve: milliseconds(costs.first_plan.solve),
+                first_plan_extract: milliseconds(costs.first_plan.extract),
+                more_plans: milliseconds(costs.more_plans),
+            },
+            peak_memory_mb: costs.process_memory.max(costs.plan_memory),
+            process_memory_mb: costs.process_memory,
+            first_plan_memory_mb: costs.plan_memory,
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! What `metaplan explain` answers.
+
+use num_rational::BigRational;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::explain::{BestPlan, Change, DesignExplanation, Target};
+use crate::mapek::PlannedStep;
+use crate::number::to_json;
+
+/// What would change the plan.
+#[derive(Debug, Clone, Serialize)]
+pub struct ChangesAnswer<'a> {
+    format: &'static str,
+    mission: &'a str,
+    best: BestPart<'a>,
+    changes: Vec<ChangePart<'a>>,
+}
+
+/// All about one design.
+#[derive(Debug, Clone, Serialize)]
+pub struct DesignAnswer<'a> {
+    format: &'static str,
+    mission: &'a str,
+    best: BestPart<'a>,
+    design: &'a str,
+    functions: &'a [String],
+    available: bool,
+    because: &'a [String],
+    used: &'a [usize],
+    alone: BestPart<'a>,
+    without: BestPart<'a>,
+    changes: Vec<ChangePart<'a>>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct BestPart<'a> {
+    cost: Option<Value>,
+    proved: bool,
+    steps: &'a [PlannedStep],
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ChangePart<'a> {
+    name: &'a str,
+    from: Option<Value>,
+    relation: &'static str,
+    bound: Option<Value>,
+    then: BestPart<'a>,
+}
+
+const FORMAT: &str = "metaplan-explain/1";
+
+impl<'a> ChangesAnswer<'a> {
+    /// The smallest changes that lead to another plan than the best.
+    pub fn new(mission: &'a str, best: &'a BestPlan, changes: &'a [Change]) -> Self {
+        Self {
+            format: FORMAT,
+            mission,
+            best: BestPart::of(best),
+            changes: changes.iter().map(ChangePart::of).collect(),
+        }
+    }
+}
+
+impl<'a> DesignAnswer<'a> {
+    /// A design beside the best plan.
+    pub fn new(mission: &'a str, best: &'a BestPlan, found: &'a DesignExplanation) -> Self {
+        Self {
+            format: FORMAT,
+            mission,
+            best: BestPart::of(best),
+            design: &found.design,
+            functions: &found.functions,
+            available: found.available,
+            because: &found.because,
+            used: &found.used,
+            alone: BestPart::of(&found.alone),
+            without: BestPart::of(&found.without),
+            changes: found.changes.iter().map(ChangePart::of).collect(),
+        }
+    }
+}
+
+impl<'a> BestPart<'a> {
+    fn of(plan: &'a BestPlan) -> Self {
+        Self { cost: plan.cost.as_ref().map(to_json), proved: plan.proved, steps: &plan.steps }
+    }
+}
+
+impl<'a> ChangePart<'a> {
+    fn of(change: &'a Change) -> Self {
+        let (relation, bound): (_, Option<&BigRational>) = match &change.to {
+            Target::AtLeast(bound) => ("at_least", Some(bound)),
+            Target::AtMost(bound) => ("at_most", Some(bound)),
+            Target::Above(bound) => ("above", Some(bound)),
+            Target::Below(bound) => ("below", Some(bound)),
+            Target::Recovered => ("recovered", None),
+            Target::Failed => ("failed", None),
+        };
+        Self {
+            name: &change.name,
+            from: change.from.as_ref().map(to_json),
+            relation,
+            bound: bound.map(to_json),
+            then: BestPart::of(&change.then),
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! What `metaplan export` and `metaplan import` answer.
+
+use serde::Serialize;
+
+/// A mission as PDDL for other planners.
+#[derive(Debug, Clone, Serialize)]
+pub struct MissionExport {
+    format: &'static str,
+    domain: String,
+    problem: String,
+}
+
+/// A mission's process as a model for model checkers.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModelExport {
+    format: &'static str,
+    model: String,
+}
+
+/// Where the mission is that was made of another tool's files.
+#[derive(Debug, Clone, Serialize)]
+pub struct ImportAnswer {
+    format: &'static str,
+    mission: String,
+}
+
+const EXPORT: &str = "metaplan-export/1";
+
+impl MissionExport {
+    /// The texts of domain and problem.
+    pub fn new(domain: String, problem: String) -> Self {
+        Self { format: EXPORT, domain, problem }
+    }
+}
+
+impl ModelExport {
+    /// The text of the model.
+    pub fn new(model: String) -> Self {
+        Self { format: EXPORT, model }
+    }
+}
+
+impl ImportAnswer {
+    /// The path of the manifest.
+    pub fn new(mission: String) -> Self {
+        Self { format: "metaplan-import/1", mission }
+    }
+}

@@ -1,0 +1,61 @@
+//! What `metaplan journal` answers.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::journal::{Entry, JournalReport};
+use crate::message::Message;
+
+/// What is in a journal, and what is wrong with it.
+#[derive(Debug, Clone, Serialize)]
+pub struct JournalAnswer<'a> {
+    format: &'static str,
+    sound: bool,
+    parts: &'a [String],
+    messages: &'a [Message],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    records: Option<Vec<RecordPart<'a>>>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct RecordPart<'a> {
+    record: u64,
+    segment: u64,
+    kind: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    microseconds: Option<u64>,
+    /// Of a decision.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    answers: Option<&'a Value>,
+    /// Of an event.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    line: Option<&'a Value>,
+}
+
+impl<'a> JournalAnswer<'a> {
+    /// The report, with the records if `shows`.
+    pub fn new(report: &'a JournalReport, shows: bool) -> Self {
+        Self {
+            format: "metaplan-journal-report/1",
+            sound: report.is_sound(),
+            parts: &report.parts,
+            messages: &report.messages,
+            records: shows.then(|| report.entries.iter().map(RecordPart::of).collect()),
+        }
+    }
+}
+
+impl<'a> RecordPart<'a> {
+    fn of(entry: &'a Entry) -> Self {
+        let content = Some(&entry.content).filter(|content| !content.is_null());
+        let is_decision = entry.kind == "decision";
+        Self {
+            record: entry.record,
+            segment: entry.segment,
+            kind: &entry.kind,
+            microseconds: entry.time,
+            answers: content.filter(|_| is_decision),
+            line: content.filter(|_| !is_decision),
+        }
+    }
+}

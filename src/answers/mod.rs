@@ -1,0 +1,46 @@
+//! What each command answers in JSON: a type for each answer, with the fields of its format in their order. The README lists
+//! them.
+//!
+//! An answer is built from what the library has found. The command line only writes it.
+
+mod check;
+mod compare;
+mod explain;
+mod export;
+mod journal;
+mod plan;
+mod reason;
+mod run;
+mod simulate;
+mod validate;
+mod verify;
+
+use serde::Serialize;
+
+use crate::message::Message;
+
+pub use check::CheckAnswer;
+pub use compare::{CompareAnswer, ComparisonAnswer, MEASURES, Pair, Row, begun_rows, rows};
+pub use explain::{ChangesAnswer, DesignAnswer};
+pub use export::{ImportAnswer, MissionExport, ModelExport};
+pub use journal::JournalAnswer;
+pub use plan::{Objective, ParetoAnswer, PlanAnswer, Preparation, milliseconds};
+pub use reason::{AssertionAnswer, EntailmentAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, statuses};
+pub use run::{HandledLine, LogLine, NumberedAnswer, PlanningLine, ReadyLine};
+pub use simulate::{SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
+pub use validate::VerdictAnswer;
+pub use verify::VerificationAnswer;
+
+/// What every command answers that has failed.
+#[derive(Debug, Clone, Serialize)]
+pub struct ErrorAnswer<'a> {
+    format: &'static str,
+    messages: &'a [Message],
+}
+
+impl<'a> ErrorAnswer<'a> {
+    /// With all messages.
+    pub fn new(messages: &'a [Message]) -> Self {
+        Self { format: "metaplan-error/1", messages }
+    }
+}

@@ -1,0 +1,190 @@
+//! What `metaplan reason` answers: what follows, and why.
+
+use ontology::entail::{Answer, Entailment, Schema, SchemaEntity};
+use ontology::tomasys::{FunctionDesign, Individual};
+use ontology::vocab::local_name;
+use rules::Value;
+use serde::Serialize;
+
+use crate::knowledge::{Contradiction, Knowledge};
+use crate::message::Message;
+
+/// What follows from documents and rules.
+#[derive(Debug, Clone, Serialize)]
+pub struct ReasonAnswer<'a> {
+    format: &'static str,
+    consistent: bool,
+    rules: usize,
+    /// As N-Triples, each with its full stop.
+    inferred: Vec<String>,
+    designs: Vec<DesignPart>,
+    objectives: Vec<ObjectivePart>,
+    contradictions: &'a [Contradiction],
+    warnings: &'a [Message],
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct DesignPart {
+    name: String,
+    iri: String,
+    solves: Vec<String>,
+    components: Vec<String>,
+    available: bool,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ObjectivePart {
+    objective: String,
+    status: String,
+}
+
+/// Whether the statements of documents follow.
+#[derive(Debug, Clone, Serialize)]
+pub struct EntailmentAnswer<'a> {
+    format: &'static str,
+    entailed: bool,
+    statements: Vec<StatementPart<'a>>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct StatementPart<'a> {
+    statement: &'a str,
+    follows: bool,
+    reason: &'a str,
+}
+
+/// Why assertions hold, or do not.
+#[derive(Debug, Clone, Serialize)]
+pub struct ReasonsAnswer {
+    format: &'static str,
+    answers: Vec<AssertionAnswer>,
+}
+
+/// Why one assertion holds, or does not.
+#[derive(Debug, Clone, Serialize)]
+pub struct AssertionAnswer {
+    /// As it was asked.
+    pub assertion: String,
+    /// Whether that is the answer to what was asked.
+    pub answered: bool,
+    /// In lines.
+    pub reason: String,
+}
+
+/// What follows about classes and properties.
+#[derive(Debug, Clone, Serialize)]
+pub struct SchemaAnswer<'a> {
+    format: &'static str,
+    classes: Vec<EntityPart<'a>>,
+    object_properties: Vec<EntityPart<'a>>,
+    data_properties: Vec<EntityPart<'a>>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct EntityPart<'a> {
+    iri: &'a str,
+    direct: &'a [String],
+    above: &'a [String],
+    empty: Option<&'a str>,
+}
+
+impl<'a> ReasonAnswer<'a> {
+    /// All that follows now.
+    pub fn new(knowledge: &'a Knowledge, contradictions: &'a [Contradiction]) -> Self {
+        let triples = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
+        let objectives = statuses(knowledge).into_iter();
+        Self {
+            format: "metaplan-reason/1",
+            consistent: contradictions.is_empty(),
+            rules: knowledge.rule_count(),
+            inferred: triples.lines().map(ToOwned::to_owned).collect(),
+            designs: knowledge.view().function_designs().into_iter().map(DesignPart::of).collect(),
+            objectives: objectives.map(|(objective, status)| ObjectivePart { objective, status }).collect(),
+            contradictions,
+            warnings: knowledge.warnings(),
+        }
+    }
+}
+
+impl DesignPart {
+    fn of(design: FunctionDesign) -> Self {
+        let names = |all: Vec<Individual>| all.into_iter().map(|own| own.name).collect();
+        Self {
+            name: design.individual.name,
+            iri: design.individual.iri,
+            solves: names(design.solves),
+            components: names(design.components),
+            available: design.available,
+        }
+    }
+}
+
+/// Objectives with their statuses, by local name, sorted.
+pub fn statuses(knowledge: &Knowledge) -> Vec<(String, String)> {
+    let symbols = knowledge.engine().symbols();
+    let mut found: Vec<_> = knowledge
+        .engine()
+        .facts()
+        .filter(|fact| match symbols.value(fact.predicate) {
+            Value::Name(iri) => fact.arguments.len() == 2 && local_name(iri) == "o_status",
+            Value::Literal(_) => false,
+        })
+        .map(|fact| {
+            let subject = symbols.value(fact.arguments[0]).to_string();
+            let value = match symbols.value(fact.arguments[1]) {
+                Value::Literal(literal) => literal.lexical(),
+                Value::Name(name) => name.to_string(),
+            };
+            (local_name(subject.trim_matches(['<', '>'])).to_owned(), value)
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+impl<'a> EntailmentAnswer<'a> {
+    /// The answers to all statements.
+    pub fn new(found: &'a [Entailment]) -> Self {
+        let statement = |one: &'a Entailment| {
+            let (follows, reason): (bool, &str) = match &one.answer {
+                Answer::Follows(reason) => (true, reason),
+                Answer::Open(reason) => (false, reason),
+            };
+            StatementPart { statement: &one.statement, follows, reason }
+        };
+        let statements: Vec<StatementPart<'a>> = found.iter().map(statement).collect();
+        let entailed = statements.iter().all(|one| one.follows);
+        Self { format: "metaplan-entails/1", entailed, statements }
+    }
+}
+
+impl ReasonsAnswer {
+    /// The answers about all assertions.
+    pub fn new(answers: Vec<AssertionAnswer>) -> Self {
+        Self { format: "metaplan-reasons/1", answers }
+    }
+}
+
+impl<'a> SchemaAnswer<'a> {
+    /// All of it.
+    pub fn new(schema: &'a Schema) -> Self {
+        let all = |entities: &'a [SchemaEntity]| entities.iter().map(EntityPart::of).collect();
+        Self {
+            format: "metaplan-schema/1",
+            classes: all(&schema.classes),
+            object_properties: all(&schema.object_properties),
+            data_properties: all(&schema.data_properties),
+        }
+    }
+}
+
+impl<'a> EntityPart<'a> {
+    fn of(entity: &'a SchemaEntity) -> Self {
+        Self {
+            iri: &entity.iri,
+            direct: &entity.direct,
+            above: &entity.above,
+            empty: entity.empty.as_deref(),
+        }
+    }
+}

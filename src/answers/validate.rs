@@ -1,0 +1,73 @@
+//! What `metaplan validate` answers.
+
+use num_rational::BigRational;
+use pddl::validate::{Unmet, Verdict, Violation};
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::number::to_json;
+
+/// Whether a plan is valid, and what it costs; or what is wrong with it.
+#[derive(Debug, Clone, Serialize)]
+pub struct VerdictAnswer<'a> {
+    format: &'static str,
+    valid: bool,
+    metric: Option<Value>,
+    total_time: Value,
+    /// By function with arguments.
+    values: Map<String, Value>,
+    violation: Option<ViolationPart<'a>>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ViolationPart<'a> {
+    step: Option<usize>,
+    action: Option<&'a str>,
+    time: Value,
+    kind: &'static str,
+    message: &'a str,
+    unmet: Vec<UnmetPart<'a>>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct UnmetPart<'a> {
+    condition: &'a str,
+    /// By function with arguments; null where it is undefined.
+    values: Map<String, Value>,
+}
+
+impl<'a> VerdictAnswer<'a> {
+    /// The verdict of the validator.
+    pub fn new(verdict: &'a Verdict) -> Self {
+        let value = |(name, value): (&String, &BigRational)| (name.clone(), to_json(value));
+        Self {
+            format: "metaplan-verdict/1",
+            valid: verdict.valid,
+            metric: verdict.metric.as_ref().map(to_json),
+            total_time: to_json(&verdict.total_time),
+            values: verdict.values.iter().map(|(name, number)| value((name, number))).collect(),
+            violation: verdict.violation.as_deref().map(ViolationPart::of),
+        }
+    }
+}
+
+impl<'a> ViolationPart<'a> {
+    fn of(violation: &'a Violation) -> Self {
+        Self {
+            step: violation.step,
+            action: violation.action.as_deref(),
+            time: to_json(&violation.time),
+            kind: violation.kind.as_str(),
+            message: &violation.message,
+            unmet: violation.unmet.iter().map(UnmetPart::of).collect(),
+        }
+    }
+}
+
+impl<'a> UnmetPart<'a> {
+    fn of(unmet: &'a Unmet) -> Self {
+        let values = unmet.values.iter();
+        let values = values.map(|(name, value)| (name.clone(), value.as_ref().map_or(Value::Null, to_json)));
+        Self { condition: &unmet.condition, values: values.collect() }
+    }
+}

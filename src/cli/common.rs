@@ -1,0 +1,93 @@
+//! What all commands share: the exit status, why there is no answer, and how one is written.
+
+use clap::{Args, ValueEnum};
+use metaplan::message::Message;
+use probabilistic::{Diagnostic, Error};
+
+/// Exit statuses; the README lists them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Exit {
+    Done = 0,
+    NotProved = 1,
+    Usage = 2,
+    BadInput = 3,
+    Unsolvable = 10,
+    UnsolvableWithinHorizon = 11,
+    NothingFound = 12,
+    Inconsistent = 20,
+    Invalid = 30,
+    Fault = 70,
+}
+
+/// Why a command has no answer.
+pub(super) struct Failure {
+    pub(super) exit: Exit,
+    pub(super) messages: Vec<Message>,
+}
+
+impl Failure {
+    pub(super) fn usage(message: Message) -> Self {
+        Self { exit: Exit::Usage, messages: vec![message] }
+    }
+}
+
+impl From<Vec<Message>> for Failure {
+    fn from(messages: Vec<Message>) -> Self {
+        Self { exit: Exit::BadInput, messages }
+    }
+}
+
+impl From<Message> for Failure {
+    fn from(message: Message) -> Self {
+        vec![message].into()
+    }
+}
+
+/// Options that all commands have.
+#[derive(Debug, Clone, Args)]
+pub(super) struct Common {
+    /// How the answer is written.
+    #[arg(long, global = true, value_enum, default_value_t = Format::Text)]
+    pub(super) format: Format,
+    /// No warnings and no progress on standard error.
+    #[arg(long, short, global = true)]
+    pub(super) quiet: bool,
+    /// Statistics besides the answer.
+    #[arg(long, short, global = true)]
+    pub(super) verbose: bool,
+}
+
+/// How answers are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Format {
+    /// For people.
+    Text,
+    /// For programs; versioned, see the README.
+    Json,
+    /// `reason` only: the inferred assertions, sorted.
+    Ntriples,
+    /// `reason` only: the inferred assertions by subject.
+    Turtle,
+}
+
+/// What the library reports, with the file that it is about.
+pub(super) fn process_failure(error: Error, file: &str) -> Failure {
+    match error {
+        Error::Model(problems) => in_file(&problems, file),
+        Error::Property(problems) => in_file(&problems, "property"),
+        Error::Constant(text) => Failure::usage(Message::error("Q504", text)),
+        Error::StateLimit { .. } | Error::Interrupted { .. } => Failure {
+            exit: Exit::NothingFound,
+            messages: vec![Message::at("Q505", file, None, error.to_string())],
+        },
+        other => Message::at("Q506", file, None, other.to_string()).into(),
+    }
+}
+
+pub(super) fn in_file(problems: &[Diagnostic], file: &str) -> Failure {
+    let message = |problem: &Diagnostic| {
+        let place = Some((problem.place.line, problem.place.column));
+        Message::at(problem.code, file, place, problem.message.clone())
+    };
+    problems.iter().map(message).collect::<Vec<_>>().into()
+}

@@ -1,0 +1,164 @@
+//! The mission that a command is about, and the situation that it is in.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metaplan::file::source;
+use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
+use metaplan::message::{Message, did_you_mean};
+use metaplan::mission::{Bindings, Mission};
+use metaplan::setup::Setup;
+use ontology::ReadOptions;
+
+use crate::cli::common::{Exit, Failure};
+use crate::cli::values::{existing_directory, setting};
+
+/// A mission, or a domain and a problem, and the situation to plan for.
+#[derive(Debug, Args)]
+pub(super) struct Situation {
+    /// A knowledge base for DOMAIN and PROBLEM (OWL; repeatable).
+    #[arg(long = "kb", value_name = "FILE")]
+    knowledge: Vec<PathBuf>,
+    /// Rules for that knowledge base: a file, `coadaptation` or `tomasys` (repeatable; default `coadaptation`).
+    #[arg(long = "rules", value_name = "FILE")]
+    rules: Vec<String>,
+    #[command(flatten)]
+    imports: Imports,
+    /// A scenario of the mission's manifest.
+    #[arg(long, value_name = "NAME")]
+    scenario: Option<String>,
+    /// A measured attribute, a numeric fluent or a fact: `ambient_light=0.9`, `battery=30`, `robot_at=wp2` (repeatable).
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    set: Vec<(String, String)>,
+    /// A component that has failed (repeatable).
+    #[arg(long, value_name = "COMPONENT")]
+    fail: Vec<String>,
+}
+
+/// Where imports are looked for; never the network.
+#[derive(Debug, Args)]
+pub(super) struct Imports {
+    /// An OASIS XML catalog that says where imports lie (repeatable).
+    #[arg(long, value_name = "FILE")]
+    catalog: Vec<PathBuf>,
+    /// A directory to look for imports in, with those below it (repeatable).
+    #[arg(long, value_name = "DIR", value_parser = existing_directory)]
+    directory: Vec<PathBuf>,
+    /// Goes on with a warning where an import is found nowhere.
+    #[arg(long)]
+    #[allow(clippy::struct_field_names)]
+    ignore_missing_imports: bool,
+}
+
+impl Imports {
+    pub(super) fn options(&self) -> ReadOptions {
+        ReadOptions {
+            catalogs: self.catalog.clone(),
+            directories: self.directory.clone(),
+            allow_missing_imports: self.ignore_missing_imports,
+            ..ReadOptions::default()
+        }
+    }
+}
+
+impl Situation {
+    /// A situation of a mission that has a manifest.
+    pub(super) fn of_mission(
+        scenario: Option<String>,
+        set: Vec<(String, String)>,
+        fail: Vec<String>,
+    ) -> Self {
+        let imports = Imports { catalog: Vec::new(), directory: Vec::new(), ignore_missing_imports: false };
+        Self { knowledge: Vec::new(), rules: Vec::new(), imports, scenario, set, fail }
+    }
+
+    /// The mission in this situation, from one input (a manifest) or two (domain and problem).
+    pub(super) fn mission(&self, inputs: &[PathBuf]) -> Result<Mission, Failure> {
+        self.setup(inputs).map(|setup| setup.mission)
+    }
+
+    /// As [`Situation::mission`], with what goes with the mission.
+    pub(super) fn setup(&self, inputs: &[PathBuf]) -> Result<Setup, Failure> {
+        let mut setup = match inputs {
+            [manifest] => {
+                let imports = &self.imports;
+                let none = self.knowledge.is_empty() && self.rules.is_empty();
+                let here = imports.catalog.is_empty() && imports.directory.is_empty();
+                if !(none && here && !imports.ignore_missing_imports) {
+                    let text = "`--kb`, `--rules` and where imports lie go with DOMAIN and PROBLEM; \
+                                a mission's manifest names its own";
+                    return Err(Failure::usage(Message::error("M107", text)));
+                }
+                let mut setup = Setup::read(manifest)?;
+                if let Some(name) = &self.scenario {
+                    let scenario = setup.scenarios.get(name).ok_or_else(|| {
+                        let known: Vec<_> = setup.scenarios.keys().map(String::as_str).collect();
+                        let text = format!(
+                            "the mission has no scenario `{name}`; it has: {}{}",
+                            known.join(", "),
+                            did_you_mean(name, known.iter().copied())
+                        );
+                        Failure::usage(Message::error("M108", text))
+                    })?;
+                    setup.mission.apply(scenario).map_err(|message| {
+                        let text = format!("scenario `{name}`: {}", message.message);
+                        Message::at(&message.code, setup.file(), None, text)
+                    })?;
+                }
+                setup
+            }
+            [domain, problem] => {
+                if self.scenario.is_some() {
+                    let text = "`--scenario` goes with a mission's manifest";
+                    return Err(Failure::usage(Message::error("M107", text)));
+                }
+                if self.knowledge.is_empty() && !self.rules.is_empty() {
+                    return Err(Failure::usage(Message::error("M107", "`--rules` goes with `--kb`")));
+                }
+                let knowledge = (!self.knowledge.is_empty()).then(|| {
+                    let rules = if self.rules.is_empty() {
+                        vec![COADAPTATION.to_owned()]
+                    } else {
+                        self.rules.clone()
+                    };
+                    Knowledge::read(&Sources {
+                        documents: self.knowledge.clone(),
+                        rules,
+                        options: self.imports.options(),
+                        ..Sources::default()
+                    })
+                });
+                Mission::new("", knowledge, Bindings::default(), source(domain), source(problem))?.into()
+            }
+            _ => {
+                let text = "give a mission's manifest, or a domain and a problem";
+                return Err(Failure::usage(Message::error("M107", text)));
+            }
+        };
+        let mission = &mut setup.mission;
+        for component in &self.fail {
+            mission.fail(component).map_err(Failure::usage)?;
+        }
+        for (name, value) in &self.set {
+            mission.set(name, value).map_err(Failure::usage)?;
+        }
+        consistent(mission.knowledge())?;
+        mission.note_doubts();
+        Ok(setup)
+    }
+}
+
+/// Nothing is planned on knowledge that contradicts itself.
+pub(super) fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Failure> {
+    let contradictions = knowledge.map(Knowledge::contradictions).unwrap_or_default();
+    if contradictions.is_empty() {
+        return Ok(());
+    }
+    let messages = contradictions.iter().map(|c| {
+        Message::error(
+            "M110",
+            format!("the knowledge is inconsistent: {}: {}", c.violated, c.facts.join(", ")),
+        )
+    });
+    Err(Failure { exit: Exit::Inconsistent, messages: messages.collect() })
+}

@@ -1,0 +1,38 @@
+//! The values of options: text to directories, settings, durations and times.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use num_rational::BigRational;
+use num_traits::Num as _;
+use serde_json::Value;
+
+pub(super) fn existing_directory(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if path.is_dir() { Ok(path) } else { Err(format!("there is no directory `{text}`")) }
+}
+
+pub(super) fn setting(text: &str) -> Result<(String, String), String> {
+    let (name, value) =
+        text.split_once('=').ok_or_else(|| format!("`{text}` is not of the form NAME=VALUE"))?;
+    Ok((name.trim().to_owned(), value.trim().to_owned()))
+}
+
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is no number of seconds"))?;
+    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
+}
+
+pub(super) fn time(text: &str) -> Result<BigRational, String> {
+    let value = text.parse::<serde_json::Number>().ok().and_then(|number| decimal(&Value::Number(number)));
+    value
+        .filter(|value| *value >= BigRational::default())
+        .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
+}
+
+/// An exact number from a decimal of JSON.
+pub(super) fn decimal(value: &Value) -> Option<BigRational> {
+    let text = value.as_number()?.to_string();
+    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
+    BigRational::from_str_radix(&format!("{whole}{fraction}/1{}", "0".repeat(fraction.len())), 10).ok()
+}

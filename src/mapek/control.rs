@@ -1,0 +1,261 @@
+//! The loop itself: an observation goes through the stations, one after the other, and answers come out.
+
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::knowledge::Knowledge;
+use crate::mapek::adapt::Adapting;
+use crate::mapek::analyze::{analyze, available, follow};
+use crate::mapek::answer::{Answer, Effect};
+use crate::mapek::ask::Outcome;
+use crate::mapek::beliefs::Beliefs;
+use crate::mapek::digest::digest;
+use crate::mapek::effects::{reconfigure, request};
+use crate::mapek::event::{Observation, Refusal};
+use crate::mapek::execute::execute;
+use crate::mapek::monitor::{Base, Changes, Monitor};
+use crate::mapek::plan::Planner;
+use crate::mapek::record::{self, Decision, Snapshot};
+use crate::mapek::sequence::Place;
+use crate::mapek::settings::Settings;
+use crate::mapek::step::PlannedStep;
+use crate::mapek::watch::Watch;
+use crate::message::Message;
+use crate::mission::Mission;
+
+/// What follows from an observation is to be found in so many steps; see [`rules::Limits`]. A robot waits meanwhile.
+const STEPS: u64 = 100_000_000;
+
+/// So many names and values may be interned before the knowledge is made anew without what is not used any more.
+const GROWTH: usize = 1024;
+
+/// The adaptation loop of one robot.
+#[derive(Debug, Clone)]
+pub struct Loop {
+    settings: Settings,
+    pub(super) beliefs: Beliefs,
+    monitor: Monitor,
+    pub(super) planner: Planner,
+    digest: String,
+}
+
+impl Loop {
+    /// Takes charge of a mission.
+    ///
+    /// # Errors
+    /// The mission cannot be planned for: what the knowledge base contributes does not fit the domain, or the knowledge
+    /// contradicts itself.
+    pub fn new(mission: Mission, settings: Settings) -> Result<Self, Vec<Message>> {
+        mission.filled()?;
+        let contradictions = mission.knowledge().map(Knowledge::contradictions).unwrap_or_default();
+        if let Some(first) = contradictions.first() {
+            let text =
+                format!("the knowledge is inconsistent: {}: {}", first.violated, first.facts.join(", "));
+            return Err(vec![Message::error("M110", text)]);
+        }
+        let monitor = Monitor::new(&mission);
+        let digest = digest(&mission, &settings);
+        let planner = Planner { time_limit: settings.time_limit, ..Planner::default() };
+        let mut beliefs = Beliefs::new(mission);
+        if let Some(base) = beliefs.mission.knowledge_mut() {
+            base.limit(STEPS);
+        }
+        if let Some(base) = beliefs.mission.knowledge() {
+            beliefs.available = available(base);
+        }
+        Ok(Self { settings, beliefs, monitor, planner, digest })
+    }
+
+    /// What the loop believes and has asked for.
+    pub fn beliefs(&self) -> &Beliefs {
+        &self.beliefs
+    }
+
+    /// To look at how planning goes, from another thread.
+    pub fn watch(&self) -> Watch {
+        self.planner.watch.clone()
+    }
+
+    /// Makes the first plan and requests the first action.
+    pub fn start(&mut self) -> Vec<Answer> {
+        let mut answers = Vec::new();
+        self.planner.made.clear();
+        execute(&mut self.adapting(), &mut answers);
+        answers
+    }
+
+    /// Takes an observation over, at a time since the start of the mission that never goes back, and says what follows.
+    pub fn handle(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
+        let mut answers = Vec::new();
+        // Plans that nobody has asked for are of no use to anybody.
+        self.planner.made.clear();
+        self.beliefs.lines += 1;
+        self.beliefs.now = self.beliefs.now.max(observation.time.unwrap_or(now));
+        if let Some(refusal) = observation.sequence.and_then(|sequence| self.refused(sequence)) {
+            return vec![refusal];
+        }
+        let mut changes = Changes::default();
+        let mut understood = false;
+        for event in &observation.events {
+            let outcome =
+                event.clone().and_then(|event| self.monitor.take(&mut self.beliefs, &event, &mut changes));
+            match outcome {
+                Ok(()) => understood = true,
+                Err(Refusal { code, message }) => {
+                    answers.push(Answer::Error { code: code.to_owned(), message });
+                }
+            }
+        }
+        if changes.goal {
+            self.planner.memo.forget();
+        }
+        if understood || changes.any() {
+            if let Some(sequence) = observation.sequence {
+                self.beliefs.numbers.insert(sequence);
+            }
+            let findings = follow(&mut self.beliefs, changes.base, &mut answers);
+            let mut adapting = self.adapting();
+            adapting.adapt(changes, findings, &mut answers);
+            execute(&mut adapting, &mut answers);
+            self.forget();
+        }
+        answers
+    }
+
+    /// The station that decides.
+    fn adapting(&mut self) -> Adapting<'_> {
+        Adapting { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
+    }
+
+    /// Why a line with this number is not taken over, if it is not.
+    fn refused(&self, sequence: u64) -> Option<Answer> {
+        match self.beliefs.numbers.place(sequence) {
+            Place::New => None,
+            Place::Seen => Some(Answer::Duplicate { sequence }),
+            Place::Stale(mark) => Some(Answer::Stale { sequence, mark }),
+            Place::Ahead(most) => {
+                let text = format!(
+                    "`seq` is {sequence}, but may be {most} at most: numbers grow from line to line, and skip a million at most"
+                );
+                Some(Answer::Error { code: "M307".to_owned(), message: text })
+            }
+        }
+    }
+
+    /// Effects that were asked for and not acknowledged, to be asked for again after a restart.
+    pub fn repeat(&self) -> Vec<Answer> {
+        let again = |effect: &Effect| Answer::Effect(Effect { repeated: true, ..effect.clone() });
+        self.beliefs.outstanding().map(again).collect()
+    }
+
+    /// A checksum of the mission before anything has happened, to tell missions apart.
+    pub(crate) fn digest(&self) -> String {
+        self.digest.clone()
+    }
+
+    /// Makes the knowledge anew where its history takes up memory.
+    fn forget(&mut self) {
+        let Some(base) = self.beliefs.mission.knowledge_mut().filter(|base| base.growth() > GROWTH) else {
+            return;
+        };
+        let statements = base.statements();
+        // What was consistent and came to an end does so again.
+        let _ = base.restore(&statements);
+    }
+}
+
+/// What the journal keeps, and what is made of it again.
+impl Loop {
+    /// The decision of which these are the answers, to be called once after each step.
+    pub fn decision(&mut self, answers: &[Answer]) -> Decision {
+        let made = std::mem::take(&mut self.planner.made);
+        Decision {
+            answers: answers.iter().map(Answer::to_json).collect(),
+            plans: made.iter().map(Outcome::to_record).collect(),
+        }
+    }
+
+    /// As [`Loop::start`], with the plans that were made then.
+    pub fn start_again(&mut self, plans: &[Value]) -> Vec<Answer> {
+        self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
+        let answers = self.start();
+        self.planner.recorded.clear();
+        answers
+    }
+
+    /// As [`Loop::handle`], with the plans that were made then.
+    pub fn handle_again(&mut self, observation: &Observation, now: Duration, plans: &[Value]) -> Vec<Answer> {
+        self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
+        let answers = self.handle(observation, now);
+        self.planner.recorded.clear();
+        answers
+    }
+
+    /// All that the loop knows.
+    pub fn snapshot(&self) -> Snapshot {
+        record::snapshot(&self.beliefs)
+    }
+
+    /// Takes over what a loop of the same mission knew.
+    ///
+    /// # Errors
+    /// The snapshot is damaged, or belongs to another mission.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
+        self.planner.memo.forget();
+        record::restore(&mut self.beliefs, snapshot)
+    }
+}
+
+/// The stations one by one, for those who decide otherwise: they observe, plan and request by themselves.
+impl Loop {
+    /// Takes an observation over without reacting to it.
+    pub(crate) fn observe(&mut self, observation: &Observation, now: Duration) {
+        self.beliefs.lines += 1;
+        self.beliefs.now = self.beliefs.now.max(now);
+        let mut changes = Changes::default();
+        for event in observation.events.iter().flatten() {
+            // What the loop would answer with an error changes nothing.
+            let _ = self.monitor.take(&mut self.beliefs, event, &mut changes);
+        }
+        if changes.goal {
+            self.planner.memo.forget();
+        }
+        if changes.base == Base::Watched {
+            analyze(&mut self.beliefs, &mut Vec::new());
+        }
+    }
+
+    /// The best plan for the situation as it is believed.
+    pub(crate) fn plan_anew(&mut self) -> Option<Vec<PlannedStep>> {
+        let outcome = self.adapting().plan(true);
+        self.planner.made.clear();
+        outcome.steps
+    }
+
+    /// Requests an action without asking whether it can be done.
+    pub(crate) fn request_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
+        request(&mut self.beliefs, step, answers);
+    }
+
+    /// Gives the action under way other designs.
+    pub(crate) fn reconfigure_now(&mut self, step: PlannedStep, answers: &mut Vec<Answer>) {
+        if let Some(mut running) = self.beliefs.running.take() {
+            running.step = step;
+            reconfigure(&mut self.beliefs, running.action, &running.step.clone(), answers);
+            self.beliefs.running = Some(running);
+        }
+    }
+
+    /// Whether the goal holds as far as is believed.
+    pub(crate) fn is_goal(&self) -> bool {
+        self.beliefs.plan.is_none() && self.beliefs.running.is_none() && self.beliefs.violation().is_none()
+    }
+
+    /// The available designs of a function, sorted.
+    pub(crate) fn designs_for(&self, function: &str) -> Vec<String> {
+        let Some(knowledge) = self.beliefs.mission.knowledge() else { return Vec::new() };
+        let designs = knowledge.runtime().available_designs(Some(function)).unwrap_or_default();
+        designs.into_iter().map(|design| design.name).collect()
+    }
+}

@@ -1,0 +1,36 @@
+//! A mission and how it is adapted to a checksum, to tell journals of different missions apart.
+
+use sha2::{Digest as _, Sha256};
+
+use crate::mapek::event::FORMAT;
+use crate::mapek::settings::Settings;
+use crate::mission::Mission;
+
+/// Everything that decisions rest on before anything has happened: what is said and follows, the rules, the domain and the
+/// problem with its settings, the bindings, how eager the loop is, and the versions of the formats.
+pub(super) fn digest(mission: &Mission, settings: &Settings) -> String {
+    let mut problem = mission.problem().clone();
+    mission.fill(&mut problem);
+    let mut parts = vec![
+        env!("CARGO_PKG_VERSION").to_owned(),
+        FORMAT.to_owned(),
+        mission.name.clone(),
+        format!("{settings:?}"),
+        format!("{:?}", mission.bindings()),
+        pddl::print_domain(mission.domain()),
+        pddl::print_problem(&problem),
+    ];
+    if let Some(knowledge) = mission.knowledge() {
+        let engine = knowledge.engine();
+        let facts: Vec<rules::Fact> = engine.facts().collect();
+        parts.push(ontology::ntriples(engine.symbols(), &facts));
+        parts.push(rules::print_rules(engine.program(), engine.symbols(), &rules::Prefixes::default()));
+    }
+    let mut hash = Sha256::new();
+    for part in parts {
+        hash.update((part.len() as u64).to_le_bytes());
+        hash.update(part);
+    }
+    let half = hash.finalize().iter().take(16).fold(0_u128, |sum, byte| sum << 8 | u128::from(*byte));
+    format!("{half:032x}")
+}

@@ -1,0 +1,74 @@
+//! How eager the loop is: the section `adaptation` of a manifest.
+
+use std::time::Duration;
+
+use num_rational::BigRational;
+use serde::Deserialize;
+
+use crate::manifest::ManifestPath;
+use crate::message::Message;
+use crate::number;
+
+/// The section `adaptation` of a manifest.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptationSection {
+    minimum_benefit: Option<toml::Value>,
+    settle: Option<toml::Value>,
+    time_limit: Option<toml::Value>,
+    #[serde(default)]
+    stay_close: bool,
+}
+
+impl AdaptationSection {
+    /// What it says, and what is so unless it says otherwise.
+    ///
+    /// # Errors
+    /// A value that is no number, or negative.
+    pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
+        let mut settings = Settings { stay_close: self.stay_close, ..Settings::default() };
+        if let Some(value) = &self.minimum_benefit {
+            settings.minimum_benefit = origin.number("minimum_benefit", value)?;
+        }
+        let seconds = |name: &str, value: &toml::Value| {
+            let number = origin.number(name, value)?;
+            let wrong = || origin.wrong(format!("`{name}` is too long"));
+            Duration::try_from_secs_f64(number::to_f64(&number)).map_err(|_| wrong())
+        };
+        if let Some(value) = &self.settle {
+            settings.settle = seconds("settle", value)?;
+        }
+        if let Some(value) = &self.time_limit {
+            settings.time_limit = Some(seconds("time_limit", value)?);
+        }
+        Ok(settings)
+    }
+}
+
+/// How eager the loop is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Another plan replaces one that could be kept only if its metric is better by this much, in the metric's unit.
+    pub minimum_benefit: BigRational,
+    /// So long must a design be available again before a better plan is looked for.
+    pub settle: Duration,
+    /// How long one plan may take; the best so far is used then, if there is one. Ten seconds unless said otherwise.
+    pub time_limit: Option<Duration>,
+    /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand. The choice then
+    /// depends on what has happened, and no longer on the situation alone.
+    pub stay_close: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            minimum_benefit: BigRational::from_integer(0.into()),
+            settle: Duration::ZERO,
+            time_limit: Some(TIME_LIMIT),
+            stay_close: false,
+        }
+    }
+}
+
+/// How long one plan may take unless said otherwise. A robot waits meanwhile.
+const TIME_LIMIT: Duration = Duration::from_secs(10);

@@ -1,0 +1,92 @@
+//! A manifest to all that it sets up: the mission, how it is adapted, compared and simulated.
+//!
+//! Each room defines its own section. Here they stand side by side, so that a key that none of them has is refused.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::comparison::Roles;
+use crate::file::source;
+use crate::knowledge::{Knowledge, KnowledgeSection};
+use crate::manifest::{self, ManifestPath};
+use crate::mapek::{AdaptationSection, Settings};
+use crate::message::Message;
+use crate::mission::{Bindings, Mission, PlanningSection, Scenario};
+use crate::simulate::Simulation;
+
+/// All sections of a manifest.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sections {
+    name: String,
+    #[serde(default)]
+    description: String,
+    knowledge: KnowledgeSection,
+    planning: PlanningSection,
+    /// PDDL symbol to query, beyond the defaults.
+    #[serde(default)]
+    bindings: BTreeMap<String, String>,
+    #[serde(default)]
+    adaptation: AdaptationSection,
+    #[serde(default)]
+    probabilistic: Roles,
+    #[serde(default)]
+    scenarios: BTreeMap<String, Scenario<Simulation>>,
+}
+
+/// A mission, and what goes with it.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The mission.
+    pub mission: Mission,
+    /// What it is about, in a sentence.
+    pub description: String,
+    /// How eager the adaptation loop is.
+    pub settings: Settings,
+    /// The symbols of the co-adaptation process, where they differ from the defaults.
+    pub roles: Roles,
+    /// Situations by name.
+    pub scenarios: BTreeMap<String, Scenario<Simulation>>,
+    origin: ManifestPath,
+}
+
+impl Setup {
+    /// Reads a manifest, and the files that it names.
+    ///
+    /// # Errors
+    /// All that is wrong with the manifest and with the files that it names.
+    pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
+        let (sections, origin): (Sections, ManifestPath) =
+            manifest::read(manifest).map_err(|message| vec![message])?;
+        let knowledge = Knowledge::read(&sections.knowledge.sources(&origin));
+        let settings = sections.adaptation.settings(&origin).map_err(|message| vec![message])?;
+        let bindings = Bindings::with(&sections.bindings).map_err(|text| vec![origin.wrong(text)])?;
+        let (domain, problem) =
+            (origin.path(&sections.planning.domain), origin.path(&sections.planning.problem));
+        let mission =
+            Mission::new(&sections.name, Some(knowledge), bindings, source(&domain), source(&problem))?;
+        let Sections { description, probabilistic: roles, scenarios, .. } = sections;
+        Ok(Self { mission, description, settings, roles, scenarios, origin })
+    }
+
+    /// The manifest's own name; empty for a mission without.
+    pub fn file(&self) -> &str {
+        self.origin.file()
+    }
+}
+
+/// A mission without a manifest: all else is as it is unless said otherwise.
+impl From<Mission> for Setup {
+    fn from(mission: Mission) -> Self {
+        Self {
+            mission,
+            description: String::new(),
+            settings: Settings::default(),
+            roles: Roles::default(),
+            scenarios: BTreeMap::new(),
+            origin: ManifestPath::default(),
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Mistakes in a manifest: whichever room a section belongs to, every command that reads the manifest refuses it, with the place.
+
+use crate::common::{metaplan_in, root};
+
+/// A manifest with further lines, which begin in line 9; all commands refuse it with this message.
+fn check(lines: &str, expected: &str) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let root = root().display().to_string();
+    let text = format!(
+        "name = \"m\"\n\n[knowledge]\nfiles = [\"{root}/ontology/kb/ugv.ttl\"]\n\n[planning]\n\
+         domain = \"{root}/encodings/ugv/domain.pddl\"\nproblem = \"{root}/encodings/ugv/problem.pddl\"\n{lines}\n"
+    );
+    std::fs::write(directory.path().join("m.toml"), text).expect("a file");
+    for command in [
+        &["plan", "m.toml"][..],
+        &["explain", "m.toml"],
+        &["compare", "m.toml"],
+        &["run", "m.toml"],
+        &["simulate", "m.toml", "--scenario", "s"],
+        &["export", "m.toml", "--to", "pddl"],
+    ] {
+        let outcome = metaplan_in(directory.path(), command, "");
+        assert_eq!(outcome.status, 3, "{command:?}: {outcome:#?}");
+        assert_eq!(outcome.stderr, format!("m.toml:{expected}\n"), "{command:?}");
+        assert!(outcome.stdout.is_empty(), "{command:?}: {outcome:#?}");
+    }
+}
+
+#[test]
+fn a_section_is_refused_whoever_uses_it() {
+    check(
+        "[scenaros.s]",
+        "9:2: error[M104]: unknown field `scenaros`, expected one of `name`, `description`, `knowledge`, `planning`, \
+         `bindings`, `adaptation`, `probabilistic`, `scenarios`; did you mean `scenarios`?",
+    );
+    check(
+        "[adaptation]\nsetle = 1",
+        "10:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
+         `stay_close`; did you mean `settle`?",
+    );
+    check(
+        "[adaptation]\nsettle = -1",
+        " error[M105]: `settle` is -1, but should be a decimal number, not negative",
+    );
+    check(
+        "[probabilistic]\nloss_rate = \"often\"",
+        "10:13: error[M104]: invalid type: string \"often\", expected f64",
+    );
+    check(
+        "[scenarios.s]\nfial = []",
+        "10:1: error[M104]: unknown field `fial`, expected one of `description`, `fail`, `set`, `simulation`; \
+         did you mean `fail`?",
+    );
+    check("[scenarios.s.simulation]\nstep = 1.0", "9:1: error[M104]: missing field `time_budget`");
+    check(
+        "[[scenarios.s.simulation.events]]\nfai = []",
+        "10:1: error[M104]: unknown field `fai`, expected one of `at`, `when`, `within`, `fail`, `recover`, `set`; \
+         did you mean `fail`?",
+    );
+    // Of several mistakes one is told: that in the section with the first name.
+    check(
+        "[probabilistic]\nbattery_unit = \"x\"\n[adaptation]\nsetle = 1",
+        "12:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
+         `stay_close`; did you mean `settle`?",
+    );
+}
