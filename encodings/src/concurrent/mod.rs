@@ -1,6 +1,6 @@
 //! A PDDL task to a plan whose actions overlap, with the least makespan or the best weighted sum of makespan and costs.
 //!
-//! What a plan is, the definition at the head of [`validate`](crate::validate) says. Besides, at any time each function that the
+//! What a plan is, the definition at the head of [`validate`](pddl::validate) says. Besides, at any time each function that the
 //! running actions require has one design, and no duration is above 0 and below the *separation* (epsilon).
 //!
 //! `split` makes two schemas of a durative action, `compile` finds what each happening waits for, and `search` goes
