@@ -14,7 +14,7 @@ use crate::ground::vocabulary::reached::Reached;
 use crate::lifted::Rational;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
-use crate::task::{OperatorId, Task};
+use crate::task::{OperatorId, State, Task};
 use pddl::ast::Span;
 
 /// A ground task whose actions can overlap.
@@ -125,5 +125,22 @@ impl Concurrent {
             happening.sets.retain(|variable| heeded.contains(variable));
         }
         Ok(())
+    }
+
+    /// Whether what must hold over all of an instance holds in a state.
+    pub(super) fn holds_over_all(&self, instance: u32, state: &State) -> bool {
+        let condition = self.instances[instance as usize].over_all;
+        let condition = condition.map(|id| &self.task.operators[id.index()].condition);
+        condition.is_none_or(|condition| {
+            condition.holds_propositionally(&state.values)
+                && condition.holds_numerically(&state.numbers, &[], &[])
+        })
+    }
+
+    /// Whether a happening writes what the joint condition over all of an instance reads.
+    pub(super) fn touches(&self, operator: OperatorId, instance: u32) -> bool {
+        let joint = &self.instances[instance as usize].joint;
+        let writes = &self.happenings[operator.index()].writes;
+        !joint.is_empty() && writes.iter().any(|id| joint.binary_search(id).is_ok())
     }
 }

@@ -1,6 +1,6 @@
 //! A PDDL task to a plan whose actions overlap, with the least makespan or the best weighted sum of makespan and costs.
 //!
-//! What a plan is, the definition at the head of [`validate`](crate::validate) says. Besides, at any time each function that the
+//! What a plan is, the definition at the head of [`validate`](pddl::validate) says. Besides, at any time each function that the
 //! running actions require has one design, and no duration is above 0 and below the *separation* (epsilon).
 //!
 //! `split` makes two schemas of a durative action, `compile` finds what each happening waits for, and `search` goes
@@ -154,7 +154,7 @@ pub fn optimize_concurrent(
     let mut search = Search::new(concurrent, &estimate, bounds.as_ref(), false, first.incumbent.take());
     drop(first);
     let ended = search.run(limits, usize::MAX, &mut hear);
-    let plan = search.incumbent.as_ref().map(|sequence| concurrent.plan(sequence));
+    let plan = search.incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
     let (status, lower) = match (&ended, &search.incumbent) {
         (Ended::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
         (Ended::Exhausted, None) => (Status::Unsolvable, None),
@@ -171,32 +171,30 @@ pub fn optimize_concurrent(
     }
 }
 
-impl Concurrent {
-    /// A sequence in names, its actions in the order of their starts.
-    fn plan(&self, sequence: &Sequence) -> Plan {
-        let times = schedule::schedule(self, &sequence.happenings, &sequence.together);
-        let mut steps: Vec<((Int, OperatorId), Step)> = Vec::new();
-        for (id, time) in sequence.happenings.iter().zip(times) {
-            let (end, duration) = match self.happenings[id.index()].role {
-                Role::Start(instance) => {
-                    let instance = &self.instances[instance as usize];
-                    (self.task.operators[instance.end.index()].cost.constant, instance.duration)
-                }
-                Role::Whole => (0, 0),
-                _ => continue,
-            };
-            let operator = &self.task.operators[id.index()];
-            let cost = Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end);
-            let cost = if self.task.objective.maximize { -cost } else { cost };
-            let [start, duration] = [time, duration].map(Rational::from_integer);
-            steps.push(((time, *id), Step::new(&self.task, operator, &[], (start, duration, cost))));
-        }
-        steps.sort_by_key(|(place, _)| *place);
-        let mut current = Vec::new();
-        for (_, step) in &mut steps {
-            step.note_reconfigured(&mut current);
-        }
-        let steps = steps.into_iter().map(|(_, step)| step).collect();
-        Plan { steps, cost: self.measure.metric(sequence.value.0) }
+/// A sequence in names, its actions in the order of their starts.
+fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
+    let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together);
+    let mut steps: Vec<((Int, OperatorId), Step)> = Vec::new();
+    for (id, time) in sequence.happenings.iter().zip(times) {
+        let (end, duration) = match concurrent.happenings[id.index()].role {
+            Role::Start(instance) => {
+                let instance = &concurrent.instances[instance as usize];
+                (concurrent.task.operators[instance.end.index()].cost.constant, instance.duration)
+            }
+            Role::Whole => (0, 0),
+            _ => continue,
+        };
+        let operator = &concurrent.task.operators[id.index()];
+        let cost = Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end);
+        let cost = if concurrent.task.objective.maximize { -cost } else { cost };
+        let [start, duration] = [time, duration].map(Rational::from_integer);
+        steps.push(((time, *id), Step::new(&concurrent.task, operator, &[], (start, duration, cost))));
     }
+    steps.sort_by_key(|(place, _)| *place);
+    let mut current = Vec::new();
+    for (_, step) in &mut steps {
+        step.note_reconfigured(&mut current);
+    }
+    let steps = steps.into_iter().map(|(_, step)| step).collect();
+    Plan { steps, cost: concurrent.measure.metric(sequence.value.0) }
 }

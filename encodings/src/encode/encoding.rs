@@ -68,9 +68,8 @@ impl<'a> Encoding<'a> {
 
     /// From now on only plans with cost at most `limit`, which must not be above the limit of the encoding.
     pub(crate) fn tighten(&mut self, limit: Int) {
-        if let Some(cost) = self.cost.take() {
+        if let Some(cost) = &self.cost {
             cost.at_most(&mut self.formula, limit);
-            self.cost = Some(cost);
         }
     }
 

@@ -263,9 +263,9 @@ impl RoundedBounds {
             number_scale: 1,
             axioms: Vec::new(),
             slots: Vec::new(),
-            operators: operators.map(|(operator, cost)| operator.without_numbers(rounded(cost))).collect(),
+            operators: operators.map(|(operator, cost)| bare_operator(operator, rounded(cost))).collect(),
             initial: without_numbers(&task.initial),
-            goal: task.goal.without_numbers(),
+            goal: bare_condition(&task.goal),
             objective: Objective::sum(),
             others: Vec::new(),
             time_scale: 1,
@@ -319,30 +319,28 @@ fn without_numbers(state: &State<Rational>) -> State {
     State { values: state.values.clone(), numbers: Vec::new() }
 }
 
-impl Condition<Rational> {
-    fn without_numbers(&self) -> Condition {
-        Condition { facts: self.facts.clone(), clauses: self.clauses.clone(), ..Condition::default() }
-    }
+/// A condition without its numbers.
+fn bare_condition(condition: &Condition<Rational>) -> Condition {
+    let (facts, clauses) = (condition.facts.clone(), condition.clauses.clone());
+    Condition { facts, clauses, ..Condition::default() }
 }
 
-impl Operator<Rational> {
-    /// What estimates need to know of it.
-    fn without_numbers(&self, cost: Int) -> Operator {
-        Operator {
-            schema: self.schema,
-            arguments: Vec::new(),
-            configuration: Vec::new(),
-            slots: [].into(),
-            forbidden: [].into(),
-            condition: self.condition.without_numbers(),
-            effects: self.effects.clone(),
-            conditional: self.conditional.clone(),
-            numeric_effects: Vec::new(),
-            cost: Quantity::constant(cost),
-            others: Vec::new(),
-            duration: Quantity::constant(0),
-            wait: None,
-            timing: Timing::free(),
-        }
+/// What estimates need to know of an operator.
+fn bare_operator(operator: &Operator<Rational>, cost: Int) -> Operator {
+    Operator {
+        schema: operator.schema,
+        arguments: Vec::new(),
+        configuration: Vec::new(),
+        slots: [].into(),
+        forbidden: [].into(),
+        condition: bare_condition(&operator.condition),
+        effects: operator.effects.clone(),
+        conditional: operator.conditional.clone(),
+        numeric_effects: Vec::new(),
+        cost: Quantity::constant(cost),
+        others: Vec::new(),
+        duration: Quantity::constant(0),
+        wait: None,
+        timing: Timing::free(),
     }
 }

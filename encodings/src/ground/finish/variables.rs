@@ -21,7 +21,7 @@ pub(super) struct Atoms {
     facts: Vec<Option<Fact>>,
     /// The value of each variable that stands for none of its atoms.
     pub(super) none: Vec<u32>,
-    /// See [`Task::exclusive`].
+    /// See [`exclusive`](crate::task::Task::exclusive).
     pub(super) exclusive: Vec<Vec<Fact>>,
 }
 

@@ -68,7 +68,7 @@ impl<'a> World<'a> {
     }
 
     /// The rows of a relation: of a static one those that hold, of a fluent one those that can ever hold.
-    pub(crate) fn relation(&self, predicate: PredicateId) -> Vec<Arguments> {
+    fn relation(&self, predicate: PredicateId) -> Vec<Arguments> {
         let facts =
             if self.lifted.predicates[predicate.index()].fluent { &self.reached.atoms } else { &self.facts };
         facts.iter().filter(|(own, _)| *own == predicate).map(|(_, arguments)| arguments.clone()).collect()
