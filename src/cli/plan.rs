@@ -15,17 +15,19 @@ use metaplan::message::Message;
 use metaplan::mission::{Blocking, Mission};
 use pddl::ast::Problem;
 
+use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::concurrent::{self, Overlap};
 use crate::cli::confirm::{Reading, fault};
 use crate::cli::limits::Guard;
 use crate::cli::objectives::Objectives;
+use crate::cli::output;
 use crate::cli::plan_answer::answer_text;
+use crate::cli::plan_exact;
 use crate::cli::plan_text::{PlanFormat, plan_text};
 use crate::cli::plan_verdict::{blocking_text, verdict};
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
-use crate::cli::{alternatives, output, plan_exact};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
