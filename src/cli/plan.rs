@@ -52,7 +52,7 @@ pub struct Arguments {
     /// How the SAT solver finds a cheapest plan: cheaper and cheaper plans until there is none, or a lower bound that rises until a
     /// plan costs as much. The cost of the answer is the same.
     #[arg(long, value_enum, default_value_t)]
-    strategy: Strategy,
+    strategy: StrategyName,
     /// How many actions stand at one step of the SAT solver's formulas; if not given, several while a first plan is looked
     /// for, and one from then on. The answer is the same.
     #[arg(long, value_enum)]
@@ -92,7 +92,7 @@ enum Encoding {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum Strategy {
+enum StrategyName {
     /// The one that is faster in general.
     #[default]
     Auto,
@@ -102,12 +102,12 @@ enum Strategy {
     Cores,
 }
 
-impl From<Strategy> for encodings::Strategy {
-    fn from(strategy: Strategy) -> Self {
+impl From<StrategyName> for encodings::Strategy {
+    fn from(strategy: StrategyName) -> Self {
         match strategy {
-            Strategy::Auto => Self::Auto,
-            Strategy::Tighten => Self::Tighten,
-            Strategy::Cores => Self::Cores,
+            StrategyName::Auto => Self::Auto,
+            StrategyName::Tighten => Self::Tighten,
+            StrategyName::Cores => Self::Cores,
         }
     }
 }
