@@ -10,7 +10,7 @@ pub struct CheckAnswer<'a> {
     property: &'a str,
     #[serde(flatten)]
     found: Found,
-    statistics: StatisticsPart,
+    statistics: SizePart,
 }
 
 /// What stands in the middle, by the kind of property.
@@ -55,16 +55,16 @@ struct ProvedPart {
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct StatisticsPart {
+struct SizePart {
     states: usize,
     choices: usize,
     transitions: usize,
     deadlocks: usize,
-    milliseconds: MillisecondsPart,
+    milliseconds: DurationPart,
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct MillisecondsPart {
+struct DurationPart {
     build: f64,
     solve: f64,
 }
@@ -113,8 +113,8 @@ impl<'a> CheckAnswer<'a> {
         };
         let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
         let milliseconds =
-            MillisecondsPart { build: build.as_secs_f64() * 1e3, solve: solve.as_secs_f64() * 1e3 };
-        let statistics = StatisticsPart {
+            DurationPart { build: build.as_secs_f64() * 1e3, solve: solve.as_secs_f64() * 1e3 };
+        let statistics = SizePart {
             states: *states,
             choices: *choices,
             transitions: *transitions,

@@ -11,8 +11,8 @@ use encodings::Limits;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 use metaplan::answers::Pair;
 use metaplan::comparison::{
-    Action, Candidate, Coadaptation, Comparison, Config, Costs, Listener, Planned, Risk, Roles, Stages,
-    Tasked, Unfinished, Valuation, compare,
+    Action, Candidate, Coadaptation, Comparison, Config, Costs, Listener, NoResult, Planned, Risk, Roles,
+    Stages, Tasked, Valuation, compare,
 };
 use metaplan::message::Message;
 use metaplan::mission::Mission;
@@ -243,8 +243,8 @@ fn one(
         None => plan(mission, coadaptation, roles, risk, *situation),
     };
     compare(coadaptation, &config, &mut planner, report).map_err(|error| match error {
-        Unfinished::Process(error) => process_failure(error, &mission.name),
-        Unfinished::Planner(messages) => messages.into(),
+        NoResult::Process(error) => process_failure(error, &mission.name),
+        NoResult::Planner(messages) => messages.into(),
     })
 }
 

@@ -54,8 +54,8 @@ struct CamaraMap {
     #[arg(long, value_name = "SECONDS", default_value_t = 5)]
     switch: u32,
     /// Which probabilities are imported.
-    #[arg(long, value_enum, default_value_t = Risk::All)]
-    risk: Risk,
+    #[arg(long, value_enum, default_value_t = Uncertainty::All)]
+    risk: Uncertainty,
     /// The mission's name.
     #[arg(long, default_value = "camara")]
     name: String,
@@ -65,7 +65,7 @@ struct CamaraMap {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Risk {
+enum Uncertainty {
     /// None of them.
     None,
     /// Those of collisions.
@@ -105,8 +105,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         dark: map.dark.clone(),
         battery: (!map.no_battery).then_some(map.battery),
         switch_seconds: map.switch,
-        collisions: map.risk != Risk::None,
-        failures: map.risk == Risk::All,
+        collisions: map.risk != Uncertainty::None,
+        failures: map.risk == Uncertainty::All,
         speeds: map.speeds == Speeds::All,
     };
     let files = import_map(file.name(), file.text(), &options)?;

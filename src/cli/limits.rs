@@ -12,7 +12,8 @@ use encodings::Limits;
 use metaplan::message::Message;
 
 use crate::cli::common::{Common, Exit, Failure};
-use crate::cli::{memory, output};
+use crate::cli::memory;
+use crate::cli::output;
 
 /// How often the reading thread looks at the clock.
 const INTERVAL: Duration = Duration::from_millis(10);

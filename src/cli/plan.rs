@@ -15,17 +15,19 @@ use metaplan::message::Message;
 use metaplan::mission::{Blocking, Mission};
 use pddl::ast::Problem;
 
+use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::concurrent::{self, Overlap};
 use crate::cli::confirm::{Reading, fault};
 use crate::cli::limits::Guard;
 use crate::cli::objectives::Objectives;
+use crate::cli::output;
 use crate::cli::plan_answer::answer_text;
+use crate::cli::plan_exact;
 use crate::cli::plan_text::{PlanFormat, plan_text};
 use crate::cli::plan_verdict::{blocking_text, verdict};
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
-use crate::cli::{alternatives, output, plan_exact};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -50,7 +52,7 @@ pub struct Arguments {
     /// How the SAT solver finds a cheapest plan: cheaper and cheaper plans until there is none, or a lower bound that rises until a
     /// plan costs as much. The cost of the answer is the same.
     #[arg(long, value_enum, default_value_t)]
-    strategy: Strategy,
+    strategy: StrategyName,
     /// How many actions stand at one step of the SAT solver's formulas; if not given, several while a first plan is looked
     /// for, and one from then on. The answer is the same.
     #[arg(long, value_enum)]
@@ -90,7 +92,7 @@ enum Encoding {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-enum Strategy {
+enum StrategyName {
     /// The one that is faster in general.
     #[default]
     Auto,
@@ -100,12 +102,12 @@ enum Strategy {
     Cores,
 }
 
-impl From<Strategy> for encodings::Strategy {
-    fn from(strategy: Strategy) -> Self {
+impl From<StrategyName> for encodings::Strategy {
+    fn from(strategy: StrategyName) -> Self {
         match strategy {
-            Strategy::Auto => Self::Auto,
-            Strategy::Tighten => Self::Tighten,
-            Strategy::Cores => Self::Cores,
+            StrategyName::Auto => Self::Auto,
+            StrategyName::Tighten => Self::Tighten,
+            StrategyName::Cores => Self::Cores,
         }
     }
 }

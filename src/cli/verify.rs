@@ -12,9 +12,10 @@ use metaplan::answers::VerificationAnswer;
 use metaplan::certificate::{Claim, Verification, VerifiedPart, conditions, verify};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::memory;
+use crate::cli::output;
 use crate::cli::situation::Situation;
 use crate::cli::values::{seconds, setting};
-use crate::cli::{memory, output};
 
 /// The process may take so much, in megabytes of 2^20 bytes: a certificate may come from anybody.
 const MEMORY_LIMIT: u64 = 4096;

@@ -9,7 +9,7 @@ use probabilistic::explore::{Bounds, explore};
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::hindsight::{self, Hindsight, LossReport, Spent};
 use crate::comparison::nominal::time_of;
-use crate::comparison::planned::{Costs, PlanFinder, PlanTable, Unfinished};
+use crate::comparison::planned::{Costs, NoResult, PlanFinder, PlanTable};
 use crate::comparison::play::Measures;
 use crate::comparison::process::{Process, REWARDS, Risk, Valuation};
 use crate::comparison::published::{published, shortest_routes};
@@ -96,7 +96,7 @@ pub fn compare(
     config: &Config<'_>,
     planner: &mut PlanFinder<'_>,
     report: &mut Listener<'_>,
-) -> Result<Comparison, Unfinished> {
+) -> Result<Comparison, NoResult> {
     // The planner comes first, so that its memory can be told from that of the process.
     (config.memory)();
     let mut memo = PlanTable { planner, plans: BTreeMap::new(), costs: Costs::default() };

@@ -7,7 +7,7 @@ use probabilistic::{Direction, Problem};
 
 use crate::comparison::coadaptation::{Coadaptation, Switch, Traversal};
 use crate::comparison::nominal::{after, time_of};
-use crate::comparison::planned::{PlanTable, Unfinished};
+use crate::comparison::planned::{NoResult, PlanTable};
 use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
@@ -42,7 +42,7 @@ pub(super) fn report(
     plan: &[Action],
     anticipating: &[u32],
     memo: &mut PlanTable<'_, '_>,
-) -> Result<LossReport, Unfinished> {
+) -> Result<LossReport, NoResult> {
     let mission = referee.mission;
     let loss = mission.loss.as_ref();
     let mut steps = Vec::new();
@@ -115,7 +115,7 @@ fn time_from(mission: &Coadaptation, configuration: usize, plan: &[Action]) -> f
 }
 
 /// The least time to the goal from a situation, when nothing else goes wrong.
-fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Option<f64>, Unfinished> {
+fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Option<f64>, NoResult> {
     let risk = Risk { collisions: false, failures: false, ..referee.risk };
     let process =
         Process::<f64>::new(referee.mission, Risk { loss: true, ..risk }, &["time"]).starting(from.into());

@@ -189,15 +189,15 @@ struct Coordinates {
     y: f64,
 }
 
-type Pair = (String, String);
+type Corridor = (String, String);
 
-fn pair(a: &str, b: &str) -> Pair {
+fn pair(a: &str, b: &str) -> Corridor {
     if a <= b { (a.to_owned(), b.to_owned()) } else { (b.to_owned(), a.to_owned()) }
 }
 
 /// One measurement for each arc and configuration; the last one counts where an arc has several.
-fn measured(list: &[Value], field: &str, digits: usize) -> BTreeMap<Pair, BTreeMap<&'static str, f64>> {
-    let mut result: BTreeMap<Pair, BTreeMap<&'static str, f64>> = BTreeMap::new();
+fn measured(list: &[Value], field: &str, digits: usize) -> BTreeMap<Corridor, BTreeMap<&'static str, f64>> {
+    let mut result: BTreeMap<Corridor, BTreeMap<&'static str, f64>> = BTreeMap::new();
     for entry in list {
         let (Some(from), Some(to)) = (entry["from"].as_str(), entry["to"].as_str()) else { continue };
         let by = result.entry(pair(from, to)).or_default();
@@ -353,11 +353,11 @@ fn problem(map: &Map, options: &MapOptions) -> String {
     let successes = measured(&map.successrate, "successrate", 9);
     let at: BTreeMap<&str, &Coordinates> =
         map.nodes.iter().map(|node| (node.id.as_str(), &node.coords)).collect();
-    let arcs: BTreeSet<Pair> =
+    let arcs: BTreeSet<Corridor> =
         map.nodes.iter().flat_map(|node| node.neighbours.iter().map(|other| pair(&node.id, other))).collect();
     let length =
-        |(a, b): &Pair| (at[a.as_str()].x - at[b.as_str()].x).hypot(at[a.as_str()].y - at[b.as_str()].y);
-    let dark: BTreeSet<Pair> = options.dark.iter().map(|(a, b)| pair(a, b)).collect();
+        |(a, b): &Corridor| (at[a.as_str()].x - at[b.as_str()].x).hypot(at[a.as_str()].y - at[b.as_str()].y);
+    let dark: BTreeSet<Corridor> = options.dark.iter().map(|(a, b)| pair(a, b)).collect();
     // Where an arc was not measured, the mean speed over all measured ones serves.
     let speed = |source: &str| {
         let known = times.iter().filter(|(arc, _)| arcs.contains(*arc));
@@ -375,8 +375,9 @@ fn problem(map: &Map, options: &MapOptions) -> String {
                 continue;
             }
             let metres = length(arc);
-            let value =
-                |table: &BTreeMap<Pair, BTreeMap<&'static str, f64>>| table.get(arc)?.get(source).copied();
+            let value = |table: &BTreeMap<Corridor, BTreeMap<&'static str, f64>>| {
+                table.get(arc)?.get(source).copied()
+            };
             let seconds = value(&times)
                 .filter(|seconds| *seconds > 0.0)
                 .unwrap_or_else(|| rounded(rounded(metres, 6) / speed(source), 4));

@@ -23,7 +23,7 @@ pub use coadaptation::{Arc, Battery, Coadaptation, Configuration, Loss, Roles, S
 pub use compare::{Candidate, Comparison, Config, Listener, compare};
 pub use hindsight::{Hindsight, LossAt, LossReport};
 pub use import::{Files, MapOptions, import_map};
-pub use planned::{Costs, PlanFinder, Planned, Stages, Unfinished};
+pub use planned::{Costs, NoResult, PlanFinder, Planned, Stages};
 pub use play::Measures;
 pub use process::{Action, Process, REWARDS, Risk, State, Valuation};
 pub use program::program;

@@ -76,20 +76,20 @@ pub struct Costs {
 
 /// Why a comparison has no result.
 #[derive(Debug)]
-pub enum Unfinished {
+pub enum NoResult {
     /// Of the process.
     Process(Error),
     /// Of the planner.
     Planner(Vec<Message>),
 }
 
-impl From<Error> for Unfinished {
+impl From<Error> for NoResult {
     fn from(error: Error) -> Self {
         Self::Process(error)
     }
 }
 
-impl From<Vec<Message>> for Unfinished {
+impl From<Vec<Message>> for NoResult {
     fn from(messages: Vec<Message>) -> Self {
         Self::Planner(messages)
     }
@@ -123,7 +123,7 @@ impl PlanTable<'_, '_> {
     }
 
     /// Follows plans, and makes a new one wherever the state is not the one that the last plan expects.
-    pub(super) fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, Unfinished> {
+    pub(super) fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, NoResult> {
         // What the plan in force wants to do in each state that it expects.
         let mut expected: BTreeMap<Valuation, Action> = BTreeMap::new();
         let mut failure = None;

@@ -16,7 +16,7 @@ use crate::comparison::process::{REWARDS, Risk};
 
 /// The mission as a model: `l` is the place, `c` the configuration, `b` the battery; `hit`, `failed` and `lost` are flags.
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
-    let writer = Writer { mission, risk };
+    let writer = ProcessWriter { mission, risk };
     model(
         writer.remark(),
         Vec::new(),
@@ -62,7 +62,7 @@ pub(super) fn flag(name: &str) -> Variable {
     Variable { range: None, initial: Some(Expr::bool(false)), ..range(name, 0, 0) }
 }
 
-struct Writer<'a> {
+struct ProcessWriter<'a> {
     mission: &'a Coadaptation,
     risk: Risk,
 }
@@ -89,7 +89,7 @@ pub(super) fn assign(name: &str, value: Expr) -> (String, Expr, Place) {
     (name.to_owned(), value, Place::default())
 }
 
-impl Writer<'_> {
+impl ProcessWriter<'_> {
     fn remark(&self) -> String {
         let list = |names: Vec<&str>| {
             let numbered: Vec<_> =

@@ -23,13 +23,13 @@ use crate::comparison::published::{ROUTES, shortest_routes};
 /// behind the robot, `c` the configuration, `b` the battery; `rd` says that a reconfiguration was made.
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
-    let writer = Writer { mission, routes };
+    let writer = RouteWriter { mission, routes };
     let route = Constant { name: "ROUTE".to_owned(), kind: Type::Int, value: None, place: Place::default() };
     let parts = (writer.variables(), writer.commands());
     model(writer.remark(), vec![route], parts, writer.rewards(), writer.labels())
 }
 
-struct Writer<'a> {
+struct RouteWriter<'a> {
     mission: &'a Coadaptation,
     routes: Vec<Vec<usize>>,
 }
@@ -38,7 +38,7 @@ fn name(what: &str, thing: &str) -> String {
     identifier(&format!("{what}_{thing}"))
 }
 
-impl Writer<'_> {
+impl RouteWriter<'_> {
     fn remark(&self) -> String {
         let place = |place: usize| self.mission.places[place].as_str();
         let routes = self.routes.iter().enumerate().map(|(number, route)| {

@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
-use serde_json::{Map, Value, json};
+use serde::{Serialize, Serializer};
+use serde_json::{Map, Value};
 
 use crate::message::did_you_mean;
 use crate::number;
@@ -21,58 +22,72 @@ pub const FORMAT: &str = "metaplan-events/1";
 pub const LONGEST_LINE: usize = 1 << 20;
 
 /// Something that has happened.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "event")]
 #[non_exhaustive]
 pub enum Event {
     /// A sensor reports the value of a quality attribute, or of a function of the problem without parameters.
+    #[serde(rename = "measured")]
     Measured {
         /// Local name or IRI.
         attribute: String,
         /// In the attribute's unit.
+        #[serde(serialize_with = "as_number")]
         value: BigRational,
     },
     /// A component reports how it is.
+    #[serde(rename = "component_status")]
     Component {
         /// Local name or IRI.
         component: String,
         /// How it is.
+        #[serde(serialize_with = "as_word")]
         status: Status,
     },
     /// A requested action has begun.
+    #[serde(rename = "action_started")]
     Started {
         /// The number of the request.
         action: u64,
     },
     /// A requested action has done all that it should.
+    #[serde(rename = "action_succeeded")]
     Succeeded {
         /// The number of the request.
         action: u64,
     },
     /// A requested action has ended without success.
+    #[serde(rename = "action_failed")]
     Failed {
         /// The number of the request.
         action: u64,
         /// Why, in words.
+        #[serde(skip_serializing_if = "String::is_empty")]
         reason: String,
     },
     /// An action has been brought to a safe end, as asked for.
+    #[serde(rename = "action_cancelled")]
     Cancelled {
         /// The number of the request.
         action: u64,
     },
     /// How much of an action is done.
+    #[serde(rename = "action_progress")]
     Progress {
         /// The number of the request.
         action: u64,
         /// From 0 to 1, in hundredths.
+        #[serde(serialize_with = "as_number")]
         fraction: BigRational,
     },
     /// Another goal from now on, as a PDDL condition.
+    #[serde(rename = "goal_changed")]
     Goal {
         /// The condition.
         goal: String,
     },
     /// A fact or a value of the problem, as for `--set`.
+    #[serde(rename = "fact_changed")]
     Fact {
         /// `battery`, `robot_at`, `pipeline_found pl1`.
         name: String,
@@ -80,11 +95,13 @@ pub enum Event {
         value: String,
     },
     /// An effect has reached the managed system.
+    #[serde(rename = "acknowledged")]
     Acknowledged {
         /// The number of the effect.
         effect: u64,
     },
     /// Time passes.
+    #[serde(rename = "tick")]
     Tick,
 }
 
@@ -352,53 +369,44 @@ fn component(component: &str, value: &str) -> Result<Event, Refusal> {
     Ok(Event::Component { component: component.to_owned(), status: status(value).ok_or_else(wrong)? })
 }
 
+fn as_number<S: Serializer>(value: &BigRational, serializer: S) -> Result<S::Ok, S::Error> {
+    number::to_json(value).serialize(serializer)
+}
+
+/// A status in the spelling of MROS.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn as_word<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(match status {
+        Status::Failed => "FALSE",
+        Status::Recovered => "RECOVERED",
+        Status::Working => "TRUE",
+    })
+}
+
 impl Event {
     /// The event as an object of the format.
     pub fn to_json(&self) -> Value {
-        match self {
-            Self::Measured { attribute, value } => {
-                json!({ "event": "measured", "attribute": attribute, "value": number::to_json(value) })
-            }
-            Self::Component { component, status } => {
-                let status = match status {
-                    Status::Failed => "FALSE",
-                    Status::Recovered => "RECOVERED",
-                    Status::Working => "TRUE",
-                };
-                json!({ "event": "component_status", "component": component, "status": status })
-            }
-            Self::Started { action } => json!({ "event": "action_started", "action": action }),
-            Self::Succeeded { action } => json!({ "event": "action_succeeded", "action": action }),
-            Self::Failed { action, reason } => {
-                let mut object = json!({ "event": "action_failed", "action": action });
-                if !reason.is_empty() {
-                    object["reason"] = json!(reason);
-                }
-                object
-            }
-            Self::Cancelled { action } => json!({ "event": "action_cancelled", "action": action }),
-            Self::Progress { action, fraction } => {
-                json!({ "event": "action_progress", "action": action, "fraction": number::to_json(fraction) })
-            }
-            Self::Goal { goal } => json!({ "event": "goal_changed", "goal": goal }),
-            Self::Fact { name, value } => json!({ "event": "fact_changed", "name": name, "value": value }),
-            Self::Acknowledged { effect } => json!({ "event": "acknowledged", "effect": effect }),
-            Self::Tick => json!({ "event": "tick" }),
-        }
+        // Texts and numbers are always data.
+        serde_json::to_value(self).unwrap_or_default()
     }
+}
+
+/// An event with what its line says besides.
+#[derive(Serialize)]
+struct Line<'a> {
+    #[serde(flatten)]
+    event: &'a Event,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seq: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<f64>,
 }
 
 impl Observation {
     /// The observation as an object of the format, if it is one event; an empty object otherwise.
     pub fn to_json(&self) -> Value {
-        let [Ok(event)] = self.events.as_slice() else { return json!({}) };
-        let mut object = event.to_json();
-        if let Some(sequence) = self.sequence {
-            object["seq"] = json!(sequence);
-        }
-        if let Some(time) = self.time {
-            object["time"] = json!(time.as_secs_f64());
-        }
-        object
+        let [Ok(event)] = self.events.as_slice() else { return Map::new().into() };
+        let line = Line { event, seq: self.sequence, time: self.time.map(|time| time.as_secs_f64()) };
+        serde_json::to_value(line).unwrap_or_default()
     }
 }

@@ -83,6 +83,17 @@ fn rooms_of_the_facade_import_as_the_architecture_says() {
     assert!(differences.is_empty(), "ARCHITECTURE.md and `src` differ:\n{}", differences.join("\n"));
 }
 
+/// What lies in a folder knows nothing of the file that stands for the folder.
+#[test]
+fn no_file_of_the_facade_imports_from_the_file_above_it() {
+    let upwards = |(file, from): (Vec<String>, BTreeSet<Vec<String>>)| {
+        let above: Vec<_> = from.into_iter().filter(|other| file.starts_with(other)).collect();
+        above.into_iter().map(move |other| format!("{} imports from {}", file.join("::"), other.join("::")))
+    };
+    let found: Vec<String> = imports(&super::files(), "src").into_iter().flat_map(upwards).collect();
+    assert!(found.is_empty(), "imports from the file above:\n{}", found.join("\n"));
+}
+
 #[test]
 fn a_wrong_arrow_is_found() {
     let page = "# x\n\n### src: order\n\n```text\n  a b\n  c\n```\n\n| files | do | imports from |\n|---|---|---|\n\
