@@ -5,6 +5,7 @@ use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use encodings::{Config, Limits, Status, optimize};
+use metaplan::mission::Planning as _;
 use metaplan::setup::Setup;
 
 fn plan(scenario: Option<&str>) {

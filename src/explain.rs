@@ -14,7 +14,7 @@ use ontology::tomasys::change::Status as Component;
 
 use crate::mapek::{PlannedStep, ruled_out};
 use crate::message::Message;
-use crate::mission::Mission;
+use crate::mission::{Mission, Planning as _};
 use crate::number;
 
 /// How finely values are told apart, as a part of the value.

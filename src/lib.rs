@@ -2,21 +2,20 @@
 //!
 //! This facade joins the libraries: [`ontology`] (what the robot is), [`rules`] (what follows) and [`encodings`] (what to
 //! do about it); and `metaplan-probabilistic`, model checking of decision processes, which [`comparison`] brings to a mission.
-//! [`mission`] is the only place that sees OWL and PDDL at once. Order lives here, not logic.
+//! `metaplan-mission` joins OWL and PDDL, [`mission`] plans with both, and `metaplan-verify` checks what is claimed of plans. Order lives
+//! here, not logic.
 
+pub use ::mission::{file, knowledge, message, visible};
+pub use ::verify::measure;
 pub use {encodings, ontology, rules};
 
 pub mod answers;
 pub mod certificate;
 pub mod comparison;
 pub mod explain;
-pub mod file;
 pub mod journal;
-pub mod knowledge;
 pub mod manifest;
 pub mod mapek;
-pub mod measure;
-pub mod message;
 pub mod mission;
 mod number;
 pub mod setup;

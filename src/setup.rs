@@ -9,11 +9,11 @@ use serde::Deserialize;
 
 use crate::comparison::Roles;
 use crate::file::source;
-use crate::knowledge::{Knowledge, KnowledgeSection};
+use crate::knowledge::Knowledge;
 use crate::manifest::{self, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::Message;
-use crate::mission::{Bindings, Mission, PlanningSection, Scenario};
+use crate::mission::{Bindings, KnowledgeSection, Mission, PlanningSection, Scenario};
 use crate::simulate::Simulation;
 
 /// All sections of a manifest.

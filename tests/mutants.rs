@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 15] = [
+const PARTS: [&str; 17] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -27,6 +27,8 @@ const PARTS: [&str; 15] = [
     "encodings",
     "pddl",
     "certificate",
+    "mission",
+    "verify",
     "probabilistic",
     "tests",
     "benches",

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use encodings::{Config, Limits, Status, lexicographic};
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::Message;
-use metaplan::mission::{Bindings, Mission};
+use metaplan::mission::{Bindings, Mission, Planning as _};
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
 use pddl::Source;

@@ -13,12 +13,9 @@ mod reason;
 mod run;
 mod simulate;
 mod validate;
-mod verify;
 
-use serde::Serialize;
-
-use crate::message::Message;
-
+pub use ::mission::message::ErrorAnswer;
+pub use ::verify::VerificationAnswer;
 pub use check::CheckAnswer;
 pub use compare::{CompareAnswer, ComparisonAnswer, MEASURES, Pair, Row, begun_rows, rows};
 pub use explain::{ChangesAnswer, DesignAnswer};
@@ -29,18 +26,3 @@ pub use reason::{AssertionAnswer, EntailmentAnswer, ReasonAnswer, ReasonsAnswer,
 pub use run::{HandledLine, LogLine, NumberedAnswer, PlanningLine, ReadyLine};
 pub use simulate::{SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
 pub use validate::VerdictAnswer;
-pub use verify::VerificationAnswer;
-
-/// What every command answers that has failed.
-#[derive(Debug, Clone, Serialize)]
-pub struct ErrorAnswer<'a> {
-    format: &'static str,
-    messages: &'a [Message],
-}
-
-impl<'a> ErrorAnswer<'a> {
-    /// With all messages.
-    pub fn new(messages: &'a [Message]) -> Self {
-        Self { format: "metaplan-error/1", messages }
-    }
-}

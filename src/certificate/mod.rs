@@ -1,23 +1,7 @@
-//! Certificates on disk: a directory with all that is needed to check that a plan is optimal, or that there is none.
-//!
-//! | file | holds |
-//! |---|---|
-//! | `manifest.json` | the claim, and the size and SHA-256 of every other file |
-//! | `domain.pddl`, `problem.pddl` | the files as they were planned with: availability and values filled in |
-//! | `plan.txt` | the plan; missing if there is none |
-//! | `knowledge.nt`, `origin.json` | the knowledge base, rules, bindings, and what has changed since they were read; missing if there is no knowledge base |
-//! | `derivations.json` | everything that follows from them, with the rule, its bindings and what it rests on; missing likewise |
-//! | `task.json` | the ground task |
-//! | `witness.json` | the atoms that may ever hold, and the values that numbers may have: why other instances of actions need no operator |
-//! | `formula.cnf`, `legend.txt`, `proof.drat`, `hints.txt` | for small tasks: "a cheaper plan has at most so many steps" in DIMACS, what its variables mean, its refutation, what each line of that follows from |
-//! | `argument.json` | why no plan is cheaper: labels, potentials, needs (see `encodings::check_certificate`) |
+//! Writes certificates: a directory that `metaplan-verify` checks, where it is said what the files hold.
 
 mod derivations;
-mod digest;
-mod files;
 mod knowledge;
-mod manifest;
-mod verify;
 
 use std::fs;
 use std::io::{BufRead, BufReader, BufWriter};
@@ -31,25 +15,22 @@ use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::{print_domain, print_problem};
 
-pub use manifest::{Claim, Verification, VerifiedPart};
-pub use verify::{conditions, verify};
+pub use ::verify::{Claim, Verification, VerifiedPart, conditions, verify};
 
-use digest::digest_of;
-use files::text;
-use manifest::{
-    ARGUMENT, DOMAIN, DRAFT, FORMAT, FORMULA, File, HINTS, LEGEND, Manifest, PLAN, PROBLEM, PROOF,
-    PROOF_LIMIT, Refutation, STREAMED, TASK, TEXT_LIMIT, WITNESS,
+use ::verify::digest::digest_of;
+use ::verify::files::text;
+use ::verify::manifest::{
+    ARGUMENT, DOMAIN, FORMAT, FORMULA, File, HINTS, LEGEND, Manifest, PLAN, PROBLEM, PROOF, PROOF_LIMIT,
+    Refutation, STREAMED, TASK, TEXT_LIMIT, WITNESS,
 };
+use ::verify::plan::plan as executed;
+use ::verify::task::{read_pddl, same_task};
 
 use crate::message::Message;
 use crate::mission::Mission;
 
-impl Verification {
-    /// Whether the claim is proved.
-    pub fn verified(&self) -> bool {
-        self.claim.is_some() && self.parts.iter().all(|part| part.result.is_ok())
-    }
-}
+/// What the solver writes, before it is shortened.
+const DRAFT: &str = "draft.drat";
 
 /// A ground task.
 #[derive(Debug, Clone, Copy)]
@@ -96,8 +77,7 @@ impl Contents<'_> {
     fn metric(&self) -> Result<Option<BigRational>, String> {
         let Some(found) = &self.solution.plan else { return Ok(None) };
         let (domain, cost) = (self.mission.domain(), found.cost.to_string());
-        verify::plan(domain, self.problem, self.task.is_timed(), self.plan, &cost)
-            .map(|(_, metric)| Some(metric))
+        executed(domain, self.problem, self.task.is_timed(), self.plan, &cost).map(|(_, metric)| Some(metric))
     }
 }
 
@@ -170,14 +150,14 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
 
 /// Makes the witness, and compares the task with the files as `verify` will: what cannot be compared gets no certificate.
 fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
-    let (domain, problem) = verify::read_pddl(domain, problem)?;
+    let (domain, problem) = read_pddl(domain, problem)?;
     let witness =
         witness(&domain, &problem, task, &|| limits.reached()).map_err(|verdict| match verdict {
             Faithful::No(difference) => difference.to_string(),
             Faithful::Undecided(cause) => cause.to_string(),
             Faithful::Yes { .. } => "no witness".to_owned(),
         })?;
-    verify::same_task(&domain, &problem, (task, &witness), limits)?;
+    same_task(&domain, &problem, (task, &witness), &|| limits.reached())?;
     Ok(witness)
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use encodings::{Alternatives, Config, Solution, Task};
-use metaplan::mission::Mission;
+use metaplan::mission::{Mission, Planning as _};
 use pddl::ast::Problem;
 
 use crate::cli::common::Failure;

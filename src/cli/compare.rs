@@ -15,7 +15,7 @@ use metaplan::comparison::{
     Stages, Tasked, Valuation, compare,
 };
 use metaplan::message::Message;
-use metaplan::mission::Mission;
+use metaplan::mission::{Mission, Planning as _};
 use metaplan::setup::Setup;
 use pddl::ast::Problem;
 

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use encodings::{Improvement, Limits, Plan, Point, optimize_concurrent};
-use metaplan::mission::Mission;
+use metaplan::mission::{Mission, Planning as _};
 use num_rational::BigRational;
 use pddl::ast::Problem;
 

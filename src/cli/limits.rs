@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use encodings::Limits;
 use metaplan::message::Message;
+use verify::memory;
 
 use crate::cli::common::{Common, Exit, Failure};
-use crate::cli::memory;
 use crate::cli::output;
 
 /// How often the reading thread looks at the clock.
@@ -34,8 +34,11 @@ impl Guard {
         if let Some(time) = time {
             limits = limits.with_time(time);
         }
-        if let Some(megabytes) = memory {
-            memory::watch(megabytes, limits.interrupt())?;
+        if let Some(megabytes) = memory
+            && !memory::watch(megabytes, limits.interrupt())
+        {
+            let text = "`--memory-limit`: this platform does not tell how much memory a process occupies";
+            return Err(Failure::usage(Message::error("M115", text)));
         }
         let has_read = Arc::new(AtomicBool::new(false));
         if time.is_some() || memory.is_some() {

@@ -14,7 +14,6 @@ mod export;
 mod import;
 mod journal;
 mod limits;
-mod memory;
 mod objectives;
 mod output;
 mod plan;

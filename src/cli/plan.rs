@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::answers::{PlanAnswer, Preparation};
 use metaplan::certificate::{self, Ground};
 use metaplan::message::Message;
-use metaplan::mission::{Blocking, Mission};
+use metaplan::mission::{Blocking, Mission, Planning as _, blocking};
 use pddl::ast::Problem;
 
 use crate::cli::alternatives;
@@ -225,7 +225,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => None,
     };
     let blocking = match point.solution.status {
-        Status::Unsolvable => mission.blocking(&problem, &config),
+        Status::Unsolvable => blocking(&mission, &problem, &config),
         _ => None,
     };
     let beside = Beside { others, blocking };

@@ -2,7 +2,7 @@
 
 use encodings::{Config, ExactTask, Point, optimize_exact};
 use metaplan::message::Message;
-use metaplan::mission::Mission;
+use metaplan::mission::{Mission, Planning as _};
 use pddl::ast::Problem;
 
 use crate::cli::confirm::Reading;

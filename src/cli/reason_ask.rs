@@ -9,6 +9,7 @@ use clap::Args;
 use metaplan::answers::{AssertionAnswer, EntailmentAnswer, ReasonsAnswer, SchemaAnswer};
 use metaplan::knowledge::Knowledge;
 use metaplan::message::Message;
+use metaplan::visible::visible_json;
 use ontology::entail::{Answer, Schema, annotations, entailments, schema};
 use ontology::vocab::{local_name, rdf};
 use rules::{Atom, Engine, Fact, Literal, Symbol, Term, Value};
@@ -56,7 +57,7 @@ impl Questions {
             return Ok(None);
         };
         match common.format {
-            Format::Json => output::document(&output::visible_json(&json)),
+            Format::Json => output::document(&visible_json(&json)),
             _ => output::answer(&text),
         }
         Ok(Some(exit))

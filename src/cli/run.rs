@@ -13,6 +13,7 @@ use metaplan::journal::{Journal, Policy, Sync};
 use metaplan::mapek::{Answer, Clock as _, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
 use metaplan::message::Message;
 use metaplan::setup::Setup;
+use metaplan::visible::visible_json;
 
 use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::output;
@@ -77,8 +78,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let lost = |error: io::Error| Message::error("M109", format!("the answer cannot be written: {error}"));
     let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
-    let first =
-        write!(stdout, "{}", output::visible_json(&output::line(&ready))).and_then(|()| stdout.flush());
+    let first = write!(stdout, "{}", visible_json(&output::line(&ready))).and_then(|()| stdout.flush());
     match first {
         // Who does not read any more has had enough.
         Err(error) if is_gone(&error) => return Ok(Exit::Done),
@@ -158,7 +158,7 @@ fn write(stdout: &mut impl io::Write, line: u64, answers: &[Answer], read: Insta
     }
     text += &output::line(&HandledLine::new(line, read.elapsed().as_micros()));
     // At once, so that no other thread's line comes in between.
-    stdout.write_all(output::visible_json(&text).as_bytes())?;
+    stdout.write_all(visible_json(&text).as_bytes())?;
     stdout.flush()
 }
 

@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = format!("`{name}` cannot be simulated: {why}; {known}");
         return Err(Failure::usage(Message::error("M108", text)));
     };
-    mission.apply(scenario)?;
+    scenario.apply(&mut mission)?;
     output::warnings(common, mission.warnings());
     consistent(mission.knowledge())?;
     let strategies: Vec<Strategy> = if arguments.strategy.is_empty() {

@@ -100,7 +100,7 @@ impl Situation {
                         );
                         Failure::usage(Message::error("M108", text))
                     })?;
-                    setup.mission.apply(scenario).map_err(|message| {
+                    scenario.apply(&mut setup.mission).map_err(|message| {
                         let text = format!("scenario `{name}`: {}", message.message);
                         Message::at(&message.code, setup.file(), None, text)
                     })?;

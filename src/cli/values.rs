@@ -1,11 +1,12 @@
 //! The values of options: text to directories, settings, durations and times.
 
 use std::path::PathBuf;
-use std::time::Duration;
 
 use num_rational::BigRational;
 use num_traits::Num as _;
 use serde_json::Value;
+
+pub(super) use verify::seconds;
 
 pub(super) fn existing_directory(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
@@ -16,11 +17,6 @@ pub(super) fn setting(text: &str) -> Result<(String, String), String> {
     let (name, value) =
         text.split_once('=').ok_or_else(|| format!("`{text}` is not of the form NAME=VALUE"))?;
     Ok((name.trim().to_owned(), value.trim().to_owned()))
-}
-
-pub(super) fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is no number of seconds"))?;
-    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }
 
 pub(super) fn time(text: &str) -> Result<BigRational, String> {

@@ -18,7 +18,7 @@ use crate::comparison::coadaptation::{
 };
 use crate::comparison::process::{Action, Valuation};
 use crate::message::Message;
-use crate::mission::Mission;
+use crate::mission::{Mission, Planning as _};
 
 /// States of the task beyond which it does not become a process.
 const STATES: usize = 50_000;

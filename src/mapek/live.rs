@@ -11,6 +11,7 @@ use crate::mapek::ask::{Ask, Outcome};
 use crate::mapek::resume::{GATE, resume};
 use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
+use crate::mission::replanner;
 
 /// So many configurations of the action under way are tried at most.
 const CONFIGURATIONS: usize = 256;
@@ -84,7 +85,7 @@ impl Live {
         report: &mut dyn FnMut(Progress),
     ) -> Option<Replanned> {
         if anew || matches!(self, Self::Untried) {
-            let made = ask.mission.replanner(ask.problem, query.limits);
+            let made = replanner(ask.mission, ask.problem, query.limits);
             *self = made.map_or(Self::Unsuited, Self::Ready);
         }
         match self {

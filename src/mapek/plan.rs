@@ -16,6 +16,7 @@ use crate::mapek::memo::Memo;
 use crate::mapek::resume::{resume, resumed_goal};
 use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
+use crate::mission::ground_with;
 use crate::number;
 
 /// Makes plans.
@@ -72,7 +73,7 @@ pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits, watch: &Watch) -> Outc
         let goal = resumed_goal(&problem.goal);
         problem.to_mut().goal = goal;
     }
-    let task = match ask.mission.ground_with(&domain, &problem, &[], &limits) {
+    let task = match ground_with(ask.mission, &domain, &problem, &[], &limits) {
         Ok(task) => task,
         Err(messages) => {
             let texts: Vec<&str> = messages.iter().map(|message| message.message.as_str()).collect();

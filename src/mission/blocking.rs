@@ -10,8 +10,9 @@
 use encodings::{Config, Status, optimize};
 use pddl::ast::{InitialElement, Name, Problem};
 
-use crate::mission::binding::atom;
-use crate::mission::joined::Mission;
+use ::mission::{Mission, atom};
+
+use crate::mission::planning::Planning as _;
 
 /// What keeps an unsolvable mission from having a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,51 +24,51 @@ pub enum Blocking {
     Other,
 }
 
-impl Mission {
-    /// Why there is no plan for a problem that [`Mission::filled`] has made and that is proved to have none. None if the mission has
-    /// no knowledge base, or if a limit was reached before the reason was known.
-    pub fn blocking(&self, problem: &Problem, config: &Config) -> Option<Blocking> {
-        let config = &Config { horizon: None, ..config.clone() };
-        let designs = self.knowledge.as_ref()?.view().function_designs();
-        let missing: Vec<String> = designs
-            .into_iter()
-            .filter(|design| !design.available)
-            .map(|design| design.individual.name)
-            .collect();
-        let mut blocking = missing.clone();
-        if self.solvable_with(problem, &missing, config)? {
-            for design in &missing {
-                let rest: Vec<String> = blocking.iter().filter(|name| *name != design).cloned().collect();
-                let available: Vec<String> =
-                    missing.iter().filter(|name| !rest.contains(name)).cloned().collect();
-                if !self.solvable_with(problem, &available, config)? {
-                    blocking = rest;
-                }
+/// Why there is no plan for a problem that [`Mission::filled`] has made and that is proved to have none. None if the mission has
+/// no knowledge base, or if a limit was reached before the reason was known.
+pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
+    let config = &Config { horizon: None, ..config.clone() };
+    let designs = mission.knowledge()?.view().function_designs();
+    let missing: Vec<String> =
+        designs.into_iter().filter(|design| !design.available).map(|design| design.individual.name).collect();
+    let mut blocking = missing.clone();
+    if solvable_with(mission, problem, &missing, config)? {
+        for design in &missing {
+            let rest: Vec<String> = blocking.iter().filter(|name| *name != design).cloned().collect();
+            let available: Vec<String> =
+                missing.iter().filter(|name| !rest.contains(name)).cloned().collect();
+            if !solvable_with(mission, problem, &available, config)? {
+                blocking = rest;
             }
-            blocking.sort();
-            return Some(Blocking::Designs(blocking));
         }
-        Some(Blocking::Other)
+        blocking.sort();
+        return Some(Blocking::Designs(blocking));
     }
+    Some(Blocking::Other)
+}
 
-    /// Whether there is a plan with some further designs available; none if a limit was reached.
-    fn solvable_with(&self, problem: &Problem, available: &[String], config: &Config) -> Option<bool> {
-        let mut problem = problem.clone();
-        // Any plan will do.
-        problem.metric = None;
-        let predicates = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
-        let predicates: Vec<&Name> =
-            predicates.filter(|predicate| self.bindings.is_availability(predicate)).collect();
-        for design in available {
-            for predicate in &predicates {
-                problem.init.push(InitialElement::Fact(atom(predicate, &[design])));
-            }
+/// Whether there is a plan with some further designs available; none if a limit was reached.
+fn solvable_with(
+    mission: &Mission,
+    problem: &Problem,
+    available: &[String],
+    config: &Config,
+) -> Option<bool> {
+    let mut problem = problem.clone();
+    // Any plan will do.
+    problem.metric = None;
+    let predicates = mission.domain().predicates.iter().map(|declared| &declared.identifier.name);
+    let predicates: Vec<&Name> =
+        predicates.filter(|predicate| mission.bindings().is_availability(predicate)).collect();
+    for design in available {
+        for predicate in &predicates {
+            problem.init.push(InitialElement::Fact(atom(predicate, &[design])));
         }
-        let task = self.ground(&problem, &[], &config.limits).ok()?;
-        match optimize(&task, config, &mut |_| {}).status {
-            Status::Optimal | Status::Feasible => Some(true),
-            Status::Unsolvable => Some(false),
-            Status::UnsolvableWithinHorizon | Status::Unknown => None,
-        }
+    }
+    let task = mission.ground(&problem, &[], &config.limits).ok()?;
+    match optimize(&task, config, &mut |_| {}).status {
+        Status::Optimal | Status::Feasible => Some(true),
+        Status::Unsolvable => Some(false),
+        Status::UnsolvableWithinHorizon | Status::Unknown => None,
     }
 }

@@ -1,19 +1,13 @@
-//! What the robot is (a knowledge base) and what it has to do (PDDL), joined.
+//! What the robot is and what it has to do, joined by `metaplan-mission`, and planned with.
 //!
-//! The only room that sees both sides: the PDDL problem gets its functions, designs and actions, which designs are available,
-//! and the values of quality attributes from the knowledge base, by the bindings of the manifest.
+//! The only room that sees both OWL and the planner.
 
-mod binding;
 mod blocking;
-mod doubts;
-mod joined;
-mod live;
-mod native;
+mod planning;
 mod sections;
-mod set;
 
-pub use binding::Bindings;
-pub use blocking::Blocking;
-pub use joined::Mission;
-pub use native::CoAdaptation;
-pub use sections::{PlanningSection, Scenario};
+pub use ::mission::{Bindings, CoAdaptation, Mission};
+pub use blocking::{Blocking, blocking};
+pub use planning::Planning;
+pub(crate) use planning::{ground_with, replanner};
+pub use sections::{KnowledgeSection, PlanningSection, Scenario};

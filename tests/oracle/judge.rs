@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use encodings::{Config, Exact, Limits, Plan, Solution, Status, Unbounded};
 use metaplan::measure::measure;
 use metaplan::message::Message;
-use metaplan::mission::{Bindings, Mission};
+use metaplan::mission::{Bindings, Mission, Planning as _};
 use num_rational::BigRational;
 use num_traits::Zero as _;
 use pddl::Source;

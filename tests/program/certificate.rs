@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::common::{Outcome, metaplan, metaplan_in};
+use crate::common::{Outcome, metaplan, metaplan_in, root, verify_in};
 
 /// The directory of a fresh certificate.
 pub fn certificate(directory: &Path, arguments: &[&str]) -> String {
@@ -16,7 +16,7 @@ pub fn certificate(directory: &Path, arguments: &[&str]) -> String {
 }
 
 pub fn verify(certificate: &str) -> Outcome {
-    metaplan(&["verify", certificate])
+    verify_in(&root(), &[certificate])
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn that_there_is_no_plan_has_a_certificate() {
         std::fs::write(directory.path().join("p.pddl"), problem(goal)).expect("a file");
         let arguments = ["plan", "d.pddl", "p.pddl", "--certificate", name];
         assert_eq!(metaplan_in(directory.path(), &arguments, "").status, 10);
-        let outcome = metaplan_in(directory.path(), &["verify", name], "");
+        let outcome = verify_in(directory.path(), &[name]);
         assert_eq!(outcome.status, 0, "{outcome:#?}");
         assert!(outcome.stdout.contains("verified: there is no plan"), "{outcome:#?}");
     }
@@ -64,7 +64,7 @@ fn that_there_is_no_plan_has_a_certificate() {
 fn a_verification_has_its_fields() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
-    let answer = metaplan(&["verify", &target, "--format", "json"]).json();
+    let answer = verify_in(&root(), &[&target, "--format", "json"]).json();
     assert_eq!(answer["format"], "metaplan-verification/1");
     assert_eq!(answer["claim"], json!({ "optimal": { "metric": "408" } }));
     let parts: Vec<_> = answer["parts"].as_array().expect("parts").iter().map(|part| &part["part"]).collect();
@@ -78,7 +78,7 @@ fn the_argument_is_written_for_other_checkers() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
     let file = directory.path().join("argument.smt2").display().to_string();
-    assert_eq!(metaplan(&["verify", &target, "--smt", &file]).status, 0);
+    assert_eq!(verify_in(&root(), &[&target, "--smt", &file]).status, 0);
     let text = std::fs::read_to_string(file).expect("a file");
     // One question for the initial state, one for goal states, and one for each of the 22 operators.
     assert_eq!(text.matches("(check-sat)").count(), 24, "{text}");
@@ -404,7 +404,7 @@ fn a_verification_comes_to_an_end() {
         let text = text.trim_end();
         format!("{} {action}", &text[..text.len() - 1])
     });
-    let outcome = metaplan(&["verify", &certificate, "--time-limit", "1"]);
+    let outcome = verify_in(&root(), &[&certificate, "--time-limit", "1"]);
     assert_eq!(outcome.status, 30, "{outcome:#?}");
     assert!(outcome.stdout.contains("ends at 400000 instances of wait"), "{outcome:#?}");
 }
@@ -441,7 +441,7 @@ fn a_lost_action_is_never_certified() {
         std::fs::write(directory.path().join("p.pddl"), problem).expect("a file");
         let outcome = metaplan_in(directory.path(), &["plan", "d.pddl", "p.pddl", "--certificate", "c"], "");
         if directory.path().join("c").exists() {
-            let verified = metaplan_in(directory.path(), &["verify", "c"], "");
+            let verified = verify_in(directory.path(), &["c"]);
             assert!(verified.stdout.contains("verified: the plan is optimal, metric 2\n"), "{verified:#?}");
         } else {
             assert!(outcome.stderr.contains("M120") && outcome.stderr.contains("(a)"), "{outcome:#?}");

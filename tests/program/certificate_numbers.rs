@@ -1,7 +1,7 @@
 //! Certificates of plans found in fractions, and of formulas that say one thing twice.
 
 use crate::certificate::change;
-use crate::common::metaplan_in;
+use crate::common::{metaplan_in, verify_in};
 
 /// Numbers whose products fit no machine integer, and one that halves: planned in fractions.
 #[test]
@@ -38,7 +38,7 @@ fn plans_found_in_fractions_have_certificates() {
             continue;
         }
         assert_eq!(planned.status, 0, "{planned:#?}");
-        let outcome = metaplan_in(directory.path(), &["verify", name], "");
+        let outcome = verify_in(directory.path(), &[name]);
         assert_eq!(outcome.status, 0, "{outcome:#?}");
         // What no machine integer holds is told apart to the last digit.
         let target = directory.path().join(name).display().to_string();
@@ -48,7 +48,7 @@ fn plans_found_in_fractions_have_certificates() {
             let last = if long.ends_with('5') { "6" } else { "5" };
             text.replacen(long, &format!("{}{last}", &long[..long.len() - 1]), 1)
         });
-        assert_eq!(metaplan_in(directory.path(), &["verify", name], "").status, 30);
+        assert_eq!(verify_in(directory.path(), &[name]).status, 30);
     }
 }
 
@@ -66,7 +66,7 @@ fn what_is_said_twice_is_proved_once() {
     assert_eq!(planned.status, 0, "{planned:#?}");
     let formula = std::fs::read_to_string(directory.path().join("c/formula.cnf")).expect("a formula");
     assert!(formula.contains("\n2 2 0\n"), "{formula}");
-    let outcome = metaplan_in(directory.path(), &["verify", "c"], "");
+    let outcome = verify_in(directory.path(), &["c"]);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
 }
 
@@ -109,7 +109,7 @@ fn the_tolerance_moves_no_plan_into_a_window() {
             assert_eq!(planned.status, 0, "{planned:#?}");
             let target = directory.path().join("c").display().to_string();
             change(&target, "plan.txt", &|_| format!("0.000: (prepare) [5.000]\n{start}: (cross) [1.000]\n"));
-            let outcome = metaplan_in(directory.path(), &["verify", "c"], "");
+            let outcome = verify_in(directory.path(), &["c"]);
             assert_eq!(
                 outcome.stdout.contains("plan        failed"),
                 !valid,

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 
 use serde_json::Value;
 
 /// What a run of the program came to.
-#[derive(Debug)]
+#[derive(Debug, PartialEq, Eq)]
 pub struct Outcome {
     pub status: i32,
     pub stdout: String,
@@ -32,8 +33,40 @@ pub fn metaplan(arguments: &[&str]) -> Outcome {
 
 /// Runs the program in a directory with a text on standard input.
 pub fn metaplan_in(directory: &Path, arguments: &[&str], input: &str) -> Outcome {
+    outcome(Path::new(env!("CARGO_BIN_EXE_metaplan")), directory, arguments, input)
+}
+
+/// Runs `metaplan verify` and `metaplan-verify` in a directory: whatever they are given, they answer the same.
+pub fn verify_in(directory: &Path, arguments: &[&str]) -> Outcome {
+    let all: Vec<&str> = ["verify"].iter().chain(arguments).copied().collect();
+    let own = metaplan_in(directory, &all, "");
+    let other = outcome(verifier(), directory, arguments, "");
+    assert_eq!(own, other, "`metaplan verify` and `metaplan-verify`: {arguments:?}");
+    own
+}
+
+/// The program `metaplan-verify`. It belongs to another package, which has a test so that cargo makes it with all tests; where only
+/// these are made, it is asked for in the same way, so that nothing else is compiled anew.
+fn verifier() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let own = Path::new(env!("CARGO_BIN_EXE_metaplan"));
+        let folder = own.parent().expect("a folder");
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["test", "--no-run", "--quiet", "--offline", "--locked", "--test", "verifier"]);
+        if folder.ends_with("release") {
+            cargo.arg("--release");
+        }
+        cargo.arg("--target-dir").arg(folder.parent().expect("a folder")).current_dir(root());
+        let output = cargo.output().expect("cargo runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        folder.join(format!("metaplan-verify{}", std::env::consts::EXE_SUFFIX))
+    })
+}
+
+fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) -> Outcome {
     use std::io::Write as _;
-    let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
+    let mut child = Command::new(program)
         .args(arguments)
         .current_dir(directory)
         .stdin(Stdio::piped())

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::certificate::{certificate, change};
-use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
+use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root, verify_in};
 
 /// Waits for the program to end, at most so long.
 fn wait(child: &mut Child) -> Option<std::process::ExitStatus> {
@@ -147,7 +147,7 @@ fn a_certificate_that_cannot_be_written_is_an_error() {
 fn a_verification_that_takes_longer_fails_however_short_it_is() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
-    let outcome = metaplan(&["verify", &target, "--time-limit", "0"]);
+    let outcome = verify_in(&root(), &[&target, "--time-limit", "0"]);
     assert_eq!(outcome.status, 30, "{outcome:#?}");
     assert!(outcome.stdout.contains("limits"), "{outcome:#?}");
 }
@@ -157,7 +157,7 @@ fn a_verification_that_takes_longer_fails_however_short_it_is() {
 fn rules_are_shipped_only_if_they_are_ours() {
     let directory = tempfile::tempdir().expect("a directory");
     let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
-    let outcome = metaplan(&["verify", &target]);
+    let outcome = verify_in(&root(), &[&target]);
     assert!(outcome.stdout.contains("`coadaptation` (shipped)"), "{outcome:#?}");
 
     let copy = copy_of_mission("ugv");
@@ -167,7 +167,7 @@ fn rules_are_shipped_only_if_they_are_ours() {
     edit(copy.path(), "missions/ugv.toml", "[planning]", "rules = [\"my.swrl\"]\n\n[planning]");
     let made = metaplan_in(copy.path(), &["plan", "missions/ugv.toml", "--certificate", "c"], "");
     assert_eq!(made.status, 0, "{made:#?}");
-    let outcome = metaplan_in(copy.path(), &["verify", "c"], "");
+    let outcome = verify_in(copy.path(), &["c"]);
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     assert!(outcome.stdout.contains("`my.swrl` (not shipped"), "{outcome:#?}");
 
@@ -187,7 +187,7 @@ fn rules_are_shipped_only_if_they_are_ours() {
     };
     change(&own, "origin.json", &relabel);
     change(&own, "derivations.json", &relabel);
-    let outcome = metaplan_in(copy.path(), &["verify", "c"], "");
+    let outcome = verify_in(copy.path(), &["c"]);
     assert!(outcome.stdout.contains("`coadaptation` (NOT the shipped rules"), "{outcome:#?}");
 }
 

@@ -24,3 +24,4 @@ mod simulate;
 mod ugv;
 mod uuv;
 mod validate;
+mod verifier;

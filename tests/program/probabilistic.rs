@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use metaplan::comparison::{
     Coadaptation, MapOptions, Process, Risk, import_map, program, published, shortest_routes,
 };
-use metaplan::mission::Mission;
+use metaplan::mission::{Mission, Planning as _};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
 use probabilistic::check::{Answer, Exactness, Options, Outcome, check};

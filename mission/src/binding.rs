@@ -1,0 +1,367 @@
+//! Bindings: which PDDL symbol stands for what in the knowledge base, and a problem filled with it.
+//!
+//! The defaults fit the names of the Metaplan paper and of the files of kas-lab. A type stands for a class, a predicate for a
+//! relation between designs, functions and actions, a numeric function for an estimated or measured attribute.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use num_rational::BigRational;
+
+use ontology::tomasys::{Individual, View};
+use pddl::ast::{
+    Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
+    TypedName,
+};
+
+use crate::knowledge::{Catalogue, Knowledge};
+use crate::message::Message;
+
+/// The predicates that say which design solves which function, unless a binding says so of others, too.
+const SOLVES: [&str; 4] = ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"];
+
+/// What a PDDL symbol stands for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Query {
+    /// A type: the individuals of a class, by local name or IRI.
+    Class(String),
+    /// A predicate `(p DESIGN FUNCTION)`.
+    Solves,
+    /// A predicate `(p DESIGN)`.
+    Available,
+    /// A predicate `(p ACTION FUNCTION…)`; for one action only if it is named.
+    Requires(Option<String>),
+    /// A numeric function of a design: the estimated value of an attribute.
+    Estimation(String),
+    /// A numeric function without parameters: the measured value of an attribute.
+    Measured(String),
+    /// A numeric function without parameters of a plain domain: the sum of an attribute over the designs that are
+    /// chosen for an action.
+    Chosen(String),
+    /// The same over those designs that were not at work before.
+    Reconfigured(String),
+    /// An action of a plain domain: that action.
+    Action(String),
+}
+
+/// PDDL symbols and what they stand for.
+#[derive(Debug, Clone, Default)]
+pub struct Bindings {
+    own: BTreeMap<Name, Query>,
+    /// As the manifest has them.
+    written: BTreeMap<String, String>,
+}
+
+impl Bindings {
+    /// The defaults, and on top of them the given ones.
+    ///
+    /// # Errors
+    /// A sentence about the first query that is none.
+    pub fn with(own: &BTreeMap<String, String>) -> Result<Self, String> {
+        let parse =
+            |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
+        Ok(Self { own: own.iter().map(parse).collect::<Result<_, String>>()?, written: own.clone() })
+    }
+
+    /// Those that are given, as they are written.
+    pub fn written(&self) -> &BTreeMap<String, String> {
+        &self.written
+    }
+
+    /// The predicates that say which design solves which function.
+    pub fn solves(&self) -> Vec<Name> {
+        let own = self.own.iter().filter(|(_, query)| **query == Query::Solves).map(|(name, _)| name.clone());
+        own.chain(SOLVES.map(Name::new)).collect()
+    }
+
+    /// Whether a type is that of function designs.
+    pub(super) fn is_design(&self, name: &Name) -> bool {
+        self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
+    }
+
+    /// Whether an action of a plain domain is an action of the knowledge base, by its local name.
+    pub(super) fn is_action(&self, name: &Name, known: &str) -> bool {
+        match self.own.get(name) {
+            Some(Query::Action(own)) => own == known,
+            _ => Name::new(known) == *name || Name::new(known) == Name::new(&format!("a_{name}")),
+        }
+    }
+
+    /// Whether a predicate says which functions an action of the knowledge base requires.
+    pub(super) fn says_needs(&self, predicate: &Name, known: &str) -> bool {
+        match self.predicate(predicate) {
+            Some(Query::Requires(None)) => true,
+            Some(Query::Requires(Some(action))) => {
+                [Name::new(known), Name::new(known.strip_prefix("a_").unwrap_or(known))]
+                    .contains(&Name::new(&action))
+            }
+            _ => false,
+        }
+    }
+
+    /// The attribute that a function sums over chosen designs, if that is stated.
+    pub(super) fn chosen(&self, name: &Name) -> Option<String> {
+        match self.own.get(name) {
+            Some(Query::Chosen(attribute)) => Some(attribute.clone()),
+            _ => None,
+        }
+    }
+
+    /// The attribute that a function sums over changed designs.
+    pub(super) fn reconfigured(&self, name: &Name) -> Option<String> {
+        match self.own.get(name) {
+            Some(Query::Reconfigured(attribute)) => Some(attribute.clone()),
+            _ => None,
+        }
+    }
+
+    /// Whether a predicate says which designs are available.
+    pub fn is_availability(&self, predicate: &Name) -> bool {
+        self.predicate(predicate) == Some(Query::Available)
+    }
+
+    /// Whether a numeric function without parameters is the measured value of an attribute.
+    pub(super) fn is_measured(&self, declared: &Declaration, attribute: &str) -> bool {
+        let query = self.function(declared);
+        declared.parameters.is_empty() && matches!(query, Query::Measured(name) if name == attribute)
+    }
+
+    fn r#type(&self, name: &Name) -> Option<Query> {
+        self.own.get(name).cloned().or_else(|| {
+            let class = match name.as_str().to_ascii_lowercase().as_str() {
+                "function" => "Function",
+                "functiondesign" | "function_design" | "function-design" => "FunctionDesign",
+                "action" => "Action",
+                "component" => "Component",
+                _ => return None,
+            };
+            Some(Query::Class(class.to_owned()))
+        })
+    }
+
+    fn predicate(&self, name: &Name) -> Option<Query> {
+        self.own.get(name).cloned().or_else(|| {
+            let name = name.as_str().to_ascii_lowercase();
+            match name.as_str() {
+                "fd_available" => Some(Query::Available),
+                "a_req_f" => Some(Query::Requires(None)),
+                other if self.solves().contains(&Name::new(other)) => Some(Query::Solves),
+                other => {
+                    other.strip_suffix("_requires_f").map(|action| Query::Requires(Some(action.to_owned())))
+                }
+            }
+        })
+    }
+
+    fn function(&self, declared: &Declaration) -> Query {
+        let name = &declared.identifier.name;
+        self.own.get(name).cloned().unwrap_or_else(|| {
+            let name = name.as_str().to_owned();
+            if declared.parameters.is_empty() { Query::Measured(name) } else { Query::Estimation(name) }
+        })
+    }
+}
+
+fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
+    let (kind, name) = query.split_once(':').unwrap_or((query, ""));
+    match (kind, name) {
+        ("class", name) if !name.is_empty() => Ok(Query::Class(name.to_owned())),
+        ("estimation", name) if !name.is_empty() => Ok(Query::Estimation(name.to_owned())),
+        ("measured", name) if !name.is_empty() => Ok(Query::Measured(name.to_owned())),
+        ("chosen", name) if !name.is_empty() => Ok(Query::Chosen(name.to_owned())),
+        ("reconfigured", name) if !name.is_empty() => Ok(Query::Reconfigured(name.to_owned())),
+        ("action", name) if !name.is_empty() => Ok(Query::Action(name.to_owned())),
+        ("requires", "") => Ok(Query::Requires(None)),
+        ("requires", name) => Ok(Query::Requires(Some(name.to_owned()))),
+        ("solves", "") => Ok(Query::Solves),
+        ("available", "") => Ok(Query::Available),
+        _ => Err(format!(
+            "`{symbol}` is bound to `{query}`, which is no query; queries are `class:NAME`, `solves`, `available`, \
+             `requires`, `requires:ACTION`, `estimation:ATTRIBUTE`, `measured:ATTRIBUTE`, and in plain domains `action:NAME`, `chosen:ATTRIBUTE` and \
+             `reconfigured:ATTRIBUTE`"
+        )),
+    }
+}
+
+/// Adds to a problem the objects, facts and values that the knowledge base has for the domain's symbols. What
+/// the problem says of availability itself is dropped, with a warning; values that it states stay.
+pub(super) fn fill(
+    domain: &Domain,
+    problem: &mut Problem,
+    knowledge: &Knowledge,
+    bindings: &Bindings,
+) -> Vec<Message> {
+    let known = knowledge.catalogue();
+    let is_known = knowledge.fault().is_none();
+    let mut fill = Fill { problem, view: knowledge.view(), known, is_known, warnings: Vec::new() };
+    let types = domain.types.iter().map(|declared| &declared.identifier.name);
+    let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
+    let actions = domain.actions.iter().map(|action| &action.identifier.name);
+    let declared: BTreeSet<&Name> = types.chain(symbols).chain(actions).collect();
+    for name in bindings.own.keys().filter(|name| !declared.contains(name)) {
+        let text =
+            format!("`{name}` is bound, but the domain declares no such type, predicate, function or action");
+        fill.warnings.push(Message::warning("M204", text));
+    }
+    for declared in &domain.types {
+        let name = &declared.identifier.name;
+        if let Some(Query::Class(class)) = bindings.r#type(name) {
+            fill.objects(domain, name, &class);
+        }
+    }
+    for declared in &domain.predicates {
+        match bindings.predicate(&declared.identifier.name) {
+            Some(Query::Solves) if declared.parameters.len() == 2 => fill.solves(&declared.identifier.name),
+            Some(Query::Available) if declared.parameters.len() == 1 => {
+                fill.available(&declared.identifier.name);
+            }
+            Some(Query::Requires(action)) => fill.requires(declared, action.as_deref()),
+            _ => {}
+        }
+    }
+    for declared in &domain.functions {
+        fill.values(declared, &bindings.function(declared));
+    }
+    fill.warnings
+}
+
+struct Fill<'a> {
+    problem: &'a mut Problem,
+    view: View<'a>,
+    known: &'a Catalogue,
+    /// Whether it is known what follows.
+    is_known: bool,
+    warnings: Vec<Message>,
+}
+
+impl Fill<'_> {
+    fn objects(&mut self, domain: &Domain, r#type: &Name, class: &str) {
+        let members = self.known.members(&self.view, class);
+        let present = domain.constants.iter().chain(&self.problem.objects);
+        let mut known: BTreeSet<Name> = present.map(|object| object.identifier.name.clone()).collect();
+        for Individual { iri, name } in &*members {
+            let spelled = Name::new(name);
+            if !is_pddl_name(name) {
+                let text = format!("<{iri}> is left out: `{name}` is no PDDL name");
+                self.warnings.push(Message::warning("M201", text));
+            } else if known.insert(spelled.clone()) {
+                let alternatives = vec![identifier(r#type)];
+                let r#type = TypeExpression { alternatives };
+                self.problem.objects.push(TypedName { identifier: identifier(&spelled), r#type });
+            }
+        }
+    }
+
+    fn fact(&mut self, predicate: &Name, arguments: &[&str]) {
+        self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
+    }
+
+    fn solves(&mut self, predicate: &Name) {
+        for design in self.known.designs() {
+            for function in &design.solves {
+                self.fact(predicate, &[&design.individual.name, &function.name]);
+            }
+        }
+    }
+
+    fn available(&mut self, predicate: &Name) {
+        let own = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate);
+        if self.problem.init.iter().any(own) {
+            self.problem.init.retain(|element| !own(element));
+            let text =
+                format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides");
+            self.warnings.push(Message::warning("M202", text));
+        }
+        // Where it is not known what follows, nothing counts as available.
+        let is_known = self.is_known;
+        for design in self.known.designs().iter().filter(|design| is_known && design.available) {
+            self.fact(predicate, &[&design.individual.name]);
+        }
+    }
+
+    /// One atom for each action: the action (where the predicate has a place for it) and all its functions.
+    fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
+        for action in self.known.actions() {
+            if only.is_some_and(|only| !only.eq_ignore_ascii_case(&action.individual.name)) {
+                continue;
+            }
+            let functions: Vec<&str> =
+                action.requires.iter().map(|function| function.name.as_str()).collect();
+            let all: Vec<&str> = std::iter::once(action.individual.name.as_str()).chain(functions).collect();
+            if all.len() == declared.parameters.len() {
+                self.fact(&declared.identifier.name, &all);
+            } else {
+                let text = format!(
+                    "`{}` has {} parameters, but {} requires {} functions; the action is left out",
+                    declared.identifier.name,
+                    declared.parameters.len(),
+                    action.individual.name,
+                    action.requires.len()
+                );
+                self.warnings.push(Message::warning("M203", text));
+            }
+        }
+    }
+
+    fn values(&mut self, declared: &Declaration, query: &Query) {
+        let name = &declared.identifier.name;
+        let stated: BTreeSet<Vec<Name>> = self
+            .problem
+            .init
+            .iter()
+            .filter_map(|element| match element {
+                InitialElement::Value(atom, _, _) if atom.predicate.name == *name => {
+                    Some(names(&atom.arguments))
+                }
+                _ => None,
+            })
+            .collect();
+        let mut values: Vec<(Vec<String>, BigRational)> = Vec::new();
+        match query {
+            Query::Estimation(attribute) if declared.parameters.len() == 1 => {
+                let plain = attribute.strip_prefix("fd_").unwrap_or(attribute);
+                for design in self.known.designs() {
+                    let value = design.estimations.get(attribute).or_else(|| design.estimations.get(plain));
+                    values.extend(value.map(|value| (vec![design.individual.name.clone()], value.clone())));
+                }
+            }
+            Query::Measured(attribute) if declared.parameters.is_empty() => {
+                let measured = self.known.measurements().iter().find(|m| m.attribute == *attribute);
+                values.extend(measured.and_then(|m| m.value.clone()).map(|value| (Vec::new(), value)));
+            }
+            _ => {}
+        }
+        for (arguments, value) in values {
+            let key: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
+            if !stated.contains(&key) {
+                let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+                self.problem.init.push(InitialElement::Value(atom(name, &arguments), value, Span::default()));
+            }
+        }
+    }
+}
+
+fn names(terms: &[Term]) -> Vec<Name> {
+    let name = |term: &Term| match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.clone(),
+    };
+    terms.iter().map(name).collect()
+}
+
+pub(super) fn identifier(name: &Name) -> Identifier {
+    Identifier { name: name.clone(), span: Span::default() }
+}
+
+/// An atom of constants.
+pub fn atom(predicate: &Name, arguments: &[&str]) -> Atom {
+    let constant = |argument: &&str| Term::Constant(identifier(&Name::new(argument)));
+    Atom {
+        predicate: identifier(predicate),
+        arguments: arguments.iter().map(constant).collect(),
+        span: Span::default(),
+    }
+}
+
+pub(super) fn is_pddl_name(name: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    !name.is_empty() && name.chars().all(allowed)
+}

@@ -1,0 +1,203 @@
+//! What makes a mission adapt less than its author expects, though nothing is wrong with any of its files: names that meet
+//! nothing of the other side.
+
+use std::collections::BTreeSet;
+
+use ontology::vocab::local_name;
+use pddl::ast::{ActionBody, Assignment, Effect, InitialElement, Name};
+use pddl::{Diagnostic, Severity, print_domain};
+use rules::{Engine, Fact};
+
+use crate::joined::Mission;
+use crate::knowledge::Knowledge;
+use crate::message::{Message, nearest};
+
+impl Mission {
+    /// Warnings about names of the knowledge base that nothing stands for, and about values that nothing gives.
+    pub fn doubts(&self) -> Vec<Message> {
+        let Some(knowledge) = &self.knowledge else { return Vec::new() };
+        let mut doubts = self.actions_without_schema(knowledge);
+        doubts.extend(components(knowledge));
+        doubts.extend(self.functions_without_value());
+        doubts.extend(attributes(knowledge));
+        doubts
+    }
+
+    /// Actions of the knowledge base that no schema of the domain stands for.
+    fn actions_without_schema(&self, knowledge: &Knowledge) -> Vec<Message> {
+        let schemas: Vec<&Name> = self.domain.actions.iter().map(|action| &action.identifier.name).collect();
+        let predicates: Vec<&Name> = self.domain.predicates.iter().map(|own| &own.identifier.name).collect();
+        let actions = knowledge.view().actions().into_iter();
+        let wanted = actions.filter(|action| !action.requires.is_empty() || !action.quality.is_empty());
+        let mut doubts = Vec::new();
+        for action in wanted {
+            let name = &action.individual.name;
+            let has_schema = schemas.iter().any(|schema| self.bindings.is_action(schema, name));
+            if has_schema || predicates.iter().any(|predicate| self.bindings.says_needs(predicate, name)) {
+                continue;
+            }
+            let known = schemas.iter().map(|schema| schema.as_str());
+            let meant = nearest(name.strip_prefix("a_").unwrap_or(name), known);
+            let meant = meant.map_or_else(String::new, |meant| {
+                format!("; if it is `{meant}`, name it so, or bind `{meant} = \"action:{name}\"`")
+            });
+            let text = format!(
+                "no action of the domain stands for <{}>, so what it requires is not asked of any{meant}",
+                action.individual.iri
+            );
+            doubts.push(warning(knowledge, "M205", &action.individual.iri, text));
+        }
+        doubts
+    }
+
+    /// Numeric functions that are used, and have no value.
+    fn functions_without_value(&self) -> Vec<Message> {
+        let mut problem = self.problem.clone();
+        self.fill(&mut problem);
+        let valued: BTreeSet<&Name> = problem
+            .init
+            .iter()
+            .filter_map(|element| match element {
+                InitialElement::Value(atom, ..) => Some(&atom.predicate.name),
+                _ => None,
+            })
+            .collect();
+        let text = print_domain(&self.domain);
+        let is_used = |name: &Name| {
+            let count = [format!("({name})"), format!("({name} ")];
+            count.iter().map(|form| text.matches(form.as_str()).count()).sum::<usize>() > 1
+        };
+        let effects = self.domain.actions.iter().flat_map(|action| match &action.body {
+            ActionBody::Instantaneous { effect, .. } => vec![effect],
+            ActionBody::Durative { effects, .. } => effects.iter().map(|(_, effect)| effect).collect(),
+        });
+        let effects: Vec<&Effect> = effects.collect();
+        let stands = |name: &Name| self.adaptation.as_ref().is_some_and(|own| own.stands_for_designs(name));
+        let declared = self.domain.functions.iter().map(|declared| &declared.identifier);
+        let silent = declared.filter(|identifier| {
+            let name = &identifier.name;
+            name.as_str() != "total-cost"
+                && !valued.contains(name)
+                && is_used(name)
+                && !stands(name)
+                && !effects.iter().any(|effect| assigns(effect, name))
+        });
+        let warning = |identifier: &pddl::ast::Identifier| {
+            let text = format!(
+                "nothing gives `{}` a value: neither the problem nor the knowledge base, by its name or a binding",
+                identifier.name
+            );
+            let found =
+                Diagnostic::new(&self.domain_source, identifier.span, Severity::Warning, "M206", text);
+            Message::from_pddl(&[found], &[&self.domain_source])
+        };
+        silent.flat_map(warning).collect()
+    }
+}
+
+fn assigns(effect: &Effect, name: &Name) -> bool {
+    match effect {
+        Effect::And(parts) => parts.iter().any(|part| assigns(part, name)),
+        Effect::ForAll(_, inner) | Effect::When(_, inner) => assigns(inner, name),
+        Effect::Assign(Assignment::Assign, target, ..) => target.predicate.name == *name,
+        Effect::Assign(..) | Effect::Add(_) | Effect::Delete(_) => false,
+    }
+}
+
+/// What is stated of an individual as a subject, and of which it is the object.
+fn stated(engine: &Engine, iri: &str) -> (Vec<Fact>, Vec<Fact>) {
+    let Some(symbol) = engine.symbols().find_name(iri) else { return (Vec::new(), Vec::new()) };
+    let facts = engine.facts().filter(|fact| engine.is_asserted(fact) && fact.arguments.contains(&symbol));
+    facts.partition(|fact| fact.arguments.first() == Some(&symbol))
+}
+
+/// Components that are only mentioned, and components that no design requires.
+fn components(knowledge: &Knowledge) -> Vec<Message> {
+    let (engine, view) = (knowledge.engine(), knowledge.view());
+    let designs = view.function_designs();
+    let required: BTreeSet<&str> =
+        designs.iter().flat_map(|design| &design.components).map(|own| own.iri.as_str()).collect();
+    let all = view.components();
+    let names: Vec<String> = all.iter().map(|component| component.individual.name.clone()).collect();
+    let mut doubts = Vec::new();
+    for component in all.iter().map(|component| &component.individual) {
+        let (own, other) = stated(engine, &component.iri);
+        if own.is_empty() {
+            let known = names.iter().map(String::as_str).filter(|name| **name != component.name);
+            let meant = nearest(&component.name, known).map(|name| format!("; did you mean `{name}`?"));
+            let text = format!(
+                "the component <{}> is only mentioned, and nothing else is said of it{}",
+                component.iri,
+                meant.unwrap_or_default()
+            );
+            doubts.push(warning(knowledge, "M207", &component.iri, text));
+        } else if !required.is_empty()
+            && !required.contains(component.iri.as_str())
+            && other.is_empty()
+            && own.iter().all(|fact| is_plain(engine, fact))
+        {
+            let text = format!(
+                "no design requires the component <{}>, so its failure changes nothing",
+                component.iri
+            );
+            doubts.push(warning(knowledge, "M208", &component.iri, text));
+        }
+    }
+    doubts
+}
+
+/// Whether a fact says only what something is, or how it is.
+fn is_plain(engine: &Engine, fact: &Fact) -> bool {
+    let name = engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
+    fact.arguments.len() == 1 || local_name(name) == "c_status"
+}
+
+/// Attributes that nothing gives a value, and bounds of actions on attributes that no design estimates.
+fn attributes(knowledge: &Knowledge) -> Vec<Message> {
+    let (engine, view) = (knowledge.engine(), knowledge.view());
+    let designs = view.function_designs();
+    let estimated: BTreeSet<&str> =
+        designs.iter().flat_map(|design| design.estimations.keys()).map(String::as_str).collect();
+    let bounded: BTreeSet<&str> =
+        designs.iter().flat_map(|design| &design.requirements).map(|own| own.attribute.as_str()).collect();
+    let mut doubts = Vec::new();
+    for kind in view.attribute_types() {
+        let used = estimated.contains(kind.name.as_str()) || bounded.contains(kind.name.as_str());
+        if !used && stated(engine, &kind.iri).1.is_empty() {
+            let text = format!("nothing gives the attribute <{}> a value, and nothing bounds it", kind.iri);
+            doubts.push(warning(knowledge, "M209", &kind.iri, text));
+        }
+    }
+    for quality in view.actions().into_iter().flat_map(|action| action.quality) {
+        let attribute = quality.bounds.attribute.as_str();
+        if !estimated.contains(attribute) {
+            let meant = nearest(attribute, estimated.iter().copied());
+            let meant = meant.map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
+            let text = format!(
+                "<{}> bounds `{attribute}`, of which no design has an estimation, so every design meets it{meant}",
+                quality.individual.iri
+            );
+            doubts.push(warning(knowledge, "M210", &quality.individual.iri, text));
+        }
+    }
+    doubts
+}
+
+/// A warning with the place where a document first has the name, if one of those that were read has it.
+fn warning(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Message {
+    let name = local_name(iri);
+    let is_part = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '-');
+    for file in knowledge.documents() {
+        let Ok(document) = std::fs::read_to_string(file) else { continue };
+        for (line, number) in document.lines().zip(1..) {
+            let place = line.match_indices(name).find(|(at, _)| {
+                !is_part(line[..*at].chars().next_back()) && !is_part(line[at + name.len()..].chars().next())
+            });
+            if let Some((at, _)) = place.filter(|_| !line.trim_start().starts_with('#')) {
+                let column = line[..at].chars().count() + 1;
+                return Message::warning_at(code, file, (number, column), text);
+            }
+        }
+    }
+    Message::warning(code, text)
+}

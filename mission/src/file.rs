@@ -1,0 +1,235 @@
+//! Files to what they are: regular ones of a reasonable size, and of the expected kind. Of a file of another kind nothing is
+//! quoted in a message: a hostile manifest may name any file.
+
+use std::io::{self, Read as _, Write as _};
+use std::path::Path;
+
+use pddl::Source;
+
+use crate::message::Message;
+
+/// The code of the message that a file is of another kind.
+pub(crate) const CODE: &str = "M131";
+
+/// Files with more bytes are not read.
+const LARGEST: u64 = 1 << 28;
+
+/// Reads a file, which must be a regular one.
+///
+/// # Errors
+/// As reading does; it is none, or too large.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let found = std::fs::metadata(path)?;
+    if found.is_dir() {
+        return Err(io::Error::other("is a directory"));
+    }
+    if !found.is_file() {
+        return Err(io::Error::other("it is no regular file"));
+    }
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST {
+        return Err(io::Error::other(format!("it has more than {LARGEST} bytes")));
+    }
+    Ok(bytes)
+}
+
+/// Reads a text file; `-` is standard input.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn source(path: &Path) -> Result<Source, Message> {
+    let name = path.display().to_string();
+    let bytes = if name == "-" {
+        let mut bytes = Vec::new();
+        io::stdin().read_to_end(&mut bytes).map(|_| bytes)
+    } else {
+        read(path)
+    };
+    match bytes {
+        Ok(bytes) => Ok(Source::from_bytes(name, &bytes)),
+        Err(error) => Err(Message::at("M101", &name, None, format!("cannot be read: {error}"))),
+    }
+}
+
+/// Writes a text file so that it is either whole or untouched.
+///
+/// # Errors
+/// It cannot be written.
+pub fn write(path: &Path, text: &str) -> Result<(), Message> {
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let written = tempfile::NamedTempFile::new_in(directory).and_then(|mut file| {
+        file.write_all(text.as_bytes())?;
+        file.as_file().sync_all()?;
+        file.persist(path).map_err(|error| error.error)
+    });
+    match written {
+        Ok(_) => Ok(()),
+        Err(error) => {
+            let text = format!("cannot be written: {}", error.kind());
+            Err(Message::at("M109", &path.display().to_string(), None, text))
+        }
+    }
+}
+
+/// What a text may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A mission's manifest, in TOML.
+    Manifest,
+    /// A PDDL domain.
+    Domain,
+    /// A PDDL problem.
+    Problem,
+    /// A knowledge base.
+    Knowledge,
+}
+
+impl Kind {
+    /// What a text looks like, by its first words.
+    fn of(text: &str) -> Option<Self> {
+        let mut lines = text.lines().map(str::trim_start);
+        let first = lines.find(|line| !line.is_empty() && !line.starts_with([';', '#']))?;
+        let rest = &text[text.find(first).unwrap_or(0)..];
+        let words: String = rest.chars().take(200).collect::<String>().to_ascii_lowercase();
+        let words = words.replace('(', " ( ");
+        let words: Vec<&str> = words.split_whitespace().take(4).collect();
+        match words[..] {
+            ["(", "define", "(", "domain", ..] => Some(Self::Domain),
+            ["(", "define", "(", "problem", ..] => Some(Self::Problem),
+            ["@prefix" | "@base" | "prefix" | "base", ..] => Some(Self::Knowledge),
+            [word, ..]
+                if ["<?xml", "<rdf", "<!doctype", "<http", "prefix("]
+                    .iter()
+                    .any(|own| word.starts_with(own)) =>
+            {
+                Some(Self::Knowledge)
+            }
+            _ if is_toml(first) => Some(Self::Manifest),
+            _ => None,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Manifest => "a mission's manifest",
+            Self::Domain => "a PDDL domain",
+            Self::Problem => "a PDDL problem",
+            Self::Knowledge => "a knowledge base",
+        }
+    }
+}
+
+/// Whether a line is `key = ...` or `[table]`.
+fn is_toml(line: &str) -> bool {
+    let is_key =
+        |key: &str| !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"' ".contains(c));
+    match line.split_once('=') {
+        Some((key, _)) => is_key(key.trim()),
+        None => line.starts_with('['),
+    }
+}
+
+/// That a text is of a kind.
+///
+/// # Errors
+/// What it is instead, and what to do; nothing of the text is quoted.
+pub fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
+    let found = Kind::of(text);
+    // What has a parenthesis first may be meant as PDDL, and the parser knows better what is wrong with it.
+    let trimmed = text.lines().map(str::trim_start).find(|line| !line.is_empty() && !line.starts_with(';'));
+    let is_list = trimmed.is_none_or(|line| line.starts_with('('));
+    let is_pddl = matches!(kind, Kind::Domain | Kind::Problem);
+    let fits = match found {
+        Some(found) => found == kind,
+        None => is_list == is_pddl || trimmed.is_none() || !is_pddl && kind != Kind::Manifest,
+    };
+    if fits {
+        return Ok(());
+    }
+    let is = found.map_or_else(|| "something else".to_owned(), |found| found.name().to_owned());
+    let help = match (kind, found) {
+        (Kind::Manifest, Some(Kind::Domain)) => "; give the problem, too: DOMAIN PROBLEM",
+        (Kind::Manifest, Some(Kind::Problem)) => "; give the domain first: DOMAIN PROBLEM",
+        (Kind::Manifest, Some(Kind::Knowledge)) => {
+            "; a manifest names it under `[knowledge]`, or give it with `--kb`"
+        }
+        (Kind::Domain, Some(Kind::Problem)) | (Kind::Problem, Some(Kind::Domain)) => {
+            "; the domain comes first, and the problem second"
+        }
+        _ => "",
+    };
+    let text = format!("this should be {}, but is {is}{help}", kind.name());
+    Err(Message::at(CODE, file, None, text))
+}
+
+/// The first words of a document of a knowledge base, whatever its syntax.
+const BEGINNINGS: [&str; 10] =
+    ["@", "prefix", "base", "<", "_:", "[", "(", "ontology", "version", "\u{feff}"];
+
+/// Messages about knowledge bases without what a document is quoted for that does not begin like one: it may be any file.
+pub(crate) fn discreet(messages: Vec<Message>) -> Vec<Message> {
+    let mut kept: Vec<Message> = Vec::new();
+    for message in messages {
+        let file =
+            message.file.clone().filter(|file| message.code == "O102" && !is_knowledge(Path::new(file)));
+        let Some(file) = file else {
+            kept.push(message);
+            continue;
+        };
+        if !kept.iter().any(|known| known.code == CODE && known.file.as_ref() == Some(&file)) {
+            let text = format!("this should be {}, but is something else", Kind::Knowledge.name());
+            kept.push(Message::at(CODE, &file, None, text));
+        }
+    }
+    kept
+}
+
+/// Whether a file begins like a knowledge base. What is no file, or cannot be read, was given otherwise.
+fn is_knowledge(path: &Path) -> bool {
+    let Ok(file) = std::fs::File::open(path) else { return true };
+    let mut bytes = Vec::new();
+    if file.take(1 << 16).read_to_end(&mut bytes).is_err() {
+        return true;
+    }
+    // Text of two bytes a character has zeros between.
+    let text: String = String::from_utf8_lossy(&bytes).chars().filter(|c| *c != '\0').collect();
+    let first = text.lines().map(str::trim_start).find(|line| !line.is_empty() && !line.starts_with('#'));
+    let first = first.unwrap_or("@").to_ascii_lowercase();
+    BEGINNINGS.iter().any(|word| first.starts_with(word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Kind, expect};
+
+    fn check(text: &str, expected: Option<Kind>) {
+        assert_eq!(Kind::of(text), expected, "{text}");
+    }
+
+    #[test]
+    fn kinds_are_told_by_their_first_words() {
+        check("; a domain\n\n ( define(domain d)", Some(Kind::Domain));
+        check("(define (problem p)", Some(Kind::Problem));
+        check("# a robot\n@prefix : <http://e.org/> .", Some(Kind::Knowledge));
+        check("<?xml version=\"1.0\"?>", Some(Kind::Knowledge));
+        check("# a mission\nname = \"ugv\"", Some(Kind::Manifest));
+        check("[knowledge]\n", Some(Kind::Manifest));
+        check("root:*:20228:0:99999:7:::", None);
+        check("", None);
+    }
+
+    #[test]
+    fn what_is_expected_is_taken_and_nothing_else_is_quoted() {
+        let secret = "root:*:20228:0:99999:7:::\n";
+        for kind in [Kind::Domain, Kind::Problem] {
+            let message = expect(kind, "f", secret).expect_err("no PDDL").text().to_owned();
+            assert!(!message.contains("20228"), "{message}");
+            assert!(expect(kind, "f", "(define (domai d)").is_ok());
+            assert!(expect(kind, "f", "").is_ok());
+        }
+        assert!(expect(Kind::Domain, "f", "(define (problem p)").is_err());
+        assert!(expect(Kind::Manifest, "f", "name = 1").is_ok());
+        assert!(expect(Kind::Manifest, "f", "(define (domain d)").is_err());
+    }
+}

@@ -1,0 +1,215 @@
+//! A mission: what the robot is (a knowledge base) and what it has to do (PDDL), joined.
+
+use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
+use pddl::{self, Severity, Source};
+
+use crate::binding::Bindings;
+use crate::file::{self, Kind};
+use crate::knowledge::Knowledge;
+use crate::message::Message;
+use crate::native::CoAdaptation;
+
+/// A mission that can be planned.
+#[derive(Debug, Clone)]
+pub struct Mission {
+    /// Its name.
+    pub name: String,
+    pub(super) knowledge: Option<Knowledge>,
+    pub(super) bindings: Bindings,
+    pub(super) domain_source: Source,
+    pub(super) problem_source: Source,
+    pub(super) domain: Domain,
+    pub(super) problem: Problem,
+    pub(super) adaptation: Option<CoAdaptation>,
+    warnings: Vec<Message>,
+}
+
+impl Mission {
+    /// Joins a knowledge base, if there is one, with a domain and a problem.
+    ///
+    /// # Errors
+    /// All that is wrong with any of them.
+    pub fn new(
+        name: &str,
+        knowledge: Option<Result<Knowledge, Vec<Message>>>,
+        bindings: Bindings,
+        domain: Result<Source, Message>,
+        problem: Result<Source, Message>,
+    ) -> Result<Self, Vec<Message>> {
+        let mut errors = Vec::new();
+        let knowledge = match knowledge.transpose() {
+            Ok(knowledge) => knowledge,
+            Err(more) => {
+                errors.extend(more);
+                None
+            }
+        };
+        let (domain_source, problem_source) = match (domain, problem) {
+            (Ok(domain), Ok(problem)) => (domain, problem),
+            (domain, problem) => {
+                errors.extend([domain.err(), problem.err()].into_iter().flatten());
+                return Err(errors);
+            }
+        };
+        for (kind, source) in [(Kind::Domain, &domain_source), (Kind::Problem, &problem_source)] {
+            errors.extend(file::expect(kind, source.name(), source.text()).err());
+        }
+        // Of what is no PDDL nothing is shown.
+        if errors.iter().any(|error| error.code == file::CODE) {
+            return Err(errors);
+        }
+        let parsed = parse(&domain_source, &problem_source);
+        let (domain, problem, warnings) = match parsed {
+            Ok(parsed) if errors.is_empty() => parsed,
+            Ok(_) => return Err(errors),
+            Err(more) => {
+                errors.extend(more);
+                return Err(errors);
+            }
+        };
+        let adaptation = match &knowledge {
+            Some(knowledge) => CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?,
+            None => None,
+        };
+        let domain = adaptation.as_ref().map_or_else(|| domain.clone(), |own| own.explicit(&domain));
+        let name = name.to_owned();
+        Ok(Self {
+            name,
+            knowledge,
+            bindings,
+            domain_source,
+            problem_source,
+            domain,
+            problem,
+            adaptation,
+            warnings,
+        })
+    }
+
+    /// What is questionable about the files.
+    pub fn warnings(&self) -> impl Iterator<Item = &Message> {
+        self.warnings.iter().chain(self.knowledge.iter().flat_map(Knowledge::warnings))
+    }
+
+    /// Adds [`Mission::doubts`] to the warnings, once the situation is complete.
+    pub fn note_doubts(&mut self) {
+        self.warnings.extend(self.doubts());
+    }
+
+    /// The knowledge base, if the mission has one.
+    pub fn knowledge(&self) -> Option<&Knowledge> {
+        self.knowledge.as_ref()
+    }
+
+    /// Marks a component as failed.
+    ///
+    /// # Errors
+    /// There is no such component, or no knowledge base that could have one.
+    pub fn fail(&mut self, component: &str) -> Result<(), Message> {
+        match &mut self.knowledge {
+            Some(knowledge) => knowledge.fail(component),
+            None => Err(Message::error(
+                "M103",
+                format!("there is no knowledge base that has a component `{component}`"),
+            )),
+        }
+    }
+
+    /// Changes the goal: the last argument of its first atom with this predicate.
+    pub fn aim(&mut self, predicate: &str, object: &str) {
+        let mut parts = vec![&mut self.problem.goal];
+        while let Some(part) = parts.pop() {
+            match part {
+                Condition::And(more) => parts.extend(more.iter_mut().rev()),
+                Condition::Atom(atom) if atom.predicate.name.as_str().eq_ignore_ascii_case(predicate) => {
+                    if let Some(Term::Constant(last)) = atom.arguments.last_mut() {
+                        last.name = Name::new(object);
+                    }
+                    return;
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The problem as it is to be planned: with what the knowledge base contributes.
+    ///
+    /// # Errors
+    /// What the knowledge base contributes does not fit the domain.
+    pub fn filled(&self) -> Result<(Problem, Vec<Message>), Vec<Message>> {
+        let mut problem = self.problem.clone();
+        let mut warnings = self.fill(&mut problem);
+        let found = pddl::check(&self.domain, &self.domain_source, &problem, &self.problem_source);
+        let (errors, questionable): (Vec<_>, Vec<_>) =
+            found.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
+        let sources = [&self.domain_source, &self.problem_source];
+        if errors.is_empty() {
+            warnings.extend(Message::from_pddl(&questionable, &sources));
+            return Ok((problem, warnings));
+        }
+        // What settings and the knowledge base have contributed stands in no file.
+        let (contributed, own): (Vec<_>, Vec<_>) =
+            errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
+        let mut messages = Message::from_pddl(&own, &sources);
+        messages.extend(contributed.iter().map(|diagnostic| {
+            let text = format!("{} (from a setting or from the knowledge base)", diagnostic.message);
+            Message::error(diagnostic.code, text)
+        }));
+        Err(messages)
+    }
+
+    /// What the knowledge base adds to the actions of a plain domain; none if the domain is explicit.
+    pub fn adaptation(&self) -> Option<&CoAdaptation> {
+        self.adaptation.as_ref()
+    }
+
+    /// The bindings.
+    pub fn bindings(&self) -> &Bindings {
+        &self.bindings
+    }
+
+    /// The domain as its file has it.
+    pub fn domain_source(&self) -> &Source {
+        &self.domain_source
+    }
+
+    /// The problem as its file has it.
+    pub fn problem_source(&self) -> &Source {
+        &self.problem_source
+    }
+
+    /// The predicates that say which design solves which function.
+    pub fn solves(&self) -> Vec<Name> {
+        self.bindings.solves()
+    }
+
+    /// The domain, in explicit form if its file is plain.
+    pub fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    /// An objective from its text: an expression as it stands in a metric, or the name of a function without
+    /// parameters.
+    ///
+    /// # Errors
+    /// All that is wrong with it.
+    pub fn objective(&self, problem: &Problem, text: &str) -> Result<Metric, Vec<Message>> {
+        let text = text.trim();
+        let is_word = !text.starts_with('(') && !text.eq_ignore_ascii_case("total-time");
+        let text = if is_word && !text.is_empty() { format!("({text})") } else { text.to_owned() };
+        let source = Source::new("objective", text);
+        pddl::read_objective(Direction::Minimize, &source, &self.domain, problem)
+            .map_err(|diagnostics| Message::from_pddl(&diagnostics, &[&source]))
+    }
+}
+
+fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Vec<Message>> {
+    let (domain_tree, mut diagnostics) = pddl::parse_domain(domain);
+    let (problem_tree, more) = pddl::parse_problem(problem);
+    diagnostics.extend(more);
+    let messages = Message::from_pddl(&diagnostics, &[domain, problem]);
+    match (domain_tree, problem_tree) {
+        (Some(domain), Some(problem)) if !pddl::has_errors(&diagnostics) => Ok((domain, problem, messages)),
+        _ => Err(messages),
+    }
+}

@@ -1,0 +1,377 @@
+//! A knowledge base at run time: OWL documents and rule files in an engine, kept in step with the robot.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use num_rational::BigRational;
+use ontology::runtime::{Mode, NewObjective, Runtime};
+use ontology::tomasys::View;
+use ontology::tomasys::change::Status;
+use ontology::{Annotation, EntityKind, Equality, Iri, ReadOptions};
+use rules::{Delta, Engine, Fact, Literal, Program, Symbols};
+
+use crate::knowledge::catalogue::Catalogue;
+use crate::knowledge::sources::{Sources, Stated};
+use crate::knowledge::statement::{Statement, Statements};
+use crate::knowledge::waiting::Waiting;
+use crate::message::Message;
+
+/// From so many names of one individual on, not all of their pairs are listed.
+const MANY_NAMES: usize = 32;
+
+/// Knowledge about a robot: what is stated, and what follows.
+#[derive(Debug, Clone)]
+pub struct Knowledge {
+    pub(super) runtime: Runtime,
+    /// What was last read of `runtime`, in step with it.
+    pub(super) catalogue: OnceLock<Arc<Catalogue>>,
+    /// What was told and nothing follows from yet.
+    pub(super) waiting: Waiting,
+    /// As it was read; shares with `runtime` what has not changed since.
+    origin: Runtime,
+    rule_count: usize,
+    warnings: Vec<Message>,
+    pub(super) sources: Sources,
+    entities: Arc<[(EntityKind, Iri)]>,
+    /// The names of all documents, those that are imported among them.
+    documents: Arc<[String]>,
+    annotations: Arc<[(Iri, Annotation)]>,
+}
+
+/// Something that the knowledge contradicts.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Contradiction {
+    /// The axiom or rule that is violated.
+    pub violated: String,
+    /// The facts that violate it together.
+    pub facts: Vec<String>,
+}
+
+impl Knowledge {
+    /// Reads documents and rules.
+    ///
+    /// # Errors
+    /// All that is wrong with them.
+    pub fn read(sources: &Sources) -> Result<Self, Vec<Message>> {
+        Self::read_as(sources, Equality::Owl)
+    }
+
+    /// As [`Knowledge::read`], where two names may stand for one individual, as in OWL, or never.
+    ///
+    /// # Errors
+    /// All that is wrong with the sources.
+    pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+        let Stated { symbols, program, facts, ontology, rule_count, mut warnings } =
+            Stated::read(sources, equality)?;
+        let engine = Engine::with_limits(symbols, program, facts, sources.limits.clone())
+            .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
+        let mistakes = ontology::tomasys::check(&ontology, &engine);
+        warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
+        let runtime = Runtime::new(engine, Mode::Retract);
+        let (sources, entities) = (sources.clone(), ontology.entities.into());
+        let documents = ontology.sources.into_iter().map(|source| source.name).collect();
+        let annotations = ontology.annotations.into();
+        Ok(Self { documents, annotations, ..Self::of(runtime, rule_count, warnings, sources, entities) })
+    }
+
+    /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
+    ///
+    /// # Errors
+    /// The facts refer to other symbols.
+    pub fn closed(symbols: Symbols, facts: Vec<Fact>, equality: bool) -> Result<Self, Vec<Message>> {
+        let program = Program { rules: Vec::new(), equality };
+        let engine = Engine::new(symbols, program, facts)
+            .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
+        let runtime = Runtime::new(engine, Mode::Retract);
+        let (sources, entities) = (Sources::default(), Arc::default());
+        Ok(Self::of(runtime, 0, Vec::new(), sources, entities))
+    }
+
+    fn of(
+        runtime: Runtime,
+        rule_count: usize,
+        warnings: Vec<Message>,
+        sources: Sources,
+        entities: Arc<[(EntityKind, Iri)]>,
+    ) -> Self {
+        let (catalogue, waiting, origin) = (OnceLock::new(), Waiting::default(), runtime.clone());
+        let (documents, annotations) = (Arc::default(), Arc::default());
+        Self {
+            runtime,
+            catalogue,
+            waiting,
+            origin,
+            rule_count,
+            warnings,
+            sources,
+            entities,
+            documents,
+            annotations,
+        }
+    }
+
+    /// What is questionable about the documents.
+    pub fn warnings(&self) -> &[Message] {
+        &self.warnings
+    }
+
+    /// The classes, properties and individuals that the documents name.
+    pub fn entities(&self) -> &[(EntityKind, Iri)] {
+        &self.entities
+    }
+
+    /// What the documents say in annotations of entities.
+    pub fn annotations(&self) -> &[(Iri, Annotation)] {
+        &self.annotations
+    }
+
+    /// What it was read from.
+    pub fn sources(&self) -> &Sources {
+        &self.sources
+    }
+
+    /// The names of the documents that were read: paths of files, imported ones among them.
+    pub fn documents(&self) -> &[String] {
+        &self.documents
+    }
+
+    /// How many rules there are: those of each document, and those of rule files; axioms do not count.
+    pub fn rule_count(&self) -> usize {
+        self.rule_count
+    }
+
+    /// The typed view on what holds now.
+    pub fn view(&self) -> View<'_> {
+        self.runtime.view()
+    }
+
+    /// The engine, to ask for facts and derivations.
+    pub fn engine(&self) -> &Engine {
+        self.runtime.engine()
+    }
+
+    /// What the robot reports, as updates of the engine.
+    pub fn runtime(&self) -> &Runtime {
+        &self.runtime
+    }
+
+    /// As [`Knowledge::runtime`], to change it.
+    pub fn runtime_mut(&mut self) -> &mut Runtime {
+        self.catalogue = OnceLock::new();
+        &mut self.runtime
+    }
+
+    /// What planning asks for again and again.
+    pub fn catalogue(&self) -> &Catalogue {
+        self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
+    }
+
+    /// Keeps the catalogue in step with what holds.
+    pub(super) fn follow(&mut self, delta: &Delta) {
+        let engine = self.runtime.engine();
+        if self.catalogue.get_mut().is_some_and(|own| !Arc::make_mut(own).follow(delta, engine)) {
+            self.catalogue = OnceLock::new();
+        }
+    }
+
+    /// The outcome of a change.
+    fn changed(&mut self, outcome: Result<Delta, ontology::Error>) -> Result<Delta, Message> {
+        let delta = outcome.map_err(|error| Message::from_ontology(&error))?;
+        self.follow(&delta);
+        Ok(delta)
+    }
+
+    /// Marks a component, named by IRI or local name, as failed.
+    ///
+    /// # Errors
+    /// There is no such component.
+    pub fn fail(&mut self, component: &str) -> Result<(), Message> {
+        self.report(component, Status::Failed).map(|_| ())
+    }
+
+    /// A component, named by IRI or local name, has a status from now on; returns what holds since, and what no more. What
+    /// was reported holds whatever follows from it: see [`Knowledge::contradictions`].
+    ///
+    /// # Errors
+    /// There is no such component, or a rule runs away.
+    pub fn report(&mut self, component: &str, status: Status) -> Result<Delta, Message> {
+        let outcome = self.runtime.report_component(component, status);
+        self.changed(outcome)
+    }
+
+    /// Sets the measured value of an attribute, named by the IRI or local name of its type; returns what holds since,
+    /// and what no more.
+    ///
+    /// # Errors
+    /// There is no such attribute, or the value is no number.
+    pub fn measure(&mut self, attribute: &str, value: &str) -> Result<Delta, Message> {
+        let literal = Literal::parse(value, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
+        if literal.as_rational().is_none() {
+            return Err(Message::error(
+                "M102",
+                format!("the value `{value}` of {attribute} is no decimal number"),
+            ));
+        }
+        let outcome = self.runtime.measure(attribute, literal);
+        self.changed(outcome)
+    }
+
+    /// An attribute has a measured value from now on; returns what holds since, and what no more. What was measured holds
+    /// whatever follows from it: see [`Knowledge::contradictions`].
+    ///
+    /// # Errors
+    /// There is no such attribute, or a rule runs away.
+    pub fn observe(&mut self, attribute: &str, value: &BigRational) -> Result<Delta, Message> {
+        let literal = Literal::Decimal(rules::Decimal::from_rational(value));
+        let outcome = self.runtime.measure(attribute, literal);
+        self.changed(outcome)
+    }
+
+    /// Makes functions, and no others, the objectives of the robot, each grounded with a design; both by local name.
+    /// Objectives of a function are named `o_<function>`. What components have reported stays as it is.
+    ///
+    /// # Errors
+    /// There is no such function or design.
+    pub fn pursue(&mut self, configuration: &[(String, String)]) -> Result<(), Message> {
+        self.pursue_now(configuration).map_err(|error| Message::from_ontology(&error))
+    }
+
+    pub(super) fn pursue_now(&mut self, configuration: &[(String, String)]) -> Result<(), ontology::Error> {
+        let name = |function: &str| format!("o_{function}");
+        let objectives = self.runtime.objectives();
+        for objective in &objectives {
+            let function = objective.function.as_ref().map(|function| function.name.as_str());
+            let ours = function.is_some_and(|function| objective.individual.name == name(function));
+            let wanted = configuration.iter().any(|(wanted, _)| Some(wanted.as_str()) == function);
+            if ours && !wanted {
+                let delta = self.runtime.remove_objective(&objective.individual.iri)?;
+                self.follow(&delta);
+            }
+        }
+        for (function, design) in configuration {
+            let objective = name(function);
+            let known = objectives.iter().find(|known| known.individual.name == objective);
+            let grounded = known.is_some_and(|known| {
+                known.groundings.iter().any(|g| g.design.as_ref().is_some_and(|d| d.name == *design))
+            });
+            if known.is_none() {
+                let new = NewObjective {
+                    name: &objective,
+                    function,
+                    requirements: Vec::new(),
+                    always_improve: false,
+                };
+                let delta = self.runtime.add_objective(&new)?;
+                self.follow(&delta);
+            }
+            if !grounded {
+                let delta = self.runtime.assign(&objective, design)?;
+                self.follow(&delta);
+            }
+        }
+        Ok(())
+    }
+
+    /// What is stated now and was not when the documents were read, and what is stated no more; sorted.
+    pub fn statements(&self) -> Statements {
+        let stated = |runtime: &Runtime| -> BTreeSet<Statement> {
+            let engine = runtime.engine();
+            let facts = engine.facts().filter(|fact| engine.is_asserted(fact));
+            facts.map(|fact| Statement::of(engine, &fact)).collect()
+        };
+        let (before, now) = (stated(&self.origin), stated(&self.runtime));
+        Statements {
+            added: now.difference(&before).cloned().collect(),
+            removed: before.difference(&now).cloned().collect(),
+        }
+    }
+
+    /// Knowledge as it was read, changed by these statements. All that the history since has left behind is forgotten,
+    /// such as names of values that were measured once.
+    ///
+    /// # Errors
+    /// A rule runs away; nothing has changed then.
+    pub fn restore(&mut self, statements: &Statements) -> Result<(), Message> {
+        let mut runtime = self.origin.clone();
+        let mut facts = |statements: &[Statement]| -> Vec<Fact> {
+            statements.iter().map(|statement| statement.intern(runtime.engine_mut().symbols_mut())).collect()
+        };
+        let delta = Delta { insert: facts(&statements.added), delete: facts(&statements.removed) };
+        runtime.apply(delta).map_err(|error| Message::from_ontology(&error))?;
+        let limits = self.runtime.engine().limits().clone();
+        runtime.engine_mut().set_limits(limits);
+        self.runtime = runtime;
+        self.catalogue = OnceLock::new();
+        Ok(())
+    }
+
+    /// How many names and values have been interned since the documents were read.
+    pub fn growth(&self) -> usize {
+        let count = |runtime: &Runtime| runtime.engine().symbols().len();
+        count(&self.runtime).saturating_sub(count(&self.origin))
+    }
+
+    /// Whether some attribute type has this local name or IRI.
+    pub fn has_attribute(&self, name: &str) -> bool {
+        self.view().attribute_types().iter().any(|attribute| attribute.name == name || attribute.iri == name)
+    }
+
+    /// Inserts and deletes stated facts.
+    ///
+    /// # Errors
+    /// A rule runs away.
+    pub fn apply(&mut self, delta: Delta) -> Result<(), Message> {
+        let outcome = self.runtime.apply(delta);
+        self.changed(outcome).map(|_| ())
+    }
+
+    /// The assertions of a document (without its imports and rules) as facts, to insert or delete.
+    ///
+    /// # Errors
+    /// All that is wrong with the document.
+    pub fn assertions(&mut self, file: &Path) -> Result<Vec<Fact>, Vec<Message>> {
+        let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
+        let ontology = ontology::read_files(&[file], &options)
+            .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
+        Ok(ontology::lower(&ontology, self.runtime.engine_mut().symbols_mut()).facts)
+    }
+
+    /// What follows and is not stated, in an order that depends on what was read only. That names stand for one individual is said of an
+    /// individual of more than 32 names by the pairs with its first name.
+    pub fn inferred(&self) -> Vec<Fact> {
+        self.engine().inferred_in_brief(MANY_NAMES)
+    }
+
+    /// All contradictions; empty if the knowledge is consistent.
+    pub fn contradictions(&self) -> Vec<Contradiction> {
+        let symbols = self.engine().symbols();
+        let violations = self.engine().violations().into_iter();
+        violations
+            .map(|violation| Contradiction {
+                violated: match &violation.cause {
+                    rules::Cause::Constraint(identity) => {
+                        identity.label.as_deref().map_or_else(|| identity.to_string(), ToOwned::to_owned)
+                    }
+                    rules::Cause::IllTyped(literal) => {
+                        format!("the datatype of {} forbids its value", symbols.value(*literal))
+                    }
+                    other => format!("{other:?}"),
+                },
+                facts: violation.supports.iter().map(|fact| shown(fact, symbols)).collect(),
+            })
+            .collect()
+    }
+}
+
+/// A fact as text; that an individual is a member of a group is in words.
+fn shown(fact: &Fact, symbols: &Symbols) -> String {
+    let name = symbols.value(fact.predicate).as_name().unwrap_or_default();
+    match fact.arguments[..] {
+        [member, number] if name.starts_with(ontology::INTERNAL) => {
+            let number = symbols.value(number).as_literal().map(Literal::lexical).unwrap_or_default();
+            format!("{} is member {number} of those that exclude each other", symbols.value(member))
+        }
+        _ => fact.display(symbols).to_string(),
+    }
+}

@@ -1,0 +1,14 @@
+//! What is known about a robot: documents and rules, what follows from them, and what is reported.
+
+mod base;
+mod catalogue;
+mod reports;
+mod sources;
+mod statement;
+mod waiting;
+
+pub use base::{Contradiction, Knowledge};
+pub use catalogue::Catalogue;
+pub use sources::{COADAPTATION, Sources, Stated, TOMASYS, rule_text};
+pub use statement::{Part, Statement, Statements};
+pub use waiting::{Fault, RobotReport, Waiting};

@@ -1,0 +1,116 @@
+//! What a knowledge base is read from: documents and rule files.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use ontology::{Equality, Ontology, ReadOptions};
+use rules::{Fact, Limits, Prefixes, Program, Rule, Symbols, Syntax};
+
+use crate::file::{self, discreet};
+use crate::knowledge::statement::Statements;
+use crate::message::Message;
+
+/// The name under which the shipped co-adaptation rules are asked for.
+pub const COADAPTATION: &str = "coadaptation";
+
+/// The name under which the shipped rules of the TOMASys metamodel are asked for.
+pub const TOMASYS: &str = "tomasys";
+
+/// What an engine is built from.
+#[derive(Debug, Clone, Default)]
+pub struct Sources {
+    /// OWL documents (`-` is standard input); their imports are followed.
+    pub documents: Vec<PathBuf>,
+    /// Rule files in SWRL's human-readable syntax; `coadaptation` and `tomasys` name the shipped ones.
+    pub rules: Vec<String>,
+    /// Where imports are looked for.
+    pub options: ReadOptions,
+    /// How far conclusions are drawn, at once and after each update.
+    pub limits: Limits,
+}
+
+/// What documents and rule files say, before anything is concluded.
+pub struct Stated {
+    /// Names and values.
+    pub symbols: Symbols,
+    /// Rules and axioms.
+    pub program: Program,
+    /// Assertions.
+    pub facts: Vec<Fact>,
+    pub(super) ontology: Ontology,
+    /// As [`Knowledge::rule_count`] has it.
+    pub rule_count: usize,
+    pub(super) warnings: Vec<Message>,
+}
+
+impl Stated {
+    /// Reads documents and rules.
+    ///
+    /// # Errors
+    /// All that is wrong with them.
+    pub fn read(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+        let read = ontology::read_files(&sources.documents, &sources.options);
+        let mut errors = Vec::new();
+        let mut symbols = Symbols::new();
+        let mut own = Vec::new();
+        match parse_rule_files(&sources.rules, &mut symbols) {
+            Ok(rules) => own.extend(rules),
+            Err(more) => errors.extend(more),
+        }
+        let ontology = match read {
+            Ok(ontology) if errors.is_empty() => ontology,
+            Ok(_) => return Err(errors),
+            Err(more) => {
+                let more = more.iter().map(Message::from_ontology).collect();
+                errors.extend(discreet(more));
+                return Err(errors);
+            }
+        };
+        let rule_count = ontology.rules.len() + own.len();
+        let lowered = ontology::lower_together(&ontology, own, equality, &mut symbols);
+        let warnings =
+            ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
+        Ok(Self { symbols, program: lowered.program, facts: lowered.facts, ontology, rule_count, warnings })
+    }
+
+    /// Changes what is stated.
+    pub fn change(&mut self, statements: &Statements) {
+        let symbols = &mut self.symbols;
+        let removed: BTreeSet<Fact> = statements.removed.iter().map(|own| own.intern(symbols)).collect();
+        self.facts.retain(|fact| !removed.contains(fact));
+        self.facts.extend(statements.added.iter().map(|own| own.intern(symbols)));
+    }
+}
+
+/// The text of a rule file, or of shipped rules by their name.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn rule_text(file: &str) -> Result<String, Message> {
+    let text = match file {
+        COADAPTATION => Ok(rules::COADAPTATION_RULES.to_owned()),
+        TOMASYS => Ok(rules::TOMASYS_RULES.to_owned()),
+        "-" => std::io::read_to_string(std::io::stdin()),
+        path => file::read(Path::new(path)).and_then(|bytes| {
+            String::from_utf8(bytes).map_err(|_| std::io::Error::other("it is no UTF-8 text"))
+        }),
+    };
+    text.map_err(|error| Message::at("M101", file, None, format!("cannot be read: {error}")))
+}
+
+/// The rules of all files. What one file asks for, another may conclude.
+fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Vec<Message>> {
+    let (mut texts, mut errors) = (Vec::new(), Vec::new());
+    for file in files {
+        match rule_text(file) {
+            Ok(text) => texts.push((file, text)),
+            Err(error) => errors.push(error),
+        }
+    }
+    let texts: Vec<(&str, &str)> = texts.iter().map(|(file, text)| (file.as_str(), text.as_str())).collect();
+    match rules::parse_rules_together(&texts, symbols, &Prefixes::default(), &Syntax::default()) {
+        Ok(program) if errors.is_empty() => Ok(program.rules),
+        Ok(_) => Err(errors),
+        Err(more) => Err(errors.into_iter().chain(more.iter().map(Message::from_rules)).collect()),
+    }
+}

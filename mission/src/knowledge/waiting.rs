@@ -1,0 +1,132 @@
+//! Reports of a robot that are kept until what follows from them is known, and how a snapshot has them.
+
+use num_rational::BigRational;
+use ontology::tomasys::change::{self, Status};
+use rules::{Delta, Literal};
+use serde_json::{Value, json};
+
+use crate::message::Message;
+
+/// What a robot says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RobotReport {
+    /// How a component is.
+    Component(Status),
+    /// What an attribute measures.
+    Measured(Literal),
+}
+
+/// That what follows is not known.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// `R301` or `R304`, as for `reason`.
+    pub code: String,
+    /// What has happened, in a sentence.
+    pub message: String,
+    /// The rule that was being evaluated.
+    pub rule: String,
+}
+
+/// What was told and nothing follows from yet.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Waiting {
+    pub(super) fault: Option<Fault>,
+    /// The name of a component or an attribute with the last word on it.
+    pub(super) reports: Vec<(String, RobotReport)>,
+    /// Functions with their designs, if the objectives could not be told either.
+    pub(super) objectives: Option<Vec<(String, String)>>,
+}
+
+impl RobotReport {
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        matches!(self, Self::Component(_)) == matches!(other, Self::Component(_))
+    }
+
+    pub(super) fn update(&self, engine: &mut rules::Engine, name: &str) -> Result<Delta, ontology::Error> {
+        match self {
+            Self::Component(status) => change::component_status(engine, name, *status),
+            Self::Measured(value) => change::measured_value(engine, name, value.clone()),
+        }
+    }
+
+    /// A number as it is measured.
+    pub fn measured(value: &BigRational) -> Self {
+        Self::Measured(Literal::Decimal(rules::Decimal::from_rational(value)))
+    }
+
+    fn to_record(&self) -> (&'static str, String) {
+        match self {
+            Self::Component(Status::Failed) => ("component", "FALSE".to_owned()),
+            Self::Component(Status::Recovered) => ("component", "RECOVERED".to_owned()),
+            Self::Component(Status::Working) => ("component", "TRUE".to_owned()),
+            Self::Measured(value) => ("measured", value.lexical()),
+        }
+    }
+
+    fn from_record(kind: &str, word: &str) -> Option<Self> {
+        match (kind, word) {
+            ("component", "FALSE") => Some(Self::Component(Status::Failed)),
+            ("component", "RECOVERED") => Some(Self::Component(Status::Recovered)),
+            ("component", "TRUE") => Some(Self::Component(Status::Working)),
+            ("measured", number) => {
+                let value = Literal::parse(number, Some(ontology::vocab::xsd::DECIMAL), None);
+                value.as_rational().is_some().then_some(Self::Measured(value))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Waiting {
+    /// For a snapshot; null where nothing waits.
+    pub fn to_record(&self) -> Value {
+        let Some(fault) = &self.fault else { return Value::Null };
+        let reports: Vec<Value> = self
+            .reports
+            .iter()
+            .map(|(name, report)| {
+                let (kind, word) = report.to_record();
+                json!([name, kind, word])
+            })
+            .collect();
+        json!([[fault.code, fault.message, fault.rule], reports, self.objectives])
+    }
+
+    /// The inverse of [`Waiting::to_record`].
+    pub fn from_record(record: &Value) -> Option<Self> {
+        if record.is_null() {
+            return Some(Self::default());
+        }
+        let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
+        let pair = |pair: &Value| Some((text(pair.get(0)?)?, text(pair.get(1)?)?));
+        let report = |report: &Value| {
+            let own = RobotReport::from_record(report.get(1)?.as_str()?, report.get(2)?.as_str()?)?;
+            Some((text(report.get(0)?)?, own))
+        };
+        let [fault, reports, objectives] = record.as_array()?.as_slice() else { return None };
+        Some(Self {
+            fault: Some(Fault {
+                code: text(fault.get(0)?)?,
+                message: text(fault.get(1)?)?,
+                rule: text(fault.get(2)?)?,
+            }),
+            reports: reports.as_array()?.iter().map(report).collect::<Option<_>>()?,
+            objectives: match objectives {
+                Value::Null => None,
+                pairs => Some(pairs.as_array()?.iter().map(pair).collect::<Option<_>>()?),
+            },
+        })
+    }
+}
+
+/// Why it is not known what follows, from the error of the engine.
+pub(super) fn fault(error: &ontology::Error) -> Fault {
+    let said = Message::from_ontology(error);
+    let rule = match error {
+        ontology::Error::Engine(
+            rules::Error::BudgetExhausted { rule, .. } | rules::Error::Interrupted { rule },
+        ) => rule.label.as_deref().map_or_else(|| rule.to_string(), ToOwned::to_owned),
+        _ => String::new(),
+    };
+    Fault { code: said.code.clone(), message: said.message.clone(), rule }
+}

@@ -1,0 +1,153 @@
+//! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
+
+use num_rational::BigRational;
+use ontology::tomasys::FunctionDesign;
+use pddl::ast::{Atom, Condition, Declaration, InitialElement, Name, Problem, Term};
+use pddl::{self, Severity, Source};
+
+use crate::binding;
+use crate::joined::Mission;
+use crate::knowledge::Knowledge;
+use crate::message::Message;
+
+impl Mission {
+    /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
+    pub fn fill(&self, problem: &mut Problem) -> Vec<Message> {
+        self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
+            if let Some(adaptation) = &self.adaptation {
+                adaptation.fill(problem, knowledge.catalogue().designs());
+            }
+            binding::fill(&self.domain, problem, knowledge, &self.bindings)
+        })
+    }
+
+    /// The knowledge base, to change it.
+    pub fn knowledge_mut(&mut self) -> Option<&mut Knowledge> {
+        self.knowledge.as_mut()
+    }
+
+    /// The problem as it is believed now, without what the knowledge base contributes.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// Whether a measured attribute, by local name, gives a function of the problem its value, and which.
+    pub fn fed_by(&self, attribute: &str) -> Option<String> {
+        let fed = |declared: &&Declaration| self.bindings.is_measured(declared, attribute);
+        self.domain.functions.iter().find(fed).map(|declared| declared.identifier.name.to_string())
+    }
+
+    /// Whether the problem has a numeric function of that name and number of arguments.
+    pub fn is_function(&self, name: &str) -> bool {
+        let mut words = name.split_whitespace();
+        let symbol = words.next().map(Name::new);
+        let arguments = words.count();
+        let declared = self.domain.functions.iter();
+        declared
+            .into_iter()
+            .any(|d| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments)
+    }
+
+    /// Whether the problem states a fact, as `predicate arguments`.
+    pub fn holds(&self, fact: &str) -> bool {
+        let words: Vec<Name> = fact.split_whitespace().map(Name::new).collect();
+        self.problem.init.iter().any(|element| match element {
+            InitialElement::Fact(atom) => {
+                let arguments = atom.arguments.iter().map(|term| match term {
+                    Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
+                });
+                std::iter::once(&atom.predicate.name).chain(arguments).eq(&words)
+            }
+            _ => false,
+        })
+    }
+
+    /// The functions without parameters that have a value in the problem, and it.
+    pub fn values(&self) -> Vec<(String, BigRational)> {
+        let values = self.problem.init.iter().filter_map(|element| match element {
+            InitialElement::Value(atom, value, _) if atom.arguments.is_empty() => {
+                Some((atom.predicate.name.to_string(), value.clone()))
+            }
+            _ => None,
+        });
+        values.collect()
+    }
+
+    /// The value of a function that the problem states, by name and arguments.
+    pub fn value(&self, name: &str) -> Option<BigRational> {
+        let words: Vec<&str> = name.split_whitespace().collect();
+        self.problem.init.iter().find_map(|element| match element {
+            InitialElement::Value(atom, value, _) if is_named(atom, &words) => Some(value.clone()),
+            _ => None,
+        })
+    }
+
+    /// Says anew which designs of a filled problem are available: those that `allowed` answers with yes, asked with the
+    /// name of each design of the knowledge base and whether it is available.
+    pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) {
+        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
+        let Some(predicate) = declared.into_iter().find(|name| self.bindings.is_availability(name)) else {
+            return;
+        };
+        let is_own = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate);
+        problem.init.retain(|element| !is_own(element));
+        let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
+        for design in designs.filter(|design| allowed(&design.individual.name, design.available)) {
+            problem.init.push(InitialElement::Fact(binding::atom(predicate, &[&design.individual.name])));
+        }
+    }
+
+    /// How many arguments an action has in the domain's file, if the knowledge base has added some.
+    pub fn written_arguments(&self, action: &str) -> Option<usize> {
+        self.adaptation.as_ref().and_then(|adaptation| adaptation.parameters(action))
+    }
+
+    /// Replaces the facts and values of the problem.
+    pub fn set_init(&mut self, init: Vec<InitialElement>) {
+        self.problem.init = init;
+    }
+
+    /// Replaces the goal.
+    pub fn set_goal(&mut self, goal: Condition) {
+        self.problem.goal = goal;
+    }
+
+    /// A goal from its text, checked against the domain and all objects.
+    ///
+    /// # Errors
+    /// All that is wrong with it.
+    pub fn goal(&self, text: &str) -> Result<Condition, Vec<Message>> {
+        let text = format!("(define (problem goal) (:domain {}) (:goal {text}))", self.domain.name.name);
+        let source = Source::new("goal", text);
+        let (tree, diagnostics) = pddl::parse_problem(&source);
+        let errors = Message::from_pddl(&diagnostics, &[&source]);
+        let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else { return Err(errors) };
+        let mut problem = self.problem.clone();
+        problem.goal = tree.goal;
+        self.fill(&mut problem);
+        let found = pddl::check(&self.domain, &self.domain_source, &problem, &source);
+        let wrong = found.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
+        // Only the goal has places in this text; all else was checked before.
+        let wrong: Vec<_> = wrong.filter(|diagnostic| diagnostic.file == "goal").collect();
+        if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source])) }
+    }
+
+    /// The designs that solve a function, by local name, whether or not they are available.
+    pub fn designs_of(&self, function: &str) -> Vec<String> {
+        let Some(knowledge) = &self.knowledge else { return Vec::new() };
+        let solves = |design: &&FunctionDesign| design.solves.iter().any(|solved| solved.name == function);
+        let designs = knowledge.catalogue().designs().iter().filter(solves);
+        designs.map(|design| design.individual.name.clone()).collect()
+    }
+}
+
+fn is_named(atom: &Atom, words: &[&str]) -> bool {
+    let same = |(term, word): (&Term, &&str)| match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(word),
+    };
+    words.split_first().is_some_and(|(symbol, arguments)| {
+        atom.predicate.name == Name::new(symbol)
+            && atom.arguments.len() == arguments.len()
+            && atom.arguments.iter().zip(arguments).all(same)
+    })
+}

@@ -1,0 +1,200 @@
+//! What went wrong or is questionable, from whatever room it came, in one form for people and programs.
+
+use std::fmt::Write as _;
+
+use pddl::{self, Diagnostic, Severity, Source};
+use serde::Serialize;
+
+/// A message about an input.
+#[derive(Debug, Clone, Serialize)]
+#[serde(transparent)]
+pub struct Message(Box<Details>);
+
+impl std::ops::Deref for Message {
+    type Target = Details;
+
+    fn deref(&self) -> &Details {
+        &self.0
+    }
+}
+
+/// What a message says.
+#[derive(Debug, Clone, Serialize)]
+pub struct Details {
+    /// `error` or `warning`.
+    pub severity: &'static str,
+    /// The stable code of the cause.
+    pub code: String,
+    /// One sentence.
+    pub message: String,
+    /// The file, where it is about one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Line, from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
+    /// Column, from 1, in characters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column: Option<usize>,
+    /// What would be right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub help: Option<String>,
+    /// The message as a terminal shows it, with its source line where there is one.
+    #[serde(skip)]
+    text: String,
+}
+
+impl Message {
+    /// An error that is about no place in a file.
+    pub fn error(code: &str, message: impl Into<String>) -> Self {
+        Self::plain("error", code, message.into(), None)
+    }
+
+    /// A warning that is about no place in a file.
+    pub fn warning(code: &str, message: impl Into<String>) -> Self {
+        Self::plain("warning", code, message.into(), None)
+    }
+
+    /// A warning about a line and column of a file.
+    pub fn warning_at(code: &str, file: &str, place: (usize, usize), message: impl Into<String>) -> Self {
+        Self::plain("warning", code, message.into(), Some((file.to_owned(), Some(place))))
+    }
+
+    /// An error about a file as a whole, or about a line and column in it.
+    pub fn at(code: &str, file: &str, place: Option<(usize, usize)>, message: impl Into<String>) -> Self {
+        Self::plain("error", code, message.into(), Some((file.to_owned(), place)))
+    }
+
+    fn plain(
+        severity: &'static str,
+        code: &str,
+        message: String,
+        place: Option<(String, Option<(usize, usize)>)>,
+    ) -> Self {
+        let mut text = String::new();
+        let (file, line, column) = match place {
+            Some((file, Some((line, column)))) => {
+                let _ = write!(text, "{file}:{line}:{column}: ");
+                (Some(file), Some(line), Some(column))
+            }
+            Some((file, None)) => {
+                let _ = write!(text, "{file}: ");
+                (Some(file), None, None)
+            }
+            None => (None, None, None),
+        };
+        let _ = write!(text, "{severity}[{code}]: {message}");
+        let text = one_line(&text);
+        Self(Box::new(Details {
+            severity,
+            code: code.to_owned(),
+            message,
+            file,
+            line,
+            column,
+            help: None,
+            text,
+        }))
+    }
+
+    /// Messages of the PDDL front end, with the source lines that they are about.
+    pub fn from_pddl(diagnostics: &[Diagnostic], sources: &[&Source]) -> Vec<Self> {
+        let details = |diagnostic: &Diagnostic| Details {
+            severity: if diagnostic.severity == Severity::Error { "error" } else { "warning" },
+            code: diagnostic.code.to_owned(),
+            message: diagnostic.message.clone(),
+            file: Some(diagnostic.file.clone()),
+            line: Some(diagnostic.line),
+            column: Some(diagnostic.column),
+            help: diagnostic.help.clone(),
+            text: pddl::render(std::slice::from_ref(diagnostic), sources, false),
+        };
+        diagnostics.iter().map(|diagnostic| Self(Box::new(details(diagnostic)))).collect()
+    }
+
+    /// An error of reading a knowledge base.
+    pub fn from_ontology(error: &ontology::Error) -> Self {
+        match error {
+            ontology::Error::Engine(error) => Self::from_rules(error),
+            ontology::Error::Unknown { name, known, .. } => {
+                let meant = did_you_mean(name, known.iter().map(String::as_str));
+                Self::from_text("error", error.code(), &(error.to_string() + &meant))
+            }
+            _ => Self::from_text("error", error.code(), &error.to_string()),
+        }
+    }
+
+    /// A warning of reading or lowering a knowledge base.
+    pub fn from_ontology_warning(warning: &ontology::Warning) -> Self {
+        Self::from_text("warning", warning.code(), &warning.to_string())
+    }
+
+    /// An error in rules.
+    pub fn from_rules(error: &rules::Error) -> Self {
+        let text = error.to_string();
+        let is_code = |word: &&str| word.len() == 4 && word.starts_with('R');
+        let code = text.split_whitespace().find(is_code).unwrap_or("R100").to_owned();
+        Self::from_text("error", &code, &text)
+    }
+
+    /// A message from `[FILE:[LINE:COLUMN:]] [SEVERITY[CODE]:] SENTENCE`, the form in which libraries print theirs.
+    fn from_text(severity: &'static str, code: &str, text: &str) -> Self {
+        let marks = [format!("{severity}[{code}]: "), format!("{code} ")];
+        let cut = marks.iter().find_map(|mark| text.find(mark.as_str()).map(|at| (at, at + mark.len())));
+        let (place, message) = cut.map_or(("", text), |(start, end)| (&text[..start], &text[end..]));
+        let place = place.trim().trim_end_matches(':');
+        let mut parts = place.rsplitn(3, ':');
+        let (column, line, file) = (parts.next(), parts.next(), parts.next());
+        let number = |part: Option<&str>| part.and_then(|part| part.parse::<usize>().ok());
+        let (file, line, column) = match (file, number(line), number(column)) {
+            (Some(file), Some(line), Some(column)) => (Some(file.to_owned()), Some(line), Some(column)),
+            _ => ((!place.is_empty()).then(|| place.to_owned()), None, None),
+        };
+        let (code, message, text) = (code.to_owned(), message.to_owned(), one_line(text));
+        Self(Box::new(Details { severity, code, message, file, line, column, help: None, text }))
+    }
+
+    /// Whether it is an error.
+    pub fn is_error(&self) -> bool {
+        self.severity == "error"
+    }
+
+    /// As a terminal shows it, with a line break at its end.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+}
+
+/// What every command answers that has failed.
+#[derive(Debug, Clone, Serialize)]
+pub struct ErrorAnswer<'a> {
+    format: &'static str,
+    messages: &'a [Message],
+}
+
+impl<'a> ErrorAnswer<'a> {
+    /// With all messages.
+    pub fn new(messages: &'a [Message]) -> Self {
+        Self { format: "metaplan-error/1", messages }
+    }
+}
+
+/// A message as one line: a name or a value with a line break in it must not look like another message.
+fn one_line(text: &str) -> String {
+    text.replace('\r', "\\r").replace('\n', "\\n") + "\n"
+}
+
+/// `; did you mean ...?` with the known name that is most like what was written, or nothing.
+pub fn did_you_mean<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> String {
+    nearest(written, known).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
+/// The known name that is most like what was written, if one is: at most a third of its letters differ, and three.
+pub(crate) fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let written = written.to_lowercase();
+    let length = written.chars().count();
+    let distance = |name: &str| strsim::osa_distance(&written, &name.to_lowercase());
+    let near = known.into_iter().map(|name| (distance(name), name));
+    let near = near.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
+    near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
+}

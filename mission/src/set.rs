@@ -1,0 +1,156 @@
+//! `--set NAME=VALUE`: measured attributes of the knowledge base, and fluents and facts of the problem.
+
+use num_rational::BigRational;
+use pddl::ast::{InitialElement, Name, Span, Term};
+
+use crate::binding::atom;
+use crate::joined::Mission;
+use crate::knowledge::Knowledge;
+use crate::message::{Message, did_you_mean};
+
+impl Mission {
+    /// Sets a value, by the first of these that fits:
+    /// a measured attribute of the knowledge base (`ambient_light=0.9`);
+    /// a numeric function of the problem, arguments after its name (`battery=30`, `travel_time wp1 wp2=3`);
+    /// a predicate with all its arguments, true or false (`pipeline_found pl1=true`);
+    /// a predicate with all arguments but the last, which becomes the value (`robot_at=wp2`): it replaces all
+    /// facts that differ in the last argument only.
+    ///
+    /// # Errors
+    /// Nothing fits.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
+        let value = value.trim();
+        if let Some(knowledge) = &mut self.knowledge
+            && knowledge.has_attribute(name.trim())
+        {
+            if !is_measured(knowledge, name.trim()) {
+                let text = format!(
+                    "`{name}` is estimated for designs; nothing measures it, and no design has a bound on it"
+                );
+                return Err(Message::error("M106", text));
+            }
+            return knowledge.measure(name.trim(), value).map(|_| ());
+        }
+        self.set_in_problem(name, value)
+    }
+
+    /// As [`Mission::set`], without the knowledge base.
+    ///
+    /// # Errors
+    /// Nothing of the problem fits.
+    pub fn set_in_problem(&mut self, name: &str, value: &str) -> Result<(), Message> {
+        let value = value.trim();
+        let words: Vec<&str> = name.split_whitespace().collect();
+        let Some((symbol, arguments)) = words.split_first() else {
+            return Err(Message::error("M106", "`--set` needs a name before the equals sign"));
+        };
+        let symbol = Name::new(symbol);
+        if self.knowledge.is_some() && self.bindings.is_availability(&symbol) {
+            let text = format!("the knowledge base decides on `{symbol}`; let components fail with `--fail`");
+            return Err(Message::error("M106", text));
+        }
+        let arity = |declared: &[pddl::ast::Declaration]| {
+            declared.iter().find(|d| d.identifier.name == symbol).map(|d| d.parameters.len())
+        };
+        if arity(&self.domain.functions) == Some(arguments.len()) {
+            return self.set_value(&symbol, arguments, value);
+        }
+        match (arity(&self.domain.predicates), value.to_ascii_lowercase().as_str()) {
+            (Some(arity), truth @ ("true" | "false")) if arity == arguments.len() => {
+                self.set_fact(&symbol, arguments, truth == "true");
+                Ok(())
+            }
+            (Some(arity), _) if arity == arguments.len() + 1 => {
+                self.replace_last(&symbol, arguments, value);
+                Ok(())
+            }
+            _ => Err(self.unknown_setting(name)),
+        }
+    }
+
+    fn set_value(&mut self, function: &Name, arguments: &[&str], value: &str) -> Result<(), Message> {
+        let Some(number) = decimal(value) else {
+            return Err(Message::error(
+                "M102",
+                format!("the value `{value}` of {function} is no decimal number"),
+            ));
+        };
+        let target = atom(function, arguments);
+        let same = |element: &InitialElement| matches!(element, InitialElement::Value(a, _, _) if same_atom(a, function, arguments));
+        self.problem.init.retain(|element| !same(element));
+        self.problem.init.push(InitialElement::Value(target, number, Span::default()));
+        Ok(())
+    }
+
+    fn set_fact(&mut self, predicate: &Name, arguments: &[&str], holds: bool) {
+        let same = |element: &InitialElement| match element {
+            InitialElement::Fact(a) | InitialElement::NegatedFact(a) => same_atom(a, predicate, arguments),
+            _ => false,
+        };
+        self.problem.init.retain(|element| !same(element));
+        if holds {
+            self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
+        }
+    }
+
+    fn replace_last(&mut self, predicate: &Name, prefix: &[&str], last: &str) {
+        let same = |element: &InitialElement| match element {
+            InitialElement::Fact(a) => {
+                let shorter = &a.arguments[..a.arguments.len().saturating_sub(1)];
+                a.predicate.name == *predicate && same_terms(shorter, prefix)
+            }
+            _ => false,
+        };
+        self.problem.init.retain(|element| !same(element));
+        let arguments: Vec<&str> = prefix.iter().copied().chain([last]).collect();
+        self.problem.init.push(InitialElement::Fact(atom(predicate, &arguments)));
+    }
+
+    fn unknown_setting(&self, name: &str) -> Message {
+        let attributes = self.knowledge.iter().flat_map(|knowledge| knowledge.view().attribute_types());
+        let attributes: Vec<_> = attributes.map(|attribute| attribute.name).collect();
+        let declared = |all: &[pddl::ast::Declaration]| {
+            let each = |d: &pddl::ast::Declaration| d.identifier.name.to_string();
+            all.iter().map(each).collect::<Vec<_>>().join(", ")
+        };
+        let text = format!(
+            "`{name}` is neither an attribute of the knowledge base ({}), nor a numeric function ({}) with its arguments, \
+             nor a predicate ({}) with its arguments or all but the last",
+            attributes.join(", "),
+            declared(&self.domain.functions),
+            declared(&self.domain.predicates),
+        );
+        let declared = self.domain.functions.iter().chain(&self.domain.predicates);
+        let known =
+            declared.map(|own| own.identifier.name.as_str()).chain(attributes.iter().map(String::as_str));
+        let symbol = name.split_whitespace().next().unwrap_or(name);
+        Message::error("M106", text + &did_you_mean(symbol, known))
+    }
+}
+
+fn same_atom(atom: &pddl::ast::Atom, predicate: &Name, arguments: &[&str]) -> bool {
+    atom.predicate.name == *predicate && same_terms(&atom.arguments, arguments)
+}
+
+fn same_terms(terms: &[Term], arguments: &[&str]) -> bool {
+    let same = |(term, argument): (&Term, &&str)| match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(argument),
+    };
+    terms.len() == arguments.len() && terms.iter().zip(arguments).all(same)
+}
+
+/// An exact number from a decimal: `-12`, `0.25`, `1e2`.
+fn decimal(text: &str) -> Option<BigRational> {
+    rules::Literal::parse(text, Some("http://www.w3.org/2001/XMLSchema#decimal"), None).as_rational()
+}
+
+/// Whether an attribute is measured, or bounds what designs can be used.
+fn is_measured(knowledge: &Knowledge, attribute: &str) -> bool {
+    let view = knowledge.view();
+    let local = ontology::vocab::local_name(attribute);
+    view.measurements().iter().any(|measurement| measurement.attribute == local)
+        || view
+            .function_designs()
+            .iter()
+            .any(|design| design.requirements.iter().any(|r| r.attribute == local))
+}

@@ -1,0 +1,72 @@
+//! Text as a terminal shows it, with nothing that is not seen.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+
+/// The text with everything escaped that would change what a terminal shows, in which order, or without being seen: control
+/// characters but line breaks and tabs, marks of bidirectional text, and characters that take no room. Names come from files that
+/// may be hostile. Joiners are left, since some languages are written with them.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    escaped(text, |character, all| {
+        let _ = write!(all, "\\u{{{:x}}}", u32::from(character));
+    })
+}
+
+/// The same for JSON, in which such characters are in strings only.
+pub fn visible_json(text: &str) -> Cow<'_, str> {
+    escaped(text, |character, all| {
+        for unit in character.encode_utf16(&mut [0; 2]) {
+            let _ = write!(all, "\\u{unit:04x}");
+        }
+    })
+}
+
+/// Whether a character is not seen as itself.
+fn hides(character: char) -> bool {
+    let is_unseen = matches!(
+        character,
+        '\u{ad}' | '\u{180e}' | '\u{200b}' | '\u{2028}' | '\u{2029}' | '\u{2060}'..='\u{2065}'
+            | '\u{206a}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}'
+    );
+    let is_mark = matches!(
+        character,
+        '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
+    );
+    character.is_control() && !matches!(character, '\n' | '\t') || is_unseen || is_mark
+}
+
+fn escaped(text: &str, escape: impl Fn(char, &mut String)) -> Cow<'_, str> {
+    let is_plain = |byte: u8| matches!(byte, b' '..=b'~' | b'\n' | b'\t');
+    if text.bytes().all(is_plain) || !text.contains(hides) {
+        return Cow::Borrowed(text);
+    }
+    let mut all = String::with_capacity(text.len());
+    for character in text.chars() {
+        if hides(character) {
+            escape(character, &mut all);
+        } else {
+            all.push(character);
+        }
+    }
+    Cow::Owned(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{visible, visible_json};
+
+    fn check(text: &str, shown: &str, in_json: &str) {
+        assert_eq!((&*visible(text), &*visible_json(text)), (shown, in_json), "{text:?}");
+    }
+
+    #[test]
+    fn what_is_not_seen_is_escaped() {
+        check("a\tb\n", "a\tb\n", "a\tb\n");
+        check("naïve Ελλάδα می\u{200c}خواهم", "naïve Ελλάδα می\u{200c}خواهم", "naïve Ελλάδα می\u{200c}خواهم");
+        check("\u{1b}[2J", "\\u{1b}[2J", "\\u001b[2J");
+        check("\u{202e}x\u{feff}", "\\u{202e}x\\u{feff}", "\\u202ex\\ufeff");
+        check("\u{200b}\u{2028}", "\\u{200b}\\u{2028}", "\\u200b\\u2028");
+        // Two units of UTF-16.
+        check("\u{e0041}", "\\u{e0041}", "\\udb40\\udc41");
+    }
+}

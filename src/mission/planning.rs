@@ -1,0 +1,153 @@
+//! A mission to a ground task, and its plans as the domain's file writes them.
+
+use encodings::{Concurrent, ExactTask, GroundConfig, Limits, Plan, Replanner, Task};
+use num_rational::BigRational;
+use pddl::ast::{Domain, Metric, Name, Problem};
+use pddl::{Diagnostic, Severity};
+
+use ::mission::Mission;
+
+use crate::message::Message;
+
+/// Planning for a mission.
+pub trait Planning {
+    /// Grounds a problem that [`Mission::filled`] has made, to be measured by some objectives in place of its metric
+    /// if there are any.
+    ///
+    /// # Errors
+    /// Everything that the planner does not handle, or that a limit was reached.
+    fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits)
+    -> Result<Task, Vec<Message>>;
+
+    /// As [`Planning::ground`], whatever the size of the numbers: for plans that are searched for in exact rationals.
+    ///
+    /// # Errors
+    /// As [`Planning::ground`].
+    fn ground_exact(
+        &self,
+        problem: &Problem,
+        objectives: &[Metric],
+        limits: &Limits,
+    ) -> Result<ExactTask, Vec<Message>>;
+
+    /// Grounds a filled problem for plans whose actions overlap; those that interfere are to lie `separation` apart, in the
+    /// domain's time unit.
+    ///
+    /// # Errors
+    /// Every construct that cannot be planned with, with its place.
+    fn ground_concurrent(
+        &self,
+        problem: &Problem,
+        objectives: &[Metric],
+        separation: &BigRational,
+        limits: &Limits,
+    ) -> Result<Concurrent, Vec<Message>>;
+
+    /// The plan with the arguments that the domain's file gives its actions: without the designs that the knowledge base has
+    /// added to a plain domain. The configuration of each step has them.
+    #[must_use]
+    fn written(&self, plan: Plan) -> Plan;
+}
+
+impl Planning for Mission {
+    fn ground(
+        &self,
+        problem: &Problem,
+        objectives: &[Metric],
+        limits: &Limits,
+    ) -> Result<Task, Vec<Message>> {
+        ground_with(self, self.domain(), problem, objectives, limits)
+    }
+
+    fn ground_exact(
+        &self,
+        problem: &Problem,
+        objectives: &[Metric],
+        limits: &Limits,
+    ) -> Result<ExactTask, Vec<Message>> {
+        encodings::ground_exact(self.domain(), problem, &config(self, objectives, limits))
+            .map_err(|errors| messages(self, &errors))
+    }
+
+    fn ground_concurrent(
+        &self,
+        problem: &Problem,
+        objectives: &[Metric],
+        separation: &BigRational,
+        limits: &Limits,
+    ) -> Result<Concurrent, Vec<Message>> {
+        encodings::ground_concurrent(self.domain(), problem, &config(self, objectives, limits), separation)
+            .map_err(|errors| messages(self, &errors))
+    }
+
+    fn written(&self, mut plan: Plan) -> Plan {
+        for step in &mut plan.steps {
+            if let Some(count) = self.written_arguments(&step.action) {
+                step.arguments.truncate(count);
+            }
+        }
+        plan
+    }
+}
+
+/// Grounds a filled problem with a variant of the domain.
+///
+/// # Errors
+/// As [`Planning::ground`].
+pub(crate) fn ground_with(
+    mission: &Mission,
+    domain: &Domain,
+    problem: &Problem,
+    objectives: &[Metric],
+    limits: &Limits,
+) -> Result<Task, Vec<Message>> {
+    encodings::ground(domain, problem, &config(mission, objectives, limits))
+        .map_err(|errors| messages(mission, &errors))
+}
+
+/// A planner for filled problems that are like this one; none if the mission is not suited.
+pub(crate) fn replanner(mission: &Mission, problem: &Problem, limits: &Limits) -> Option<Replanner> {
+    let predicates = mission.domain().predicates.iter().map(|declared| &declared.identifier.name);
+    let available: Vec<Name> = if mission.knowledge().is_some() {
+        predicates.filter(|name| mission.bindings().is_availability(name)).cloned().collect()
+    } else {
+        Vec::new()
+    };
+    Replanner::new(mission.domain(), problem, &available, &config(mission, &[], limits))
+}
+
+fn config(mission: &Mission, objectives: &[Metric], limits: &Limits) -> GroundConfig {
+    GroundConfig { solves: mission.solves(), objectives: objectives.to_vec(), limits: limits.clone() }
+}
+
+/// Errors of grounding and encoding, with the source lines that they are about.
+fn messages(mission: &Mission, errors: &[encodings::Error]) -> Vec<Message> {
+    let (domain, problem) = (mission.domain_source(), mission.problem_source());
+    let message = |error: &encodings::Error| match error.place() {
+        Some(place) => {
+            let source = if place.file == encodings::File::Domain { domain } else { problem };
+            let diagnostic =
+                Diagnostic::new(source, place.span, Severity::Error, error.code(), error.to_string());
+            Message::from_pddl(&[diagnostic], &[domain, problem]).swap_remove(0)
+        }
+        None => Message::error(error.code(), error.to_string()),
+    };
+    errors.iter().map(message).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ::mission::Bindings;
+
+    use super::{GroundConfig, Name};
+
+    /// Who only checks links no planner, so that these names stand twice.
+    #[test]
+    fn the_defaults_are_those_of_the_planner() {
+        let sorted = |mut names: Vec<Name>| {
+            names.sort();
+            names
+        };
+        assert_eq!(sorted(Bindings::default().solves()), sorted(GroundConfig::default().solves));
+    }
+}

@@ -1,0 +1,45 @@
+//! `metaplan verify` and `metaplan-verify` side by side. All tests of certificates run both, see [`verify_in`].
+
+use crate::certificate::{certificate, verify};
+use crate::common::{root, verify_in};
+
+/// What the pages show is what the programs say; the size of the files depends on where they lie.
+#[test]
+fn the_pages_show_a_verification() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let said = verify(&certificate(directory.path(), &["plan", "missions/ugv.toml"])).stdout;
+    let masked = |text: &str| {
+        let (before, rest) = text.split_once("13 files, ").expect("a number of files");
+        let (_, rest) = rest.split_once(" bytes").expect("a size");
+        format!("{before}{rest}")
+    };
+    for (page, command) in
+        [("README.md", "$ metaplan verify proof\n"), ("verify/README.md", "$ metaplan-verify proof\n")]
+    {
+        let text = std::fs::read_to_string(root().join(page)).expect("a page");
+        let shown = text.split(command).nth(1).and_then(|rest| rest.split("```").next());
+        assert_eq!(masked(shown.expect("an example")), masked(&said), "{page}");
+    }
+}
+
+/// What is no certificate at all, what cannot be written, and what takes too long.
+#[test]
+fn both_programs_refuse_alike() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let target = certificate(directory.path(), &["plan", "missions/uuv_plain.toml"]);
+    let (nowhere, file) = (format!("{target}/nowhere"), format!("{target}/argument.smt2"));
+    let unwritable = format!("{nowhere}/argument.smt2");
+    let [target, nowhere, file, unwritable] = [&target, &nowhere, &file, &unwritable].map(String::as_str);
+    for (arguments, status) in [
+        (&[nowhere][..], 30),
+        (&[nowhere, "--smt", file], 3),
+        (&[nowhere, "--smt", file, "--format", "json"], 3),
+        (&[target, "--smt", unwritable], 3),
+        (&[target, "--time-limit", "0", "--format", "json"], 30),
+        (&[target, "--format", "json"], 0),
+        (&["/dev/null"], 30),
+    ] {
+        let outcome = verify_in(&root(), arguments);
+        assert_eq!(outcome.status, status, "{arguments:?}: {outcome:#?}");
+    }
+}

@@ -1,0 +1,50 @@
+//! Whether a certificate is about a mission, as its files and the situation are now.
+
+use mission::Mission;
+use mission::knowledge::rule_text;
+use ontology::OutputSyntax;
+use pddl::{print_domain, print_problem};
+
+use crate::knowledge::{KnowledgeFiles, ORIGIN, Origin, said_first};
+
+/// Whether a certificate is about a mission, as its files and the situation are now.
+pub(crate) fn about(
+    written: Option<&KnowledgeFiles<'_>>,
+    (domain, problem): (&str, &str),
+    mission: &Mission,
+) -> Result<String, String> {
+    let said = format!("it is about `{}` as it is now", mission.name);
+    let other = |what: &str| Err(format!("it is not about `{}` as it is now: {what}", mission.name));
+    let (written, base) = match (written, mission.knowledge()) {
+        (Some(written), Some(base)) => (written, base),
+        (None, None) => {
+            let (filled, _) = mission.filled().map_err(|messages| said_first(&messages))?;
+            let same = print_domain(mission.domain()) == domain && print_problem(&filled) == problem;
+            return if same { Ok(said) } else { other("domain or problem differ") };
+        }
+        _ => return other("one has a knowledge base, and the other has none"),
+    };
+    let origin: Origin =
+        serde_json::from_str(written.origin).map_err(|error| format!("{ORIGIN}: {error}"))?;
+    let sources = base.sources();
+    let (document, _) = ontology::convert_files(&sources.documents, &sources.options, OutputSyntax::NTriples)
+        .map_err(|_| "the mission's knowledge base cannot be read again".to_owned())?;
+    let texts = sources.rules.iter().map(|name| rule_text(name)).collect::<Result<Vec<_>, _>>();
+    let texts = texts.map_err(|message| message.message.clone())?;
+    if mission.domain_source().text() != origin.domain {
+        return other("the domain differs");
+    }
+    if document != written.document {
+        return other("the knowledge base differs");
+    }
+    if !origin.rules.iter().map(|(_, text)| text).eq(&texts) {
+        return other("the rules differ");
+    }
+    if *mission.bindings().written() != origin.bindings {
+        return other("the bindings differ");
+    }
+    if print_problem(mission.problem()) != origin.problem || base.statements() != origin.changes {
+        return other("the problem or the situation (`--scenario`, `--set`, `--fail`) differs");
+    }
+    Ok(said)
+}

@@ -1,0 +1,67 @@
+//! What came of a verification, for people and programs.
+
+use std::fmt::Write as _;
+
+use mission::visible::{visible, visible_json};
+use serde::Serialize;
+
+use crate::manifest::{Claim, Verification, VerifiedPart};
+
+/// What a certificate claims, and whether each part of it holds.
+#[derive(Debug, Clone, Serialize)]
+pub struct VerificationAnswer<'a> {
+    format: &'static str,
+    verified: bool,
+    claim: Option<&'a Claim>,
+    parts: Vec<PartAnswer<'a>>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct PartAnswer<'a> {
+    part: &'static str,
+    verified: bool,
+    message: &'a str,
+}
+
+impl<'a> VerificationAnswer<'a> {
+    /// What came of a verification.
+    pub fn new(report: &'a Verification) -> Self {
+        let part = |part: &'a VerifiedPart| PartAnswer {
+            part: part.part,
+            verified: part.result.is_ok(),
+            message: part.result.as_ref().unwrap_or_else(|reason| reason),
+        };
+        Self {
+            format: "metaplan-verification/1",
+            verified: report.verified(),
+            claim: report.claim.as_ref(),
+            parts: report.parts.iter().map(part).collect(),
+        }
+    }
+}
+
+/// For people: a line for each part, and the verdict.
+pub fn text(report: &Verification) -> String {
+    let mut text = String::new();
+    for part in &report.parts {
+        let _ = match &part.result {
+            Ok(said) => writeln!(text, "{:11} verified: {said}", part.part),
+            Err(reason) => writeln!(text, "{:11} failed: {reason}", part.part),
+        };
+    }
+    let claim = match &report.claim {
+        Some(Claim::Optimal { metric }) => format!("the plan is optimal, metric {metric}"),
+        Some(Claim::Unsolvable) => "there is no plan".to_owned(),
+        None => "nothing is claimed".to_owned(),
+    };
+    let verdict = if report.verified() { "verified" } else { "NOT verified" };
+    let _ = writeln!(text, "{verdict}: {claim}");
+    visible(&text).into_owned()
+}
+
+/// For programs: a [`VerificationAnswer`].
+pub fn json(report: &Verification) -> String {
+    // Texts and lists of them are always data.
+    let text = serde_json::to_string_pretty(&VerificationAnswer::new(report)).unwrap_or_default() + "\n";
+    visible_json(&text).into_owned()
+}

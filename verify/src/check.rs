@@ -1,0 +1,145 @@
+//! What a certificate claims, checked part by part.
+
+use std::fs;
+use std::io::BufReader;
+use std::path::Path;
+
+use certificate::{Checked, Inputs, check, check_refutation, verification_conditions};
+use mission::Mission;
+use mission::message::Message;
+use num_rational::BigRational;
+
+use crate::about::about;
+use crate::files::{read, text};
+use crate::manifest::{
+    ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Refutation, STREAMED, TASK, Verification, VerifiedPart,
+    WITNESS,
+};
+use crate::plan::plan;
+use crate::task::{read_pddl, same_task};
+use crate::{derivations, knowledge};
+
+/// Checks a certificate without trusting what wrote it, and whether it is about a mission, if one is given. The comparison of the task
+/// with the files ends when `stop` says so.
+pub fn verify(directory: &Path, mission: Option<&Mission>, stop: &dyn Fn() -> bool) -> Verification {
+    let mut report = Verification { claim: None, parts: Vec::new() };
+    match read(directory) {
+        Ok((manifest, contents)) => {
+            report.claim = Some(manifest.claim.clone());
+            let bytes: u64 = manifest.files.iter().map(|file| file.bytes).sum();
+            let files = format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());
+            report.parts.push(VerifiedPart { part: "files", result: Ok(files) });
+            report.parts.extend(parts(directory, &manifest, &contents, stop));
+            if let Some(mission) = mission {
+                let written = written(&contents);
+                let domain = text(&contents, DOMAIN);
+                let result = about(written.as_ref(), (domain, text(&contents, PROBLEM)), mission);
+                report.parts.push(VerifiedPart { part: "mission", result });
+            }
+        }
+        Err(reason) => report.parts.push(VerifiedPart { part: "files", result: Err(reason) }),
+    }
+    report
+}
+
+/// The argument of a certificate as verification conditions in SMT-LIB 2; it is not checked here.
+///
+/// # Errors
+/// The certificate cannot be read, or its task has derived variables, for which there are no such conditions.
+pub fn conditions(directory: &Path, stop: &dyn Fn() -> bool) -> Result<String, Message> {
+    let wrong = |reason: String| Message::at("M121", &directory.display().to_string(), None, reason);
+    let (Manifest { claim, .. }, contents) = read(directory).map_err(wrong)?;
+    let text = |name: &str| text(&contents, name);
+    let metric = match &claim {
+        Claim::Unsolvable => None,
+        Claim::Optimal { metric } => {
+            let (domain, problem) = read_pddl(text(DOMAIN), text(PROBLEM)).map_err(wrong)?;
+            let (_, timed) =
+                same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop).map_err(wrong)?;
+            Some(plan(&domain, &problem, timed, text(PLAN), metric).map_err(wrong)?.1)
+        }
+    };
+    verification_conditions(text(TASK), text(ARGUMENT), metric.as_ref())
+        .map_err(|fault| wrong(fault.to_string()))?
+        .ok_or_else(|| wrong("a task with derived predicates has no verification conditions".to_owned()))
+}
+
+fn parts(
+    directory: &Path,
+    manifest: &Manifest,
+    contents: &[(String, String)],
+    stop: &dyn Fn() -> bool,
+) -> Vec<VerifiedPart> {
+    let Manifest { claim, refutation, .. } = manifest;
+    let text = |name: &str| text(contents, name);
+    let (domain, problem) = match read_pddl(text(DOMAIN), text(PROBLEM)) {
+        Ok(read) => read,
+        Err(reason) => return vec![VerifiedPart { part: "files", result: Err(reason) }],
+    };
+    let mut parts = Vec::new();
+    if let Some(written) = written(contents) {
+        let [derivations, filled] = knowledge::check(&written, &domain, &problem);
+        parts.push(VerifiedPart { part: "derivations", result: derivations });
+        parts.push(VerifiedPart { part: "knowledge", result: filled });
+    }
+    let (same, timed) = match same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop) {
+        Ok((said, timed)) => (Ok(said), timed),
+        // Whatever it is, it is not verified.
+        Err(reason) => (Err(reason), false),
+    };
+    parts.push(VerifiedPart { part: "task", result: same });
+    let metric = match claim {
+        Claim::Unsolvable => None,
+        Claim::Optimal { metric } => {
+            let checked = plan(&domain, &problem, timed, text(PLAN), metric);
+            let (result, value) = match checked {
+                Ok((said, value)) => (Ok(said), Some(value)),
+                Err(reason) => (Err(reason), None),
+            };
+            parts.push(VerifiedPart { part: "plan", result });
+            let Some(value) = value else { return parts };
+            Some(value)
+        }
+    };
+    let checked = check(text(TASK), text(ARGUMENT), metric.as_ref());
+    let result = checked.map_err(|fault| fault.to_string()).map(|Checked { labels, potentials, needs }| {
+        format!("no plan is better: induction over {labels} labels, with {potentials} potentials and {needs} needs")
+    });
+    parts.push(VerifiedPart { part: "argument", result });
+    let documents = (text(TASK), text(ARGUMENT));
+    parts.extend(match refutation {
+        Refutation::Steps(steps) => refuted(directory, documents, metric.as_ref(), *steps),
+        Refutation::None(reason) => {
+            vec![VerifiedPart {
+                part: "formula",
+                result: Ok(format!("none, the claim rests on the argument: {reason}")),
+            }]
+        }
+    });
+    parts
+}
+
+/// What a certificate says about knowledge, if it does.
+fn written(contents: &[(String, String)]) -> Option<knowledge::KnowledgeFiles<'_>> {
+    contents.iter().any(|(name, _)| name == knowledge::ORIGIN).then(|| knowledge::KnowledgeFiles {
+        document: text(contents, knowledge::DOCUMENT),
+        origin: text(contents, knowledge::ORIGIN),
+        derivations: text(contents, derivations::DERIVATIONS),
+    })
+}
+
+fn refuted(
+    directory: &Path,
+    documents: (&str, &str),
+    metric: Option<&BigRational>,
+    steps: usize,
+) -> Vec<VerifiedPart> {
+    let open = |name: &str| fs::File::open(directory.join(name)).map(BufReader::new);
+    let opened = STREAMED.map(open);
+    let [Ok(mut formula), Ok(mut legend), Ok(mut proof), Ok(mut hints)] = opened else {
+        return vec![VerifiedPart { part: "formula", result: Err("it cannot be read".to_owned()) }];
+    };
+    let inputs = Inputs { formula: &mut formula, legend: &mut legend, proof: &mut proof, hints: &mut hints };
+    let checked = check_refutation(documents, metric, steps, inputs).into_iter();
+    checked.map(|(part, result)| VerifiedPart { part, result }).collect()
+}

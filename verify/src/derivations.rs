@@ -1,0 +1,119 @@
+//! Everything that follows from a mission's knowledge, with why, as a file: to be replayed by `rules::replay`, which shares no
+//! code with the engine's evaluation.
+
+use rules::{Derivation, DerivationStep, Fact, Literal, Reason, RuleIdentity, Symbol, Symbols};
+use serde::{Deserialize, Serialize};
+
+/// The file.
+pub const DERIVATIONS: &str = "derivations.json";
+/// The version of its format.
+pub const FORMAT: &str = "metaplan-derivations/1";
+
+/// The document: steps, each after what it rests on.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Document {
+    /// [`FORMAT`].
+    pub format: String,
+    /// Names and literals; everything else refers to them by position.
+    pub terms: Vec<Term>,
+    /// The rules that steps name.
+    pub rules: Vec<Rule>,
+    /// What follows, and why.
+    pub steps: Vec<Step>,
+}
+
+/// A name or a literal.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Term {
+    /// An IRI.
+    Name(String),
+    /// Lexical form, datatype.
+    Literal(String, String),
+    /// Text, `rdf:langString`, language.
+    Text(String, String, String),
+}
+
+/// A rule by where it stands.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rule {
+    /// The file.
+    pub source: String,
+    /// Which one of the file's.
+    pub position: u32,
+    /// Its name, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub label: Option<String>,
+    /// Those that have a value in each step.
+    pub variables: Vec<String>,
+}
+
+/// A fact; stated unless more is said.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Step {
+    /// Predicate and arguments.
+    pub fact: Vec<u32>,
+    /// The rule that says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rule: Option<u32>,
+    /// The values of the rule's variables.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bindings: Vec<u32>,
+    /// The steps of the facts that the relation atoms of the rule's body found, in order; or what an equality rests on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supports: Option<Vec<u32>>,
+}
+
+/// Reads derivations; names and values are interned in `symbols`.
+pub(crate) fn read(text: &str, symbols: &mut Symbols) -> Result<Derivation, String> {
+    let wrong = |reason: &str| format!("{DERIVATIONS}: {reason}");
+    let document: Document = serde_json::from_str(text).map_err(|error| wrong(&error.to_string()))?;
+    if document.format != FORMAT {
+        return Err(wrong(&format!("format `{}`, where `{FORMAT}` is expected", document.format)));
+    }
+    let intern = |term: &Term| match term {
+        Term::Name(name) => symbols.name(name),
+        Term::Literal(lexical, datatype) => symbols.literal(Literal::parse(lexical, Some(datatype), None)),
+        Term::Text(text, datatype, language) => {
+            symbols.literal(Literal::parse(text, Some(datatype), Some(language)))
+        }
+    };
+    let terms: Vec<Symbol> = document.terms.iter().map(intern).collect();
+    let term =
+        |number: &u32| terms.get(*number as usize).copied().ok_or_else(|| wrong("a term that is not there"));
+    let step = |step: &Step| {
+        let mut fact = step.fact.iter().map(term);
+        let predicate = fact.next().ok_or_else(|| wrong("a fact without a predicate"))??;
+        let arguments: Vec<Symbol> = fact.collect::<Result<_, String>>()?;
+        let supports = step.supports.iter().flatten().map(|support| *support as usize).collect();
+        let reason = match (step.rule, &step.supports) {
+            (None, None) => Reason::Asserted,
+            (None, Some(_)) => Reason::Equality { supports },
+            (Some(rule), _) => {
+                let rule =
+                    document.rules.get(rule as usize).ok_or_else(|| wrong("a rule that is not there"))?;
+                if rule.variables.len() != step.bindings.len() {
+                    return Err(wrong("a step that has not one value for each variable"));
+                }
+                let values = step.bindings.iter().map(term).collect::<Result<Vec<_>, String>>()?;
+                Reason::Rule {
+                    identity: RuleIdentity {
+                        source: rule.source.as_str().into(),
+                        label: rule.label.as_deref().map(Into::into),
+                        position: rule.position,
+                    },
+                    bindings: rule.variables.iter().cloned().zip(values).collect(),
+                    supports,
+                    absent: Vec::new(),
+                    aggregates: Vec::new(),
+                }
+            }
+        };
+        Ok(DerivationStep { fact: Fact::new(predicate, arguments), reason })
+    };
+    let steps = document.steps.iter().map(step).collect::<Result<_, String>>()?;
+    Ok(Derivation { steps })
+}

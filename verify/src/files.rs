@@ -1,0 +1,122 @@
+//! The files of a certificate: read as the manifest has them, and none that it does not have.
+
+use std::fs;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use crate::digest::{digest, digest_of};
+use crate::manifest::{
+    ARGUMENT, Claim, DOMAIN, FORMAT, File, HINTS, Manifest, PLAN, PROBLEM, PROOF, PROOF_LIMIT, Refutation,
+    SIZE_LIMIT, STREAMED, TASK, TEXT_LIMIT, WITNESS,
+};
+use crate::{derivations, knowledge};
+
+/// The text of a file among several.
+pub fn text<'t, N: AsRef<str>>(files: &'t [(N, String)], name: &str) -> &'t str {
+    files.iter().find(|(own, _)| own.as_ref() == name).map_or("", |(_, text)| text.as_str())
+}
+
+/// The manifest, and the contents of the files, each as the manifest says.
+pub(crate) fn read(directory: &Path) -> Result<(Manifest, Vec<(String, String)>), String> {
+    let manifest = read_file(directory, "manifest.json", 1 << 20)?;
+    let manifest: Manifest =
+        serde_json::from_str(&manifest).map_err(|error| format!("manifest.json: {error}"))?;
+    if manifest.format != FORMAT {
+        return Err(format!("manifest.json: format `{}`, where `{FORMAT}` is expected", manifest.format));
+    }
+    let mut expected = vec![ARGUMENT, DOMAIN, PROBLEM, TASK, WITNESS];
+    if manifest.claim != Claim::Unsolvable {
+        expected.push(PLAN);
+    }
+    if manifest.files.iter().any(|file| file.name == knowledge::ORIGIN) {
+        expected.extend([knowledge::DOCUMENT, knowledge::ORIGIN, derivations::DERIVATIONS]);
+    }
+    if matches!(manifest.refutation, Refutation::Steps(_)) {
+        expected.extend(STREAMED);
+    }
+    expected.sort_unstable();
+    let mut names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
+    names.sort_unstable();
+    if names != expected {
+        // However many there are, the first show what is wrong.
+        names.truncate(expected.len() + 1);
+        return Err(format!(
+            "manifest.json: lists {}, where {} are expected",
+            names.join(", "),
+            expected.join(", ")
+        ));
+    }
+    let is_streamed = |file: &&File| STREAMED.contains(&file.name.as_str());
+    let (streamed, whole): (Vec<&File>, Vec<&File>) = manifest.files.iter().partition(is_streamed);
+    for (files, limit) in [(whole, TEXT_LIMIT), (streamed, SIZE_LIMIT)] {
+        let total = files.iter().try_fold(0_u64, |sum, file| sum.checked_add(file.bytes));
+        if total.is_none_or(|total| total > limit) {
+            return Err(format!("manifest.json: the files are larger than {limit} bytes"));
+        }
+    }
+    let mut contents = Vec::new();
+    for file in &manifest.files {
+        if STREAMED.contains(&file.name.as_str()) {
+            check_streamed(directory, file)?;
+            continue;
+        }
+        let text = read_file(directory, &file.name, file.bytes)?;
+        if text.len() as u64 != file.bytes {
+            return Err(format!(
+                "{}: has {} bytes, where {} are expected",
+                file.name,
+                text.len(),
+                file.bytes
+            ));
+        }
+        let found = digest(text.as_bytes());
+        if found != file.sha256 {
+            return Err(format!("{}: SHA-256 is {found}, where {} is expected", file.name, file.sha256));
+        }
+        contents.push((file.name.clone(), text));
+    }
+    Ok((manifest, contents))
+}
+
+/// A file whose contents are looked at later.
+fn check_streamed(directory: &Path, file: &File) -> Result<(), String> {
+    let File { name, bytes, sha256 } = file;
+    let wrong = |what: String| format!("{name}: {what}");
+    let most = if [PROOF, HINTS].contains(&name.as_str()) { PROOF_LIMIT.min(*bytes) } else { *bytes };
+    let path = plain_file(directory, name, most)?;
+    let (found, digest) =
+        digest_of(&path).map_err(|error| wrong(format!("cannot be read: {}", error.kind())))?;
+    if found != *bytes {
+        return Err(wrong(format!("has {found} bytes, where {bytes} are expected")));
+    }
+    if digest != *sha256 {
+        return Err(wrong(format!("SHA-256 is {digest}, where {sha256} is expected")));
+    }
+    Ok(())
+}
+
+/// The path of a plain file of at most so many bytes.
+fn plain_file(directory: &Path, name: &str, most: u64) -> Result<PathBuf, String> {
+    let path = directory.join(name);
+    let wrong = |what: String| format!("{name}: {what}");
+    let kind =
+        fs::symlink_metadata(&path).map_err(|error| wrong(format!("cannot be read: {}", error.kind())))?;
+    if !kind.is_file() {
+        return Err(wrong("is no plain file".to_owned()));
+    }
+    if kind.len() > most {
+        return Err(wrong(format!("has {} bytes, more than {most}", kind.len())));
+    }
+    Ok(path)
+}
+
+/// The contents of a plain file of at most so many bytes.
+fn read_file(directory: &Path, name: &str, most: u64) -> Result<String, String> {
+    let path = plain_file(directory, name, most)?;
+    let wrong = |what: String| format!("{name}: {what}");
+    let mut text = String::new();
+    fs::File::open(&path)
+        .and_then(|file| file.take(most).read_to_string(&mut text))
+        .map_err(|error| wrong(format!("cannot be read: {error}")))?;
+    Ok(text)
+}

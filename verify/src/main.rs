@@ -1,0 +1,116 @@
+//! `metaplan-verify DIR`: whether a certificate proves what it claims.
+
+use std::io::{ErrorKind, Write as _};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Parser, ValueEnum};
+use metaplan_verify::{Verification, Watch, conditions, json, seconds, text, verify};
+use mission::file;
+use mission::message::{ErrorAnswer, Message};
+use mission::visible::{visible, visible_json};
+
+/// The statuses of `metaplan verify`.
+const VERIFIED: u8 = 0;
+const BAD_INPUT: u8 = 3;
+const INVALID: u8 = 30;
+const FAULT: u8 = 70;
+
+/// Checks a certificate of an optimal plan, or that there is no plan, without trusting the planner.
+#[derive(Debug, Clone, Parser)]
+#[command(name = "metaplan-verify", version, about)]
+struct Arguments {
+    /// What `metaplan plan --certificate` has written.
+    directory: PathBuf,
+    /// How the answer is written.
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    /// Write the argument as verification conditions in SMT-LIB 2, too: an SMT solver has to answer `unsat` to each.
+    #[arg(long, value_name = "FILE")]
+    smt: Option<PathBuf>,
+    /// The verification fails if it takes more seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true, default_value = "600")]
+    time_limit: Duration,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For people.
+    Text,
+    /// For programs.
+    Json,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    // The default hook would print a stack trace at users; what matters is printed below.
+    std::panic::set_hook(Box::new(|_| {}));
+    let outcome = std::panic::catch_unwind(|| run(&arguments));
+    ExitCode::from(match outcome {
+        Ok(Ok(report)) => show(&report, arguments.format),
+        Ok(Err(message)) => {
+            fail(&message, arguments.format);
+            BAD_INPUT
+        }
+        Err(panic) => {
+            let reason = panic.downcast_ref::<String>().map(String::as_str);
+            let reason = reason.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or_default();
+            let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
+            fail(&Message::error("M170", text), arguments.format);
+            FAULT
+        }
+    })
+}
+
+/// Checks the certificate.
+fn run(arguments: &Arguments) -> Result<Verification, Message> {
+    let Arguments { directory, format, smt, time_limit } = arguments.clone();
+    let watch = Watch::start(time_limit, move |report| std::process::exit(show(report, format).into()));
+    let stop = || watch.reached();
+    if let Some(file) = &smt {
+        file::write(file, &conditions(&directory, &stop)?)?;
+    }
+    Ok(watch.end(verify(&directory, None, &stop)))
+}
+
+/// Writes what came of it; returns the status.
+fn show(report: &Verification, format: Format) -> u8 {
+    let written = document(&match format {
+        Format::Text => text(report),
+        Format::Json => json(report),
+    });
+    match (written, report.verified()) {
+        (false, _) => BAD_INPUT,
+        (true, true) => VERIFIED,
+        (true, false) => INVALID,
+    }
+}
+
+/// Writes an error: text on standard error, or a JSON object as the answer.
+fn fail(message: &Message, format: Format) {
+    match format {
+        Format::Text => {
+            let _ = std::io::stderr().write_all(visible(message.text()).as_bytes());
+        }
+        Format::Json => {
+            let messages = [message.clone()];
+            let answer =
+                serde_json::to_string_pretty(&ErrorAnswer::new(&messages)).unwrap_or_default() + "\n";
+            document(&visible_json(&answer));
+        }
+    }
+}
+
+/// Writes to standard output; false if that is not possible. A reader that has gone away is no fault, a full disk is.
+fn document(text: &str) -> bool {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            let message = Message::error("M109", format!("the answer cannot be written: {error}"));
+            let _ = std::io::stderr().write_all(message.text().as_bytes());
+            false
+        }
+        _ => true,
+    }
+}

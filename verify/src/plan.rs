@@ -1,0 +1,61 @@
+//! The plan of a certificate, executed by the validator.
+
+use num_rational::BigRational;
+use num_traits::Zero;
+use pddl::ast::{ActionBody, Comparison, Domain, InitialElement, Name, Problem};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, to_decimal};
+
+use crate::manifest::PLAN;
+use crate::measure::measure;
+
+/// Has the validator execute the plan. The metric is what it says.
+///
+/// # Errors
+/// The plan is none, cannot be executed, or has another metric than claimed.
+pub fn plan(
+    domain: &Domain,
+    problem: &Problem,
+    timed: bool,
+    text: &str,
+    claimed: &str,
+) -> Result<(String, BigRational), String> {
+    let mut plan = PlanText::parse(&Source::new(PLAN, text))
+        .map_err(|found| found.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone()))?;
+    if plan.steps.iter().all(|step| step.start.is_some()) {
+        plan.steps.sort_by(|left, right| left.start.cmp(&right.start));
+    }
+    // One step after the other, each as long as the files say, unless they leave a choice: what is written may be rounded. Where
+    // nothing happens by itself, each starts when the one before it has ended; otherwise when it is written, or a little
+    // later for that reason.
+    let is_timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
+    for step in &mut plan.steps {
+        step.start = step.start.take().filter(|_| is_timed);
+        step.duration = step.duration.take().filter(|_| is_chosen(domain, &step.action));
+    }
+    let tolerance = if is_timed { Options::default().tolerance } else { BigRational::zero() };
+    let options = Options { tolerance, ..Options::default() };
+    let verdict = validate(domain, problem, &plan, &options);
+    if let Some(violation) = verdict.violation {
+        return Err(violation.message);
+    }
+    let steps = plan.steps.len();
+    let value = measure(problem, &verdict, steps, timed).ok_or("the metric has no value after the plan")?;
+    // As a decimal where there is one, or as a fraction.
+    if value.to_string() != claimed && to_decimal(&value).is_none_or(|decimal| decimal != claimed) {
+        return Err(format!("its metric is {value}, where {claimed} is claimed"));
+    }
+    Ok((format!("{steps} steps, valid, metric {claimed}"), value))
+}
+
+/// Whether an action of this name has a duration that is not fixed.
+fn is_chosen(domain: &Domain, name: &Name) -> bool {
+    let mut bodies =
+        domain.actions.iter().filter(|action| action.identifier.name == *name).map(|action| &action.body);
+    bodies.any(|body| match body {
+        ActionBody::Durative { duration, .. } => {
+            !matches!(&duration[..], [only] if only.operator == Comparison::Equal)
+        }
+        ActionBody::Instantaneous { .. } => false,
+    })
+}

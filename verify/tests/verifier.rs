@@ -1,0 +1,45 @@
+//! The program `metaplan-verify`, by itself. What it says of certificates is compared with what `metaplan verify` says of them in the
+//! tests of `metaplan`, which can make some.
+
+use std::process::Command;
+
+/// The status, what is written to standard output, and what to standard error.
+fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_metaplan-verify")).args(arguments).output();
+    let output = output.expect("the program runs");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn what_is_no_certificate_is_not_verified() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = directory.path().display().to_string();
+    let (status, text, _) = run(&[&path]);
+    assert_eq!(status, Some(30));
+    assert!(text.starts_with("files       failed: manifest.json: cannot be read"), "{text}");
+    assert!(text.ends_with("NOT verified: nothing is claimed\n"), "{text}");
+    let (status, answer, _) = run(&[&path, "--format", "json"]);
+    let answer: serde_json::Value = serde_json::from_str(&answer).expect("JSON");
+    assert_eq!((status, &answer["verified"]), (Some(30), &false.into()));
+}
+
+#[test]
+fn conditions_of_nothing_are_bad_input() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = directory.path().display().to_string();
+    let file = directory.path().join("conditions.smt2");
+    let (status, text, message) = run(&[&path, "--smt", &file.display().to_string()]);
+    assert_eq!((status, text.as_str()), (Some(3), ""));
+    assert!(message.contains("error[M121]: manifest.json"), "{message}");
+    assert!(!file.exists());
+}
+
+#[test]
+fn arguments_are_named_where_they_are_wrong() {
+    for arguments in [&[][..], &["c", "--format", "turtle"], &["c", "--time-limit", "-1"]] {
+        let (status, text, message) = run(arguments);
+        assert_eq!((status, text.as_str()), (Some(2), ""), "{arguments:?}");
+        assert!(message.starts_with("error: "), "{message}");
+    }
+}
