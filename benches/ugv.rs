@@ -12,7 +12,7 @@ fn plan(scenario: Option<&str>) {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
     let Setup { mut mission, scenarios, .. } = Setup::read(&manifest).expect("the mission is read");
     if let Some(scenario) = scenario {
-        mission.apply(&scenarios[scenario]).expect("the scenario fits");
+        scenarios[scenario].apply(&mut mission).expect("the scenario fits");
     }
     let (problem, _) = mission.filled().expect("the knowledge base fits the domain");
     let task = mission.ground(&problem, &[], &Limits::none()).expect("the mission is ground");

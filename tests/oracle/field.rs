@@ -6,6 +6,7 @@
 use std::time::Duration;
 
 use encodings::{Config, Limits, Status};
+use metaplan::mission::Planning as _;
 use num_bigint::BigInt;
 use num_rational::BigRational;
 

@@ -38,7 +38,7 @@ pub struct Stated {
     /// Assertions.
     pub facts: Vec<Fact>,
     pub(super) ontology: Ontology,
-    /// As [`Knowledge::rule_count`] has it.
+    /// As [`crate::knowledge::Knowledge::rule_count`] has it.
     pub rule_count: usize,
     pub(super) warnings: Vec<Message>,
 }

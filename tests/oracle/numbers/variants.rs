@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use encodings::{Backend, Config, Limits, Semantics, Solution, Status, Strategy, Unbounded};
 use fastrand::Rng;
+use metaplan::mission::Planning as _;
 
 use crate::judge::{Case, Mode, Tally, plan_lines, project_verdict, rational, read, steps_of};
 
