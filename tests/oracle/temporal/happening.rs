@@ -147,9 +147,9 @@ impl World {
             };
             (list.iter().map(of).collect::<Vec<_>>(), next)
         };
-        let (atoms, total_atoms) = (offsets(&task.predicates).0, offsets(&task.predicates).1);
-        let (values, total_values) = (offsets(&task.functions).0, offsets(&task.functions).1);
-        assert!(total_atoms <= 128 && total_values <= 64, "the generator makes small tasks");
+        let (atoms, _) = offsets(&task.predicates);
+        let (values, total_values) = offsets(&task.functions);
+        assert!(task.is_small(), "the generator makes small tasks");
         let initial = State { atoms: 0, values: vec![None; total_values] };
         let (depends, instances, events) = (HashMap::new(), Vec::new(), Vec::new());
         let mut world = Self { task, atoms, values, depends, instances, initial, events };

@@ -55,7 +55,14 @@ impl Maker {
         Self::build(seed, None, true)
     }
 
+    /// Where a seed makes a task that is too large, others are tried.
     fn build(seed: u64, unit: Option<Q>, designs: bool) -> Task {
+        let seeds = (0..u64::MAX).map(|again| seed ^ (again << 40));
+        let mut small = seeds.filter_map(|seed| Self::small(seed, unit, designs));
+        small.next().expect("a small task")
+    }
+
+    fn small(seed: u64, unit: Option<Q>, designs: bool) -> Option<Task> {
         let mut random = fastrand::Rng::with_seed(seed);
         let percent = |random: &mut fastrand::Rng, choices: &[u8]| choices[random.usize(..choices.len())];
         let flavour = Flavour {
@@ -80,10 +87,14 @@ impl Maker {
             measure: Measure::Steps,
         };
         let mut maker = Self { random, flavour, task, designs: None, slot: None };
-        maker.fill(designs);
+        maker.declare(designs);
+        if !maker.task.is_small() {
+            return None;
+        }
+        maker.fill();
         maker.random = fastrand::Rng::with_seed(!seed);
         maker.durations_in_effects();
-        maker.task
+        Some(maker.task)
     }
 
     pub(super) fn chance(&mut self, percent: u8) -> bool {
@@ -94,7 +105,8 @@ impl Maker {
         choices[self.random.usize(..choices.len())].clone()
     }
 
-    fn fill(&mut self, designs: bool) {
+    /// Objects, predicates and functions.
+    fn declare(&mut self, designs: bool) {
         for kind in 0..self.task.types {
             let count = 1 + self.random.usize(..2);
             self.task.objects.extend(std::iter::repeat_n(kind, count));
@@ -113,6 +125,9 @@ impl Maker {
             self.task.functions.push((name.to_owned(), arity));
         }
         self.axioms();
+    }
+
+    fn fill(&mut self) {
         let actions = 1 + self.random.usize(..4);
         for number in 0..actions {
             let action = self.action(number);

@@ -159,6 +159,13 @@ pub fn number(value: Q) -> String {
 }
 
 impl Task {
+    /// Whether states fit what they are kept in: 128 atoms, 64 values.
+    pub fn is_small(&self) -> bool {
+        let instances = |(_, arity): &(String, usize)| self.objects.len().pow(*arity as u32);
+        let all = |list: &[(String, usize)]| list.iter().map(instances).sum::<usize>();
+        all(&self.predicates) <= 128 && all(&self.functions) <= 64
+    }
+
     fn term(term: Term) -> String {
         match term {
             Term::Var(depth) => format!("?v{depth}"),
