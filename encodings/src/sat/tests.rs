@@ -231,6 +231,12 @@ fn limits_interrupt() {
         assert_eq!(counted.solve(&[]), Answer::Interrupted, "{backend:?}, by conflicts");
         assert!(started.elapsed() < Duration::from_secs(20), "{backend:?}");
         assert!(counted.failure().is_none());
+        // Time stays up, and who asks once more hears so.
+        for solver in [&mut limited, &mut counted] {
+            solver.add_clause(&literals(&[1, 1_000]));
+            assert_ne!(solver.solve(&literals(&[-1])), Answer::Satisfiable, "{backend:?}");
+        }
+        assert_eq!(limited.solve(&[]), Answer::Interrupted, "{backend:?}, asked again");
     }
 }
 

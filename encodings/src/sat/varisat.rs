@@ -25,6 +25,8 @@ pub(super) struct Varisat {
     solver: varisat::Solver<'static>,
     /// Whether the solver has failed under assumptions before.
     failed: bool,
+    /// Whether a limit was reached. Varisat panics when it is asked once more.
+    interrupted: bool,
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
@@ -42,6 +44,7 @@ impl Varisat {
         Self {
             solver: start(limits, budget, &conflicts),
             failed: false,
+            interrupted: false,
             limits: limits.clone(),
             budget,
             conflicts,
@@ -55,6 +58,9 @@ impl Varisat {
     /// Decides the clauses under assumptions, once.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn ask(&mut self, assumptions: &[Lit]) -> Answer {
+        if self.interrupted {
+            return Answer::Interrupted;
+        }
         let assumed: Vec<varisat::Lit> = assumptions.iter().copied().map(translate).collect();
         self.solver.assume(&assumed);
         match self.solver.solve() {
@@ -77,7 +83,10 @@ impl Varisat {
                 self.failed |= !self.core.is_empty();
                 Answer::Unsatisfiable
             }
-            Err(_) => Answer::Interrupted,
+            Err(_) => {
+                self.interrupted = true;
+                Answer::Interrupted
+            }
         }
     }
 
