@@ -50,6 +50,14 @@ impl Message {
         Self::plain("error", code, message.into(), None)
     }
 
+    /// A fault of the program, from what a panic has said.
+    pub fn of_panic(panic: &(dyn std::any::Any + Send)) -> Self {
+        let reason = panic.downcast_ref::<String>().map(String::as_str);
+        let reason = reason.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or_default();
+        let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
+        Self::error("M170", text)
+    }
+
     /// A warning that is about no place in a file.
     pub fn warning(code: &str, message: impl Into<String>) -> Self {
         Self::plain("warning", code, message.into(), None)

@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
 /// The text with everything escaped that would change what a terminal shows, in which order, or without being seen: control
 /// characters but line breaks and tabs, marks of bidirectional text, and characters that take no room. Names come from files that
 /// may be hostile. Joiners are left, since some languages are written with them.
@@ -19,6 +21,12 @@ pub fn visible_json(text: &str) -> Cow<'_, str> {
             let _ = write!(all, "\\u{unit:04x}");
         }
     })
+}
+
+/// An answer for programs as text, with a line break at its end.
+pub fn pretty(answer: &impl Serialize) -> String {
+    // Texts, numbers and lists of them are always data.
+    serde_json::to_string_pretty(answer).unwrap_or_default() + "\n"
 }
 
 /// Whether a character is not seen as itself.

@@ -91,13 +91,7 @@ pub fn main() -> ExitCode {
             failure.exit
         }
         Err(panic) => {
-            let reason = panic
-                .downcast_ref::<String>()
-                .cloned()
-                .or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()))
-                .unwrap_or_default();
-            let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
-            output::failure(&cli.common, &[Message::error("M170", text)]);
+            output::failure(&cli.common, &[Message::of_panic(&*panic)]);
             Exit::Fault
         }
     };

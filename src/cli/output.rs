@@ -9,6 +9,7 @@ use comfy_table::{ContentArrangement, Table, TableStyle};
 use metaplan::answers::ErrorAnswer;
 use metaplan::file;
 use metaplan::message::Message;
+pub use metaplan::visible::pretty;
 use metaplan::visible::{visible, visible_json};
 use serde::Serialize;
 
@@ -50,13 +51,7 @@ pub fn json_answer(answer: &impl Serialize) {
     document(&visible_json(&pretty(answer)));
 }
 
-/// An answer for programs as text, with a line break at its end.
-pub fn pretty(answer: &impl Serialize) -> String {
-    // Texts, numbers and lists of them are always data.
-    serde_json::to_string_pretty(answer).unwrap_or_default() + "\n"
-}
-
-/// The same as one line.
+/// An answer for programs as one line.
 pub fn line(answer: &impl Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default() + "\n"
 }

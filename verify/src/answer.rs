@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use mission::visible::{visible, visible_json};
+use mission::visible::{pretty, visible, visible_json};
 use serde::Serialize;
 
 use crate::manifest::{Claim, Verification, VerifiedPart};
@@ -61,7 +61,5 @@ pub fn text(report: &Verification) -> String {
 
 /// For programs: a [`VerificationAnswer`].
 pub fn json(report: &Verification) -> String {
-    // Texts and lists of them are always data.
-    let text = serde_json::to_string_pretty(&VerificationAnswer::new(report)).unwrap_or_default() + "\n";
-    visible_json(&text).into_owned()
+    visible_json(&pretty(&VerificationAnswer::new(report))).into_owned()
 }

@@ -9,7 +9,7 @@ use clap::{Parser, ValueEnum};
 use metaplan_verify::{Verification, Watch, conditions, json, seconds, text, verify};
 use mission::file;
 use mission::message::{ErrorAnswer, Message};
-use mission::visible::{visible, visible_json};
+use mission::visible::{pretty, visible, visible_json};
 
 /// The statuses of `metaplan verify`.
 const VERIFIED: u8 = 0;
@@ -54,10 +54,7 @@ fn main() -> ExitCode {
             BAD_INPUT
         }
         Err(panic) => {
-            let reason = panic.downcast_ref::<String>().map(String::as_str);
-            let reason = reason.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or_default();
-            let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
-            fail(&Message::error("M170", text), arguments.format);
+            fail(&Message::of_panic(&*panic), arguments.format);
             FAULT
         }
     })
@@ -95,9 +92,7 @@ fn fail(message: &Message, format: Format) {
         }
         Format::Json => {
             let messages = [message.clone()];
-            let answer =
-                serde_json::to_string_pretty(&ErrorAnswer::new(&messages)).unwrap_or_default() + "\n";
-            document(&visible_json(&answer));
+            document(&visible_json(&pretty(&ErrorAnswer::new(&messages))));
         }
     }
 }

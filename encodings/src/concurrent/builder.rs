@@ -216,7 +216,7 @@ impl<'a> Builder<'a> {
     ) -> Result<(Vec<Happening>, usize), Error> {
         let Context { task, limits } = context;
         let whole = (0..roles.len()).filter(|id| roles[*id] == Role::Whole);
-        let whole = whole.flat_map(|id| designs(task, OperatorId(dense(id))));
+        let whole = whole.flat_map(|id| designs(task, OperatorId::of(id)));
         let used = instances.iter().flat_map(|instance| instance.designs.iter().copied());
         let mut keys = Keys::new(self.separation, used.chain(whole).collect());
         let index = self.footprints.index();

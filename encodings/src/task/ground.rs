@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use crate::lifted::ObjectId;
 use crate::number::{Int, dense};
+use crate::task::dense_ids::dense_ids;
 use crate::task::number::{TaskNumber, sum_of_products};
 use crate::task::quantity::{Linear, NumericId, Quantity, SlotSet};
 use crate::task::timing::Timing;
@@ -27,48 +28,7 @@ pub struct OperatorId(pub(crate) u32);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SlotId(pub(crate) u32);
 
-impl VariableId {
-    pub(crate) fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    /// The id of what stands at an index.
-    pub(crate) fn of(index: usize) -> Self {
-        Self(dense(index))
-    }
-
-    /// The first ids, so many.
-    pub(crate) fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
-        (0..dense(count)).map(Self)
-    }
-}
-
-impl OperatorId {
-    pub(crate) fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    /// The first ids, so many.
-    pub(crate) fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
-        (0..dense(count)).map(Self)
-    }
-}
-
-impl SlotId {
-    pub(crate) fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    /// The id of what stands at an index.
-    pub(crate) fn of(index: usize) -> Self {
-        Self(dense(index))
-    }
-
-    /// The first ids, so many.
-    pub(crate) fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
-        (0..dense(count)).map(Self)
-    }
-}
+dense_ids!(VariableId, OperatorId, SlotId);
 
 /// A variable has a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

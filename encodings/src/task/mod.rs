@@ -1,6 +1,7 @@
 //! The ground task and its parts: variables, operators and states; quantities over slots, and the numbers in them.
 
 pub(crate) mod common_denominator;
+mod dense_ids;
 mod ground;
 pub(crate) mod number;
 pub(crate) mod quantity;

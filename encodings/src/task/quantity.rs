@@ -3,7 +3,8 @@
 //! A quantity is a constant plus tables over slots. The tables are what keeps the encoding factored: a sum over
 //! k functions of m designs each is k tables of m entries, not one of m^k.
 
-use crate::number::{Int, dense};
+use crate::number::Int;
+use crate::task::dense_ids::dense_ids;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
@@ -46,21 +47,7 @@ pub(crate) struct Linear<N> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NumericId(pub(crate) u32);
 
-impl NumericId {
-    pub(crate) fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    /// The id of what stands at an index.
-    pub(crate) fn of(index: usize) -> Self {
-        Self(dense(index))
-    }
-
-    /// The first ids, so many.
-    pub(crate) fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
-        (0..dense(count)).map(Self)
-    }
-}
+dense_ids!(NumericId);
 
 /// The arithmetic that quantities need.
 pub(crate) trait Number:
