@@ -11,8 +11,8 @@ use crate::argument::Argument;
 use crate::integer::Integer;
 use crate::model::TASK_FORMAT;
 use crate::model::{Model, Operator};
+use crate::references;
 use crate::semantics::{State, holds_without_numbers};
-use crate::shape;
 use crate::table::{Table, check_need, check_potential};
 
 /// Combinations of designs that matter, of all operators together, are not more than this.
@@ -133,8 +133,8 @@ pub(super) fn parse(
             return Err(form(document, format!("format `{found}`, where `{expected}` is expected")));
         }
     }
-    shape::task(&model).map_err(|reason| form("the task", reason))?;
-    shape::argument(&model, &argument).map_err(|reason| form("the argument", reason))?;
+    references::task(&model).map_err(|reason| form("the task", reason))?;
+    references::argument(&model, &argument).map_err(|reason| form("the argument", reason))?;
     let cost = claim.map(|claim| cost(&model, claim)).transpose()?;
     Ok((model, argument, cost))
 }

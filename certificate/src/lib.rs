@@ -38,8 +38,8 @@ mod clausal;
 mod faithful;
 mod integer;
 mod model;
+mod references;
 mod semantics;
-mod shape;
 mod smt;
 mod table;
 

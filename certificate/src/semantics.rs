@@ -14,13 +14,13 @@ pub(super) struct State {
 
 impl Model {
     /// The variables that are not derived.
-    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `shape`")]
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `references`")]
     pub(super) fn basic_variables(&self) -> Range<u32> {
         0..self.basic as u32
     }
 
     /// The variables that are derived.
-    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `shape`")]
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^32 of each kind, see `references`")]
     pub(super) fn derived_variables(&self) -> Range<u32> {
         self.basic as u32..self.variables.len() as u32
     }
@@ -29,7 +29,7 @@ impl Model {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::arithmetic_side_effects,
-        reason = "a variable has a value, and fewer than 2^32, see `shape`"
+        reason = "a variable has a value, and fewer than 2^32, see `references`"
     )]
     pub(super) fn none(&self, variable: u32) -> u32 {
         self.variables[variable as usize].len() as u32 - 1
@@ -75,7 +75,7 @@ impl Model {
     }
 
     /// All combinations of designs that an operator admits.
-    #[expect(clippy::cast_possible_truncation, reason = "a slot has fewer designs, see `shape`")]
+    #[expect(clippy::cast_possible_truncation, reason = "a slot has fewer designs, see `references`")]
     pub(super) fn choices(&self, operator: &Operator) -> Vec<Vec<u32>> {
         let mut all: Vec<Vec<u32>> = vec![Vec::new()];
         for size in self.sizes(operator) {
@@ -95,7 +95,10 @@ impl Model {
     }
 
     /// The value of a quantity for a combination of designs.
-    #[expect(clippy::arithmetic_side_effects, reason = "a row is below the size of its table, see `shape`")]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a row is below the size of its table, see `references`"
+    )]
     pub(super) fn quantity(&self, quantity: &Quantity, choice: &[u32], sizes: &[usize]) -> Integer {
         let mut sum = quantity.constant.clone();
         for (slots, table) in &quantity.tables {

@@ -129,7 +129,7 @@ impl Writer<'_> {
     /// One part for each entry of a table for which there is something to say.
     #[expect(
         clippy::arithmetic_side_effects,
-        reason = "a row and its parts are below the size of a table, see `shape`"
+        reason = "a row and its parts are below the size of a table, see `references`"
     )]
     fn entries(
         &self,

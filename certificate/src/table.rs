@@ -34,7 +34,10 @@ impl<'t> Table<'t> {
     }
 
     /// The position of a combination of values.
-    #[expect(clippy::arithmetic_side_effects, reason = "a row is below the size of its table, see `shape`")]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a row is below the size of its table, see `references`"
+    )]
     pub(super) fn row(&self, values: &[u32]) -> usize {
         self.sizes.iter().zip(values).fold(0, |row, (size, value)| row * size + *value as usize)
     }
@@ -58,7 +61,7 @@ impl<'t> Table<'t> {
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
-        reason = "a row is below the size of its table, see `shape`"
+        reason = "a row is below the size of its table, see `references`"
     )]
     pub(super) fn matching(&self, facts: &[Fact]) -> Vec<Vec<u32>> {
         let mut all = vec![Vec::new()];

@@ -15,11 +15,11 @@ use crate::cli::output;
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]
-    what: What,
+    what: Form,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum Form {
     /// The map of Cámara et al. (`map-p2cp3.json` and maps of its form) as a mission with probabilities.
     CamaraMap(CamaraMap),
 }
@@ -90,7 +90,7 @@ fn two(text: &str) -> Result<(String, String), String> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let What::CamaraMap(map) = &arguments.what;
+    let Form::CamaraMap(map) = &arguments.what;
     let is_name = !map.name.is_empty() && map.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if !is_name {
         let text = format!("`{}` cannot name a mission; use letters, digits and `_`", map.name);

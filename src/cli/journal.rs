@@ -15,11 +15,11 @@ use crate::cli::output;
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]
-    what: What,
+    what: Operation,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum Operation {
     /// Whether the journal can be used, and what is wrong with it.
     Check {
         /// The journal's directory.
@@ -36,9 +36,9 @@ enum What {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let (What::Check { directory } | What::Show { directory }) = &arguments.what;
+    let (Operation::Check { directory } | Operation::Show { directory }) = &arguments.what;
     let report = JournalReport::read(directory)?;
-    let shows = matches!(arguments.what, What::Show { .. });
+    let shows = matches!(arguments.what, Operation::Show { .. });
     if common.format == Format::Json {
         output::json_answer(&JournalAnswer::new(&report, shows));
     } else {

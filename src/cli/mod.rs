@@ -42,13 +42,13 @@ use common::{Common, Exit, Failure, Format};
 #[command(name = "metaplan", version, about)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: Subcommands,
     #[command(flatten)]
     common: Common,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum Subcommands {
     /// A jointly optimal task plan and configuration.
     Plan(plan::Arguments),
     /// What follows from knowledge bases and rules: assertions, availability, objectives in error.
@@ -100,23 +100,23 @@ pub fn main() -> ExitCode {
 
 fn run(cli: &Cli) -> Result<Exit, Failure> {
     let triples = matches!(cli.common.format, Format::Ntriples | Format::Turtle);
-    if triples && !matches!(cli.command, Command::Reason(_)) {
+    if triples && !matches!(cli.command, Subcommands::Reason(_)) {
         let text = "`--format ntriples` and `--format turtle` go with `reason`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
     match &cli.command {
-        Command::Plan(arguments) => plan::run(arguments, &cli.common),
-        Command::Reason(arguments) => reason::run(arguments, &cli.common),
-        Command::Convert(arguments) => convert::run(arguments, &cli.common),
-        Command::Check(arguments) => check::run(arguments, &cli.common),
-        Command::Compare(arguments) => compare::run(arguments, &cli.common),
-        Command::Import(arguments) => import::run(arguments, &cli.common),
-        Command::Explain(arguments) => explain::run(arguments, &cli.common),
-        Command::Export(arguments) => export::run(arguments, &cli.common),
-        Command::Run(arguments) => run::run(arguments, &cli.common),
-        Command::Journal(arguments) => journal::run(arguments, &cli.common),
-        Command::Simulate(arguments) => simulate::run(arguments, &cli.common),
-        Command::Validate(arguments) => validate::run(arguments, &cli.common),
-        Command::Verify(arguments) => verify::run(arguments, &cli.common),
+        Subcommands::Plan(arguments) => plan::run(arguments, &cli.common),
+        Subcommands::Reason(arguments) => reason::run(arguments, &cli.common),
+        Subcommands::Convert(arguments) => convert::run(arguments, &cli.common),
+        Subcommands::Check(arguments) => check::run(arguments, &cli.common),
+        Subcommands::Compare(arguments) => compare::run(arguments, &cli.common),
+        Subcommands::Import(arguments) => import::run(arguments, &cli.common),
+        Subcommands::Explain(arguments) => explain::run(arguments, &cli.common),
+        Subcommands::Export(arguments) => export::run(arguments, &cli.common),
+        Subcommands::Run(arguments) => run::run(arguments, &cli.common),
+        Subcommands::Journal(arguments) => journal::run(arguments, &cli.common),
+        Subcommands::Simulate(arguments) => simulate::run(arguments, &cli.common),
+        Subcommands::Validate(arguments) => validate::run(arguments, &cli.common),
+        Subcommands::Verify(arguments) => verify::run(arguments, &cli.common),
     }
 }

@@ -110,7 +110,7 @@ impl Sums {
 
     #[expect(
         clippy::arithmetic_side_effects,
-        reason = "a row and its parts are below the size of a table, see `shape`"
+        reason = "a row and its parts are below the size of a table, see `references`"
     )]
     pub(super) fn advance(
         &mut self,
@@ -280,7 +280,7 @@ impl Adder<'_> {
     #[expect(
         clippy::arithmetic_side_effects,
         clippy::cast_possible_truncation,
-        reason = "a row and its parts are below the size of a table, see `shape`"
+        reason = "a row and its parts are below the size of a table, see `references`"
     )]
     fn table(
         &mut self,

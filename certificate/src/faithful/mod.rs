@@ -6,7 +6,7 @@
 //! task may allow more than the files, and leave out what does not matter to it.
 //!
 //! All instances of all actions are gone through: `instances` enumerates them by joins over what never changes, `reader` and
-//! `meaning` say what each requires and does, case by case, and `compare` looks for the operator, `effects` at what it does.
+//! `action` say what each requires and does, case by case, and `compare` looks for the operator, `effects` at what it does.
 //! `translation` reads the task in terms of the files. A variable of the task stands for
 //! atoms of which at most one holds: that is true at first, and every instance keeps it so. An instance needs no operator if it
 //! changes nothing that the task knows, or if it can never be executed: its conditions contradict what never changes, each other,
@@ -19,6 +19,7 @@
 //!
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
 
+mod action;
 mod axioms;
 mod case;
 mod compare;
@@ -32,7 +33,6 @@ mod key;
 mod length;
 mod lengths;
 mod linear;
-mod meaning;
 mod reader;
 mod reads;
 mod timeline;
@@ -47,7 +47,7 @@ use num_traits::Zero;
 
 use crate::model::Model;
 use crate::model::TASK_FORMAT;
-use crate::shape;
+use crate::references;
 use axioms::Axioms;
 use case::Case;
 use compare::Comparison;
@@ -110,7 +110,7 @@ fn read(task: &str) -> Result<Model> {
     if model.format != TASK_FORMAT {
         return Err(form(format!("format `{}`, where `{TASK_FORMAT}` is expected", model.format)));
     }
-    shape::task(&model).map_err(form)?;
+    references::task(&model).map_err(form)?;
     Ok(model)
 }
 
@@ -168,14 +168,14 @@ impl<'f> Files<'f> {
         let mut reader = Reader::new(&self.world, invariant, axioms);
         let names = schema.parameters.iter().map(|parameter| &parameter.identifier.name);
         reader.binding = names.zip(instance.arguments.iter().copied()).collect();
-        Ok(meaning::cases(reader, &self.names.structure, schema)?)
+        Ok(action::cases(reader, &self.names.structure, schema)?)
     }
 
     fn witness(&self) -> Result<String> {
         let mut widening = Widening::new(&self.world);
         let untimed = self.world.timeline.is_empty();
         let plain: Vec<bool> = self.domain.actions.iter().map(|action| untimed && is_plain(action)).collect();
-        let waits = meaning::waits(&self.world.timeline, &self.names.structure)?;
+        let waits = action::waits(&self.world.timeline, &self.names.structure)?;
         // An instance that always does the same need not be looked at again.
         let mut open: Vec<&Instance> = self.instances.iter().collect();
         for _ in 0..ROUND_LIMIT {
@@ -215,7 +215,7 @@ impl<'f> Files<'f> {
         comparison.initial()?;
         comparison.goal()?;
         comparison.rules()?;
-        for case in meaning::waits(&self.world.timeline, &self.names.structure)? {
+        for case in action::waits(&self.world.timeline, &self.names.structure)? {
             invariant.admits(&self.world, &self.names.structure, &case)?;
             comparison.wait(&case)?;
         }

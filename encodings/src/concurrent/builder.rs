@@ -2,9 +2,9 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::concurrent::access::{Designs, Keys, prune};
 use crate::concurrent::footprint::{Footprint, Footprints};
 use crate::concurrent::happening::{Happening, Instance, Role};
-use crate::concurrent::keys::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::Unit;
 use crate::context::Context;

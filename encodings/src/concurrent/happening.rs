@@ -1,6 +1,6 @@
 //! Happenings and instances of durative actions.
 
-use crate::concurrent::keys::{Accesses, Designs};
+use crate::concurrent::access::{Accesses, Designs};
 use crate::number::Int;
 use crate::task::OperatorId;
 

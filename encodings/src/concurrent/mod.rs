@@ -6,13 +6,13 @@
 //! `split` makes two schemas of a durative action, `compile` finds what each happening waits for, and `search` goes
 //! through all sequences of happenings that matter, with what is left of their simple temporal network in `clocks`.
 
+mod access;
 mod builder;
 mod clocks;
 mod compile;
 mod estimate;
 mod footprint;
 mod happening;
-mod keys;
 mod links;
 mod measure;
 mod schedule;

@@ -14,11 +14,11 @@ use std::collections::hash_map::Entry;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
+use crate::concurrent::access::Accesses;
 use crate::concurrent::clocks::{self, Clocks, Kind};
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::estimate::Estimate;
 use crate::concurrent::happening::Role;
-use crate::concurrent::keys::Accesses;
 use crate::limits::Limits;
 use crate::number::{GROWTH_LIMIT, Int, dense, words};
 use crate::search::is_monotone;
