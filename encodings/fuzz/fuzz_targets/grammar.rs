@@ -6,9 +6,12 @@
 #[allow(dead_code, reason = "shared with a test and another target")]
 #[path = "../../tests/ground_semantics/generate.rs"]
 mod generate;
+#[path = "../../tests/ground_semantics/interfere.rs"]
+mod interfere;
 #[allow(dead_code, reason = "shared with a test and another target")]
 #[path = "../../tests/ground_semantics/interpret.rs"]
 mod interpret;
+#[allow(dead_code, reason = "shared with a test and another target")]
 #[path = "../../tests/ground_semantics/model.rs"]
 mod model;
 #[allow(dead_code, reason = "shared with a test and another target")]
