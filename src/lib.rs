@@ -12,6 +12,7 @@ pub use {encodings, ontology, rules};
 pub mod answers;
 pub mod certificate;
 pub mod comparison;
+pub mod configure;
 pub mod explain;
 pub mod journal;
 pub mod manifest;

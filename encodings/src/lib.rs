@@ -43,6 +43,7 @@ mod optimize;
 
 mod alternatives;
 mod concurrent;
+mod configuration;
 mod exact;
 mod replan;
 
@@ -54,6 +55,7 @@ mod tests;
 pub use self::certificate::{Certificate, Outputs as RefutationOutputs, certify, certify_exact, refute};
 pub use alternatives::{Alternatives, Forced, alternatives};
 pub use concurrent::{Concurrent, ground_concurrent, optimize_concurrent};
+pub use configuration::{Chosen, DesignChoice, configure};
 pub use encode::Semantics;
 pub use error::{Error, File, Place};
 pub use exact::{ExactTask, ground_exact, optimize_exact};

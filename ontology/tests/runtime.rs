@@ -57,13 +57,52 @@ t:hasQAvalue(?fg, ?m) ^ t:isQAtype(?m, ?q) ^ t:hasValue(?m, ?v) ^ t:typeFD(?fg, 
 "#;
 
 fn robot(mode: Mode) -> Runtime {
+    robot_with(mode, "")
+}
+
+fn robot_with(mode: Mode, further: &str) -> Runtime {
+    let rules_text = format!("{RULES}{further}");
     let ontology = read_text(ROBOT, "robot.ttl", &ReadOptions::default()).expect("well-formed");
     let mut symbols = Symbols::new();
     let mut lowered = lower(&ontology, &mut symbols);
-    let program = rules::parse_rules(RULES, "rules", &mut symbols, &rules::Prefixes::default());
+    let program = rules::parse_rules(&rules_text, "rules", &mut symbols, &rules::Prefixes::default());
     lowered.program.rules.extend(program.expect("rules").rules);
     Runtime::new(Engine::new(symbols, lowered.program, lowered.facts).expect("safe rules"), mode)
 }
+
+#[test]
+fn candidates_say_which_requirements_they_miss() {
+    for mode in [Mode::Retract, Mode::Latch] {
+        let mut runtime = robot(mode);
+        let requirements = vec![("air", decimal("9")), ("performance", decimal("0.5"))];
+        let objective = NewObjective { name: "o", function: "f_move", requirements, always_improve: false };
+        runtime.add_objective(&objective).expect("known");
+        // No rule speaks of requirements.
+        let missed = |runtime: &Runtime| {
+            let candidates = runtime.candidates("o", None).expect("known").into_iter();
+            let said = |missed: ontology::runtime::Missed| format!("{} {}", missed.attribute, missed.status);
+            candidates.map(|own| own.missed.into_iter().map(said).collect()).collect::<Vec<Vec<String>>>()
+        };
+        assert_eq!(missed(&runtime), [Vec::<String>::new(), vec![]]);
+        let mut runtime = robot_with(mode, LESS_IS_AN_ERROR);
+        runtime.add_objective(&objective).expect("known");
+        // Both are estimated to perform worse; what is compared with the surroundings is no requirement of this kind.
+        assert_eq!(missed(&runtime), [["performance IN_ERROR_FR"], ["performance IN_ERROR_FR"]]);
+        runtime.measure("performance", decimal("0.1")).expect("known");
+        // What was measured of a design before says nothing about the next one.
+        runtime.ground("o", "fd_fast").expect("known");
+        runtime.forget_performance("o").expect("known");
+        runtime.conclude().expect("no runaway");
+        assert!(!runtime.objectives()[0].is_in_error(), "{mode:?}");
+        runtime.measure("performance", decimal("0.1")).expect("known");
+        runtime.conclude().expect("no runaway");
+        assert!(runtime.objectives()[0].is_in_error(), "{mode:?}");
+    }
+}
+
+/// What is measured below a requirement is an error, as MROS's rules have it for energy.
+const LESS_IS_AN_ERROR: &str = r#"t:hasNFR(?o, ?n) ^ t:isQAtype(?n, ?q) ^ t:hasValue(?n, ?w) ^ t:solvesO(?fg, ?o) ^ t:hasQAvalue(?fg, ?m) ^ t:isQAtype(?m, ?q) ^ t:hasValue(?m, ?v) ^ swrlb:lessThan(?v, ?w) -> t:o_status(?o, "IN_ERROR_FR")
+"#;
 
 fn decimal(text: &str) -> Literal {
     Literal::parse(text, Some(vocab::xsd::DECIMAL), None)

@@ -7,6 +7,7 @@ mod compare;
 mod compare_so_far;
 mod compare_table;
 mod concurrent;
+mod configure;
 mod confirm;
 mod convert;
 mod explain;
@@ -59,6 +60,8 @@ enum Subcommands {
     Check(check::Arguments),
     /// Metaplan and probabilistic model checking side by side, on one co-adaptation mission.
     Compare(compare::Arguments),
+    /// A design for every function in need, as MROS chooses it, without a task plan.
+    Configure(configure::Arguments),
     /// A mission from the files of another tool.
     Import(import::Arguments),
     /// Why a design is available or not, why it is chosen or not, and what would change the answer.
@@ -110,6 +113,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Subcommands::Convert(arguments) => convert::run(arguments, &cli.common),
         Subcommands::Check(arguments) => check::run(arguments, &cli.common),
         Subcommands::Compare(arguments) => compare::run(arguments, &cli.common),
+        Subcommands::Configure(arguments) => configure::run(arguments, &cli.common),
         Subcommands::Import(arguments) => import::run(arguments, &cli.common),
         Subcommands::Explain(arguments) => explain::run(arguments, &cli.common),
         Subcommands::Export(arguments) => export::run(arguments, &cli.common),

@@ -8,7 +8,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use metaplan::answers::{HandledLine, NumberedAnswer, PlanningLine, ReadyLine};
+use metaplan::answers::{
+    HandledLine, KeeperReadyLine, NumberedAnswer, NumberedKeeperAnswer, PlanningLine, ReadyLine,
+};
+use metaplan::configure::Keeper;
 use metaplan::journal::{Journal, Policy, Sync};
 use metaplan::mapek::{Answer, Clock as _, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
 use metaplan::message::Message;
@@ -16,17 +19,23 @@ use metaplan::setup::Setup;
 use metaplan::visible::visible_json;
 
 use crate::cli::common::{Common, Exit, Failure};
+use crate::cli::configure::Wanted;
 use crate::cli::output;
-use crate::cli::situation::Situation;
+use crate::cli::situation::{Situation, consistent};
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission's manifest, or a PDDL domain and a PDDL problem.
-    #[arg(required = true, num_args = 1..=2, value_name = "MISSION | DOMAIN PROBLEM")]
+    /// A mission's manifest, or a PDDL domain and a PDDL problem; with `--configure`, knowledge bases.
+    #[arg(required = true, value_name = "MISSION | DOMAIN PROBLEM | KB")]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
+    /// Without a task plan: a design for every function in need, as `metaplan configure` chooses it.
+    #[arg(long, conflicts_with = "journal")]
+    configure: bool,
+    #[command(flatten)]
+    wanted: Wanted,
     /// Where events come from, one JSON object a line; `-` is standard input.
     #[arg(long, value_name = "FILE", default_value = "-")]
     events: PathBuf,
@@ -54,6 +63,13 @@ enum Fsync {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    if arguments.configure {
+        return keep(arguments, common);
+    }
+    if !arguments.wanted.is_empty() {
+        let text = "`--objective`, `--require`, `--budget`, `--exclusive`, `--most` and `--least` go with `--configure`";
+        return Err(Failure::usage(Message::error("M107", text)));
+    }
     let Setup { mission, settings, .. } = arguments.situation.setup(&arguments.inputs)?;
     output::warnings(common, mission.warnings());
     let name = mission.name.clone();
@@ -114,6 +130,39 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         }
     }
     Ok(Exit::Done)
+}
+
+/// The loop without a task plan.
+fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let knowledge = arguments.situation.knowledge(&arguments.inputs)?;
+    output::warnings(common, knowledge.warnings());
+    let configurator = arguments.wanted.configurator(knowledge)?;
+    consistent(Some(configurator.knowledge()))?;
+    let objectives = configurator.objectives().into_iter().map(|own| own.individual.name).collect();
+    let mut keeper = Keeper::new(configurator, None);
+    let mut events = Lines::open(&arguments.events)?;
+    let mut line = 0;
+    let mut text = output::line(&KeeperReadyLine::new(objectives));
+    let mut read = Instant::now();
+    let mut answers = keeper.start();
+    loop {
+        for answer in &answers {
+            text += &output::line(&NumberedKeeperAnswer::new(answer, line));
+        }
+        text += &output::line(&HandledLine::new(line, read.elapsed().as_micros()));
+        let mut stdout = io::stdout();
+        match stdout.write_all(visible_json(&text).as_bytes()).and_then(|()| stdout.flush()) {
+            // Who does not read any more has had enough.
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Done),
+            other => other
+                .map_err(|error| Message::error("M109", format!("the answer cannot be written: {error}")))?,
+        }
+        let Some(next) = events.next()? else { return Ok(Exit::Done) };
+        read = Instant::now();
+        line += 1;
+        text.clear();
+        answers = keeper.handle(&Observation::parse(&next));
+    }
 }
 
 fn unwritten(error: &io::Error) -> Message {

@@ -11,6 +11,7 @@ use metaplan::setup::Setup;
 use ontology::ReadOptions;
 
 use crate::cli::common::{Exit, Failure};
+use crate::cli::configure;
 use crate::cli::values::{existing_directory, setting};
 
 /// A mission, or a domain and a problem, and the situation to plan for.
@@ -70,6 +71,15 @@ impl Situation {
     ) -> Self {
         let imports = Imports { catalog: Vec::new(), directory: Vec::new(), ignore_missing_imports: false };
         Self { knowledge: Vec::new(), rules: Vec::new(), imports, scenario, set, fail }
+    }
+
+    /// The knowledge of documents in this situation, without a mission.
+    pub(super) fn knowledge(&self, documents: &[PathBuf]) -> Result<Knowledge, Failure> {
+        if !self.knowledge.is_empty() || self.scenario.is_some() {
+            let text = "with `--configure` the knowledge bases are the arguments, and there is neither `--kb` nor `--scenario`";
+            return Err(Failure::usage(Message::error("M107", text)));
+        }
+        configure::knowledge(documents, &self.rules, &self.imports, &self.fail, &self.set)
     }
 
     /// The mission in this situation, from one input (a manifest) or two (domain and problem).

@@ -19,6 +19,14 @@ pub(super) fn setting(text: &str) -> Result<(String, String), String> {
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
+/// A name with an exact decimal number.
+pub(super) fn amount(text: &str) -> Result<(String, BigRational), String> {
+    let (name, value) = setting(text)?;
+    let wrong = || format!("`{value}` is not a decimal number");
+    let number = serde_json::from_str::<Value>(&value).map_err(|_| wrong())?;
+    Ok((name, decimal(&number).ok_or_else(wrong)?))
+}
+
 pub(super) fn time(text: &str) -> Result<BigRational, String> {
     let value = text.parse::<serde_json::Number>().ok().and_then(|number| decimal(&Value::Number(number)));
     value

@@ -21,7 +21,7 @@ pub(super) struct Findings {
 }
 
 /// The designs that are available, by local name; none where it is not known what follows.
-pub(super) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
+pub(crate) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
     if knowledge.fault().is_some() {
         return BTreeSet::new();
     }
@@ -140,7 +140,8 @@ pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
     because
 }
 
-fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
+/// The rules and stated facts by which an objective has its status.
+pub(crate) fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
     let derivations = knowledge.runtime().why(objective).unwrap_or_default();
     derivations.iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }

@@ -100,6 +100,31 @@ pub enum Event {
         /// The number of the effect.
         effect: u64,
     },
+    /// An effect could not be carried out.
+    #[serde(rename = "reconfiguration_failed")]
+    ReconfigurationFailed {
+        /// The number of the effect.
+        effect: u64,
+    },
+    /// A function is needed from now on.
+    #[serde(rename = "objective_added")]
+    ObjectiveAdded {
+        /// The objective's name.
+        objective: String,
+        /// The function, by local name or IRI.
+        function: String,
+        /// Attribute types, by local name or IRI, and bounds in their units.
+        #[serde(serialize_with = "as_numbers", skip_serializing_if = "Vec::is_empty")]
+        requirements: Vec<(String, BigRational)>,
+        /// Whether to look for a better design also while all is well.
+        always_improve: bool,
+    },
+    /// An objective is given up.
+    #[serde(rename = "objective_removed")]
+    ObjectiveRemoved {
+        /// Its name.
+        objective: String,
+    },
     /// Time passes.
     #[serde(rename = "tick")]
     Tick,
@@ -243,6 +268,12 @@ fn fraction(value: &Value) -> Option<BigRational> {
     Some((fraction * &percent).round() / percent)
 }
 
+/// Names with exact numbers.
+fn numbers(value: &Value) -> Option<Vec<(String, BigRational)>> {
+    let fields = value.as_object()?.iter();
+    fields.map(|(name, value)| Some((name.clone(), number::from_json(value)?))).collect()
+}
+
 /// The value of a fact: a word, a number or a truth value.
 fn word(value: &Value) -> Option<String> {
     match value {
@@ -283,6 +314,25 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
         "acknowledged" => {
             Event::Acknowledged { effect: need(fields, "effect", "the number of an effect", Value::as_u64)? }
         }
+        "reconfiguration_failed" => Event::ReconfigurationFailed {
+            effect: need(fields, "effect", "the number of an effect", Value::as_u64)?,
+        },
+        "objective_added" => Event::ObjectiveAdded {
+            objective: need(fields, "objective", "a name", text)?,
+            function: need(fields, "function", "the name of a function", text)?,
+            requirements: take(
+                fields,
+                "requirements",
+                "an object of attributes and decimal numbers",
+                numbers,
+            )?
+            .unwrap_or_default(),
+            always_improve: take(fields, "always_improve", "true or false", Value::as_bool)?
+                .unwrap_or_default(),
+        },
+        "objective_removed" => Event::ObjectiveRemoved {
+            objective: need(fields, "objective", "the name of an objective", text)?,
+        },
         "tick" => Event::Tick,
         other => {
             let meant = did_you_mean(other, KINDS);
@@ -296,7 +346,7 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
     }
 }
 
-const KINDS: [&str; 11] = [
+const KINDS: [&str; 14] = [
     "measured",
     "component_status",
     "action_started",
@@ -307,6 +357,9 @@ const KINDS: [&str; 11] = [
     "goal_changed",
     "fact_changed",
     "acknowledged",
+    "reconfiguration_failed",
+    "objective_added",
+    "objective_removed",
     "tick",
 ];
 
@@ -373,6 +426,10 @@ fn as_number<S: Serializer>(value: &BigRational, serializer: S) -> Result<S::Ok,
     number::to_json(value).serialize(serializer)
 }
 
+fn as_numbers<S: Serializer>(values: &[(String, BigRational)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(values.iter().map(|(name, value)| (name, number::to_json(value))))
+}
+
 /// A status in the spelling of MROS.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn as_word<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
@@ -388,6 +445,11 @@ impl Event {
     pub fn to_json(&self) -> Value {
         // Texts and numbers are always data.
         serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// Its kind, as the format names it.
+    pub(crate) fn kind(&self) -> String {
+        self.to_json().get("event").and_then(Value::as_str).unwrap_or_default().to_owned()
     }
 }
 

@@ -153,6 +153,13 @@ impl Taking<'_> {
                 None if *effect >= 1 && *effect <= self.beliefs.effects => Ok(()),
                 None => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
             },
+            Event::ReconfigurationFailed { .. }
+            | Event::ObjectiveAdded { .. }
+            | Event::ObjectiveRemoved { .. } => {
+                let text =
+                    format!("`{}` goes with `run --configure`; here the plan needs functions", event.kind());
+                Err(Refusal::new("M306", text))
+            }
             Event::Tick => Ok(()),
         }
     }

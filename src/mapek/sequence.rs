@@ -20,7 +20,7 @@ const FIRST: u64 = 1 << 62;
 
 /// What a number is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(crate) enum Place {
     /// It was not seen.
     New,
     /// It was seen.
@@ -33,7 +33,7 @@ pub(super) enum Place {
 
 /// The numbers that were seen.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Numbers {
+pub(crate) struct Numbers {
     /// The first number of a range to its last.
     ranges: BTreeMap<u64, u64>,
     /// Up to here ranges were forgotten.
@@ -42,7 +42,7 @@ pub(super) struct Numbers {
 
 impl Numbers {
     /// What a number is.
-    pub(super) fn place(&self, number: u64) -> Place {
+    pub(crate) fn place(&self, number: u64) -> Place {
         let range = self.ranges.range(..=number).next_back();
         if range.is_some_and(|(_, &last)| number <= last) {
             return Place::Seen;
@@ -56,7 +56,7 @@ impl Numbers {
     }
 
     /// Notes a number that is new.
-    pub(super) fn insert(&mut self, number: u64) {
+    pub(crate) fn insert(&mut self, number: u64) {
         let last = number.checked_add(1).and_then(|next| self.ranges.remove(&next)).unwrap_or(number);
         let before = self.ranges.range_mut(..number).next_back();
         match before.filter(|(_, end)| **end + 1 == number) {
@@ -73,17 +73,17 @@ impl Numbers {
     }
 
     /// The greatest number that was seen.
-    pub(super) fn greatest(&self) -> Option<u64> {
+    pub(crate) fn greatest(&self) -> Option<u64> {
         self.ranges.last_key_value().map(|(_, last)| *last)
     }
 
     /// For a snapshot.
-    pub(super) fn to_record(&self) -> Value {
+    pub(crate) fn to_record(&self) -> Value {
         json!([self.mark, self.ranges.iter().collect::<Vec<_>>()])
     }
 
     /// The inverse of [`Numbers::to_record`].
-    pub(super) fn from_record(record: &Value) -> Option<Self> {
+    pub(crate) fn from_record(record: &Value) -> Option<Self> {
         let range = |pair: &Value| Some((pair.get(0)?.as_u64()?, pair.get(1)?.as_u64()?));
         let ranges = record.get(1)?.as_array()?.iter().map(range).collect::<Option<_>>()?;
         Some(Self { ranges, mark: record.get(0)?.as_u64() })

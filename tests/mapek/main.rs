@@ -1,6 +1,7 @@
 //! The adaptation loop as a library: the paper's experiments event by event, the journal under crashes, random events.
 
 mod common;
+mod configure;
 mod damage;
 mod experiments;
 mod failures;

@@ -10,11 +10,13 @@
 //!
 //! - \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
+mod candidates;
 mod knowledge;
 mod objective;
 mod select;
 mod state;
 
+pub use candidates::{Candidate, Missed};
 pub use knowledge::{Mode, Runtime};
 pub use objective::NewObjective;
 pub use select::{Rejection, Selection};

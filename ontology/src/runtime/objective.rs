@@ -149,6 +149,43 @@ impl Runtime {
         self.apply(Delta { insert: Vec::new(), delete })
     }
 
+    /// What was measured of the design before does not count for the one that an objective is grounded with now, until it is measured
+    /// again. Measurements of the surroundings count: those of attribute types with a `qa_comparison_operator`.
+    ///
+    /// # Errors
+    /// [`Error::Unknown`], [`Error::Engine`].
+    pub fn forget_performance(&mut self, objective: &str) -> Result<Delta, Error> {
+        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
+        let facts = self.all();
+        let is_of_surroundings = |&holder: &Symbol| {
+            let mut kinds = facts.objects(holder, terms::IS_TYPE).into_iter();
+            kinds.any(|kind| !facts.texts(kind, terms::OPERATOR).is_empty())
+        };
+        let groundings = facts.subjects(objective, terms::SOLVES_O).into_iter();
+        let links = groundings.flat_map(|grounding| self.statements(grounding, terms::HAS_QA_VALUE));
+        let is_stale = |fact: &Fact| fact.arguments.get(1).is_some_and(|holder| !is_of_surroundings(holder));
+        let delete = links.filter(is_stale).collect();
+        self.apply(Delta { insert: Vec::new(), delete })
+    }
+
+    /// States which designs have failed an objective, so that this is known when its status is forgotten. MROS keeps that for ever;
+    /// here it goes with the objective.
+    ///
+    /// # Errors
+    /// [`Error::Unknown`], [`Error::Engine`].
+    pub fn log_failures(&mut self, objective: &str) -> Result<Delta, Error> {
+        let (objective, _) = self.all().find("objective", terms::OBJECTIVE, objective)?;
+        let facts = self.all();
+        let symbols = self.engine.symbols();
+        let predicates = terms::ERROR_LOG.iter().filter_map(|name| symbols.find_name(name));
+        let rows = predicates.flat_map(|predicate| {
+            let designs = facts.subjects(objective, terms::ERROR_LOG).into_iter();
+            designs.map(move |design| Fact::new(predicate, [design, objective]))
+        });
+        let insert = rows.filter(|fact| self.engine.holds(fact)).collect();
+        self.apply(Delta { insert, delete: Vec::new() })
+    }
+
     /// The statements that components have recovered.
     fn recoveries(&self) -> Vec<Fact> {
         let facts = self.facts();
@@ -190,7 +227,7 @@ impl Runtime {
         if taken { format!("{name}_{owner}") } else { name }
     }
 
-    fn fact<const N: usize>(&mut self, predicate: &str, arguments: [Symbol; N]) -> Fact {
+    pub(super) fn fact<const N: usize>(&mut self, predicate: &str, arguments: [Symbol; N]) -> Fact {
         Fact::new(self.engine.symbols_mut().name(predicate), arguments)
     }
 }

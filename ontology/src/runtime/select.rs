@@ -91,7 +91,7 @@ impl Runtime {
     }
 
     /// The designs that solve any of the functions, sorted by IRI.
-    fn designs_of(&self, facts: Facts, functions: &[Symbol]) -> Vec<Symbol> {
+    pub(super) fn designs_of(&self, facts: Facts, functions: &[Symbol]) -> Vec<Symbol> {
         let mut designs: Vec<Symbol> =
             functions.iter().flat_map(|&function| facts.subjects(function, terms::SOLVES_F)).collect();
         designs.sort_by_key(|&design| self.engine.symbols().value(design).as_name());
@@ -104,7 +104,7 @@ fn is_available(facts: Facts, design: Symbol) -> bool {
     !facts.is_false(design, terms::REALISABILITY) && !facts.is_false(design, terms::AVAILABLE)
 }
 
-fn rejections(facts: Facts, design: Symbol, objective: Symbol) -> Vec<Rejection> {
+pub(super) fn rejections(facts: Facts, design: Symbol, objective: Symbol) -> Vec<Rejection> {
     let mut rejections = Vec::new();
     if !is_available(facts, design) {
         rejections.push(Rejection::Unavailable);
@@ -135,7 +135,7 @@ fn violation(facts: Facts, estimation: Symbol) -> Option<Rejection> {
     violates.then_some(Rejection::Violates { attribute, measured, operator, estimation })
 }
 
-fn utility(facts: Facts, design: Symbol) -> BigRational {
+pub(super) fn utility(facts: Facts, design: Symbol) -> BigRational {
     let concluded = facts.number(design, terms::CONCLUDED_UTILITY);
     let is_performance = |&value: &Symbol| {
         let kinds = facts.objects(value, terms::IS_TYPE).into_iter();

@@ -1,0 +1,222 @@
+//! `metaplan configure`, and what `metaplan run --configure` shares with it.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use metaplan::answers::ConfigureAnswer;
+use metaplan::configure::{Choice, Configuration, Configurator, Goal, Verdict, Wishes, Worth};
+use metaplan::knowledge::{Knowledge, Sources};
+use metaplan::message::Message;
+use num_rational::BigRational;
+
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::limits::Guard;
+use crate::cli::output;
+use crate::cli::situation::{Imports, consistent};
+use crate::cli::values::{amount, seconds, setting};
+
+/// Arguments of `configure`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Knowledge bases (OWL in RDF/XML, Turtle, N-Triples, OWL/XML or functional syntax).
+    #[arg(required = true, value_name = "KB")]
+    documents: Vec<PathBuf>,
+    /// Further rules: a file, `coadaptation` or `tomasys` (repeatable).
+    #[arg(long = "rules", value_name = "FILE")]
+    rules: Vec<String>,
+    #[command(flatten)]
+    imports: Imports,
+    /// A measured attribute and its value (repeatable).
+    #[arg(long = "set", value_name = "ATTRIBUTE=VALUE", value_parser = setting)]
+    set: Vec<(String, String)>,
+    /// A component that has failed (repeatable).
+    #[arg(long, value_name = "COMPONENT")]
+    fail: Vec<String>,
+    /// Stop after that many seconds with the best choice so far.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    time_limit: Option<Duration>,
+    #[command(flatten)]
+    wanted: Wanted,
+}
+
+/// What is to be served, and what that is worth.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct Wanted {
+    /// A function that is needed (repeatable; default: the objectives of the knowledge base, or else all its functions).
+    #[arg(long = "objective", value_name = "FUNCTION")]
+    objectives: Vec<String>,
+    /// A bound that the design for a function has to keep, as an objective's requirement (repeatable).
+    #[arg(long = "require", value_name = "FUNCTION.ATTRIBUTE=BOUND", value_parser = requirement)]
+    requirements: Vec<(String, String, BigRational)>,
+    /// What the estimations of all chosen designs may come to in sum (repeatable).
+    #[arg(long = "budget", value_name = "ATTRIBUTE=MOST", value_parser = amount)]
+    budgets: Vec<(String, BigRational)>,
+    /// A component that only one design can use at a time (repeatable).
+    #[arg(long = "exclusive", value_name = "COMPONENT")]
+    exclusive: Vec<String>,
+    /// The attribute of which designs are to have much, in place of MROS's utility.
+    #[arg(long, value_name = "ATTRIBUTE", conflicts_with = "least")]
+    most: Option<String>,
+    /// The attribute of which designs are to have little, in place of MROS's utility.
+    #[arg(long, value_name = "ATTRIBUTE")]
+    least: Option<String>,
+}
+
+fn requirement(text: &str) -> Result<(String, String, BigRational), String> {
+    let wrong = || format!("`{text}` is not of the form FUNCTION.ATTRIBUTE=BOUND");
+    let (name, bound) = amount(text).map_err(|_| wrong())?;
+    let (function, attribute) = name.split_once('.').ok_or_else(wrong)?;
+    Ok((function.to_owned(), attribute.to_owned(), bound))
+}
+
+impl Wanted {
+    /// Whether anything is said.
+    pub(super) fn is_empty(&self) -> bool {
+        self.objectives.is_empty()
+            && self.requirements.is_empty()
+            && self.budgets.is_empty()
+            && self.exclusive.is_empty()
+            && self.most.is_none()
+            && self.least.is_none()
+    }
+
+    /// What serves it, from a knowledge base.
+    ///
+    /// # Errors
+    /// All names that are not in the knowledge base.
+    pub(super) fn configurator(&self, knowledge: Knowledge) -> Result<Configurator, Failure> {
+        let worth = match (&self.most, &self.least) {
+            (Some(attribute), _) => Worth::Most(attribute.clone()),
+            (_, Some(attribute)) => Worth::Least(attribute.clone()),
+            _ => Worth::Mros,
+        };
+        let exclusive = self.exclusive.iter().cloned().collect();
+        let wishes = Wishes { worth, budgets: self.budgets.clone(), exclusive };
+        let usage = |messages| Failure { exit: Exit::Usage, messages };
+        let mut configurator = Configurator::new(knowledge, wishes).map_err(usage)?;
+        let functions = if self.objectives.is_empty() && configurator.objectives().is_empty() {
+            configurator.functions()
+        } else {
+            self.objectives.clone()
+        };
+        let mut wrong = Vec::new();
+        for (function, ..) in &self.requirements {
+            if !functions.contains(function) {
+                let text = format!(
+                    "`--require {function}.…` is about no objective; there are: {}",
+                    functions.join(", ")
+                );
+                wrong.push(Message::error("M107", text));
+            }
+        }
+        for function in &functions {
+            let own = self.requirements.iter().filter(|(of, ..)| of == function);
+            let requirements = own.map(|(_, attribute, bound)| (attribute.clone(), bound.clone())).collect();
+            wrong.extend(configurator.pursue(&Goal { requirements, ..Goal::of(function) }).err());
+        }
+        if wrong.is_empty() { Ok(configurator) } else { Err(usage(wrong)) }
+    }
+}
+
+/// Reads a knowledge base and reports what is the case.
+pub(super) fn knowledge(
+    documents: &[PathBuf],
+    rules: &[String],
+    imports: &Imports,
+    fail: &[String],
+    set: &[(String, String)],
+) -> Result<Knowledge, Failure> {
+    let (documents, rules) = (documents.to_vec(), rules.to_vec());
+    let sources = Sources { documents, rules, options: imports.options(), ..Sources::default() };
+    let mut knowledge = Knowledge::read(&sources)?;
+    let mut wrong: Vec<Message> =
+        fail.iter().filter_map(|component| knowledge.fail(component).err()).collect();
+    wrong.extend(set.iter().filter_map(|(attribute, value)| knowledge.measure(attribute, value).err()));
+    if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong }) }
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let Arguments { documents, rules, imports, set, fail, time_limit, wanted } = arguments;
+    let guard = Guard::new(*time_limit, None, common)?;
+    let knowledge = knowledge(documents, rules, imports, fail, set)?;
+    output::warnings(common, knowledge.warnings());
+    let configurator = wanted.configurator(knowledge)?;
+    consistent(Some(configurator.knowledge()))?;
+    let configuration = configurator.choose(&guard.plan())?;
+    match common.format {
+        Format::Json => {
+            output::json_answer(&ConfigureAnswer::new(&configuration, configurator.knowledge().warnings()));
+        }
+        _ => output::answer(&text(&configuration, configurator.wishes())),
+    }
+    let is_served = configuration.choices.iter().all(|choice| choice.design.is_some());
+    Ok(match (is_served, configuration.optimal) {
+        (_, false) => Exit::NotProved,
+        (true, true) => Exit::Done,
+        (false, true) => Exit::Unsolvable,
+    })
+}
+
+fn text(configuration: &Configuration, wishes: &Wishes) -> String {
+    let mut text = String::new();
+    if configuration.choices.is_empty() {
+        return "no function is in need\n".to_owned();
+    }
+    let rows = configuration.choices.iter().map(|choice| {
+        let function = choice.function.clone().unwrap_or_default();
+        let chosen = choice.considered.iter().find(|own| own.verdict == Verdict::Chosen);
+        let utility = chosen.map(|own| output::decimal(&own.utility)).unwrap_or_default();
+        let design = choice.design.clone().unwrap_or_else(|| "none can be used".to_owned());
+        vec![choice.objective.clone(), function, design, utility, choice.need.join(", ")]
+    });
+    text += &output::table(&["objective", "function", "design", "utility", "in need, since"], rows);
+    let worth = match &wishes.worth {
+        Worth::Mros => {
+            "as MROS has it: concluded, or else the estimated `performance`, or else 0.001".to_owned()
+        }
+        Worth::Most(attribute) => format!("the estimated {attribute}; more is better"),
+        Worth::Least(attribute) => format!("the estimated {attribute}, negated; less is better"),
+    };
+    let proved = if configuration.optimal {
+        "proved: no choice is better"
+    } else {
+        "not proved: a limit was reached; a better choice may exist"
+    };
+    let _ =
+        writeln!(text, "\nutility: {worth}\nin sum {}; {proved}", output::decimal(&configuration.utility));
+    for choice in &configuration.choices {
+        text += &reasons(choice);
+    }
+    text
+}
+
+/// Why designs were not chosen that would be better, or cannot be used; and what the chosen one misses.
+fn reasons(choice: &Choice) -> String {
+    let mut text = String::new();
+    for considered in &choice.considered {
+        let said: Vec<&str> = match &considered.verdict {
+            Verdict::Chosen => {
+                for missed in &considered.missed {
+                    let _ = writeln!(
+                        text,
+                        "\n{} misses a requirement of {}:\n    {missed}",
+                        considered.design, choice.objective
+                    );
+                }
+                continue;
+            }
+            Verdict::Less => continue,
+            Verdict::RuledOut(reasons) => reasons.iter().map(String::as_str).collect(),
+            Verdict::Together(reason) => vec![reason],
+        };
+        let utility = output::decimal(&considered.utility);
+        let _ = writeln!(text, "\nnot {} ({utility}) for {}:", considered.design, choice.objective);
+        for reason in said {
+            let _ = writeln!(text, "    {reason}");
+        }
+    }
+    text
+}
