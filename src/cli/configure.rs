@@ -7,14 +7,14 @@ use std::time::Duration;
 use clap::Args;
 use metaplan::answers::ConfigureAnswer;
 use metaplan::configure::{Choice, Configuration, Configurator, Goal, Verdict, Wishes, Worth};
-use metaplan::knowledge::{Knowledge, Sources};
+use metaplan::knowledge::Knowledge;
 use metaplan::message::Message;
 use num_rational::BigRational;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::Guard;
 use crate::cli::output;
-use crate::cli::situation::{Imports, consistent};
+use crate::cli::situation::{Imports, consistent, knowledge};
 use crate::cli::values::{amount, seconds, setting};
 
 /// Arguments of `configure`.
@@ -94,14 +94,16 @@ impl Wanted {
         };
         let exclusive = self.exclusive.iter().cloned().collect();
         let wishes = Wishes { worth, budgets: self.budgets.clone(), exclusive };
-        let usage = |messages| Failure { exit: Exit::Usage, messages };
-        let mut configurator = Configurator::new(knowledge, wishes).map_err(usage)?;
+        let (mut configurator, mut wrong) = match Configurator::new(knowledge.clone(), wishes) {
+            Ok(configurator) => (configurator, Vec::new()),
+            // What else is wrong is told, too.
+            Err(wrong) => (Configurator::new(knowledge, Wishes::default())?, wrong),
+        };
         let functions = if self.objectives.is_empty() && configurator.objectives().is_empty() {
             configurator.functions()
         } else {
             self.objectives.clone()
         };
-        let mut wrong = Vec::new();
         for (function, ..) in &self.requirements {
             if !functions.contains(function) {
                 let text = format!(
@@ -116,25 +118,8 @@ impl Wanted {
             let requirements = own.map(|(_, attribute, bound)| (attribute.clone(), bound.clone())).collect();
             wrong.extend(configurator.pursue(&Goal { requirements, ..Goal::of(function) }).err());
         }
-        if wrong.is_empty() { Ok(configurator) } else { Err(usage(wrong)) }
+        if wrong.is_empty() { Ok(configurator) } else { Err(Failure { exit: Exit::Usage, messages: wrong }) }
     }
-}
-
-/// Reads a knowledge base and reports what is the case.
-pub(super) fn knowledge(
-    documents: &[PathBuf],
-    rules: &[String],
-    imports: &Imports,
-    fail: &[String],
-    set: &[(String, String)],
-) -> Result<Knowledge, Failure> {
-    let (documents, rules) = (documents.to_vec(), rules.to_vec());
-    let sources = Sources { documents, rules, options: imports.options(), ..Sources::default() };
-    let mut knowledge = Knowledge::read(&sources)?;
-    let mut wrong: Vec<Message> =
-        fail.iter().filter_map(|component| knowledge.fail(component).err()).collect();
-    wrong.extend(set.iter().filter_map(|(attribute, value)| knowledge.measure(attribute, value).err()));
-    if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong }) }
 }
 
 /// Runs the command.

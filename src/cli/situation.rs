@@ -11,7 +11,6 @@ use metaplan::setup::Setup;
 use ontology::ReadOptions;
 
 use crate::cli::common::{Exit, Failure};
-use crate::cli::configure;
 use crate::cli::values::{existing_directory, setting};
 
 /// A mission, or a domain and a problem, and the situation to plan for.
@@ -79,7 +78,7 @@ impl Situation {
             let text = "with `--configure` the knowledge bases are the arguments, and there is neither `--kb` nor `--scenario`";
             return Err(Failure::usage(Message::error("M107", text)));
         }
-        configure::knowledge(documents, &self.rules, &self.imports, &self.fail, &self.set)
+        knowledge(documents, &self.rules, &self.imports, &self.fail, &self.set)
     }
 
     /// The mission in this situation, from one input (a manifest) or two (domain and problem).
@@ -156,6 +155,23 @@ impl Situation {
         mission.note_doubts();
         Ok(setup)
     }
+}
+
+/// Reads a knowledge base and reports what is the case.
+pub(super) fn knowledge(
+    documents: &[PathBuf],
+    rules: &[String],
+    imports: &Imports,
+    fail: &[String],
+    set: &[(String, String)],
+) -> Result<Knowledge, Failure> {
+    let (documents, rules) = (documents.to_vec(), rules.to_vec());
+    let sources = Sources { documents, rules, options: imports.options(), ..Sources::default() };
+    let mut knowledge = Knowledge::read(&sources)?;
+    let mut wrong: Vec<Message> =
+        fail.iter().filter_map(|component| knowledge.fail(component).err()).collect();
+    wrong.extend(set.iter().filter_map(|(attribute, value)| knowledge.measure(attribute, value).err()));
+    if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong }) }
 }
 
 /// Nothing is planned on knowledge that contradicts itself.

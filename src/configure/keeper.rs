@@ -74,8 +74,8 @@ pub enum KeeperAnswer {
     Stale {
         /// Its number.
         seq: u64,
-        /// Numbers up to this one are too old.
-        mark: u64,
+        /// Up to which number lines are too old, in a sentence.
+        because: String,
     },
     /// The line, or a part of it, has changed nothing.
     #[serde(rename = "error")]
@@ -166,7 +166,12 @@ impl Keeper {
         match self.numbers.place(seq) {
             Place::New => None,
             Place::Seen => Some(KeeperAnswer::Duplicate { seq }),
-            Place::Stale(mark) => Some(KeeperAnswer::Stale { seq, mark }),
+            Place::Stale(mark) => {
+                let because = format!(
+                    "too many numbers are missing: of those up to {mark} it is not known any more which were seen"
+                );
+                Some(KeeperAnswer::Stale { seq, because })
+            }
             Place::Ahead(most) => {
                 let message =
                     format!("the number {seq} is too far ahead; the greatest that can be is {most}");

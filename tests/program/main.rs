@@ -7,6 +7,7 @@ mod cli;
 mod client;
 mod common;
 mod concurrent;
+mod configure;
 mod doubts;
 mod explain;
 mod export;

@@ -1,0 +1,117 @@
+//! `metaplan configure` and `metaplan run --configure`: what README shows, SUAVE's knowledge base, and what is refused.
+
+#![allow(clippy::print_stdout)] // a skipped test says so
+
+use crate::common::{metaplan, metaplan_in, root};
+
+#[test]
+fn the_readme_shows_a_choice() {
+    let readme = std::fs::read_to_string(root().join("README.md")).expect("the README");
+    let mut shown = 0;
+    for block in readme.split("```console\n$ metaplan configure ").skip(1) {
+        let (arguments, answer) = block.split_once('\n').expect("an answer");
+        let arguments: Vec<&str> = std::iter::once("configure").chain(arguments.split(' ')).collect();
+        let outcome = metaplan(&arguments);
+        assert_eq!(outcome.stdout.trim_end(), answer.split("```").next().expect("an end").trim_end());
+        shown += 1;
+    }
+    assert!(shown > 0, "README shows none");
+}
+
+#[test]
+fn suave_is_configured() {
+    let shared = root().join("../shared/real/owl");
+    let (directory, file) =
+        (shared.display().to_string(), shared.join("suave/suave.owl").display().to_string());
+    if !shared.exists() {
+        println!("skipped: SUAVE's knowledge base is not there");
+        return;
+    }
+    let choose = |further: &[&str]| {
+        let arguments =
+            [&["configure", &file, "--directory", &directory, "--format", "json"], further].concat();
+        let outcome = metaplan(&arguments);
+        let answer = outcome.json();
+        let choices = answer["choices"].as_array().expect("choices");
+        let designs = choices.iter().map(|choice| choice["design"].as_str().unwrap_or("none").to_owned());
+        (outcome.status, designs.collect::<Vec<_>>())
+    };
+    assert_eq!(choose(&[]), (0, vec_of(["fd_follow_pipeline", "fd_spiral_high", "fd_all_thrusters"])));
+    assert_eq!(
+        choose(&["--set", "water_visibility=1.5", "--fail", "c_thruster_1"]),
+        (0, vec_of(["fd_follow_pipeline", "fd_spiral_low", "fd_recover_thrusters"]))
+    );
+    let path = ["--objective", "f_generate_search_path"];
+    assert_eq!(choose(&[&path[..], &["--set", "water_visibility=0.5"]].concat()), (10, vec_of(["none"])));
+    assert_eq!(choose(&path), (0, vec_of(["fd_spiral_high"])));
+}
+
+fn vec_of<const N: usize>(names: [&str; N]) -> Vec<String> {
+    names.map(ToOwned::to_owned).to_vec()
+}
+
+#[test]
+fn all_wrong_names_are_told() {
+    let base = ["configure", "ontology/kb/ugv.ttl", "--rules", "coadaptation"];
+    let wrong = [
+        &base[..],
+        &["--objective", "f_localisation", "--exclusive", "c_kinekt", "--budget", "energi=3"],
+        &["--require", "f_move.safety=0.5"],
+    ]
+    .concat();
+    let outcome = metaplan(&wrong);
+    assert_eq!(outcome.status, 2);
+    for part in ["c_kinect", "`energi`", "f_localization", "`--require f_move"] {
+        assert!(outcome.stderr.contains(part), "{part}: {}", outcome.stderr);
+    }
+    for (further, part) in [
+        (&["--budget", "safety"][..], "NAME=VALUE"),
+        (&["--budget", "safety=many"], "decimal number"),
+        (&["--require", "safety=1"], "FUNCTION.ATTRIBUTE=BOUND"),
+        (&["--most", "safety", "--least", "safety"], "cannot be used with"),
+        (&["--set", "safety=x"], "no decimal number"),
+        (&["--fail", "c_none"], "c_none"),
+    ] {
+        let outcome = metaplan(&[&base[..], further].concat());
+        assert_eq!(outcome.status, 2, "{further:?}: {}", outcome.stderr);
+        assert!(outcome.stderr.contains(part), "{further:?}: {}", outcome.stderr);
+    }
+    for arguments in [
+        &["run", "missions/ugv.toml", "--budget", "safety=1"][..],
+        &["run", "--configure", "ontology/kb/ugv.ttl", "--scenario", "x"],
+        &["run", "--configure", "ontology/kb/ugv.ttl", "--journal", "x"],
+    ] {
+        assert_eq!(metaplan(arguments).status, 2, "{arguments:?}");
+    }
+}
+
+#[test]
+fn the_loop_reconfigures() {
+    let arguments =
+        ["run", "--configure", "ontology/kb/ugv.ttl", "--rules", "coadaptation", "--most", "safety"];
+    let events = "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\nx\n";
+    let outcome = metaplan_in(&root(), &arguments, events);
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+    let lines =
+        outcome.stdout.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).expect("JSON"));
+    let said: Vec<(String, Option<String>)> = lines
+        .map(|line| {
+            (line["answer"].as_str().expect("a kind").to_owned(), line["to"].as_str().map(ToOwned::to_owned))
+        })
+        .collect();
+    let kinds: Vec<&str> = said.iter().map(|(kind, _)| kind.as_str()).collect();
+    let expected = [
+        "ready",
+        "reconfigure",
+        "handled",
+        "inferred",
+        "reconfigure",
+        "inferred",
+        "handled",
+        "error",
+        "handled",
+    ];
+    assert_eq!(kinds, expected);
+    assert_eq!(said[1].1.as_deref(), Some("fd_amcl_kinect"));
+    assert_eq!(said[4].1.as_deref(), Some("fd_aruco"));
+}
