@@ -19,15 +19,12 @@ pub struct ManifestPath {
 /// Reads a manifest; `-` is standard input, and paths are relative to the current directory then.
 ///
 /// # Errors
-/// The file cannot be read, is no manifest, or has other sections or keys.
-pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Message> {
-    let source = source(file)?;
+/// The file cannot be read, is no manifest, or has other sections or keys: all that is wrong with them.
+pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Vec<Message>> {
+    let source = source(file).map_err(|message| vec![message])?;
     let (name, text) = (source.name().to_owned(), source.text());
-    file::expect(Kind::Manifest, &name, text)?;
-    let sections = toml::from_str(text).map_err(|error| {
-        let place = error.span().map(|span| line_and_column(text, span.start));
-        Message::at("M104", &name, place, error.message().to_owned() + &meant(error.message()))
-    })?;
+    file::expect(Kind::Manifest, &name, text).map_err(|message| vec![message])?;
+    let sections = toml::from_str(text).map_err(|error| mistakes::<S>(text, error, &name))?;
     Ok((
         sections,
         ManifestPath { file: name, directory: file.parent().map(Path::to_owned).unwrap_or_default() },
@@ -63,6 +60,50 @@ impl ManifestPath {
         let wrong = || format!("`{key}` is {value}, but should be a decimal number, not negative");
         number.ok_or_else(|| self.wrong(wrong()))
     }
+}
+
+/// All that is wrong with a manifest, in its order; of it one thing is known: where an entry is wrong, the rest is read without it.
+fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str) -> Vec<Message> {
+    let mut messages: Vec<(Option<(usize, usize)>, Message)> = Vec::new();
+    let (mut rest, mut error) = (text.to_owned(), first);
+    loop {
+        let said = error.message();
+        let is_new = messages.iter().all(|(_, message)| !message.message.starts_with(said));
+        // What is missing may be what was left out.
+        let counts = is_new && (messages.is_empty() || !said.starts_with("missing field"));
+        if counts {
+            let place = error.span().map(|span| line_and_column(text, span.start));
+            let message = Message::at("M104", name, place, said.to_owned() + &meant(said));
+            messages.push((place, message));
+        }
+        let is_toml = rest.parse::<toml::Table>().is_ok();
+        let Some(left) = error.span().filter(|_| is_toml).and_then(|span| without(&rest, span)) else {
+            break;
+        };
+        match toml::from_str::<S>(&left) {
+            Ok(_) => break,
+            Err(next) => (rest, error) = (left, next),
+        }
+    }
+    messages.sort_by_key(|(place, _)| *place);
+    messages.into_iter().map(|(_, message)| message).collect()
+}
+
+/// The text with blanks in place of the entry that a place lies in, so that all other places stay; a section goes with its entries.
+/// Nothing where there is nothing to be left out.
+fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
+    let begin = text.get(..place.start)?.rfind('\n').map_or(0, |at| at + 1);
+    let line_end =
+        |from: usize| text.get(from..).and_then(|rest| rest.find('\n')).map_or(text.len(), |at| from + at);
+    let mut end = line_end(place.end.max(begin));
+    if text.get(begin..)?.trim_start().starts_with('[') {
+        let next = text.get(end..)?.match_indices("\n[").next();
+        end = next.map_or(text.len(), |(at, _)| end + at);
+    }
+    let blank: String = text.get(begin..end)?.chars().map(|c| if c == '\n' { c } else { ' ' }).collect();
+    // Blanks are as long as what they replace only where that is ASCII; columns are counted within lines, and those are gone.
+    let left = format!("{}{blank}{}", text.get(..begin)?, text.get(end..)?);
+    (left != text).then_some(left)
 }
 
 /// Which key was meant, where the message of the parser lists those that there are.

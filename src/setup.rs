@@ -58,8 +58,7 @@ impl Setup {
     /// # Errors
     /// All that is wrong with the manifest and with the files that it names.
     pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
-        let (sections, origin): (Sections, ManifestPath) =
-            manifest::read(manifest).map_err(|message| vec![message])?;
+        let (sections, origin): (Sections, ManifestPath) = manifest::read(manifest)?;
         let knowledge = Knowledge::read(&sections.knowledge.sources(&origin));
         let settings = sections.adaptation.settings(&origin).map_err(|message| vec![message])?;
         let bindings = Bindings::with(&sections.bindings).map_err(|text| vec![origin.wrong(text)])?;
