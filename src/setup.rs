@@ -13,7 +13,7 @@ use crate::knowledge::Knowledge;
 use crate::manifest::{self, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::Message;
-use crate::mission::{Bindings, KnowledgeSection, Mission, PlanningSection, Scenario};
+use crate::mission::{BindingsSection, KnowledgeSection, Mission, PlanningSection, Scenario};
 use crate::simulate::Simulation;
 
 /// All sections of a manifest.
@@ -25,9 +25,8 @@ struct Sections {
     description: String,
     knowledge: KnowledgeSection,
     planning: PlanningSection,
-    /// PDDL symbol to query, beyond the defaults.
     #[serde(default)]
-    bindings: BTreeMap<String, String>,
+    bindings: BindingsSection,
     #[serde(default)]
     adaptation: AdaptationSection,
     #[serde(default)]
@@ -62,7 +61,7 @@ impl Setup {
             manifest::read(manifest).map_err(|message| vec![message])?;
         let knowledge = Knowledge::read(&sections.knowledge.sources(&origin));
         let settings = sections.adaptation.settings(&origin).map_err(|message| vec![message])?;
-        let bindings = Bindings::with(&sections.bindings).map_err(|text| vec![origin.wrong(text)])?;
+        let bindings = sections.bindings.bindings(&origin).map_err(|message| vec![message])?;
         let (domain, problem) =
             (origin.path(&sections.planning.domain), origin.path(&sections.planning.problem));
         let mission =

@@ -8,11 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use num_rational::BigRational;
 
 use ontology::tomasys::{Individual, View};
+use ontology::vocab::local_name;
 use pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
     TypedName,
 };
 
+use crate::called::Names;
 use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 
@@ -49,6 +51,8 @@ pub struct Bindings {
     own: BTreeMap<Name, Query>,
     /// As the manifest has them.
     written: BTreeMap<String, String>,
+    /// What individuals are called in the problem.
+    names: Names,
 }
 
 impl Bindings {
@@ -59,7 +63,19 @@ impl Bindings {
     pub fn with(own: &BTreeMap<String, String>) -> Result<Self, String> {
         let parse =
             |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
-        Ok(Self { own: own.iter().map(parse).collect::<Result<_, String>>()?, written: own.clone() })
+        let (parsed, written) = (own.iter().map(parse).collect::<Result<_, String>>()?, own.clone());
+        Ok(Self { own: parsed, written, names: Names::default() })
+    }
+
+    /// The same bindings, with names for individuals.
+    #[must_use]
+    pub fn naming(self, names: Names) -> Self {
+        Self { names, ..self }
+    }
+
+    /// What individuals are called in the problem.
+    pub fn names(&self) -> &Names {
+        &self.names
     }
 
     /// Those that are given, as they are written.
@@ -73,27 +89,40 @@ impl Bindings {
         own.chain(SOLVES.map(Name::new)).collect()
     }
 
+    /// The class that a type stands for, by local name or IRI.
+    pub(super) fn class(&self, name: &Name) -> Option<String> {
+        match self.r#type(name) {
+            Some(Query::Class(class)) => Some(class),
+            _ => None,
+        }
+    }
+
+    /// Whether a predicate says which functions an action requires.
+    pub(super) fn is_requirement(&self, predicate: &Name) -> bool {
+        matches!(self.predicate(predicate), Some(Query::Requires(_)))
+    }
+
     /// Whether a type is that of function designs.
     pub(super) fn is_design(&self, name: &Name) -> bool {
         self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
     }
 
-    /// Whether an action of a plain domain is an action of the knowledge base, by its local name.
-    pub(super) fn is_action(&self, name: &Name, known: &str) -> bool {
-        match self.own.get(name) {
+    /// Whether an action of a plain domain is an action of the knowledge base, by its local name or what it is called.
+    pub(super) fn is_action(&self, name: &Name, known: &Individual) -> bool {
+        both(known).iter().any(|known| match self.own.get(name) {
             Some(Query::Action(own)) => own == known,
             _ => Name::new(known) == *name || Name::new(known) == Name::new(&format!("a_{name}")),
-        }
+        })
     }
 
     /// Whether a predicate says which functions an action of the knowledge base requires.
-    pub(super) fn says_needs(&self, predicate: &Name, known: &str) -> bool {
+    pub(super) fn says_needs(&self, predicate: &Name, known: &Individual) -> bool {
         match self.predicate(predicate) {
             Some(Query::Requires(None)) => true,
-            Some(Query::Requires(Some(action))) => {
+            Some(Query::Requires(Some(action))) => both(known).iter().any(|known| {
                 [Name::new(known), Name::new(known.strip_prefix("a_").unwrap_or(known))]
                     .contains(&Name::new(&action))
-            }
+            }),
             _ => false,
         }
     }
@@ -161,6 +190,11 @@ impl Bindings {
     }
 }
 
+/// What an individual is called in the problem, and its local name.
+fn both(known: &Individual) -> [&str; 2] {
+    [&known.name, local_name(&known.iri)]
+}
+
 fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
     let (kind, name) = query.split_once(':').unwrap_or((query, ""));
     match (kind, name) {
@@ -183,16 +217,17 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
 }
 
 /// Adds to a problem the objects, facts and values that the knowledge base has for the domain's symbols. What
-/// the problem says of availability itself is dropped, with a warning; values that it states stay.
+/// the problem says of availability itself is dropped, with a warning, but for its `own` designs; values that it states stay.
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,
     knowledge: &Knowledge,
     bindings: &Bindings,
+    own: &BTreeSet<Name>,
 ) -> Vec<Message> {
     let known = knowledge.catalogue();
     let is_known = knowledge.fault().is_none();
-    let mut fill = Fill { problem, view: knowledge.view(), known, is_known, warnings: Vec::new() };
+    let mut fill = Fill { problem, view: knowledge.view(), known, is_known, own, warnings: Vec::new() };
     let types = domain.types.iter().map(|declared| &declared.identifier.name);
     let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
     let actions = domain.actions.iter().map(|action| &action.identifier.name);
@@ -230,6 +265,8 @@ struct Fill<'a> {
     known: &'a Catalogue,
     /// Whether it is known what follows.
     is_known: bool,
+    /// Designs about whose availability the problem itself decides.
+    own: &'a BTreeSet<Name>,
     warnings: Vec<Message>,
 }
 
@@ -264,7 +301,8 @@ impl Fill<'_> {
     }
 
     fn available(&mut self, predicate: &Name) {
-        let own = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate);
+        let decides = |atom: &Atom| names(&atom.arguments).iter().any(|design| self.own.contains(design));
+        let own = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate && !decides(a));
         if self.problem.init.iter().any(own) {
             self.problem.init.retain(|element| !own(element));
             let text =
@@ -281,7 +319,9 @@ impl Fill<'_> {
     /// One atom for each action: the action (where the predicate has a place for it) and all its functions.
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
         for action in self.known.actions() {
-            if only.is_some_and(|only| !only.eq_ignore_ascii_case(&action.individual.name)) {
+            let named =
+                |only: &str| both(&action.individual).iter().any(|own| only.eq_ignore_ascii_case(own));
+            if only.is_some_and(|only| !named(only)) {
                 continue;
             }
             let functions: Vec<&str> =
