@@ -292,10 +292,23 @@ impl Fill<'_> {
         self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
     }
 
+    /// What the problem itself says with a predicate.
+    fn stated(&self, predicate: &Name) -> BTreeSet<Vec<Name>> {
+        let arguments = |element: &InitialElement| match element {
+            InitialElement::Fact(atom) if atom.predicate.name == *predicate => Some(names(&atom.arguments)),
+            _ => None,
+        };
+        self.problem.init.iter().filter_map(arguments).collect()
+    }
+
     fn solves(&mut self, predicate: &Name) {
+        let stated = self.stated(predicate);
         for design in self.known.designs() {
             for function in &design.solves {
-                self.fact(predicate, &[&design.individual.name, &function.name]);
+                let pair = [design.individual.name.as_str(), function.name.as_str()];
+                if !stated.contains(&pair.map(Name::new)[..]) {
+                    self.fact(predicate, &pair);
+                }
             }
         }
     }
@@ -305,8 +318,14 @@ impl Fill<'_> {
         let own = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate && !decides(a));
         if self.problem.init.iter().any(own) {
             self.problem.init.retain(|element| !own(element));
+            let names: Vec<String> = self.own.iter().map(|design| format!("`{design}`")).collect();
+            let but = if names.is_empty() {
+                String::new()
+            } else {
+                format!(", but not on {}, whose functions it does not know", names.join(", "))
+            };
             let text =
-                format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides");
+                format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides{but}");
             self.warnings.push(Message::warning("M202", text));
         }
         // Where it is not known what follows, nothing counts as available.
@@ -318,6 +337,7 @@ impl Fill<'_> {
 
     /// One atom for each action: the action (where the predicate has a place for it) and all its functions.
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
+        let stated = self.stated(&declared.identifier.name);
         for action in self.known.actions() {
             let named =
                 |only: &str| both(&action.individual).iter().any(|own| only.eq_ignore_ascii_case(own));
@@ -327,7 +347,9 @@ impl Fill<'_> {
             let functions: Vec<&str> =
                 action.requires.iter().map(|function| function.name.as_str()).collect();
             let all: Vec<&str> = std::iter::once(action.individual.name.as_str()).chain(functions).collect();
-            if all.len() == declared.parameters.len() {
+            if stated.contains(&all.iter().map(|name| Name::new(name)).collect::<Vec<_>>()) {
+                // The problem says so, too.
+            } else if all.len() == declared.parameters.len() {
                 self.fact(&declared.identifier.name, &all);
             } else {
                 let text = format!(

@@ -14,6 +14,7 @@ mod journal;
 mod limits;
 mod manifest;
 mod mutation;
+mod names;
 mod probabilistic;
 mod real;
 mod reason;
