@@ -13,6 +13,7 @@ mod export;
 mod journal;
 mod limits;
 mod manifest;
+mod maps;
 mod mutation;
 mod names;
 mod probabilistic;
