@@ -118,7 +118,7 @@ impl<'t> Map<'t> {
             let own = node.id.text.as_str();
             match objects.insert(object(own), own) {
                 Some(other) if other == own => {
-                    wrong(node.id.raw, format!("the place `{own}` is there twice"))
+                    wrong(node.id.raw, format!("the place `{own}` is there twice"));
                 }
                 Some(other) => {
                     wrong(
