@@ -230,11 +230,11 @@ fn joined_names(
     bindings: &Bindings,
     warnings: &mut Vec<Message>,
 ) -> Result<(BTreeSet<Name>, NeverNamed), Vec<Message>> {
-    let (called, more) = names::resolve(domain.0, problem.0, &knowledge.view(), bindings)?;
+    let (called, more) = names::resolve(domain.0, problem.0, knowledge, bindings)?;
     warnings.extend(more);
     knowledge.call(called);
     let Meeting { own, errors, warnings: more, never_named } =
-        names::meet(domain, problem, &knowledge.view(), bindings);
+        names::meet(domain, problem, knowledge, bindings);
     if !errors.is_empty() {
         return Err(errors.into_iter().chain(more).collect());
     }

@@ -16,6 +16,7 @@ mod manifest;
 mod maps;
 mod mutation;
 mod names;
+mod paper;
 mod probabilistic;
 mod real;
 mod reason;

@@ -10,13 +10,13 @@
 
 use std::collections::BTreeSet;
 
-use ontology::tomasys::{FunctionDesign, View};
 use pddl::ast::{Declaration, Domain, Name, Problem, Span};
 use pddl::{Diagnostic, Severity, Source};
 
 use super::likeness::{entries, list, pairs};
 use super::roles::{ACTION, DESIGN, FUNCTION, Object, Role, Roles, arguments, facts};
 use crate::binding::Bindings;
+use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 
 /// How the names of both sides meet.
@@ -39,12 +39,12 @@ pub(crate) type NeverNamed = Option<(String, String)>;
 pub(crate) fn meet(
     (domain, domain_source): (&Domain, &Source),
     (problem, problem_source): (&Problem, &Source),
-    view: &View<'_>,
+    knowledge: &Knowledge,
     bindings: &Bindings,
 ) -> Meeting {
-    let roles = Roles::new(domain, problem, view, bindings);
-    let designs = view.function_designs();
-    let comparison = Comparison { domain, problem, bindings, view, designs: &designs, roles: &roles };
+    let roles = Roles::new(domain, problem, knowledge, bindings);
+    let known = knowledge.catalogue();
+    let comparison = Comparison { domain, problem, bindings, known, roles: &roles };
     let own = comparison.own_designs();
     let errors = comparison.unsolved(&own);
     let mut meeting = Meeting { own, ..Meeting::default() };
@@ -89,8 +89,7 @@ struct Comparison<'a> {
     domain: &'a Domain,
     problem: &'a Problem,
     bindings: &'a Bindings,
-    view: &'a View<'a>,
-    designs: &'a [FunctionDesign],
+    known: &'a Catalogue,
     roles: &'a Roles,
 }
 
@@ -137,7 +136,7 @@ impl Comparison<'_> {
                 add(name, Some(atom.span));
             }
         }
-        for action in self.view.actions() {
+        for action in self.known.actions() {
             let known = &action.individual;
             let mut schemas = self.domain.actions.iter().map(|schema| &schema.identifier.name);
             let mut predicates = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
@@ -168,7 +167,8 @@ impl Comparison<'_> {
         let stated: Vec<_> = all.iter().filter(|(_, solved, _)| *solved == function).collect();
         let is_met = |object: &&Object| designs.knows(&object.name);
         let known: Vec<&str> = self
-            .designs
+            .known
+            .designs()
             .iter()
             .filter(|design| design.solves.iter().any(|own| Name::new(&own.name) == *function))
             .map(|design| design.individual.name.as_str())
@@ -274,7 +274,7 @@ impl Comparison<'_> {
     /// Whether a design solves a function that the problem names, or the problem names none.
     fn is_of_named_function(&self, iri: &str) -> bool {
         let functions = self.roles.of(FUNCTION);
-        let design = self.designs.iter().find(|design| design.individual.iri == iri);
+        let design = self.known.designs().iter().find(|design| design.individual.iri == iri);
         functions.objects.is_empty()
             || design.is_some_and(|design| {
                 design.solves.iter().any(|function| functions.has(&Name::new(&function.name)))
@@ -293,18 +293,14 @@ fn noun(class: &str) -> String {
 }
 
 /// Entries for names that are alike; where `all` are for the same thing and one is left on each side, for these, too.
-fn suggestion(known: &[&str], here: &[&str], all: bool) -> Option<String> {
+fn suggestion<'n>(known: &[&'n str], here: &[&'n str], all: bool) -> Option<String> {
     let mut meant = pairs(known, here);
-    let rest = |names: &[&'_ str], taken: &dyn Fn(&str) -> bool| -> Vec<String> {
-        names.iter().filter(|name| !taken(name)).map(|name| (*name).to_owned()).collect()
-    };
-    let left = rest(known, &|name| meant.iter().any(|(one, _)| *one == name));
-    let right = rest(here, &|name| meant.iter().any(|(_, other)| *other == name));
+    let left: Vec<&str> =
+        known.iter().copied().filter(|own| meant.iter().all(|pair| pair.0 != *own)).collect();
+    let right: Vec<&str> =
+        here.iter().copied().filter(|own| meant.iter().all(|pair| pair.1 != *own)).collect();
     if let ([one], [other], true) = (&left[..], &right[..], all) {
-        let find = |names: &[&str], name: &String| names.iter().position(|own| own == name);
-        if let (Some(one), Some(other)) = (find(known, one), find(here, other)) {
-            meant.push((known[one], here[other]));
-        }
+        meant.push((one, other));
     }
     let entries = suggested(&meant);
     match (entries, all) {

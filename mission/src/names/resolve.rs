@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ontology::tomasys::{CalledNames, Individual, View};
+use ontology::tomasys::{CalledNames, Individual};
 use pddl::TypeHierarchy;
 use pddl::ast::{Domain, Name, Problem, TypedName};
 
@@ -10,6 +10,7 @@ use super::likeness::list;
 use super::roles::Roles;
 use crate::binding::Bindings;
 use crate::called::Naming;
+use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean};
 
 /// What individuals are called, by IRI, and warnings.
@@ -23,14 +24,14 @@ pub(crate) type Resolved = (CalledNames, Vec<Message>);
 pub(crate) fn resolve(
     domain: &Domain,
     problem: &Problem,
-    view: &View<'_>,
+    knowledge: &Knowledge,
     bindings: &Bindings,
 ) -> Result<Resolved, Vec<Message>> {
     let entries = bindings.names().entries();
     if entries.is_empty() {
         return Ok(Resolved::default());
     }
-    let roles = Roles::new(domain, problem, view, bindings);
+    let roles = Roles::new(domain, problem, knowledge, bindings);
     let individuals: BTreeSet<&Individual> = roles.all().iter().flat_map(|role| &role.individuals).collect();
     let objects = domain.constants.iter().chain(&problem.objects);
     let objects: BTreeMap<&Name, &TypedName> =

@@ -6,12 +6,13 @@
 
 use std::collections::BTreeSet;
 
-use ontology::tomasys::{Individual, View};
+use ontology::tomasys::Individual;
 use ontology::vocab::local_name;
 use pddl::TypeHierarchy;
 use pddl::ast::{Atom, Domain, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName};
 
 use crate::binding::{Bindings, identifier};
+use crate::knowledge::Knowledge;
 
 pub(super) const FUNCTION: &str = "Function";
 pub(super) const DESIGN: &str = "FunctionDesign";
@@ -47,11 +48,17 @@ pub(super) struct Roles {
 
 impl Roles {
     /// The roles of a domain and a problem, as a knowledge base knows them.
-    pub(super) fn new(domain: &Domain, problem: &Problem, view: &View<'_>, bindings: &Bindings) -> Self {
+    pub(super) fn new(
+        domain: &Domain,
+        problem: &Problem,
+        knowledge: &Knowledge,
+        bindings: &Bindings,
+    ) -> Self {
+        let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
         let known = |class: &str| match class {
             FUNCTION => view.functions(),
-            DESIGN => view.function_designs().into_iter().map(|design| design.individual).collect(),
-            ACTION => view.actions().into_iter().map(|action| action.individual).collect(),
+            DESIGN => catalogue.designs().iter().map(|design| design.individual.clone()).collect(),
+            ACTION => catalogue.actions().iter().map(|action| action.individual.clone()).collect(),
             COMPONENT => view.components().into_iter().map(|component| component.individual).collect(),
             _ => Vec::new(),
         };
@@ -66,11 +73,7 @@ impl Roles {
         for declared in &domain.types {
             let name = &declared.identifier.name;
             let Some(class) = bindings.class(name) else { continue };
-            let members = if class.contains(':') {
-                view.individuals_of(&class)
-            } else {
-                view.individuals_of_class_named(&class)
-            };
+            let members = catalogue.members(&view, &class);
             let class = local_name(&class);
             let index = roles.iter().position(|role| role.class == class).unwrap_or_else(|| {
                 let (class, types) = (class.to_owned(), TypeExpression::default());
@@ -78,7 +81,8 @@ impl Roles {
                 roles.len() - 1
             });
             let role = &mut roles[index];
-            let all: BTreeSet<Individual> = role.individuals.drain(..).chain(members).collect();
+            let all: BTreeSet<Individual> =
+                role.individuals.drain(..).chain(members.iter().cloned()).collect();
             role.individuals = all.into_iter().collect();
             role.types.alternatives.push(identifier(name));
         }
