@@ -18,7 +18,7 @@ impl Mission {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };
         let mut doubts = self.actions_without_schema(knowledge);
         let never_named = self.never_named.iter();
-        doubts.extend(never_named.map(|(iri, text)| warning(knowledge, "M211", iri, text.clone())));
+        doubts.extend(never_named.map(|(iri, text)| warning(knowledge, "M221", iri, text.clone())));
         doubts.extend(components(knowledge));
         doubts.extend(self.functions_without_value());
         doubts.extend(attributes(knowledge));

@@ -42,7 +42,7 @@ const ENTRIES: &str = "\"kd_*\" = \"fd_*\"\n\"kf_*\" = \"f_*\"\n\"ka_*\" = \"a_*
 fn said(directory: &Path, arguments: &[&str], input: &str) -> String {
     let outcome = metaplan_in(directory, arguments, input);
     assert!(
-        [0, 10].contains(&outcome.status) && !outcome.stderr.contains("M21"),
+        [0, 10].contains(&outcome.status) && !outcome.stderr.contains("M22"),
         "{arguments:?}: {outcome:#?}"
     );
     let text = outcome
@@ -168,20 +168,20 @@ fn entries_that_are_wrong_have_their_place() {
     check(
         &with("kd_serach_low = \"fd_search_low\""),
         3,
-        &[&place(1), "M213", "`kd_serach_low`; did you mean `kd_search_low`?"],
+        &[&place(1), "M223", "`kd_serach_low`; did you mean `kd_search_low`?"],
     );
-    check(&with("\"x_*\" = \"fd_*\""), 3, &[&place(1), "M213", "the pattern `x_*` meets no individual"]);
+    check(&with("\"x_*\" = \"fd_*\""), 3, &[&place(1), "M223", "the pattern `x_*` meets no individual"]);
     check(
         &with("  kd_search_low = \"fd_serach_low\""),
         3,
-        &[&place(3), "M214", "there is no object `fd_serach_low`", "did you mean `fd_search_low`?"],
+        &[&place(3), "M224", "there is no object `fd_serach_low`", "did you mean `fd_search_low`?"],
     );
     check(
         &with("kd_search_low = \"pl1\""),
         3,
         &[
             &place(1),
-            "M214",
+            "M224",
             "`pl1` is of type `pipeline`",
             "an object of type `functiondesign` would be right",
         ],
@@ -189,18 +189,18 @@ fn entries_that_are_wrong_have_their_place() {
     check(
         &with("kd_search_low = \"fd_search_high\""),
         3,
-        &["M215", "`fd_search_high` would be `kd_search_high`, `kd_search_low`"],
+        &["M225", "`fd_search_high` would be `kd_search_high`, `kd_search_low`"],
     );
     check(
         &with("\"kd_search_*\" = \"fd_speed_*\""),
         3,
-        &[&place(1), "M215", "`kd_search_low` would be `fd_speed_low` and `fd_search_low`"],
+        &[&place(1), "M225", "`kd_search_low` would be `fd_speed_low` and `fd_search_low`"],
     );
-    check(&with("\"kd_*_*\" = \"fd_*\""), 3, &[&place(1), "M213", "a pattern has one star on each side"]);
-    check(&with("\"kd_search_*\" = \"fd_search_low\""), 3, &[&place(1), "M213", "a star on both sides"]);
+    check(&with("\"kd_*_*\" = \"fd_*\""), 3, &[&place(1), "M223", "a pattern has one star on each side"]);
+    check(&with("\"kd_search_*\" = \"fd_search_low\""), 3, &[&place(1), "M223", "a star on both sides"]);
     check(&with("kd_search_low = 3"), 3, &["missions/uuv.toml:11:17: ", "M104", "expected a string"]);
     let all = check(&with("kd_x = \"fd_search_low\"\nkd_y = \"fd_search_low\""), 3, &["kd_x", "kd_y"]);
-    assert_eq!(all.stderr.matches("M213").count(), 2, "{all:#?}");
+    assert_eq!(all.stderr.matches("M223").count(), 2, "{all:#?}");
 }
 
 #[test]
@@ -221,7 +221,7 @@ fn a_pattern_leaves_what_has_no_object() {
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     for word in
-        ["warning[M216]", "missions/uuv.toml:8:1", "`kd_search_medium`", "no object `fd_search_medium`"]
+        ["warning[M226]", "missions/uuv.toml:8:1", "`kd_search_medium`", "no object `fd_search_medium`"]
     {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
@@ -235,11 +235,11 @@ fn names_that_meet_nothing_are_listed_from_both_sides() {
     let outcome = metaplan_in(without.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 3, "{outcome:#?}");
     for word in [
-        "error[M212]: no design of the required function `kf_maintain_motion` is known to both sides; in the problem only: \
+        "error[M222]: no design of the required function `kf_maintain_motion` is known to both sides; in the problem only: \
          `fd_speed_low`, ",
         "in the knowledge base only: `kd_speed_high`, `kd_speed_low`, `kd_speed_medium`",
         "problem.pddl:4:13",
-        "warning[M211]: the knowledge base does not know all functions of the problem; in the problem only: `f_maintain_motion`",
+        "warning[M221]: the knowledge base does not know all functions of the problem; in the problem only: `f_maintain_motion`",
     ] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
@@ -249,7 +249,7 @@ fn names_that_meet_nothing_are_listed_from_both_sides() {
     let outcome = metaplan_in(some.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     for word in [
-        "warning[M211]: the knowledge base does not know all designs of the problem",
+        "warning[M221]: the knowledge base does not know all designs of the problem",
         "problem.pddl:4:56",
         "in the problem only: `fd_serach_low`; in the knowledge base only: `fd_search_low`",
         "write in `[bindings.names]`: fd_search_low = \"fd_serach_low\"",
@@ -261,7 +261,7 @@ fn names_that_meet_nothing_are_listed_from_both_sides() {
     edit(fewer.path(), PROBLEM, "fd_search_low ", "");
     let outcome = metaplan_in(fewer.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
-    for word in ["uuv.ttl:", "M211", "the problem names designs, but not all", "only: `fd_search_low`"] {
+    for word in ["uuv.ttl:", "M221", "the problem names designs, but not all", "only: `fd_search_low`"] {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
     let strange = declared();
@@ -331,11 +331,11 @@ fn names_on_the_command_line_go_with_a_knowledge_base() {
         (&["plan", domain, problem, "--name", "a=b"][..], 2, "`--name` goes with `--kb`"),
         (&["plan", "missions/uuv.toml", "--name", "a=b"], 2, "a mission's manifest names its own"),
         (&["plan", domain, problem, "--kb", KB, "--name", "a"], 2, "is not of the form NAME=VALUE"),
-        (&["plan", domain, problem, "--kb", KB, "--name", "a=b"], 3, "error[M213]: `--name a=b`: "),
+        (&["plan", domain, problem, "--kb", KB, "--name", "a=b"], 3, "error[M223]: `--name a=b`: "),
         (
             &["plan", domain, problem, "--kb", KB, "--name", "fd_follow=pl1"],
             3,
-            "error[M214]: `--name fd_follow=pl1`: `pl1` is of type `pipeline`",
+            "error[M224]: `--name fd_follow=pl1`: `pl1` is of type `pipeline`",
         ),
     ] {
         let outcome = metaplan(arguments);

@@ -133,7 +133,7 @@ fn the_papers_problem_without_a_map_is_an_error() {
         .iter()
         .map(|own| (own["code"].as_str(), own["line"].as_u64(), own["column"].as_u64()))
         .collect();
-    let code = Some("M212");
+    let code = Some("M222");
     assert_eq!(places, [(code, Some(18), Some(3)), (code, Some(22), Some(3)), (code, Some(25), Some(3))]);
     let said = [
         (

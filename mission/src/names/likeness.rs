@@ -132,6 +132,6 @@ mod tests {
             "fd_cameera = \"fd_camera\"",
         ];
         assert_eq!(entries(&found), written);
-        assert_eq!(pairs(&["fd_a", "x"], &["fd_b", ""]), []);
+        assert_eq!(pairs(&["fd_low", "x"], &["fd_high", ""]), []);
     }
 }

@@ -55,11 +55,11 @@ pub(crate) fn meet(
         Message::from_pddl(&[found], &[source])
     };
     let is_error = !errors.is_empty();
-    meeting.errors = errors.into_iter().flat_map(|own| message(own, Severity::Error, "M212")).collect();
+    meeting.errors = errors.into_iter().flat_map(|own| message(own, Severity::Error, "M222")).collect();
     for role in roles.all().iter().filter(|role| role.class != DESIGN || !is_error) {
         match comparison.one_sided(role, &meeting.own) {
             OneSided::Objects(finding) => {
-                meeting.warnings.extend(message(finding, Severity::Warning, "M211"));
+                meeting.warnings.extend(message(finding, Severity::Warning, "M221"));
             }
             OneSided::Individuals(iri, text) => meeting.never_named = Some((iri, text)),
             OneSided::Nothing => {}

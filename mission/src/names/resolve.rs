@@ -47,7 +47,7 @@ pub(crate) fn resolve(
     };
     for entry in entries {
         if let Some(fault) = entry.fault() {
-            resolving.errors.push(entry.wrong("M213", fault));
+            resolving.errors.push(entry.wrong("M223", fault));
         }
     }
     let sound = || entries.iter().filter(|entry| entry.fault().is_none());
@@ -86,11 +86,11 @@ impl<'a> Resolving<'a> {
                     entry.individual,
                     did_you_mean(&entry.individual, names())
                 );
-                self.errors.push(entry.wrong("M213", &text));
+                self.errors.push(entry.wrong("M223", &text));
             }
             [individual] => match self.fits(individual, &entry.object) {
                 Ok(name) => self.call(individual, name, entry),
-                Err(text) => self.errors.push(entry.wrong("M214", &text)),
+                Err(text) => self.errors.push(entry.wrong("M224", &text)),
             },
             _ => {
                 let iris: Vec<&str> = meant.iter().map(|own| own.iri.as_str()).collect();
@@ -99,7 +99,7 @@ impl<'a> Resolving<'a> {
                     entry.individual,
                     list(&iris)
                 );
-                self.errors.push(entry.wrong("M213", &text));
+                self.errors.push(entry.wrong("M223", &text));
             }
         }
     }
@@ -129,13 +129,13 @@ impl<'a> Resolving<'a> {
                     entry.individual,
                     list(&names)
                 );
-                self.errors.push(entry.wrong("M213", &text));
+                self.errors.push(entry.wrong("M223", &text));
             }
-            Some(reason) if met == 0 => self.errors.push(entry.wrong("M214", &reason)),
+            Some(reason) if met == 0 => self.errors.push(entry.wrong("M224", &reason)),
             Some(reason) => {
                 let text =
                     format!("the pattern leaves {} as they are, without an object: {reason}", list(&lost));
-                self.warnings.push(entry.questionable("M216", &text));
+                self.warnings.push(entry.questionable("M226", &text));
             }
             None => {}
         }
@@ -173,7 +173,7 @@ impl<'a> Resolving<'a> {
         match self.called.get(individual.iri.as_str()) {
             Some((other, _)) if Name::new(other) != Name::new(&name) => {
                 let text = format!("`{}` would be `{name}` and `{other}`", individual.name);
-                self.errors.push(entry.wrong("M215", &text));
+                self.errors.push(entry.wrong("M225", &text));
             }
             Some(_) => {}
             None => {
@@ -194,7 +194,7 @@ impl<'a> Resolving<'a> {
             let Some((_, entry)) = entries.next_back() else { continue };
             let names: Vec<&str> = individuals.iter().map(|own| own.name.as_str()).collect();
             let text = format!("`{name}` would be {}; an object is one individual", list(&names));
-            self.errors.push(entry.wrong("M215", &text));
+            self.errors.push(entry.wrong("M225", &text));
         }
     }
 }
