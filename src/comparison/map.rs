@@ -155,17 +155,15 @@ impl<'t> Map<'t> {
     /// What is not taken over, or taken for granted.
     pub(super) fn warnings(&self, file: &str) -> Vec<Message> {
         let mut warnings = Vec::new();
+        let mut warn = |text: &str| warnings.push(Message::warning("M132", format!("{file}: {text}")));
         if self.time.is_empty() {
-            let text = "the map has no measurements of time; each move takes its length at full speed, \
-                        and measured probabilities are left out";
-            warnings.push(Message::warning("M132", format!("{file}: {text}")));
+            warn("the map has no measurements of time; each move takes its length at full speed");
+        }
+        if self.hitrate.is_empty() && self.successrate.is_empty() {
+            warn("the map has no probabilities; every move gets to its end, and nothing is hit");
         }
         if !self.unsafe_rectangles.is_empty() {
-            let count = self.unsafe_rectangles.len();
-            let text = format!(
-                "{file}: {count} rectangles in `unsafe-rects` are not taken over: robots follow the arcs"
-            );
-            warnings.push(Message::warning("M132", text));
+            warn("the rectangles in `unsafe-rects` are not taken over; robots follow the arcs");
         }
         warnings
     }
