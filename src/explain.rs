@@ -9,8 +9,9 @@ use std::collections::BTreeSet;
 
 use encodings::{Config, Limits, Status, optimize};
 use num_rational::BigRational;
-use ontology::tomasys::FunctionDesign;
 use ontology::tomasys::change::Status as Component;
+use ontology::tomasys::{FunctionDesign, Individual};
+use ontology::vocab::local_name;
 
 use crate::mapek::{PlannedStep, ruled_out};
 use crate::message::Message;
@@ -114,12 +115,19 @@ fn solve(
 pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignExplanation, Vec<Message>> {
     let designs =
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
-    let Some(found) = designs.iter().find(|design| design.individual.name == name) else {
+    let named = || designs.iter().find(|design| design.individual.name == name);
+    let known = || {
+        designs
+            .iter()
+            .find(|design| [local_name(&design.individual.iri), &design.individual.iri].contains(&name))
+    };
+    let Some(found) = named().or_else(known) else {
         let known: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
         let meant = crate::message::did_you_mean(name, known.iter().map(|own| &**own));
         let text = format!("there is no design `{name}`; there are: {}{meant}", known.join(", "));
         return Err(vec![Message::error("M112", text)]);
     };
+    let name = found.individual.name.as_str();
     let rivals: BTreeSet<&str> = designs
         .iter()
         .filter(|other| other.solves.iter().any(|function| found.solves.contains(function)))
@@ -300,9 +308,9 @@ fn availability_changes(
         }
         let mut other = mission.clone();
         let status = if failed { Component::Recovered } else { Component::Failed };
-        let name = component.individual.name;
+        let Individual { iri, name } = component.individual;
         if let Some(knowledge) = other.knowledge_mut() {
-            knowledge.report(&name, status).map_err(|message| vec![message])?;
+            knowledge.report(&iri, status).map_err(|message| vec![message])?;
         }
         let to = if failed { Target::Recovered } else { Target::Failed };
         changes.push(Change { name, from: None, to, then: best(&other, limits)? });

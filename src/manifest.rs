@@ -1,6 +1,7 @@
 //! A manifest's text to data, read once. Which sections there are, and what stands in them, is known to whoever asks.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use num_rational::BigRational;
 use serde::de::DeserializeOwned;
@@ -14,6 +15,7 @@ use crate::number;
 pub struct ManifestPath {
     file: String,
     directory: PathBuf,
+    text: Arc<str>,
 }
 
 /// Reads a manifest; `-` is standard input, and paths are relative to the current directory then.
@@ -27,7 +29,11 @@ pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Vec<M
     let sections = toml::from_str(text).map_err(|error| mistakes::<S>(text, error, &name))?;
     Ok((
         sections,
-        ManifestPath { file: name, directory: file.parent().map(Path::to_owned).unwrap_or_default() },
+        ManifestPath {
+            file: name,
+            directory: file.parent().map(Path::to_owned).unwrap_or_default(),
+            text: text.into(),
+        },
     ))
 }
 
@@ -40,6 +46,11 @@ impl ManifestPath {
     /// The manifest's own name.
     pub fn file(&self) -> &str {
         &self.file
+    }
+
+    /// Line and column, both from 1, of what stands at an offset in bytes.
+    pub fn place(&self, offset: usize) -> (usize, usize) {
+        line_and_column(&self.text, offset)
     }
 
     /// That a value of the manifest is wrong.

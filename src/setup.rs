@@ -13,7 +13,7 @@ use crate::knowledge::Knowledge;
 use crate::manifest::{self, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::Message;
-use crate::mission::{Bindings, KnowledgeSection, Mission, PlanningSection, Scenario};
+use crate::mission::{BindingsSection, KnowledgeSection, Mission, PlanningSection, Scenario};
 use crate::simulate::Simulation;
 
 /// All sections of a manifest.
@@ -25,9 +25,8 @@ struct Sections {
     description: String,
     knowledge: KnowledgeSection,
     planning: PlanningSection,
-    /// PDDL symbol to query, beyond the defaults.
     #[serde(default)]
-    bindings: BTreeMap<String, String>,
+    bindings: BindingsSection,
     #[serde(default)]
     adaptation: AdaptationSection,
     #[serde(default)]
@@ -60,8 +59,13 @@ impl Setup {
     pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
         let (sections, origin): (Sections, ManifestPath) = manifest::read(manifest)?;
         let knowledge = Knowledge::read(&sections.knowledge.sources(&origin));
-        let settings = sections.adaptation.settings(&origin).map_err(|message| vec![message])?;
-        let bindings = Bindings::with(&sections.bindings).map_err(|text| vec![origin.wrong(text)])?;
+        let (settings, bindings) =
+            match (sections.adaptation.settings(&origin), sections.bindings.bindings(&origin)) {
+                (Ok(settings), Ok(bindings)) => (settings, bindings),
+                (settings, bindings) => {
+                    return Err(settings.err().into_iter().chain(bindings.err()).collect());
+                }
+            };
         let (domain, problem) =
             (origin.path(&sections.planning.domain), origin.path(&sections.planning.problem));
         let mission =

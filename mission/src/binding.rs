@@ -8,11 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use num_rational::BigRational;
 
 use ontology::tomasys::{Individual, View};
+use ontology::vocab::local_name;
 use pddl::ast::{
     Atom, Declaration, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression,
     TypedName,
 };
 
+use crate::called::Names;
 use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 
@@ -49,6 +51,8 @@ pub struct Bindings {
     own: BTreeMap<Name, Query>,
     /// As the manifest has them.
     written: BTreeMap<String, String>,
+    /// What individuals are called in the problem.
+    names: Names,
 }
 
 impl Bindings {
@@ -59,7 +63,19 @@ impl Bindings {
     pub fn with(own: &BTreeMap<String, String>) -> Result<Self, String> {
         let parse =
             |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
-        Ok(Self { own: own.iter().map(parse).collect::<Result<_, String>>()?, written: own.clone() })
+        let (parsed, written) = (own.iter().map(parse).collect::<Result<_, String>>()?, own.clone());
+        Ok(Self { own: parsed, written, names: Names::default() })
+    }
+
+    /// The same bindings, with names for individuals.
+    #[must_use]
+    pub fn naming(self, names: Names) -> Self {
+        Self { names, ..self }
+    }
+
+    /// What individuals are called in the problem.
+    pub fn names(&self) -> &Names {
+        &self.names
     }
 
     /// Those that are given, as they are written.
@@ -73,27 +89,40 @@ impl Bindings {
         own.chain(SOLVES.map(Name::new)).collect()
     }
 
+    /// The class that a type stands for, by local name or IRI.
+    pub(super) fn class(&self, name: &Name) -> Option<String> {
+        match self.r#type(name) {
+            Some(Query::Class(class)) => Some(class),
+            _ => None,
+        }
+    }
+
+    /// Whether a predicate says which functions an action requires.
+    pub(super) fn is_requirement(&self, predicate: &Name) -> bool {
+        matches!(self.predicate(predicate), Some(Query::Requires(_)))
+    }
+
     /// Whether a type is that of function designs.
     pub(super) fn is_design(&self, name: &Name) -> bool {
         self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
     }
 
-    /// Whether an action of a plain domain is an action of the knowledge base, by its local name.
-    pub(super) fn is_action(&self, name: &Name, known: &str) -> bool {
-        match self.own.get(name) {
+    /// Whether an action of a plain domain is an action of the knowledge base, by its local name or what it is called.
+    pub(super) fn is_action(&self, name: &Name, known: &Individual) -> bool {
+        both(known).iter().any(|known| match self.own.get(name) {
             Some(Query::Action(own)) => own == known,
             _ => Name::new(known) == *name || Name::new(known) == Name::new(&format!("a_{name}")),
-        }
+        })
     }
 
     /// Whether a predicate says which functions an action of the knowledge base requires.
-    pub(super) fn says_needs(&self, predicate: &Name, known: &str) -> bool {
+    pub(super) fn says_needs(&self, predicate: &Name, known: &Individual) -> bool {
         match self.predicate(predicate) {
             Some(Query::Requires(None)) => true,
-            Some(Query::Requires(Some(action))) => {
+            Some(Query::Requires(Some(action))) => both(known).iter().any(|known| {
                 [Name::new(known), Name::new(known.strip_prefix("a_").unwrap_or(known))]
                     .contains(&Name::new(&action))
-            }
+            }),
             _ => false,
         }
     }
@@ -161,6 +190,11 @@ impl Bindings {
     }
 }
 
+/// What an individual is called in the problem, and its local name.
+fn both(known: &Individual) -> [&str; 2] {
+    [&known.name, local_name(&known.iri)]
+}
+
 fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
     let (kind, name) = query.split_once(':').unwrap_or((query, ""));
     match (kind, name) {
@@ -183,16 +217,17 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
 }
 
 /// Adds to a problem the objects, facts and values that the knowledge base has for the domain's symbols. What
-/// the problem says of availability itself is dropped, with a warning; values that it states stay.
+/// the problem says of availability itself is dropped, with a warning, but for its `own` designs; values that it states stay.
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,
     knowledge: &Knowledge,
     bindings: &Bindings,
+    own: &BTreeSet<Name>,
 ) -> Vec<Message> {
     let known = knowledge.catalogue();
     let is_known = knowledge.fault().is_none();
-    let mut fill = Fill { problem, view: knowledge.view(), known, is_known, warnings: Vec::new() };
+    let mut fill = Fill { problem, view: knowledge.view(), known, is_known, own, warnings: Vec::new() };
     let types = domain.types.iter().map(|declared| &declared.identifier.name);
     let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
     let actions = domain.actions.iter().map(|action| &action.identifier.name);
@@ -230,6 +265,8 @@ struct Fill<'a> {
     known: &'a Catalogue,
     /// Whether it is known what follows.
     is_known: bool,
+    /// Designs about whose availability the problem itself decides.
+    own: &'a BTreeSet<Name>,
     warnings: Vec<Message>,
 }
 
@@ -255,20 +292,40 @@ impl Fill<'_> {
         self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
     }
 
+    /// What the problem itself says with a predicate.
+    fn stated(&self, predicate: &Name) -> BTreeSet<Vec<Name>> {
+        let arguments = |element: &InitialElement| match element {
+            InitialElement::Fact(atom) if atom.predicate.name == *predicate => Some(names(&atom.arguments)),
+            _ => None,
+        };
+        self.problem.init.iter().filter_map(arguments).collect()
+    }
+
     fn solves(&mut self, predicate: &Name) {
+        let stated = self.stated(predicate);
         for design in self.known.designs() {
             for function in &design.solves {
-                self.fact(predicate, &[&design.individual.name, &function.name]);
+                let pair = [design.individual.name.as_str(), function.name.as_str()];
+                if !stated.contains(&pair.map(Name::new)[..]) {
+                    self.fact(predicate, &pair);
+                }
             }
         }
     }
 
     fn available(&mut self, predicate: &Name) {
-        let own = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate);
+        let decides = |atom: &Atom| names(&atom.arguments).iter().any(|design| self.own.contains(design));
+        let own = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate && !decides(a));
         if self.problem.init.iter().any(own) {
             self.problem.init.retain(|element| !own(element));
+            let names: Vec<String> = self.own.iter().map(|design| format!("`{design}`")).collect();
+            let but = if names.is_empty() {
+                String::new()
+            } else {
+                format!(", but not on {}, whose functions it does not know", names.join(", "))
+            };
             let text =
-                format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides");
+                format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides{but}");
             self.warnings.push(Message::warning("M202", text));
         }
         // Where it is not known what follows, nothing counts as available.
@@ -280,14 +337,19 @@ impl Fill<'_> {
 
     /// One atom for each action: the action (where the predicate has a place for it) and all its functions.
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
+        let stated = self.stated(&declared.identifier.name);
         for action in self.known.actions() {
-            if only.is_some_and(|only| !only.eq_ignore_ascii_case(&action.individual.name)) {
+            let named =
+                |only: &str| both(&action.individual).iter().any(|own| only.eq_ignore_ascii_case(own));
+            if only.is_some_and(|only| !named(only)) {
                 continue;
             }
             let functions: Vec<&str> =
                 action.requires.iter().map(|function| function.name.as_str()).collect();
             let all: Vec<&str> = std::iter::once(action.individual.name.as_str()).chain(functions).collect();
-            if all.len() == declared.parameters.len() {
+            if stated.contains(&all.iter().map(|name| Name::new(name)).collect::<Vec<_>>()) {
+                // The problem says so, too.
+            } else if all.len() == declared.parameters.len() {
                 self.fact(&declared.identifier.name, &all);
             } else {
                 let text = format!(

@@ -17,6 +17,8 @@ impl Mission {
     pub fn doubts(&self) -> Vec<Message> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };
         let mut doubts = self.actions_without_schema(knowledge);
+        let never_named = self.never_named.iter();
+        doubts.extend(never_named.map(|(iri, text)| warning(knowledge, "M221", iri, text.clone())));
         doubts.extend(components(knowledge));
         doubts.extend(self.functions_without_value());
         doubts.extend(attributes(knowledge));
@@ -32,8 +34,10 @@ impl Mission {
         let mut doubts = Vec::new();
         for action in wanted {
             let name = &action.individual.name;
-            let has_schema = schemas.iter().any(|schema| self.bindings.is_action(schema, name));
-            if has_schema || predicates.iter().any(|predicate| self.bindings.says_needs(predicate, name)) {
+            let has_schema = schemas.iter().any(|schema| self.bindings.is_action(schema, &action.individual));
+            if has_schema
+                || predicates.iter().any(|predicate| self.bindings.says_needs(predicate, &action.individual))
+            {
                 continue;
             }
             let known = schemas.iter().map(|schema| schema.as_str());

@@ -1,5 +1,7 @@
 //! A mission: what the robot is (a knowledge base) and what it has to do (PDDL), joined.
 
+use std::collections::BTreeSet;
+
 use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use pddl::{self, Severity, Source};
 
@@ -7,6 +9,7 @@ use crate::binding::Bindings;
 use crate::file::{self, Kind};
 use crate::knowledge::Knowledge;
 use crate::message::Message;
+use crate::names::{self, Meeting, NeverNamed};
 use crate::native::CoAdaptation;
 
 /// A mission that can be planned.
@@ -21,6 +24,10 @@ pub struct Mission {
     pub(super) domain: Domain,
     pub(super) problem: Problem,
     pub(super) adaptation: Option<CoAdaptation>,
+    /// Designs about whose availability the problem itself decides.
+    pub(super) own: BTreeSet<Name>,
+    /// That the problem does not name all designs of the knowledge base: the IRI of one, and what is to be said.
+    pub(super) never_named: NeverNamed,
     warnings: Vec<Message>,
 }
 
@@ -37,7 +44,7 @@ impl Mission {
         problem: Result<Source, Message>,
     ) -> Result<Self, Vec<Message>> {
         let mut errors = Vec::new();
-        let knowledge = match knowledge.transpose() {
+        let mut knowledge = match knowledge.transpose() {
             Ok(knowledge) => knowledge,
             Err(more) => {
                 errors.extend(more);
@@ -59,13 +66,20 @@ impl Mission {
             return Err(errors);
         }
         let parsed = parse(&domain_source, &problem_source);
-        let (domain, problem, warnings) = match parsed {
+        let (domain, problem, mut warnings) = match parsed {
             Ok(parsed) if errors.is_empty() => parsed,
             Ok(_) => return Err(errors),
             Err(more) => {
                 errors.extend(more);
                 return Err(errors);
             }
+        };
+        let (own, never_named) = match &mut knowledge {
+            Some(knowledge) => {
+                let files = ((&domain, &domain_source), (&problem, &problem_source));
+                joined_names(files, knowledge, &bindings, &mut warnings)?
+            }
+            None => (BTreeSet::new(), None),
         };
         let adaptation = match &knowledge {
             Some(knowledge) => CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?,
@@ -82,6 +96,8 @@ impl Mission {
             domain,
             problem,
             adaptation,
+            own,
+            never_named,
             warnings,
         })
     }
@@ -201,6 +217,29 @@ impl Mission {
         pddl::read_objective(Direction::Minimize, &source, &self.domain, problem)
             .map_err(|diagnostics| Message::from_pddl(&diagnostics, &[&source]))
     }
+}
+
+/// Gives individuals the names that the bindings say, and compares the names of both sides; returns the designs about whose
+/// availability the problem itself decides, and those that it never names.
+///
+/// # Errors
+/// Names that cannot be given, and functions of which no design is known to both sides.
+fn joined_names(
+    (domain, problem): ((&Domain, &Source), (&Problem, &Source)),
+    knowledge: &mut Knowledge,
+    bindings: &Bindings,
+    warnings: &mut Vec<Message>,
+) -> Result<(BTreeSet<Name>, NeverNamed), Vec<Message>> {
+    let (called, more) = names::resolve(domain.0, problem.0, knowledge, bindings)?;
+    warnings.extend(more);
+    knowledge.call(called);
+    let Meeting { own, errors, warnings: more, never_named } =
+        names::meet(domain, problem, knowledge, bindings);
+    if !errors.is_empty() {
+        return Err(errors.into_iter().chain(more).collect());
+    }
+    warnings.extend(more);
+    Ok((own, never_named))
 }
 
 fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Vec<Message>> {

@@ -6,16 +6,19 @@
 #![doc = include_str!("../README.md")]
 
 mod binding;
+mod called;
 mod doubts;
 pub mod file;
 mod joined;
 pub mod knowledge;
 mod live;
 pub mod message;
+mod names;
 mod native;
 mod set;
 pub mod visible;
 
 pub use binding::{Bindings, atom};
+pub use called::{Names, Place};
 pub use joined::Mission;
 pub use native::CoAdaptation;

@@ -17,7 +17,7 @@ impl Mission {
             if let Some(adaptation) = &self.adaptation {
                 adaptation.fill(problem, knowledge.catalogue().designs());
             }
-            binding::fill(&self.domain, problem, knowledge, &self.bindings)
+            binding::fill(&self.domain, problem, knowledge, &self.bindings, &self.own)
         })
     }
 
@@ -53,9 +53,7 @@ impl Mission {
         let words: Vec<Name> = fact.split_whitespace().map(Name::new).collect();
         self.problem.init.iter().any(|element| match element {
             InitialElement::Fact(atom) => {
-                let arguments = atom.arguments.iter().map(|term| match term {
-                    Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
-                });
+                let arguments = atom.arguments.iter().map(name_of);
                 std::iter::once(&atom.predicate.name).chain(arguments).eq(&words)
             }
             _ => false,
@@ -82,15 +80,29 @@ impl Mission {
         })
     }
 
+    /// Whether the problem itself says if a design is available: the knowledge base knows neither it nor a function that it
+    /// solves.
+    pub fn decides_on(&self, design: &str) -> bool {
+        self.own.contains(&Name::new(design))
+    }
+
+    /// Whether a design that the problem decides on is available now, as far as the problem says.
+    pub fn provides(&self, design: &str) -> bool {
+        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
+        let mut predicates = declared.filter(|name| self.bindings.is_availability(name));
+        self.decides_on(design) && predicates.any(|predicate| self.holds(&format!("{predicate} {design}")))
+    }
+
     /// Says anew which designs of a filled problem are available: those that `allowed` answers with yes, asked with the
-    /// name of each design of the knowledge base and whether it is available.
+    /// name of each design of the knowledge base and whether it is available. Designs that the problem decides on stay.
     pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) {
         let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
         let Some(predicate) = declared.into_iter().find(|name| self.bindings.is_availability(name)) else {
             return;
         };
-        let is_own = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate);
-        problem.init.retain(|element| !is_own(element));
+        let decides = |atom: &Atom| atom.arguments.iter().any(|term| self.own.contains(name_of(term)));
+        let is_known = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate && !decides(atom));
+        problem.init.retain(|element| !is_known(element));
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
         for design in designs.filter(|design| allowed(&design.individual.name, design.available)) {
             problem.init.push(InitialElement::Fact(binding::atom(predicate, &[&design.individual.name])));
@@ -132,12 +144,29 @@ impl Mission {
         if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source])) }
     }
 
-    /// The designs that solve a function, by local name, whether or not they are available.
+    /// The designs that solve a function, as the problem calls them, whether or not they are available.
     pub fn designs_of(&self, function: &str) -> Vec<String> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };
         let solves = |design: &&FunctionDesign| design.solves.iter().any(|solved| solved.name == function);
         let designs = knowledge.catalogue().designs().iter().filter(solves);
-        designs.map(|design| design.individual.name.clone()).collect()
+        let designs = designs.map(|design| design.individual.name.clone());
+        let function = Name::new(function);
+        let own = self.own.iter().filter(|design| {
+            self.problem.init.iter().any(|element| match element {
+                InitialElement::Fact(atom) => {
+                    let named: Vec<&Name> = atom.arguments.iter().map(name_of).collect();
+                    named == [*design, &function] && self.bindings.solves().contains(&atom.predicate.name)
+                }
+                _ => false,
+            })
+        });
+        designs.chain(own.map(ToString::to_string)).collect()
+    }
+}
+
+fn name_of(term: &Term) -> &Name {
+    match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
     }
 }
 

@@ -45,7 +45,8 @@ impl Mission {
             return Err(Message::error("M106", "`--set` needs a name before the equals sign"));
         };
         let symbol = Name::new(symbol);
-        if self.knowledge.is_some() && self.bindings.is_availability(&symbol) {
+        let is_own = matches!(arguments, [design] if self.decides_on(design));
+        if self.knowledge.is_some() && self.bindings.is_availability(&symbol) && !is_own {
             let text = format!("the knowledge base decides on `{symbol}`; let components fail with `--fail`");
             return Err(Message::error("M106", text));
         }

@@ -105,6 +105,38 @@ fn a_violated_requirement_makes_designs_unavailable() {
     check(COADAPTATION_RULES, stated, &script);
 }
 
+/// As MROS leaves designs out: a measurement that stands to the estimation as the attribute's operator says. Other estimations and
+/// what objectives ask for are no measurements.
+#[test]
+fn a_missed_estimation_makes_designs_unavailable() {
+    for (operator, out, still) in [
+        ("<", ["1.24", "-1"], ["1.25", "9"]),
+        ("<=", ["1.24", "1.25"], ["1.26", "9"]),
+        (">", ["1.26", "9"], ["1.250", "-1"]),
+        (">=", ["1.26", "1.25"], ["1.24", "-1"]),
+    ] {
+        let stated = format!(
+            "t:FunctionDesign(low), t:FunctionDesign(high), t:hasQAestimation(low, e1), t:hasQAestimation(high, e2),
+             t:isQAtype(e1, view), t:isQAtype(e2, view), t:hasValue(e1, 1.25), t:hasValue(e2, 1.25), t:isQAtype(obs, view),
+             t:qa_comparison_operator(view, \"{operator}\"), t:hasNFR(o, nfr), t:isQAtype(nfr, view), t:hasValue(nfr, -50),
+             t:hasQAestimation(other, e3), t:isQAtype(e3, heat), t:hasValue(e3, 0), t:FunctionDesign(other)"
+        );
+        let mut script = vec!["?t:fd_available(low, true)".to_owned()];
+        for (values, verb) in [(out, '!'), (still, '?'), (out, '!')] {
+            for value in values {
+                script.push(format!("+t:hasValue(obs, {value})"));
+                script.push(format!("{verb}t:fd_available(low, true)"));
+                script.push(format!("{verb}t:fd_available(high, true)"));
+                script.push("?t:fd_available(other, true)".to_owned());
+                script.push(format!("-t:hasValue(obs, {value})"));
+            }
+        }
+        script.push("?t:fd_available(high, true)".to_owned());
+        let script: Vec<&str> = script.iter().map(String::as_str).collect();
+        check(COADAPTATION_RULES, &stated, &script);
+    }
+}
+
 #[test]
 fn statuses_follow_their_causes() {
     let stated = "t:typeC(c, class), t:cc_unique(class, true), t:typeC(spec, class), t:roleDef(role, spec),

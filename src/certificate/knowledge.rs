@@ -31,6 +31,7 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
         domain: mission.domain_source().text().to_owned(),
         problem: print_problem(mission.problem()),
         bindings: mission.bindings().written().clone(),
+        names: mission.bindings().names().written(),
         rules,
         shipped,
         changes: knowledge.statements(),

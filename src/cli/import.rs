@@ -20,7 +20,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Form {
-    /// The map of Cámara et al. (`map-p2cp3.json` and maps of its form) as a mission with probabilities.
+    /// The map of Cámara et al. (`map-p2cp3.json` and maps of its form, also of 2017) as a mission with probabilities.
     CamaraMap(CamaraMap),
 }
 
@@ -110,6 +110,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         speeds: map.speeds == Speeds::All,
     };
     let files = import_map(file.name(), file.text(), &options)?;
+    output::warnings(common, &files.warnings);
     std::fs::create_dir_all(&map.output).map_err(|error| {
         let text = format!("cannot be made: {}", error.kind());
         Message::at("M109", &map.output.display().to_string(), None, text)

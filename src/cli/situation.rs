@@ -6,7 +6,7 @@ use clap::Args;
 use metaplan::file::source;
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::{Message, did_you_mean};
-use metaplan::mission::{Bindings, Mission};
+use metaplan::mission::{Bindings, Mission, Names};
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
 
@@ -24,6 +24,10 @@ pub(super) struct Situation {
     rules: Vec<String>,
     #[command(flatten)]
     imports: Imports,
+    /// What an individual of that knowledge base is called in PROBLEM: `fd_spiral_low=fd_search_low`; a star on both sides
+    /// stands for the same characters, `fd_spiral_*=fd_search_*` (repeatable).
+    #[arg(long = "name", value_name = "INDIVIDUAL=OBJECT", value_parser = setting)]
+    names: Vec<(String, String)>,
     /// A scenario of the mission's manifest.
     #[arg(long, value_name = "NAME")]
     scenario: Option<String>,
@@ -69,7 +73,8 @@ impl Situation {
         fail: Vec<String>,
     ) -> Self {
         let imports = Imports { catalog: Vec::new(), directory: Vec::new(), ignore_missing_imports: false };
-        Self { knowledge: Vec::new(), rules: Vec::new(), imports, scenario, set, fail }
+        let (knowledge, rules, names) = (Vec::new(), Vec::new(), Vec::new());
+        Self { knowledge, rules, imports, names, scenario, set, fail }
     }
 
     /// The knowledge of documents in this situation, without a mission.
@@ -91,10 +96,10 @@ impl Situation {
         let mut setup = match inputs {
             [manifest] => {
                 let imports = &self.imports;
-                let none = self.knowledge.is_empty() && self.rules.is_empty();
+                let none = self.knowledge.is_empty() && self.rules.is_empty() && self.names.is_empty();
                 let here = imports.catalog.is_empty() && imports.directory.is_empty();
                 if !(none && here && !imports.ignore_missing_imports) {
-                    let text = "`--kb`, `--rules` and where imports lie go with DOMAIN and PROBLEM; \
+                    let text = "`--kb`, `--rules`, `--name` and where imports lie go with DOMAIN and PROBLEM; \
                                 a mission's manifest names its own";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
@@ -121,9 +126,16 @@ impl Situation {
                     let text = "`--scenario` goes with a mission's manifest";
                     return Err(Failure::usage(Message::error("M107", text)));
                 }
-                if self.knowledge.is_empty() && !self.rules.is_empty() {
-                    return Err(Failure::usage(Message::error("M107", "`--rules` goes with `--kb`")));
+                for (option, given) in
+                    [("--rules", !self.rules.is_empty()), ("--name", !self.names.is_empty())]
+                {
+                    if self.knowledge.is_empty() && given {
+                        let text = format!("`{option}` goes with `--kb`");
+                        return Err(Failure::usage(Message::error("M107", text)));
+                    }
                 }
+                let mut names = Names::default();
+                self.names.iter().for_each(|(individual, object)| names.add(individual, object, None));
                 let knowledge = (!self.knowledge.is_empty()).then(|| {
                     let rules = if self.rules.is_empty() {
                         vec![COADAPTATION.to_owned()]
@@ -137,7 +149,14 @@ impl Situation {
                         ..Sources::default()
                     })
                 });
-                Mission::new("", knowledge, Bindings::default(), source(domain), source(problem))?.into()
+                Mission::new(
+                    "",
+                    knowledge,
+                    Bindings::default().naming(names),
+                    source(domain),
+                    source(problem),
+                )?
+                .into()
             }
             _ => {
                 let text = "give a mission's manifest, or a domain and a problem";

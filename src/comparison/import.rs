@@ -6,10 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use serde::Deserialize;
-use serde_json::Value;
-
-use crate::message::Message;
+use super::map::{Coordinates, Map, Measured, object};
+use crate::message::{Message, did_you_mean};
 
 /// Where the mission starts and ends, and what the file does not say.
 #[derive(Debug, Clone)]
@@ -54,7 +52,7 @@ impl Default for MapOptions {
 }
 
 /// The files of a mission as texts.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Files {
     /// `NAME.toml`.
     pub manifest: String,
@@ -64,6 +62,8 @@ pub struct Files {
     pub domain: String,
     /// `problem.pddl`.
     pub problem: String,
+    /// What is not taken over from the map, or taken for granted.
+    pub warnings: Vec<Message>,
 }
 
 /// A configuration of the robot: name, power in milliwatts, whether it works in the dark, whose measurements count for
@@ -159,35 +159,10 @@ impl Legal {
 const SPEED: f64 = 0.68;
 /// Energy of a metre for each milliwatt at that speed, in the map's unit.
 const ENERGY: f64 = 0.01;
+/// So many places are shown where one is not known.
+const SHOWN: usize = 20;
 /// Levels of the battery that are kept in reserve.
 const RESERVE: u32 = 500;
-
-#[derive(Deserialize)]
-struct Map {
-    #[serde(rename = "map")]
-    nodes: Vec<Node>,
-    #[serde(default)]
-    time: Vec<Value>,
-    #[serde(default)]
-    hitrate: Vec<Value>,
-    #[serde(default)]
-    successrate: Vec<Value>,
-}
-
-#[derive(Deserialize)]
-struct Node {
-    #[serde(rename = "node-id")]
-    id: String,
-    coords: Coordinates,
-    #[serde(rename = "connected-to", default)]
-    neighbours: Vec<String>,
-}
-
-#[derive(Deserialize)]
-struct Coordinates {
-    x: f64,
-    y: f64,
-}
 
 type Corridor = (String, String);
 
@@ -196,10 +171,13 @@ fn pair(a: &str, b: &str) -> Corridor {
 }
 
 /// One measurement for each arc and configuration; the last one counts where an arc has several.
-fn measured(list: &[Value], field: &str, digits: usize) -> BTreeMap<Corridor, BTreeMap<&'static str, f64>> {
+fn measured(
+    list: &[Measured<'_>],
+    field: &str,
+    digits: usize,
+) -> BTreeMap<Corridor, BTreeMap<&'static str, f64>> {
     let mut result: BTreeMap<Corridor, BTreeMap<&'static str, f64>> = BTreeMap::new();
-    for entry in list {
-        let (Some(from), Some(to)) = (entry["from"].as_str(), entry["to"].as_str()) else { continue };
+    for Measured { from, to, entry, .. } in list {
         let by = result.entry(pair(from, to)).or_default();
         for Design(name, ..) in &DESIGNS {
             if let Some(value) = entry[*name][field].as_f64() {
@@ -219,16 +197,19 @@ fn rounded(value: f64, digits: usize) -> f64 {
 /// # Errors
 /// The file is no such map, or has no such places.
 pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Vec<Message>> {
-    let map: Map = serde_json::from_str(text).map_err(|error| {
-        let text = format!("this is no map: {error}");
-        vec![Message::at("M123", file, Some((error.line().max(1), error.column().max(1))), text)]
-    })?;
-    let known: BTreeSet<&str> = map.nodes.iter().map(|node| node.id.as_str()).collect();
+    let map = Map::read(file, text)?;
+    let known = map.places();
     let asked =
         [&options.start, &options.goal].into_iter().chain(options.dark.iter().flat_map(|(a, b)| [a, b]));
     let mut problems: Vec<_> = asked
         .filter(|name| !known.contains(name.as_str()))
-        .map(|name| Message::at("M124", file, None, format!("the map has no place `{name}`")))
+        .map(|name| {
+            let meant = did_you_mean(name, known.iter().copied());
+            let names = known.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
+            let more = if known.len() > SHOWN { ", …" } else { "" };
+            let text = format!("the map has no place `{name}`; it has: {names}{more}{meant}");
+            Message::at("M124", file, None, text)
+        })
         .collect();
     if !DESIGNS.iter().any(|Design(name, ..)| *name == options.configuration) {
         let names: Vec<_> = DESIGNS.iter().map(|Design(name, ..)| *name).collect();
@@ -236,13 +217,6 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
             format!("there is no configuration `{}`; there are: {}", options.configuration, names.join(", "));
         problems.push(Message::error("M124", text));
     }
-    let strange = map.nodes.iter().flat_map(|node| {
-        let lost = node.neighbours.iter().filter(|name| !known.contains(name.as_str()));
-        lost.map(|name| {
-            Message::at("M124", file, None, format!("`{}` leads to `{name}`, which is no place", node.id))
-        })
-    });
-    problems.extend(strange);
     if !problems.is_empty() {
         return Err(problems);
     }
@@ -251,12 +225,8 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
         knowledge: knowledge(options),
         domain: domain(options),
         problem: problem(&map, options),
+        warnings: map.warnings(file),
     })
-}
-
-fn object(name: &str) -> String {
-    let safe: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    safe.to_ascii_lowercase()
 }
 
 fn manifest(name: &str) -> String {
@@ -347,14 +317,17 @@ fn domain(options: &MapOptions) -> String {
     lines.fold(String::new(), |text, line| text + line + "\n")
 }
 
-fn problem(map: &Map, options: &MapOptions) -> String {
+fn problem(map: &Map<'_>, options: &MapOptions) -> String {
     let times = measured(&map.time, "mean", 4);
     let hits = measured(&map.hitrate, "hitrate", 9);
     let successes = measured(&map.successrate, "successrate", 9);
     let at: BTreeMap<&str, &Coordinates> =
-        map.nodes.iter().map(|node| (node.id.as_str(), &node.coords)).collect();
-    let arcs: BTreeSet<Corridor> =
-        map.nodes.iter().flat_map(|node| node.neighbours.iter().map(|other| pair(&node.id, other))).collect();
+        map.nodes.iter().map(|node| (node.id.text.as_str(), &node.coords)).collect();
+    let arcs: BTreeSet<Corridor> = map
+        .nodes
+        .iter()
+        .flat_map(|node| node.neighbours.iter().map(|other| pair(&node.id.text, &other.text)))
+        .collect();
     let length =
         |(a, b): &Corridor| (at[a.as_str()].x - at[b.as_str()].x).hypot(at[a.as_str()].y - at[b.as_str()].y);
     let dark: BTreeSet<Corridor> = options.dark.iter().map(|(a, b)| pair(a, b)).collect();

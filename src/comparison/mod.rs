@@ -8,6 +8,7 @@ mod coadaptation;
 mod compare;
 mod hindsight;
 mod import;
+mod map;
 mod nominal;
 mod planned;
 mod play;

@@ -175,7 +175,7 @@ impl Beliefs {
 
     /// Whether a design can be used, as far as is known; all can without a knowledge base.
     pub(super) fn is_available(&self, design: &str) -> bool {
-        self.mission.knowledge().is_none() || self.available.contains(design)
+        self.mission.knowledge().is_none() || self.available.contains(design) || self.mission.provides(design)
     }
 
     /// The designs of the steps that are still to be requested.

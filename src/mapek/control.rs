@@ -252,10 +252,10 @@ impl Loop {
         self.beliefs.plan.is_none() && self.beliefs.running.is_none() && self.beliefs.violation().is_none()
     }
 
-    /// The available designs of a function, sorted.
+    /// The available designs of a function, in the order of the knowledge base.
     pub(crate) fn designs_for(&self, function: &str) -> Vec<String> {
-        let Some(knowledge) = self.beliefs.mission.knowledge() else { return Vec::new() };
-        let designs = knowledge.runtime().available_designs(Some(function)).unwrap_or_default();
-        designs.into_iter().map(|design| design.name).collect()
+        let mut designs = self.beliefs.mission.designs_of(function);
+        designs.retain(|design| self.beliefs.is_available(design));
+        designs
     }
 }

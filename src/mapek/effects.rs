@@ -52,9 +52,11 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
 
 /// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded as the step says.
 fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
-    let wanted = step.map_or(&[][..], |step| &step.configuration);
+    let mission = &beliefs.mission;
+    let mut wanted = step.map_or_else(Vec::new, |step| step.configuration.clone());
+    wanted.retain(|(_, design)| !mission.decides_on(design));
     let Some(knowledge) = beliefs.mission.knowledge_mut() else { return };
-    if let Err(error) = knowledge.pursue_in_time(wanted) {
+    if let Err(error) = knowledge.pursue_in_time(&wanted) {
         answers.push(Answer::Error { code: error.code.clone(), message: error.message.clone() });
     }
     contradict(beliefs, answers);

@@ -6,8 +6,8 @@ mod blocking;
 mod planning;
 mod sections;
 
-pub use ::mission::{Bindings, CoAdaptation, Mission};
+pub use ::mission::{Bindings, CoAdaptation, Mission, Names};
 pub use blocking::{Blocking, blocking};
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
-pub use sections::{KnowledgeSection, PlanningSection, Scenario};
+pub use sections::{BindingsSection, KnowledgeSection, PlanningSection, Scenario};

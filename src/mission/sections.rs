@@ -1,11 +1,14 @@
-//! What a manifest says of a mission: its sections `knowledge`, `planning` and `scenarios`.
+//! What a manifest says of a mission: its sections `knowledge`, `planning`, `bindings` and `scenarios`.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
-use ::mission::Mission;
+use ::mission::{Bindings, Mission, Names};
 use ontology::ReadOptions;
-use serde::Deserialize;
+use serde::de::{self, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use toml::Spanned;
 
 use crate::knowledge::{COADAPTATION, Sources, TOMASYS};
 use crate::manifest::ManifestPath;
@@ -57,6 +60,99 @@ pub struct PlanningSection {
     pub domain: PathBuf,
     /// The problem file.
     pub problem: PathBuf,
+}
+
+/// The section `bindings`.
+#[derive(Debug, Clone, Default)]
+pub struct BindingsSection {
+    /// PDDL symbol to query, beyond the defaults.
+    symbols: BTreeMap<String, String>,
+    /// Individuals to objects, and where that stands.
+    names: Vec<(Spanned<String>, String)>,
+}
+
+impl BindingsSection {
+    /// The bindings.
+    ///
+    /// # Errors
+    /// A query is none.
+    pub fn bindings(&self, origin: &ManifestPath) -> Result<Bindings, Message> {
+        let mut names = Names::default();
+        for (individual, object) in &self.names {
+            let place = (origin.file().to_owned(), Some(origin.place(individual.span().start)));
+            names.add(individual.get_ref(), object, Some(place));
+        }
+        Ok(Bindings::with(&self.symbols).map_err(|text| origin.wrong(text))?.naming(names))
+    }
+}
+
+impl<'de> Deserialize<'de> for BindingsSection {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Section)
+    }
+}
+
+/// Reads the section: symbols with queries, and the table `names`.
+struct Section;
+
+impl<'de> Visitor<'de> for Section {
+    type Value = BindingsSection;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("PDDL symbols with queries, and the table `names`")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<BindingsSection, A::Error> {
+        let mut section = BindingsSection::default();
+        while let Some(symbol) = map.next_key::<String>()? {
+            match map.next_value()? {
+                Bound::Query(query) => {
+                    section.symbols.insert(symbol, query);
+                }
+                Bound::Names(names) if symbol == "names" => section.names = names,
+                Bound::Names(_) => {
+                    let text =
+                        format!("`{symbol}` is a table; a symbol is bound to a query, which is a string");
+                    return Err(de::Error::custom(text));
+                }
+            }
+        }
+        Ok(section)
+    }
+}
+
+/// What a key of the section has.
+enum Bound {
+    Query(String),
+    Names(Vec<(Spanned<String>, String)>),
+}
+
+impl<'de> Deserialize<'de> for Bound {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(QueryOrNames)
+    }
+}
+
+struct QueryOrNames;
+
+impl<'de> Visitor<'de> for QueryOrNames {
+    type Value = Bound;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a query, or in `names` a table of individuals and objects")
+    }
+
+    fn visit_str<E: de::Error>(self, query: &str) -> Result<Bound, E> {
+        Ok(Bound::Query(query.to_owned()))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Bound, A::Error> {
+        let mut names = Vec::new();
+        while let Some(entry) = map.next_entry()? {
+            names.push(entry);
+        }
+        Ok(Bound::Names(names))
+    }
 }
 
 /// A situation: what has failed, and what has changed; and what a simulated robot meets, of which a mission knows nothing.

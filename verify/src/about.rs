@@ -40,7 +40,8 @@ pub(crate) fn about(
     if !origin.rules.iter().map(|(_, text)| text).eq(&texts) {
         return other("the rules differ");
     }
-    if *mission.bindings().written() != origin.bindings {
+    let bindings = mission.bindings();
+    if *bindings.written() != origin.bindings || bindings.names().written() != origin.names {
         return other("the bindings differ");
     }
     if print_problem(mission.problem()) != origin.problem || base.statements() != origin.changes {

@@ -12,7 +12,7 @@ use crate::derivations::{self, DERIVATIONS};
 use crate::digest::digest;
 use mission::knowledge::{COADAPTATION, Knowledge, Sources, Stated, Statements, TOMASYS};
 use mission::message::Message;
-use mission::{Bindings, Mission};
+use mission::{Bindings, Mission, Names};
 
 /// The knowledge base with all that it imports, as N-Triples.
 pub const DOCUMENT: &str = "knowledge.nt";
@@ -29,6 +29,9 @@ pub struct Origin {
     pub problem: String,
     /// PDDL symbol to query, beyond the defaults.
     pub bindings: BTreeMap<String, String>,
+    /// Names of individuals to names of objects, where they differ.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub names: BTreeMap<String, String>,
     /// Names and texts of rule files.
     pub rules: Vec<(String, String)>,
     /// The SHA-256 of those that the program ships, by name.
@@ -150,7 +153,7 @@ fn filled(
     domain: &Domain,
     problem: &Problem,
 ) -> Result<String, String> {
-    let bindings = Bindings::with(&origin.bindings)?;
+    let bindings = Bindings::with(&origin.bindings)?.naming(Names::from(&origin.names));
     let source = |name: &str, text: &str| Ok(Source::new(name, text));
     let (own_domain, own_problem) = (source("domain", &origin.domain), source("problem", &origin.problem));
     let mission = Mission::new("", Some(Ok(knowledge)), bindings, own_domain, own_problem);

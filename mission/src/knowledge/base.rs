@@ -6,8 +6,9 @@ use std::sync::{Arc, OnceLock};
 
 use num_rational::BigRational;
 use ontology::runtime::{Mode, NewObjective, Runtime};
-use ontology::tomasys::View;
 use ontology::tomasys::change::Status;
+use ontology::tomasys::{CalledNames, View};
+use ontology::vocab::local_name;
 use ontology::{Annotation, EntityKind, Equality, Iri, ReadOptions};
 use rules::{Delta, Engine, Fact, Literal, Program, Symbols};
 
@@ -33,6 +34,8 @@ pub struct Knowledge {
     rule_count: usize,
     warnings: Vec<Message>,
     pub(super) sources: Sources,
+    /// What individuals are called in place of their local names.
+    pub(super) called: Arc<CalledNames>,
     entities: Arc<[(EntityKind, Iri)]>,
     /// The names of all documents, those that are imported among them.
     documents: Arc<[String]>,
@@ -105,6 +108,7 @@ impl Knowledge {
             rule_count,
             warnings,
             sources,
+            called: Arc::default(),
             entities,
             documents,
             annotations,
@@ -143,7 +147,13 @@ impl Knowledge {
 
     /// The typed view on what holds now.
     pub fn view(&self) -> View<'_> {
-        self.runtime.view()
+        self.runtime.view().calling(&self.called)
+    }
+
+    /// Calls individuals, by IRI, otherwise than by their local names from now on.
+    pub(crate) fn call(&mut self, called: CalledNames) {
+        self.called = Arc::new(called);
+        self.catalogue = OnceLock::new();
     }
 
     /// The engine, to ask for facts and derivations.
@@ -182,7 +192,22 @@ impl Knowledge {
         Ok(delta)
     }
 
-    /// Marks a component, named by IRI or local name, as failed.
+    /// The individual that is called so, by IRI.
+    fn called_so(&self, name: &str) -> Option<&str> {
+        let is_so = |(_, own): &(&String, &String)| own.eq_ignore_ascii_case(name);
+        self.called.iter().find(is_so).map(|(iri, _)| iri.as_str())
+    }
+
+    /// A component as the knowledge base names it: what it has no component of that name for may be the name of an object.
+    pub(super) fn component(&self, name: &str) -> String {
+        let iri = self.called_so(name).filter(|_| {
+            let own = self.runtime.view().components();
+            !own.iter().any(|own| own.individual.name == name || own.individual.iri == name)
+        });
+        iri.unwrap_or(name).to_owned()
+    }
+
+    /// Marks a component, named by IRI or local name, or as the problem calls it, as failed.
     ///
     /// # Errors
     /// There is no such component.
@@ -190,13 +215,13 @@ impl Knowledge {
         self.report(component, Status::Failed).map(|_| ())
     }
 
-    /// A component, named by IRI or local name, has a status from now on; returns what holds since, and what no more. What
+    /// A component, named by IRI or local name, or as the problem calls it, has a status from now on; returns what holds since, and what no more. What
     /// was reported holds whatever follows from it: see [`Knowledge::contradictions`].
     ///
     /// # Errors
     /// There is no such component, or a rule runs away.
     pub fn report(&mut self, component: &str, status: Status) -> Result<Delta, Message> {
-        let outcome = self.runtime.report_component(component, status);
+        let outcome = self.runtime.report_component(&self.component(component), status);
         self.changed(outcome)
     }
 
@@ -228,7 +253,7 @@ impl Knowledge {
         self.changed(outcome)
     }
 
-    /// Makes functions, and no others, the objectives of the robot, each grounded with a design; both by local name.
+    /// Makes functions, and no others, the objectives of the robot, each grounded with a design; both as the problem calls them.
     /// Objectives of a function are named `o_<function>`. What components have reported stays as it is.
     ///
     /// # Errors
@@ -238,6 +263,11 @@ impl Knowledge {
     }
 
     pub(super) fn pursue_now(&mut self, configuration: &[(String, String)]) -> Result<(), ontology::Error> {
+        let local = |name: &String| {
+            self.called_so(name).map_or_else(|| name.clone(), |iri| local_name(iri).to_owned())
+        };
+        let configuration: Vec<(String, String)> =
+            configuration.iter().map(|(function, design)| (local(function), local(design))).collect();
         let name = |function: &str| format!("o_{function}");
         let objectives = self.runtime.objectives();
         for objective in &objectives {
@@ -249,7 +279,7 @@ impl Knowledge {
                 self.follow(&delta);
             }
         }
-        for (function, design) in configuration {
+        for (function, design) in &configuration {
             let objective = name(function);
             let known = objectives.iter().find(|known| known.individual.name == objective);
             let grounded = known.is_some_and(|known| {

@@ -24,6 +24,8 @@ impl Knowledge {
     /// # Errors
     /// There is no such component or attribute.
     pub fn take(&mut self, name: &str, report: RobotReport) -> Result<Delta, Message> {
+        let component = self.component(name);
+        let name = if matches!(report, RobotReport::Component(_)) { component.as_str() } else { name };
         let mut reports = self.waiting.reports.clone();
         reports.retain(|(known, other)| known != name || !other.is_alike(&report));
         reports.push((name.to_owned(), report));

@@ -78,8 +78,7 @@ impl CoAdaptation {
         let mut actions = BTreeMap::new();
         for action in &domain.actions {
             let name = &action.identifier.name;
-            let Some(known) = known.iter().find(|known| bindings.is_action(name, &known.individual.name))
-            else {
+            let Some(known) = known.iter().find(|known| bindings.is_action(name, &known.individual)) else {
                 continue;
             };
             let functions = known.requires.iter().map(|function| Needed {

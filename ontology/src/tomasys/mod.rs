@@ -21,14 +21,17 @@ use rules::{Engine, Literal, Symbol, Value};
 use crate::vocab::local_name;
 use terms::Term;
 
-/// An individual: its IRI, and the last part of it.
+/// An individual: its IRI, and the last part of it, or what it is called here.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Individual {
     /// The IRI.
     pub iri: String,
-    /// Its local name.
+    /// Its local name; the name that a view was told to call it by, if there is one.
     pub name: String,
 }
+
+/// What individuals are called in place of their local names, by IRI.
+pub type CalledNames = BTreeMap<String, String>;
 
 impl Individual {
     pub(crate) fn new(iri: &str) -> Self {
@@ -115,6 +118,8 @@ type Edges = Rc<HashMap<Symbol, Vec<Symbol>>>;
 #[derive(Debug)]
 pub struct View<'a> {
     engine: &'a Engine,
+    /// What individuals are called in place of their local names.
+    called: Option<&'a CalledNames>,
     /// Properties that have been read, by name and direction.
     edges: RefCell<HashMap<(&'static str, bool), Edges>>,
 }
@@ -122,7 +127,13 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     /// Looks at an engine.
     pub fn new(engine: &'a Engine) -> Self {
-        Self { engine, edges: RefCell::default() }
+        Self { engine, called: None, edges: RefCell::default() }
+    }
+
+    /// The same view, in which individuals have other names.
+    #[must_use]
+    pub fn calling(self, called: &'a CalledNames) -> Self {
+        Self { called: (!called.is_empty()).then_some(called), ..self }
     }
 
     /// The named individuals of a class, by its IRI.
@@ -245,7 +256,11 @@ impl<'a> View<'a> {
     }
 
     fn individual(&self, symbol: Symbol) -> Option<Individual> {
-        self.name(symbol).map(Individual::new)
+        let mut individual = Individual::new(self.name(symbol)?);
+        if let Some(name) = self.called.and_then(|called| called.get(&individual.iri)) {
+            individual.name.clone_from(name);
+        }
+        Some(individual)
     }
 
     fn members(&self, term: Term) -> Vec<Individual> {

@@ -1,0 +1,111 @@
+//! `[bindings.names]` as it is written: what individuals of the knowledge base are called in the problem.
+//!
+//! An entry is exact (`fd_spiral_low = "fd_search_low"`), or a pattern with one star on each side
+//! (`"fd_spiral_*" = "fd_search_*"`). What it comes to for a knowledge base and a problem is found out in `names`.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use crate::message::Message;
+
+/// Where an entry stands: a file, and a line and column in it.
+pub type Place = (String, Option<(usize, usize)>);
+
+/// Names of individuals, and of the objects that they are.
+#[derive(Clone, Default)]
+pub struct Names {
+    entries: Vec<Naming>,
+}
+
+/// An entry.
+#[derive(Debug, Clone)]
+pub(crate) struct Naming {
+    /// The local name or IRI of an individual, or a pattern.
+    pub(crate) individual: String,
+    /// The name of an object, or a pattern.
+    pub(crate) object: String,
+    place: Option<Place>,
+}
+
+impl Names {
+    /// Adds an entry; without a place it comes from the command line.
+    pub fn add(&mut self, individual: &str, object: &str, place: Option<Place>) {
+        self.entries.push(Naming { individual: individual.to_owned(), object: object.to_owned(), place });
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// All entries, without their places.
+    pub fn written(&self) -> BTreeMap<String, String> {
+        self.entries.iter().map(|entry| (entry.individual.clone(), entry.object.clone())).collect()
+    }
+
+    pub(crate) fn entries(&self) -> &[Naming] {
+        &self.entries
+    }
+}
+
+impl From<&BTreeMap<String, String>> for Names {
+    fn from(written: &BTreeMap<String, String>) -> Self {
+        let mut names = Self::default();
+        for (individual, object) in written {
+            names.add(individual, object, None);
+        }
+        names
+    }
+}
+
+/// Where the entries stand does not matter: the same names make the same mission.
+impl fmt::Debug for Names {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.written().fmt(f)
+    }
+}
+
+impl Naming {
+    /// Whether it is for several individuals.
+    pub(crate) fn is_pattern(&self) -> bool {
+        self.individual.contains('*')
+    }
+
+    /// What an individual with that name, local or IRI, is called by this entry.
+    pub(crate) fn call(&self, name: &str) -> Option<String> {
+        let Some((head, tail)) = self.individual.split_once('*') else {
+            return (self.individual == name).then(|| self.object.clone());
+        };
+        let middle = name.strip_prefix(head)?.strip_suffix(tail)?;
+        Some(self.object.replacen('*', middle, 1))
+    }
+
+    /// What is wrong with its form.
+    pub(crate) fn fault(&self) -> Option<&'static str> {
+        let stars = |text: &str| text.matches('*').count();
+        match (stars(&self.individual), stars(&self.object)) {
+            _ if self.individual.is_empty() || self.object.is_empty() => Some("one of the names is empty"),
+            (0, 0) | (1, 1) => None,
+            (0 | 1, 0 | 1) => Some("a pattern has a star on both sides"),
+            _ => Some("a pattern has one star on each side"),
+        }
+    }
+
+    /// That something is wrong with it.
+    pub(crate) fn wrong(&self, code: &str, text: &str) -> Message {
+        match &self.place {
+            Some((file, place)) => Message::at(code, file, *place, format!("`[bindings.names]`: {text}")),
+            None => Message::error(code, format!("`--name {}={}`: {text}", self.individual, self.object)),
+        }
+    }
+
+    /// That something about it is questionable.
+    pub(crate) fn questionable(&self, code: &str, text: &str) -> Message {
+        match &self.place {
+            Some((file, Some(place))) => {
+                Message::warning_at(code, file, *place, format!("`[bindings.names]`: {text}"))
+            }
+            _ => Message::warning(code, format!("`--name {}={}`: {text}", self.individual, self.object)),
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! `[bindings.names]` against a knowledge base and a problem: which individual is called what, and what is wrong with the entries.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use ontology::tomasys::{CalledNames, Individual};
+use pddl::TypeHierarchy;
+use pddl::ast::{Domain, Name, Problem, TypedName};
+
+use super::likeness::list;
+use super::roles::Roles;
+use crate::binding::Bindings;
+use crate::called::Naming;
+use crate::knowledge::Knowledge;
+use crate::message::{Message, did_you_mean};
+
+/// What individuals are called, by IRI, and warnings.
+pub(crate) type Resolved = (CalledNames, Vec<Message>);
+
+/// Finds out what individuals are called. An exact entry counts before a pattern.
+///
+/// # Errors
+/// All entries that are malformed, that meet no individual or no object, or an object of another type; and objects that would be
+/// several individuals.
+pub(crate) fn resolve(
+    domain: &Domain,
+    problem: &Problem,
+    knowledge: &Knowledge,
+    bindings: &Bindings,
+) -> Result<Resolved, Vec<Message>> {
+    let entries = bindings.names().entries();
+    if entries.is_empty() {
+        return Ok(Resolved::default());
+    }
+    let roles = Roles::new(domain, problem, knowledge, bindings);
+    let individuals: BTreeSet<&Individual> = roles.all().iter().flat_map(|role| &role.individuals).collect();
+    let objects = domain.constants.iter().chain(&problem.objects);
+    let objects: BTreeMap<&Name, &TypedName> =
+        objects.map(|object| (&object.identifier.name, object)).collect();
+    let mut resolving = Resolving {
+        roles: &roles,
+        types: TypeHierarchy::of(domain),
+        individuals,
+        objects,
+        called: BTreeMap::new(),
+        errors: Vec::new(),
+        warnings: Vec::new(),
+    };
+    for entry in entries {
+        if let Some(fault) = entry.fault() {
+            resolving.errors.push(entry.wrong("M223", fault));
+        }
+    }
+    let sound = || entries.iter().filter(|entry| entry.fault().is_none());
+    sound().filter(|entry| !entry.is_pattern()).for_each(|entry| resolving.exact(entry));
+    let exact: BTreeSet<String> = resolving.called.keys().map(|iri| (*iri).to_owned()).collect();
+    sound().filter(|entry| entry.is_pattern()).for_each(|entry| resolving.pattern(entry, &exact));
+    resolving.clashes();
+    let Resolving { called, errors, warnings, .. } = resolving;
+    if errors.is_empty() {
+        Ok((called.into_iter().map(|(iri, (name, _))| (iri.to_owned(), name)).collect(), warnings))
+    } else {
+        Err(errors)
+    }
+}
+
+struct Resolving<'a> {
+    roles: &'a Roles,
+    types: TypeHierarchy,
+    individuals: BTreeSet<&'a Individual>,
+    objects: BTreeMap<&'a Name, &'a TypedName>,
+    /// The name of an individual by IRI, and the entry that says so.
+    called: BTreeMap<&'a str, (String, &'a Naming)>,
+    errors: Vec<Message>,
+    warnings: Vec<Message>,
+}
+
+impl<'a> Resolving<'a> {
+    fn exact(&mut self, entry: &'a Naming) {
+        let is_meant = |own: &&&Individual| entry.individual == own.name || entry.individual == own.iri;
+        let meant: Vec<&Individual> = self.individuals.iter().filter(is_meant).copied().collect();
+        match meant[..] {
+            [] => {
+                let names = || self.individuals.iter().map(|own| own.name.as_str());
+                let text = format!(
+                    "the knowledge base has no function, design, action, component or member of a bound class `{}`{}",
+                    entry.individual,
+                    did_you_mean(&entry.individual, names())
+                );
+                self.errors.push(entry.wrong("M223", &text));
+            }
+            [individual] => match self.fits(individual, &entry.object) {
+                Ok(name) => self.call(individual, name, entry),
+                Err(text) => self.errors.push(entry.wrong("M224", &text)),
+            },
+            _ => {
+                let iris: Vec<&str> = meant.iter().map(|own| own.iri.as_str()).collect();
+                let text = format!(
+                    "`{}` may be each of {}; write the IRI that is meant",
+                    entry.individual,
+                    list(&iris)
+                );
+                self.errors.push(entry.wrong("M223", &text));
+            }
+        }
+    }
+
+    fn pattern(&mut self, entry: &'a Naming, exact: &BTreeSet<String>) {
+        let (mut met, mut lost) = (0, Vec::new());
+        let mut reason = None;
+        for individual in self.individuals.clone() {
+            let image = entry.call(&individual.name).or_else(|| entry.call(&individual.iri));
+            let Some(image) = image.filter(|_| !exact.contains(&individual.iri)) else { continue };
+            match self.fits(individual, &image) {
+                Ok(name) => {
+                    met += 1;
+                    self.call(individual, name, entry);
+                }
+                Err(text) => {
+                    lost.push(individual.name.as_str());
+                    reason.get_or_insert(text);
+                }
+            }
+        }
+        match reason {
+            None if met == 0 => {
+                let names: Vec<&str> = self.individuals.iter().map(|own| own.name.as_str()).collect();
+                let text = format!(
+                    "the pattern `{}` meets no individual that has not a name of its own here; there are: {}",
+                    entry.individual,
+                    list(&names)
+                );
+                self.errors.push(entry.wrong("M223", &text));
+            }
+            Some(reason) if met == 0 => self.errors.push(entry.wrong("M224", &reason)),
+            Some(reason) => {
+                let text =
+                    format!("the pattern leaves {} as they are, without an object: {reason}", list(&lost));
+                self.warnings.push(entry.questionable("M226", &text));
+            }
+            None => {}
+        }
+    }
+
+    /// The object of that name as it is written, if an individual can be it.
+    fn fits(&self, individual: &Individual, name: &str) -> Result<String, String> {
+        let Some(object) = self.objects.get(&Name::new(name)) else {
+            let known = self.objects.keys().map(|name| name.as_str());
+            return Err(format!(
+                "there is no object `{name}`, neither in the problem nor among the domain's constants{}",
+                did_you_mean(name, known)
+            ));
+        };
+        let bound = self.roles.all().iter().filter(|role| !role.types.alternatives.is_empty());
+        let own: Vec<_> = bound.filter(|role| role.individuals.contains(individual)).collect();
+        if own.is_empty() || own.iter().any(|role| self.types.fits(&object.r#type, &role.types)) {
+            return Ok(object.identifier.name.as_str().to_owned());
+        }
+        let classes: Vec<&str> = own.iter().map(|role| role.class.as_str()).collect();
+        let types = own.iter().flat_map(|role| &role.types.alternatives);
+        let types: Vec<&str> = types.map(|r#type| r#type.name.as_str()).collect();
+        let given: Vec<&str> = object.r#type.alternatives.iter().map(|own| own.name.as_str()).collect();
+        let given = if given.is_empty() { vec!["object"] } else { given };
+        Err(format!(
+            "`{name}` is of type {}, but `{}` is a {}; an object of type {} would be right",
+            list(&given),
+            individual.name,
+            classes.join(" and "),
+            list(&types)
+        ))
+    }
+
+    fn call(&mut self, individual: &'a Individual, name: String, entry: &'a Naming) {
+        match self.called.get(individual.iri.as_str()) {
+            Some((other, _)) if Name::new(other) != Name::new(&name) => {
+                let text = format!("`{}` would be `{name}` and `{other}`", individual.name);
+                self.errors.push(entry.wrong("M225", &text));
+            }
+            Some(_) => {}
+            None => {
+                self.called.insert(&individual.iri, (name, entry));
+            }
+        }
+    }
+
+    /// Objects that would be several individuals.
+    fn clashes(&mut self) {
+        let mut all: BTreeMap<Name, Vec<&Individual>> = BTreeMap::new();
+        for individual in &self.individuals {
+            let name = self.called.get(individual.iri.as_str()).map_or(&individual.name, |(name, _)| name);
+            all.entry(Name::new(name)).or_default().push(individual);
+        }
+        for (name, individuals) in all.iter().filter(|(_, individuals)| individuals.len() > 1) {
+            let mut entries = individuals.iter().filter_map(|own| self.called.get(own.iri.as_str()));
+            let Some((_, entry)) = entries.next_back() else { continue };
+            let names: Vec<&str> = individuals.iter().map(|own| own.name.as_str()).collect();
+            let text = format!("`{name}` would be {}; an object is one individual", list(&names));
+            self.errors.push(entry.wrong("M225", &text));
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! Objects of a problem and individuals of a knowledge base by the roles in which both sides speak about them.
+//!
+//! A type of the domain that is bound to a class gives its objects the role of that class. Where types say nothing, the
+//! predicates that are bound to TOMASys do: of a fact that a design solves a function, the first argument is a design and the
+//! second one a function.
+
+use std::collections::BTreeSet;
+
+use ontology::tomasys::Individual;
+use ontology::vocab::local_name;
+use pddl::TypeHierarchy;
+use pddl::ast::{Atom, Domain, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName};
+
+use crate::binding::{Bindings, identifier};
+use crate::knowledge::Knowledge;
+
+pub(super) const FUNCTION: &str = "Function";
+pub(super) const DESIGN: &str = "FunctionDesign";
+pub(super) const ACTION: &str = "Action";
+const COMPONENT: &str = "Component";
+
+/// An object, and where it is named: in the problem, or as a constant of the domain.
+#[derive(Debug, Clone)]
+pub(super) struct Object {
+    pub(super) name: Name,
+    pub(super) span: Span,
+    pub(super) in_domain: bool,
+}
+
+/// A class, and what has its role on either side.
+#[derive(Debug)]
+pub(super) struct Role {
+    /// The local name of the class.
+    pub(super) class: String,
+    /// The types of the domain that stand for it.
+    pub(super) types: TypeExpression,
+    /// Its members, by IRI.
+    pub(super) individuals: Vec<Individual>,
+    /// The objects with this role, each once, in the order of the files.
+    pub(super) objects: Vec<Object>,
+}
+
+/// All roles.
+#[derive(Debug)]
+pub(super) struct Roles {
+    roles: Vec<Role>,
+}
+
+impl Roles {
+    /// The roles of a domain and a problem, as a knowledge base knows them.
+    pub(super) fn new(
+        domain: &Domain,
+        problem: &Problem,
+        knowledge: &Knowledge,
+        bindings: &Bindings,
+    ) -> Self {
+        let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
+        let known = |class: &str| match class {
+            FUNCTION => view.functions(),
+            DESIGN => catalogue.designs().iter().map(|design| design.individual.clone()).collect(),
+            ACTION => catalogue.actions().iter().map(|action| action.individual.clone()).collect(),
+            COMPONENT => view.components().into_iter().map(|component| component.individual).collect(),
+            _ => Vec::new(),
+        };
+        let mut roles: Vec<Role> = [FUNCTION, DESIGN, ACTION, COMPONENT]
+            .map(|class| Role {
+                class: class.to_owned(),
+                types: TypeExpression::default(),
+                individuals: known(class),
+                objects: Vec::new(),
+            })
+            .into();
+        for declared in &domain.types {
+            let name = &declared.identifier.name;
+            let Some(class) = bindings.class(name) else { continue };
+            let members = catalogue.members(&view, &class);
+            let class = local_name(&class);
+            let index = roles.iter().position(|role| role.class == class).unwrap_or_else(|| {
+                let (class, types) = (class.to_owned(), TypeExpression::default());
+                roles.push(Role { class, types, individuals: Vec::new(), objects: Vec::new() });
+                roles.len() - 1
+            });
+            let role = &mut roles[index];
+            let all: BTreeSet<Individual> =
+                role.individuals.drain(..).chain(members.iter().cloned()).collect();
+            role.individuals = all.into_iter().collect();
+            role.types.alternatives.push(identifier(name));
+        }
+        let mut roles = Self { roles };
+        roles.place(domain, problem);
+        roles.place_by_facts(domain, problem, bindings);
+        roles
+    }
+
+    /// All roles.
+    pub(super) fn all(&self) -> &[Role] {
+        &self.roles
+    }
+
+    /// The role of a class, by local name.
+    pub(super) fn of(&self, class: &str) -> &Role {
+        self.roles.iter().find(|role| role.class == class).expect("invariant: TOMASys' own roles are there")
+    }
+
+    /// Gives objects the roles of their types.
+    fn place(&mut self, domain: &Domain, problem: &Problem) {
+        let types = TypeHierarchy::of(domain);
+        let constants = domain.constants.iter().map(|constant| (constant, true));
+        for (object, in_domain) in constants.chain(problem.objects.iter().map(|object| (object, false))) {
+            for role in &mut self.roles {
+                if !role.types.alternatives.is_empty() && types.fits(&object.r#type, &role.types) {
+                    role.add(object, in_domain);
+                }
+            }
+        }
+    }
+
+    /// Gives objects whose types say nothing the roles that they have in facts.
+    fn place_by_facts(&mut self, domain: &Domain, problem: &Problem, bindings: &Bindings) {
+        let constants = domain.constants.iter().map(|constant| (constant, true));
+        let declared: Vec<_> =
+            constants.chain(problem.objects.iter().map(|object| (object, false))).collect();
+        for (class, name) in facts(problem).flat_map(|atom| said(atom, bindings)) {
+            let object = declared.iter().find(|(object, _)| object.identifier.name == *name);
+            let index = self.roles.iter().position(|role| role.class == class);
+            if let (Some((object, in_domain)), Some(index)) = (object, index)
+                && self.roles[index].types.alternatives.is_empty()
+            {
+                self.roles[index].add(object, *in_domain);
+            }
+        }
+    }
+}
+
+impl Role {
+    fn add(&mut self, object: &TypedName, in_domain: bool) {
+        let name = &object.identifier.name;
+        if !self.has(name) {
+            self.objects.push(Object { name: name.clone(), span: object.identifier.span, in_domain });
+        }
+    }
+
+    /// Whether an object has it.
+    pub(super) fn has(&self, name: &Name) -> bool {
+        self.objects.iter().any(|object| object.name == *name)
+    }
+
+    /// Whether the knowledge base has an individual of that name in it.
+    pub(super) fn knows(&self, name: &Name) -> bool {
+        self.individuals.iter().any(|individual| Name::new(&individual.name) == *name)
+    }
+}
+
+/// The facts that a problem states.
+pub(super) fn facts(problem: &Problem) -> impl Iterator<Item = &Atom> {
+    problem.init.iter().filter_map(|element| match element {
+        InitialElement::Fact(atom) => Some(atom),
+        _ => None,
+    })
+}
+
+/// The names of the arguments of a fact.
+pub(super) fn arguments(atom: &Atom) -> Vec<&Name> {
+    let name = |term| match term {
+        &Term::Constant(ref identifier) | &Term::Variable(ref identifier) => &identifier.name,
+    };
+    atom.arguments.iter().map(name).collect()
+}
+
+/// Which classes a fact puts its arguments in.
+fn said<'p>(atom: &'p Atom, bindings: &Bindings) -> Vec<(&'static str, &'p Name)> {
+    let (predicate, arguments) = (&atom.predicate.name, arguments(atom));
+    if bindings.solves().contains(predicate) && arguments.len() == 2 {
+        return vec![(DESIGN, arguments[0]), (FUNCTION, arguments[1])];
+    }
+    if bindings.is_availability(predicate) && arguments.len() == 1 {
+        return vec![(DESIGN, arguments[0])];
+    }
+    if bindings.is_requirement(predicate) && !arguments.is_empty() {
+        let functions = arguments[1..].iter().map(|function| (FUNCTION, *function));
+        return std::iter::once((ACTION, arguments[0])).chain(functions).collect();
+    }
+    Vec::new()
+}

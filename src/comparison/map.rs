@@ -1,0 +1,184 @@
+//! The map of Cámara et al. in its JSON forms, read with the place of everything that may be wrong.
+//!
+//! A place has `node-id`, `connected-to` and `coords`; in maps of 2017, for Rainbow's first robots, `coord`. Those have no
+//! measurements, and rectangles that the robot should not enter (`unsafe-rects`), which no corridor needs.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Deserializer, de};
+use serde_json::Value;
+use serde_json::value::RawValue;
+
+use crate::message::{Message, did_you_mean};
+
+/// A map.
+#[derive(Deserialize)]
+pub(super) struct Map<'t> {
+    #[serde(rename = "map", borrow)]
+    pub(super) nodes: Vec<Node<'t>>,
+    #[serde(default, borrow)]
+    pub(super) time: Vec<Measured<'t>>,
+    #[serde(default, borrow)]
+    pub(super) hitrate: Vec<Measured<'t>>,
+    #[serde(default, borrow)]
+    pub(super) successrate: Vec<Measured<'t>>,
+    #[serde(rename = "unsafe-rects", default)]
+    unsafe_rectangles: Vec<de::IgnoredAny>,
+}
+
+/// A place of the map.
+#[derive(Deserialize)]
+pub(super) struct Node<'t> {
+    #[serde(rename = "node-id", borrow)]
+    pub(super) id: Placed<'t>,
+    #[serde(alias = "coord")]
+    pub(super) coords: Coordinates,
+    #[serde(rename = "connected-to", default, borrow)]
+    pub(super) neighbours: Vec<Placed<'t>>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Coordinates {
+    pub(super) x: f64,
+    pub(super) y: f64,
+}
+
+/// A string, and where it stands.
+pub(super) struct Placed<'t> {
+    pub(super) text: String,
+    raw: &'t str,
+}
+
+impl<'de: 't, 't> Deserialize<'de> for Placed<'t> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let raw = <&'t RawValue>::deserialize(deserializer)?.get();
+        let text =
+            serde_json::from_str(raw).map_err(|_| de::Error::custom("the name of a place is a string"))?;
+        Ok(Self { text, raw })
+    }
+}
+
+/// Measurements on an arc.
+pub(super) struct Measured<'t> {
+    pub(super) from: String,
+    pub(super) to: String,
+    pub(super) entry: Value,
+    raw: &'t str,
+}
+
+impl<'de: 't, 't> Deserialize<'de> for Measured<'t> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let raw = <&'t RawValue>::deserialize(deserializer)?.get();
+        let entry: Value = serde_json::from_str(raw).map_err(de::Error::custom)?;
+        let end = |name: &str| {
+            let own = entry[name].as_str().map(ToOwned::to_owned);
+            own.ok_or_else(|| {
+                de::Error::custom(format!("a measurement is of an arc, and needs a place `{name}`"))
+            })
+        };
+        let (from, to) = (end("from")?, end("to")?);
+        Ok(Self { from, to, entry, raw })
+    }
+}
+
+impl<'t> Map<'t> {
+    /// Reads a map.
+    ///
+    /// # Errors
+    /// It is no JSON of that form, or places are there twice, or lead where there is no place.
+    pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Vec<Message>> {
+        let map: Self = serde_json::from_str(text).map_err(|error| {
+            let older = if error.to_string().contains("missing field `coords`") {
+                " (or `coord`, in maps of 2017)"
+            } else {
+                ""
+            };
+            let place = Some((error.line().max(1), error.column().max(1)));
+            let sentence = error.to_string();
+            let sentence = sentence.split(" at line ").next().unwrap_or_default();
+            vec![Message::at("M123", file, place, format!("this is no map: {sentence}{older}"))]
+        })?;
+        let problems = map.problems(file, text);
+        if problems.is_empty() { Ok(map) } else { Err(problems) }
+    }
+
+    /// The names of all places.
+    pub(super) fn places(&self) -> BTreeSet<&str> {
+        self.nodes.iter().map(|node| node.id.text.as_str()).collect()
+    }
+
+    fn problems(&self, file: &str, text: &str) -> Vec<Message> {
+        let known = self.places();
+        let mut problems = Vec::new();
+        let mut wrong = |raw: &str, sentence: String| {
+            problems.push(Message::at("M124", file, Some(place(text, raw)), sentence));
+        };
+        let mut objects: BTreeMap<String, &str> = BTreeMap::new();
+        for node in &self.nodes {
+            let own = node.id.text.as_str();
+            match objects.insert(object(own), own) {
+                Some(other) if other == own => {
+                    wrong(node.id.raw, format!("the place `{own}` is there twice"));
+                }
+                Some(other) => {
+                    wrong(
+                        node.id.raw,
+                        format!("`{own}` and `{other}` would be one object in PDDL; rename one"),
+                    );
+                }
+                None if object(own).chars().next().is_none_or(|first| !first.is_ascii_alphabetic()) => {
+                    let text =
+                        format!("`{own}` cannot name an object of PDDL; it should begin with a letter");
+                    wrong(node.id.raw, text);
+                }
+                None => {}
+            }
+            if !(node.coords.x.is_finite() && node.coords.y.is_finite()) {
+                wrong(node.id.raw, format!("the coordinates of `{own}` are not finite"));
+            }
+            for next in &node.neighbours {
+                if !known.contains(next.text.as_str()) {
+                    let meant = did_you_mean(&next.text, known.iter().copied());
+                    wrong(next.raw, format!("`{own}` leads to `{}`, which is no place{meant}", next.text));
+                } else if next.text == own {
+                    wrong(next.raw, format!("`{own}` leads to itself"));
+                }
+            }
+        }
+        let measured = self.time.iter().chain(&self.hitrate).chain(&self.successrate);
+        for entry in measured.filter(|entry| entry.from == entry.to) {
+            wrong(entry.raw, format!("this measures the way from `{}` to itself", entry.from));
+        }
+        problems
+    }
+
+    /// What is not taken over, or taken for granted.
+    pub(super) fn warnings(&self, file: &str) -> Vec<Message> {
+        let mut warnings = Vec::new();
+        let mut warn = |text: &str| warnings.push(Message::warning("M132", format!("{file}: {text}")));
+        if self.time.is_empty() {
+            warn("the map has no measurements of time; each move takes its length at full speed");
+        }
+        if self.hitrate.is_empty() && self.successrate.is_empty() {
+            warn("the map has no probabilities; every move gets to its end, and nothing is hit");
+        }
+        if !self.unsafe_rectangles.is_empty() {
+            warn("the rectangles in `unsafe-rects` are not taken over; robots follow the arcs");
+        }
+        warnings
+    }
+}
+
+/// A place or design as an object of PDDL.
+pub(super) fn object(name: &str) -> String {
+    let safe: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    safe.to_ascii_lowercase()
+}
+
+/// Line and column, both from 1, of a part of a text.
+fn place(text: &str, part: &str) -> (usize, usize) {
+    let offset = (part.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
+    let before = text.get(..offset).unwrap_or_default();
+    let last = before.rsplit('\n').next().unwrap_or_default();
+    (before.matches('\n').count() + 1, last.chars().count() + 1)
+}

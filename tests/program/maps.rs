@@ -1,0 +1,147 @@
+//! `metaplan import camara-map` on maps of 2017, which have `coord` and no measurements. The map is made up.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use metaplan::comparison::{MapOptions, import_map};
+
+use crate::common::{Outcome, metaplan_in, steps};
+
+/// Places, where they lie, and where arcs lead that the other end need not name, too.
+const PLACES: [(&str, f64, f64, &str); 6] = [
+    ("h1", 0.0, 0.0, "\"h2\", \"c1\""),
+    ("h2", 6.8, 0.0, "\"h1\", \"h3\""),
+    ("h3", 6.8, 3.4, "\"h2\""),
+    ("c1", 0.0, 17.0, "\"h1\""),
+    ("h4", 6.8, 10.2, "\"h3\", \"c1\""),
+    ("hs", 30.0, 10.2, ""),
+];
+
+/// A map in the form of 2017.
+fn map() -> String {
+    let mut text = "{\"map\": [\n".to_owned();
+    for (number, (id, x, y, next)) in (1..).zip(PLACES) {
+        let end = if number == PLACES.len() { "" } else { "," };
+        let _ = writeln!(
+            text,
+            "  {{\"node-id\": \"{id}\", \"coord\" : {{\"x\" : {x}, \"y\" : {y}}}, \"connected-to\": [{next}] }}{end}"
+        );
+    }
+    text + "],\n\"unsafe-rects\": [\n  {\"top_y\": 2, \"right_x\": 5.5, \"left_x\": 1.5, \"bottom_y\": 1}\n]\n}\n"
+}
+
+fn import(directory: &Path, text: &str, more: &[&str]) -> Outcome {
+    std::fs::write(directory.join("map.json"), text).expect("written");
+    let arguments = ["import", "camara-map", "map.json", "--start", "h1", "--goal", "h4", "-o", "out"];
+    metaplan_in(directory, &[&arguments[..], more].concat(), "")
+}
+
+/// The length of the shortest way, by trying all ways without a place twice.
+fn shortest(from: &str, to: &str, before: &[&str]) -> f64 {
+    let at = |name: &str| PLACES.iter().find(|place| place.0 == name).expect("a place");
+    let leads =
+        |a: &str, b: &str| at(a).3.contains(&format!("\"{b}\"")) || at(b).3.contains(&format!("\"{a}\""));
+    if from == to {
+        return 0.0;
+    }
+    let seen: Vec<&str> = before.iter().copied().chain([from]).collect();
+    let next = PLACES.iter().filter(|place| leads(from, place.0) && !seen.contains(&place.0));
+    let ways =
+        next.map(|place| (at(from).1 - place.1).hypot(at(from).2 - place.2) + shortest(place.0, to, &seen));
+    ways.fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn maps_of_2017_become_missions() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let outcome = import(directory.path(), &map(), &["--speeds", "full", "--battery", "1000000"]);
+    assert_eq!((outcome.status, outcome.stdout.as_str()), (0, "out/camara.toml\n"), "{outcome:#?}");
+    for word in [
+        "warning[M132]",
+        "no measurements of time",
+        "no probabilities",
+        "the rectangles in `unsafe-rects` are not taken over",
+    ] {
+        assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
+    }
+    let outcome = metaplan_in(directory.path(), &["plan", "out/camara.toml", "--format", "json"], "");
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (0, ""), "{outcome:#?}");
+    let answer = outcome.json();
+    // At 0.68 metres a second.
+    let seconds = shortest("h1", "h4", &[]) / 0.68;
+    assert!((answer["cost"].as_f64().expect("a cost") - seconds).abs() < 1e-3, "{seconds}: {answer:#}");
+    let route: Vec<String> =
+        steps(&answer).iter().map(|step| step.split(" | ").next().unwrap_or_default().to_owned()).collect();
+    assert_eq!(route.len(), 3, "{route:?}");
+    // Nothing leads to `hs`.
+    let outcome = import(directory.path(), &map(), &["--goal", "hs"]);
+    assert_eq!(outcome.status, 2, "an option is there twice: {outcome:#?}");
+}
+
+/// With the same numbers, both forms are the same mission.
+#[test]
+fn both_forms_say_the_same() {
+    let options = MapOptions { start: "h1".to_owned(), goal: "h4".to_owned(), ..MapOptions::default() };
+    let (old, new) = (map(), map().replace("\"coord\"", "\"coords\""));
+    let [old, new] = [old, new].map(|text| import_map("map", &text, &options).expect("a map"));
+    assert_eq!((&old.manifest, &old.knowledge, &old.domain), (&new.manifest, &new.knowledge, &new.domain));
+    assert_eq!(old.problem, new.problem);
+    // The energy of the first arc at full speed: metres, by speed, by power in milliwatts, by the factor of the unit.
+    let energy = (6.8 * 0.68 * 17_790.0 * 0.01_f64).trunc();
+    assert!(old.problem.contains(&format!("(= (energy h1 h2 fd_amcl_kinect) {energy})")), "{}", old.problem);
+    assert!(old.problem.contains("(= (time h1 h2 fd_amcl_kinect) 10)"), "{}", old.problem);
+}
+
+#[test]
+fn malformed_maps_have_a_place() {
+    let check = |old: &str, new: &str, place: &str, words: &str| {
+        let text = map();
+        assert!(text.contains(old), "no `{old}`");
+        let directory = tempfile::tempdir().expect("a directory");
+        let outcome = import(directory.path(), &text.replacen(old, new, 1), &[]);
+        assert_eq!(outcome.status, 3, "{new}: {outcome:#?}");
+        assert!(!directory.path().join("out").exists(), "{new}: nothing is written");
+        for word in [&format!("map.json:{place}: error["), words] {
+            assert!(outcome.stderr.contains(word), "{new}: no `{word}`: {outcome:#?}");
+        }
+    };
+    check("\"coord\"", "\"cord\"", "2:79", "missing field `coords` (or `coord`, in maps of 2017)");
+    check("\"x\" : 0,", "\"x\" : \"far\",", "2:42", "expected f64");
+    check("\"x\" : 0,", "", "2:40", "missing field `x`");
+    check("\"x\" : 0", "\"x\" : 1e999", "2:42", "this is no map");
+    check("\"coord\" :", "\"coords\": {\"x\": 1, \"y\": 1}, \"coord\" :", "2:56", "duplicate field");
+    check("\"node-id\": \"h1\"", "\"node-id\": 1", "2:15", "the name of a place is a string");
+    check("\"node-id\": \"h3\"", "\"node-id\": \"h1\"", "4:15", "the place `h1` is there twice");
+    check("\"node-id\": \"h3\"", "\"node-id\": \"H1\"", "4:15", "`H1` and `h1` would be one object in PDDL");
+    check("\"node-id\": \"hs\"", "\"node-id\": \"7\"", "7:15", "it should begin with a letter");
+    check(
+        "[\"h1\", \"h3\"]",
+        "[\"h1\", \"hh3\"]",
+        "3:76",
+        "`h2` leads to `hh3`, which is no place; did you mean",
+    );
+    check("[\"h1\", \"h3\"]", "[\"h1\", \"h2\"]", "3:76", "`h2` leads to itself");
+    check("],\n", "],,\n", "8:3", "this is no map");
+    check("\n}\n", "\n", "12:1", "EOF");
+    check("],\n", "],\n\"time\": [{\"from\": \"h1\"}],\n", "9:24", "needs a place `to`");
+}
+
+#[test]
+fn all_that_is_wrong_with_a_map_is_said() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let text = map()
+        .replace("\"h3\", \"c1\"", "\"h9\", \"c9\"")
+        .replace("\"node-id\": \"hs\"", "\"node-id\": \"h1\"");
+    let outcome = import(directory.path(), &text, &[]);
+    for word in ["map.json:6:73: ", "map.json:6:79: ", "map.json:7:15: "] {
+        assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
+    }
+    assert_eq!(outcome.stderr.matches("error[M124]").count(), 3, "{outcome:#?}");
+    std::fs::write(directory.path().join("map.json"), map()).expect("written");
+    let outcome = metaplan_in(directory.path(), &["import", "camara-map", "map.json", "-o", "out"], "");
+    for word in
+        ["the map has no place `l1`; it has: c1, h1, h2, h3, h4, hs; did you mean `c1`?", "no place `l18`"]
+    {
+        assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
+    }
+}
