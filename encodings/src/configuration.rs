@@ -1,20 +1,33 @@
 //! Which design each of several functions gets, where their designs compete for components or share a budget.
 //!
 //! The best choice serves as many functions as can be served together; of those choices, it misses the fewest requirements, and of
-//! those it has the greatest sum of utilities.
-//! Of equals it is the first: earlier functions get the earlier ones of their designs.
+//! those it has the greatest sum of utilities. Of equals it is the first: earlier functions get the earlier ones of their designs. All three
+//! together are one integer, the worth, in which one function more outweighs any requirements, and one requirement any utility. A component
+//! that only one design can use is a budget of one.
 //!
-//! Function after function, all that has been chosen so far is kept unless something else is at least as good in every respect: as
-//! many functions served, no more requirements missed, as much utility, no more of any budget, no component more in use. What is left at the end has the
-//! optimum among it. A choice that can no more keep a budget, whatever comes, is left out at once.
+//! Function after function, all that has been chosen so far is kept unless something else is at least as good in every respect: of as
+//! much worth, no more of any budget taken. What is left at the end has the optimum among it. A choice is left out, too, if it can no
+//! more keep a budget, whatever comes, or if no completion is worth as much as a choice that is known. For that, the worth of the functions that
+//! follow is bounded by what they are worth at a price for each budget, whatever the prices are \[1\]; good ones are found by subgradients
+//! \[2\] in floating-point numbers, and then rounded, so that the bound is exact.
+//!
+//! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of Resources, Operations
+//!   Research 11(3), 1963.
+//! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II, Mathematical Programming 1, 1971.
 
-use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
+use num_bigint::BigInt;
+use num_integer::Integer as _;
 use num_rational::BigRational;
-use num_traits::Zero as _;
+use num_traits::{One as _, Signed as _, ToPrimitive as _, Zero as _};
 
 use crate::limits::{Interrupted, Limits};
+
+/// Prices are looked for so often.
+const ROUNDS: usize = 300;
+/// Prices are fractions of this power of two.
+const PRICE_BITS: i32 = 40;
 
 /// One of the designs of a function.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -40,132 +53,247 @@ pub struct Chosen {
     pub optimal: bool,
 }
 
+/// The best choice for functions, each with its designs in the order of preference among equals, under budgets.
+pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Chosen {
+    let problem = Problem::new(functions, budgets);
+    let (prices, known) = problem.prices();
+    let (designs, optimal) = match problem.search(&prices, &known, limits) {
+        Ok(designs) => (designs, true),
+        Err(Interrupted) => (known.designs, false),
+    };
+    let chosen = functions.iter().zip(&designs).filter_map(|(own, at)| at.and_then(|at| own.get(at)));
+    let utility = chosen.map(|design| &design.utility).sum();
+    Chosen { designs, utility, optimal }
+}
+
+/// A design in integers.
+struct Item {
+    worth: BigInt,
+    demands: Vec<BigInt>,
+}
+
+/// The problem in integers.
+struct Problem {
+    functions: Vec<Vec<Item>>,
+    /// Those of the caller, and one for each component.
+    budgets: Vec<BigInt>,
+    /// For each function, the least that it and those after it can take of each budget; one more entry for none.
+    least: Vec<Vec<BigInt>>,
+}
+
 /// What has been chosen for the functions so far.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 struct Label {
     designs: Vec<Option<usize>>,
-    served: usize,
-    missed: usize,
-    utility: BigRational,
-    spent: Vec<BigRational>,
-    used: BTreeSet<usize>,
+    worth: BigInt,
+    spent: Vec<BigInt>,
 }
 
 impl Label {
-    fn with(&self, position: usize, choice: &DesignChoice) -> Option<Self> {
-        if !self.used.is_disjoint(&choice.components) {
-            return None;
+    fn with(&self, position: Option<usize>, item: Option<&Item>) -> Self {
+        let mut label = self.clone();
+        label.designs.push(position);
+        if let Some(item) = item {
+            label.worth += &item.worth;
+            label.spent.iter_mut().zip(&item.demands).for_each(|(spent, demand)| *spent += demand);
         }
-        let mut label = self.clone();
-        label.designs.push(Some(position));
-        label.served = label.served.saturating_add(1);
-        label.missed = label.missed.saturating_add(choice.missed);
-        label.utility += &choice.utility;
-        label.spent.iter_mut().zip(&choice.demands).for_each(|(spent, demand)| *spent += demand);
-        label.used.extend(&choice.components);
-        Some(label)
-    }
-
-    fn without(&self) -> Self {
-        let mut label = self.clone();
-        label.designs.push(None);
         label
-    }
-
-    fn worth(&self, other: &Self) -> Ordering {
-        self.served
-            .cmp(&other.served)
-            .then_with(|| other.missed.cmp(&self.missed))
-            .then_with(|| self.utility.cmp(&other.utility))
     }
 
     /// Whether whatever can be added to the other one can be added to this one.
     fn is_as_free(&self, other: &Self) -> bool {
-        self.used.is_subset(&other.used)
-            && self.spent.iter().zip(&other.spent).all(|(own, other)| own <= other)
+        self.spent.iter().zip(&other.spent).all(|(own, other)| own <= other)
     }
 }
 
-/// The best choice for functions, each with its designs in the order of preference among equals, under budgets.
-pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Chosen {
-    let least = least_demands(functions, budgets.len());
-    let first = Label { spent: vec![BigRational::zero(); budgets.len()], ..Label::default() };
-    let mut labels = vec![first];
-    for (at, (designs, least)) in functions.iter().zip(&least).enumerate() {
-        match extended(&labels, designs, least, budgets, limits) {
-            Ok(next) => labels = next,
-            Err(Interrupted) => {
-                return completed(&labels, functions, at, &least_demands(functions, budgets.len()), budgets);
+/// A price for each budget, as a fraction of 2^`PRICE_BITS`, and what functions are worth at most at these prices.
+struct Prices {
+    each: Vec<BigInt>,
+    /// For each function, of it and those after it; one more entry for none.
+    after: Vec<BigInt>,
+}
+
+/// Numbers as integers of one scale, and the scale.
+fn scaled<'a>(numbers: impl Iterator<Item = &'a BigRational> + Clone) -> (Vec<BigInt>, BigInt) {
+    let scale = numbers.clone().fold(BigInt::one(), |scale, number| scale.lcm(number.denom()));
+    (numbers.map(|number| (number * &scale).to_integer()).collect(), scale)
+}
+
+impl Problem {
+    fn new(functions: &[Vec<DesignChoice>], budgets: &[BigRational]) -> Self {
+        let all = || functions.iter().flatten();
+        let (utilities, _) = scaled(all().map(|design| &design.utility));
+        // Utilities may be negative: one requirement outweighs the difference of any two sums of them.
+        let requirement: BigInt = utilities.iter().map(BigInt::abs).sum::<BigInt>() * 2 + 1;
+        let function =
+            &requirement * all().map(|design| BigInt::from(design.missed)).sum::<BigInt>() + &requirement;
+        let mut worths =
+            all().zip(utilities).map(|(design, utility)| &function - &requirement * design.missed + utility);
+        let components: BTreeSet<usize> =
+            all().flat_map(|design| design.components.iter().copied()).collect();
+        let zero = BigRational::zero();
+        let demand =
+            |design: &'_ DesignChoice, budget: usize| design.demands.get(budget).unwrap_or(&zero).clone();
+        let mut columns = Vec::new();
+        let mut whole = Vec::new();
+        for (budget, most) in budgets.iter().enumerate() {
+            let numbers: Vec<BigRational> =
+                all().map(|design| demand(design, budget)).chain([most.clone()]).collect();
+            let (mut column, _) = scaled(numbers.iter());
+            whole.push(column.pop().unwrap_or_default());
+            columns.push(column.into_iter());
+        }
+        for component in components {
+            let uses = all().map(|design| BigInt::from(u8::from(design.components.contains(&component))));
+            columns.push(uses.collect::<Vec<_>>().into_iter());
+            whole.push(BigInt::one());
+        }
+        let mut item = || Item {
+            worth: worths.next().unwrap_or_default(),
+            demands: columns.iter_mut().map(|column| column.next().unwrap_or_default()).collect(),
+        };
+        let functions: Vec<Vec<Item>> =
+            functions.iter().map(|designs| designs.iter().map(|_| item()).collect()).collect();
+        let mut least = vec![vec![BigInt::zero(); whole.len()]];
+        for designs in functions.iter().rev() {
+            let after = least.last().cloned().unwrap_or_default();
+            let own = after.into_iter().enumerate().map(|(budget, after)| {
+                let demands = designs.iter().filter_map(|design| design.demands.get(budget));
+                // A function that is not served takes nothing.
+                after + demands.min().cloned().unwrap_or_default().min(BigInt::zero())
+            });
+            let own = own.collect();
+            least.push(own);
+        }
+        least.reverse();
+        Self { functions, budgets: whole, least }
+    }
+
+    fn nothing(&self) -> Label {
+        Label { spent: vec![BigInt::zero(); self.budgets.len()], ..Label::default() }
+    }
+
+    /// Whether the functions from this one on can be chosen for so that all budgets are kept.
+    fn fits(&self, label: &Label, from: usize) -> bool {
+        let Some(least) = self.least.get(from) else { return true };
+        let ahead = label.spent.iter().zip(least).map(|(spent, least)| spent + least);
+        ahead.zip(&self.budgets).all(|(spent, budget)| spent <= *budget)
+    }
+
+    /// For each function the first design that fits, in an order of preference.
+    fn greedy(&self, preference: impl Fn(&Item) -> f64) -> Label {
+        let mut label = self.nothing();
+        for (at, designs) in self.functions.iter().enumerate() {
+            let mut order: Vec<(usize, f64)> = designs.iter().map(&preference).enumerate().collect();
+            order.sort_by(|a, b| b.1.total_cmp(&a.1));
+            let mut with =
+                order.into_iter().map(|(position, _)| label.with(Some(position), designs.get(position)));
+            let found = with.find(|new| self.fits(new, at.saturating_add(1)));
+            label = found.unwrap_or_else(|| label.with(None, None));
+        }
+        // What a later function would have given back may not have come.
+        if self.fits(&label, self.functions.len()) {
+            return label;
+        }
+        self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
+    }
+
+    /// Good prices, and the best choice that was met on the way.
+    #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
+    fn prices(&self) -> (Prices, Label) {
+        let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
+        let budgets: Vec<f64> = self.budgets.iter().map(float).collect();
+        let mut known = self.greedy(|item| float(&item.worth));
+        let mut prices = vec![0.0_f64; budgets.len()];
+        let mut best = (f64::INFINITY, prices.clone());
+        let mut stride = 1.0;
+        for _ in 0..ROUNDS {
+            let reduced = |item: &Item| {
+                let paid: f64 =
+                    item.demands.iter().zip(&prices).map(|(demand, price)| float(demand) * price).sum();
+                float(&item.worth) - paid
+            };
+            let (mut bound, mut left) = (0.0, budgets.clone());
+            for designs in &self.functions {
+                let chosen =
+                    designs.iter().map(|item| (item, reduced(item))).max_by(|a, b| a.1.total_cmp(&b.1));
+                let Some((item, worth)) = chosen.filter(|(_, worth)| *worth > 0.0) else { continue };
+                bound += worth;
+                left.iter_mut().zip(&item.demands).for_each(|(left, demand)| *left -= float(demand));
             }
-        }
-    }
-    let best = labels.into_iter().reduce(|best, other| if other.worth(&best).is_gt() { other } else { best });
-    let Label { designs, utility, .. } = best.unwrap_or_default();
-    Chosen { designs, utility, optimal: true }
-}
-
-/// For each function, the least that the functions after it can take of each budget.
-fn least_demands(functions: &[Vec<DesignChoice>], budgets: usize) -> Vec<Vec<BigRational>> {
-    let mut after = vec![BigRational::zero(); budgets];
-    let mut all = Vec::with_capacity(functions.len());
-    for designs in functions.iter().rev() {
-        all.push(after.clone());
-        for (budget, least) in after.iter_mut().enumerate() {
-            let demands = designs.iter().filter_map(|design| design.demands.get(budget));
-            // A function that is not served takes nothing.
-            *least += demands.min().cloned().unwrap_or_default().min(BigRational::zero());
-        }
-    }
-    all.reverse();
-    all
-}
-
-fn fits(label: &Label, least: &[BigRational], budgets: &[BigRational]) -> bool {
-    let ahead = label.spent.iter().zip(least).map(|(spent, least)| spent + least);
-    ahead.zip(budgets).all(|(spent, budget)| spent <= *budget)
-}
-
-/// All labels with one more function, without those that others are as good as. They are in the order of preference.
-fn extended(
-    labels: &[Label],
-    designs: &[DesignChoice],
-    least: &[BigRational],
-    budgets: &[BigRational],
-    limits: &Limits,
-) -> Result<Vec<Label>, Interrupted> {
-    let mut next: Vec<Label> = Vec::new();
-    for label in limits.watch(labels) {
-        let label = label?;
-        let with = designs.iter().enumerate().filter_map(|(position, choice)| label.with(position, choice));
-        for new in limits.watch(with.chain([label.without()])) {
-            let new = new?;
-            let is_worse = |old: &Label| old.worth(&new).is_ge() && old.is_as_free(&new);
-            if !fits(&new, least, budgets) || next.iter().any(is_worse) {
-                continue;
+            bound += budgets.iter().zip(&prices).map(|(budget, price)| budget * price).sum::<f64>();
+            let met = self.greedy(reduced);
+            if met.worth > known.worth {
+                known = met;
             }
-            next.retain(|old| !(new.worth(old).is_gt() && new.is_as_free(old)));
-            next.push(new);
+            if bound < best.0 {
+                best = (bound, prices.clone());
+            } else {
+                stride *= 0.97;
+            }
+            let length: f64 = left.iter().map(|left| left * left).sum();
+            if length <= 0.0 {
+                break;
+            }
+            let step = stride * (bound - float(&known.worth)).max(0.0) / length;
+            prices.iter_mut().zip(&left).for_each(|(price, left)| *price = (*price - step * left).max(0.0));
         }
+        let one = 2.0_f64.powi(PRICE_BITS);
+        let each: Vec<BigInt> =
+            best.1.iter().map(|price| BigInt::from((price * one).min(1e30) as i128)).collect();
+        let mut after = vec![BigInt::zero()];
+        for designs in self.functions.iter().rev() {
+            let reduced = designs.iter().map(|item| {
+                let paid: BigInt = item.demands.iter().zip(&each).map(|(demand, price)| demand * price).sum();
+                (&item.worth << PRICE_BITS) - paid
+            });
+            let own = reduced.max().unwrap_or_default().max(BigInt::zero());
+            let sum = after.last().cloned().unwrap_or_default() + own;
+            after.push(sum);
+        }
+        after.reverse();
+        (Prices { each, after }, known)
     }
-    Ok(next)
-}
 
-/// The best label, completed by the first design that fits for each function that is left.
-fn completed(
-    labels: &[Label],
-    functions: &[Vec<DesignChoice>],
-    from: usize,
-    least: &[Vec<BigRational>],
-    budgets: &[BigRational],
-) -> Chosen {
-    let best = labels.iter().reduce(|best, other| if other.worth(best).is_gt() { other } else { best });
-    let mut label = best.cloned().unwrap_or_default();
-    for (designs, least) in functions.iter().zip(least).skip(from) {
-        let mut with =
-            designs.iter().enumerate().filter_map(|(position, choice)| label.with(position, choice));
-        label = with.find(|new| fits(new, least, budgets)).unwrap_or_else(|| label.without());
+    /// At most so much is a choice worth that begins like this, as a fraction of 2^`PRICE_BITS`.
+    fn bound(&self, label: &Label, from: usize, prices: &Prices) -> BigInt {
+        let left = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
+        let paid: BigInt = left.zip(&prices.each).map(|(left, price)| left * price).sum();
+        (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
     }
-    Chosen { designs: label.designs, utility: label.utility, optimal: false }
+
+    /// The best choice, where one is known.
+    fn search(
+        &self,
+        prices: &Prices,
+        known: &Label,
+        limits: &Limits,
+    ) -> Result<Vec<Option<usize>>, Interrupted> {
+        let wanted: BigInt = &known.worth << PRICE_BITS;
+        let mut labels = vec![self.nothing()];
+        for (from, designs) in (1..).zip(&self.functions) {
+            let mut next: Vec<Label> = Vec::new();
+            for label in limits.watch(&labels) {
+                let label = label?;
+                let with = designs.iter().enumerate().map(|(at, item)| label.with(Some(at), Some(item)));
+                for new in limits.watch(with.chain([label.with(None, None)])) {
+                    let new = new?;
+                    let is_worse = |old: &Label| old.worth >= new.worth && old.is_as_free(&new);
+                    let is_hopeless = !self.fits(&new, from) || self.bound(&new, from, prices) < wanted;
+                    if is_hopeless || next.iter().any(is_worse) {
+                        continue;
+                    }
+                    next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
+                    next.push(new);
+                }
+            }
+            labels = next;
+        }
+        // Labels are in the order of preference.
+        let best =
+            labels.into_iter().reduce(|best, other| if other.worth > best.worth { other } else { best });
+        Ok(best.map_or_else(|| known.designs.clone(), |best| best.designs))
+    }
 }
 
 #[cfg(test)]
