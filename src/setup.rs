@@ -60,13 +60,14 @@ impl Setup {
     pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
         let (sections, origin): (Sections, ManifestPath) =
             manifest::read(manifest).map_err(|message| vec![message])?;
-        let knowledge = Knowledge::read(&sections.knowledge.sources(&origin));
         let settings = sections.adaptation.settings(&origin).map_err(|message| vec![message])?;
         let bindings = Bindings::with(&sections.bindings).map_err(|text| vec![origin.wrong(text)])?;
         let (domain, problem) =
             (origin.path(&sections.planning.domain), origin.path(&sections.planning.problem));
-        let mission =
-            Mission::new(&sections.name, Some(knowledge), bindings, source(&domain), source(&problem))?;
+        let (domain, problem) = (source(&domain), source(&problem));
+        let text = domain.as_ref().map_or("", |domain| domain.text());
+        let knowledge = Knowledge::read_for(&sections.knowledge.sources(&origin), text);
+        let mission = Mission::new(&sections.name, Some(knowledge), bindings, domain, problem)?;
         let Sections { description, probabilistic: roles, scenarios, .. } = sections;
         Ok(Self { mission, description, settings, roles, scenarios, origin })
     }

@@ -8,6 +8,7 @@ use crate::file::{self, Kind};
 use crate::knowledge::Knowledge;
 use crate::message::Message;
 use crate::native::CoAdaptation;
+use crate::planta::Planta;
 
 /// A mission that can be planned.
 #[derive(Debug, Clone)]
@@ -21,6 +22,7 @@ pub struct Mission {
     pub(super) domain: Domain,
     pub(super) problem: Problem,
     pub(super) adaptation: Option<CoAdaptation>,
+    pub(super) planta: Option<Planta>,
     warnings: Vec<Message>,
 }
 
@@ -67,9 +69,16 @@ impl Mission {
                 return Err(errors);
             }
         };
+        let (mut domain, mut warnings) = (domain, warnings);
+        let planta = knowledge.as_ref().and_then(Knowledge::terms).map(|terms| {
+            let (planta, completed, more) = Planta::new(terms, &domain, &problem);
+            domain = completed;
+            warnings.extend(more);
+            planta
+        });
         let adaptation = match &knowledge {
-            Some(knowledge) => CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?,
-            None => None,
+            Some(knowledge) if planta.is_none() => CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?,
+            _ => None,
         };
         let domain = adaptation.as_ref().map_or_else(|| domain.clone(), |own| own.explicit(&domain));
         let name = name.to_owned();
@@ -82,6 +91,7 @@ impl Mission {
             domain,
             problem,
             adaptation,
+            planta,
             warnings,
         })
     }

@@ -13,6 +13,7 @@ pub mod knowledge;
 mod live;
 pub mod message;
 mod native;
+mod planta;
 mod set;
 pub mod visible;
 

@@ -14,6 +14,10 @@ impl Mission {
     /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
     pub fn fill(&self, problem: &mut Problem) -> Vec<Message> {
         self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
+            if let Some(planta) = &self.planta {
+                let stated = knowledge.stated().into_iter();
+                return planta.fill(&self.domain, problem, knowledge.engine(), stated);
+            }
             if let Some(adaptation) = &self.adaptation {
                 adaptation.fill(problem, knowledge.catalogue().designs());
             }
