@@ -70,14 +70,17 @@ impl Mission {
             }
         };
         let (mut domain, mut warnings) = (domain, warnings);
-        let planta = knowledge.as_ref().and_then(Knowledge::terms).map(|terms| {
-            let (planta, completed, more) = Planta::new(terms, &domain, &problem);
+        let planta = knowledge.as_ref().and_then(|knowledge| {
+            let facts = (knowledge.engine(), knowledge.stated());
+            let (planta, completed, more) = Planta::new(knowledge.terms()?, &domain, &problem, facts);
             domain = completed;
             warnings.extend(more);
-            planta
+            Some(planta)
         });
         let adaptation = match &knowledge {
-            Some(knowledge) if planta.is_none() => CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?,
+            Some(knowledge) if planta.is_none() => {
+                CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?
+            }
             _ => None,
         };
         let domain = adaptation.as_ref().map_or_else(|| domain.clone(), |own| own.explicit(&domain));
@@ -149,6 +152,9 @@ impl Mission {
     pub fn filled(&self) -> Result<(Problem, Vec<Message>), Vec<Message>> {
         let mut problem = self.problem.clone();
         let mut warnings = self.fill(&mut problem);
+        if warnings.iter().any(Message::is_error) {
+            return Err(warnings);
+        }
         let found = pddl::check(&self.domain, &self.domain_source, &problem, &self.problem_source);
         let (errors, questionable): (Vec<_>, Vec<_>) =
             found.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
@@ -166,6 +172,20 @@ impl Mission {
             Message::error(diagnostic.code, text)
         }));
         Err(messages)
+    }
+
+    /// The domain and the problem as other planners get them: those of [`Mission::filled`], and for a domain in PLANTA's form all
+    /// rules as derived predicates, none of them decided.
+    ///
+    /// # Errors
+    /// As [`Mission::filled`].
+    pub fn merged(&self) -> Result<(Domain, Problem, Vec<Message>), Vec<Message>> {
+        let (filled, warnings) = self.filled()?;
+        let merged = self.planta.as_ref().zip(self.knowledge.as_ref()).and_then(|(planta, knowledge)| {
+            planta.merged(&self.problem, (knowledge.engine(), knowledge.stated()))
+        });
+        let (domain, problem) = merged.unwrap_or_else(|| (self.domain.clone(), filled));
+        Ok((domain, problem, warnings))
     }
 
     /// What the knowledge base adds to the actions of a plain domain; none if the domain is explicit.

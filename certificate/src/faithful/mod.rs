@@ -20,6 +20,7 @@
 //! [1] R. Milner: An algebraic definition of simulation between programs, IJCAI 1971.
 
 mod axioms;
+mod candidates;
 mod case;
 mod compare;
 mod derived;

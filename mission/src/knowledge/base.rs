@@ -89,7 +89,12 @@ impl Knowledge {
         let (sources, entities) = (sources.clone(), ontology.entities.into());
         let documents = ontology.sources.into_iter().map(|source| source.name).collect();
         let annotations = ontology.annotations.into();
-        Ok(Self { documents, annotations, terms, ..Self::of(runtime, rule_count, warnings, sources, entities) })
+        Ok(Self {
+            documents,
+            annotations,
+            terms,
+            ..Self::of(runtime, rule_count, warnings, sources, entities)
+        })
     }
 
     /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.

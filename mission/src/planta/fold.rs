@@ -1,74 +1,74 @@
 //! What follows whatever the robot does, decided once: derived predicates to initial facts.
 //!
-//! A derived predicate of the knowledge base is *settled* if no action and no event changes anything that it depends on. Its rules
-//! are conjunctions of atoms, equalities and comparisons without negated predicates, so that what it holds of is the least
-//! fixpoint of the settled rules over the initial facts: the same set in every state. It is computed by naive evaluation, in
-//! which each rule asks first for what restricts most.
+//! The clauses of settled predicates (`settle`) have no negated atoms, so that what they hold of is their least fixpoint over the
+//! facts that are stated: the same set in every state. It is computed by naive evaluation, in which each clause asks first for
+//! what restricts most.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use pddl::ast::{Condition, Derived, Domain, Name, Term};
+use pddl::ast::{Derived, Domain, Name};
 
-/// Facts by name.
-type Said = (Name, Vec<Name>);
+use super::clause::{self, Clause, Literal, Operand};
+use super::settle::{Guards, settle};
 
-/// The settled derived predicates, and their rules.
+/// A fact by name.
+pub(super) type Said = (Name, Vec<Name>);
+
+/// The settled derived predicates, and their clauses.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Folded {
-    heads: BTreeSet<Name>,
-    rules: Vec<Rule>,
-}
-
-/// `head(parameters) ← body`, a disjunction of conjunctions.
-#[derive(Debug, Clone)]
-struct Rule {
-    head: Name,
-    parameters: Vec<Name>,
-    body: Vec<Vec<Literal>>,
-}
-
-/// A conjunct.
-#[derive(Debug, Clone)]
-enum Literal {
-    Holds(Name, Vec<Operand>),
-    Equal(bool, Operand, Operand),
-}
-
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum Operand {
-    Variable(Name),
-    Constant(Name),
+    settled: BTreeMap<Name, Vec<Clause>>,
 }
 
 impl Folded {
-    /// What is settled of the rules of a knowledge base in a domain whose actions and events change some predicates.
-    pub fn new(derived: &[Derived], domain: &Domain, changed: &BTreeSet<Name>) -> Self {
-        let mut open: BTreeSet<Name> = changed.clone();
-        open.extend(domain.derived.iter().map(|own| own.head.identifier.name.clone()));
-        let rules: Vec<(Name, Option<Rule>)> =
-            derived.iter().map(|own| (own.head.identifier.name.clone(), rule(own))).collect();
-        loop {
-            let before = open.len();
-            for (head, rule) in &rules {
-                let depends = |own: &Rule| {
-                    own.body.iter().flatten().any(|part| matches!(part, Literal::Holds(name, _) if open.contains(name)))
-                };
-                if rule.as_ref().is_none_or(depends) {
-                    open.insert(head.clone());
-                }
-            }
-            if open.len() == before {
-                break;
-            }
+    /// What is settled of the rules of a knowledge base in a domain whose actions and events change some predicates, and of the
+    /// domain's own axioms about nothing but the given predicates of the knowledge base.
+    pub fn new(
+        derived: &[Derived],
+        domain: &Domain,
+        changed: &BTreeSet<Name>,
+        guards: &Guards,
+        mut known: BTreeSet<Name>,
+    ) -> Self {
+        let mut all: BTreeMap<Name, Option<Vec<Clause>>> = BTreeMap::new();
+        for axiom in derived {
+            add(&mut all, &axiom.head.identifier.name, clause::clauses(axiom));
         }
-        let rules: Vec<Rule> =
-            rules.into_iter().filter(|(head, _)| !open.contains(head)).filter_map(|(_, rule)| rule).collect();
-        Self { heads: rules.iter().map(|rule| rule.head.clone()).collect(), rules }
+        let own: Vec<(&Name, Option<Vec<Clause>>)> = domain
+            .derived
+            .iter()
+            .map(|axiom| (&axiom.head.identifier.name, clause::clauses(axiom)))
+            .collect();
+        // Axioms about maps may hold of very much; they are left to the planner.
+        let mut large: BTreeSet<&Name> = own.iter().map(|(head, _)| *head).collect();
+        loop {
+            let small = |clauses: &Option<Vec<Clause>>| {
+                clauses.iter().all(|all| {
+                    all.iter().all(|clause| {
+                        clause.is_bound()
+                            && clause.body.iter().all(|part| match part {
+                                Literal::Holds(name, _) => part.is_type() || known.contains(name),
+                                Literal::Equal(..) => true,
+                            })
+                    })
+                })
+            };
+            let next = large.iter().copied().find(|head| {
+                own.iter().all(|(other, clauses)| other != head || clauses.is_some() && small(clauses))
+            });
+            let Some(next) = next else { break };
+            large.remove(next);
+            known.insert(next.clone());
+        }
+        for (head, clauses) in &own {
+            add(&mut all, head, clauses.clone().filter(|_| !large.contains(head)));
+        }
+        Self { settled: settle(all, changed, guards) }
     }
 
     /// Takes what is settled out of the axioms of a domain.
     pub fn shorten(&self, domain: &mut Domain) {
-        domain.derived.retain(|own| !self.heads.contains(&own.head.identifier.name));
+        domain.derived.retain(|own| !self.settled.contains_key(&own.head.identifier.name));
     }
 
     /// What is settled, given what is stated of which objects.
@@ -76,38 +76,60 @@ impl Folded {
         &self,
         stated: impl Iterator<Item = &'f Said>,
         objects: &BTreeSet<Name>,
+        is_of: &dyn Fn(&Name, &Name) -> bool,
     ) -> BTreeSet<Said> {
         let mut known = Known { relations: HashMap::new(), objects };
+        let parts = self.settled.values().flatten().flat_map(|clause| &clause.body);
+        let types: BTreeSet<&Name> = parts.filter(|part| part.is_type()).filter_map(Literal::name).collect();
+        for relation in types {
+            let r#type = Name::new(relation.as_str().split(' ').nth(1).unwrap_or_default());
+            for object in objects.iter().filter(|object| is_of(object, &r#type)) {
+                known.insert(relation, vec![object.clone()]);
+            }
+        }
         for (predicate, arguments) in stated {
             known.insert(predicate, arguments.clone());
         }
         let mut facts = BTreeSet::new();
+        // The predicates that have grown since a clause was last evaluated; in the first round all of them.
+        let mut grown: Option<BTreeSet<Name>> = None;
         loop {
+            let has_grown = |part: &Literal| {
+                part.name().is_some_and(|name| grown.as_ref().is_none_or(|grown| grown.contains(name)))
+            };
+            let is_due = |clause: &&Clause| grown.is_none() || clause.body.iter().any(has_grown);
             let mut new = Vec::new();
-            for rule in &self.rules {
-                for body in &rule.body {
-                    let order = known.order(body);
-                    known.matches(&order, 0, &mut BTreeMap::new(), &mut |found| {
-                        known.heads(rule, found, &mut |head| new.push((rule.head.clone(), head)));
-                    });
-                }
+            for clause in self.settled.values().flatten().filter(is_due) {
+                let order = known.order(&clause.body);
+                known.matches(&order, &mut BTreeMap::new(), &mut |found| {
+                    known.heads(clause, found, &mut new);
+                });
             }
-            let mut grown = false;
+            let mut more = BTreeSet::new();
             for (head, arguments) in new {
                 if known.insert(&head, arguments.clone()) {
-                    grown = true;
+                    more.insert(head.clone());
                     facts.insert((head, arguments));
                 }
             }
-            if !grown {
+            if more.is_empty() {
                 return facts;
             }
+            grown = Some(more);
         }
     }
 }
 
+fn add(all: &mut BTreeMap<Name, Option<Vec<Clause>>>, head: &Name, more: Option<Vec<Clause>>) {
+    let entry = all.entry(head.clone()).or_insert_with(|| Some(Vec::new()));
+    match (entry.as_mut(), more) {
+        (Some(known), Some(more)) => known.extend(more),
+        _ => *entry = None,
+    }
+}
+
 /// What variables stand for.
-type Found = BTreeMap<Name, Name>;
+type Found<'k> = BTreeMap<&'k Name, &'k Name>;
 
 /// What holds so far.
 struct Known<'o> {
@@ -125,28 +147,29 @@ impl Known<'_> {
         is_new
     }
 
-    /// The conjuncts, each behind what binds its variables if something does, small relations first.
+    fn rows(&self, predicate: &Name) -> &[Vec<Name>] {
+        self.relations.get(predicate).map_or(&[], |(rows, _)| rows)
+    }
+
+    /// The conjuncts: those that share variables with others before them first, small relations first; types and inequalities as soon
+    /// as they are tests.
     fn order<'b>(&self, body: &'b [Literal]) -> Vec<&'b Literal> {
         let (mut left, mut order): (Vec<&Literal>, Vec<&Literal>) = (body.iter().collect(), Vec::new());
         let mut bound: BTreeSet<&Name> = BTreeSet::new();
         while !left.is_empty() {
             let cost = |part: &Literal| {
-                let free = operands(part).into_iter().filter(|own| {
-                    matches!(own, Operand::Variable(name) if !bound.contains(name))
-                });
-                let free = free.count();
-                match part {
-                    // Equality binds one variable by the other, and never ranges over all objects if that can be helped.
-                    Literal::Equal(same, ..) => if free == 0 || (*same && free == 1) { (0, 0) } else { (9, free) },
-                    Literal::Holds(name, _) => {
-                        let rows = self.relations.get(name).map_or(0, |(rows, _)| rows.len());
-                        (if rows == 0 { 0 } else { free }, rows)
-                    }
-                }
+                let operands = part.operands();
+                let is_free =
+                    |own: &&&Operand| matches!(own, Operand::Variable(name) if !bound.contains(name));
+                let free = operands.iter().filter(is_free).count();
+                let rows = part.name().map_or(0, |name| self.rows(name).len());
+                let is_test = part.name().is_none() || part.is_type();
+                let is_apart = free == operands.len() && !bound.is_empty();
+                (free > 0, is_test && free > 0, is_apart && free > 0, free, rows)
             };
             let best = (0..left.len()).min_by_key(|&index| cost(left[index])).unwrap_or(0);
             let next = left.remove(best);
-            bound.extend(operands(next).into_iter().filter_map(|own| match own {
+            bound.extend(next.operands().into_iter().filter_map(|own| match own {
                 Operand::Variable(name) => Some(name),
                 Operand::Constant(_) => None,
             }));
@@ -155,144 +178,80 @@ impl Known<'_> {
         order
     }
 
-    fn matches(&self, order: &[&Literal], at: usize, found: &mut Found, each: &mut dyn FnMut(&mut Found)) {
-        let Some(part) = order.get(at) else { return each(found) };
-        match part {
-            Literal::Equal(same, left, right) => match (value(left, found), value(right, found)) {
-                (Some(left), Some(right)) => {
-                    if (left == right) == *same {
-                        self.matches(order, at + 1, found, each);
-                    }
+    fn matches<'k>(&'k self, order: &[&'k Literal], found: &mut Found<'k>, each: &mut dyn FnMut(&Found<'k>)) {
+        let Some((part, rest)) = order.split_first() else { return each(found) };
+        let free = part.operands().into_iter().find(|own| value(own, found).is_none());
+        match (part, free) {
+            // No atom binds this variable: it stands for anything.
+            (Literal::Equal(..), Some(Operand::Variable(name))) => {
+                for object in self.objects {
+                    found.insert(name, object);
+                    self.matches(order, found, each);
+                    found.remove(name);
                 }
-                (Some(known), None) if *same => self.bind(right, known, (order, at), found, each),
-                (None, Some(known)) if *same => self.bind(left, known, (order, at), found, each),
-                (left_known, _) => {
-                    let free = if left_known.is_none() { left } else { right };
-                    for object in self.objects {
-                        if let Operand::Variable(name) = free {
-                            found.insert(name.clone(), object.clone());
-                            self.matches(order, at, found, each);
-                            found.remove(name);
+            }
+            (Literal::Equal(same, left, right), _) => {
+                if (value(left, found) == value(right, found)) == *same {
+                    self.matches(rest, found, each);
+                }
+            }
+            (Literal::Holds(predicate, operands), _) => {
+                for row in self.rows(predicate) {
+                    let before = found.clone();
+                    if row.len() == operands.len()
+                        && operands.iter().zip(row).all(|(operand, argument)| bind(operand, argument, found))
+                    {
+                        self.matches(rest, found, each);
+                    }
+                    *found = before;
+                }
+            }
+        }
+    }
+
+    /// The instances of a head; arguments that the body does not bind stand for anything.
+    fn heads(&self, clause: &Clause, found: &Found<'_>, new: &mut Vec<Said>) {
+        let mut rows: Vec<(Vec<Name>, Found<'_>)> = vec![(Vec::new(), found.clone())];
+        for argument in &clause.arguments {
+            rows = rows
+                .into_iter()
+                .flat_map(|(row, found)| {
+                    let values = match (value(argument, &found), argument) {
+                        (Some(known), _) => vec![(known.clone(), found)],
+                        (None, Operand::Variable(name)) => {
+                            let with = |object| {
+                                let mut own = found.clone();
+                                own.insert(name, object);
+                                (Name::clone(object), own)
+                            };
+                            self.objects.iter().map(with).collect()
                         }
-                    }
-                }
-            },
-            Literal::Holds(predicate, operands) => {
-                let rows = self.relations.get(predicate).map_or(&[][..], |(rows, _)| rows);
-                for row in rows {
-                    let mut own = Vec::new();
-                    let fits = row.len() == operands.len()
-                        && operands.iter().zip(row).all(|(operand, argument)| {
-                            match (operand, value(operand, found)) {
-                                (_, Some(known)) => known == *argument,
-                                (Operand::Variable(name), None) => {
-                                    found.insert(name.clone(), argument.clone());
-                                    own.push(name);
-                                    true
-                                }
-                                (Operand::Constant(_), None) => false,
-                            }
-                        });
-                    if fits {
-                        self.matches(order, at + 1, found, each);
-                    }
-                    for name in own {
-                        found.remove(name);
-                    }
-                }
-            }
+                        (None, Operand::Constant(_)) => Vec::new(),
+                    };
+                    values.into_iter().map(move |(value, found)| ([row.clone(), vec![value]].concat(), found))
+                })
+                .collect();
         }
-    }
-
-    fn bind(
-        &self,
-        free: &Operand,
-        known: Name,
-        (order, at): (&[&Literal], usize),
-        found: &mut Found,
-        each: &mut dyn FnMut(&mut Found),
-    ) {
-        if let Operand::Variable(name) = free {
-            found.insert(name.clone(), known);
-            self.matches(order, at + 1, found, each);
-            found.remove(name);
-        }
-    }
-
-    /// The instances of a head; parameters that the body does not bind stand for anything.
-    fn heads(&self, rule: &Rule, found: &Found, each: &mut dyn FnMut(Vec<Name>)) {
-        let mut rows: Vec<Vec<Name>> = vec![Vec::new()];
-        for parameter in &rule.parameters {
-            let values: Vec<&Name> = match found.get(parameter) {
-                Some(value) => vec![value],
-                None => self.objects.iter().collect(),
-            };
-            let longer = |row: &Vec<Name>, value: &Name| row.iter().chain([value]).cloned().collect();
-            rows = rows.iter().flat_map(|row| values.iter().map(move |value| longer(row, value))).collect();
-        }
-        rows.into_iter().for_each(each);
+        new.extend(rows.into_iter().map(|(row, _)| (clause.head.clone(), row)));
     }
 }
 
-fn value(operand: &Operand, found: &Found) -> Option<Name> {
+fn value<'k>(operand: &'k Operand, found: &Found<'k>) -> Option<&'k Name> {
     match operand {
-        Operand::Variable(name) => found.get(name).cloned(),
-        Operand::Constant(name) => Some(name.clone()),
+        Operand::Variable(name) => found.get(name).copied(),
+        Operand::Constant(name) => Some(name),
     }
 }
 
-fn operands(part: &Literal) -> Vec<&Operand> {
-    match part {
-        Literal::Holds(_, operands) => operands.iter().collect(),
-        Literal::Equal(_, left, right) => vec![left, right],
-    }
-}
-
-/// A derived predicate as a rule; none if its body is not of the form that this room knows.
-fn rule(derived: &Derived) -> Option<Rule> {
-    let parameters = derived.head.parameters.iter().map(|own| own.identifier.name.clone()).collect();
-    Some(Rule { head: derived.head.identifier.name.clone(), parameters, body: body(&derived.condition)? })
-}
-
-/// A condition as a disjunction of conjunctions. All variables of a rule of a knowledge base have names of their own.
-fn body(condition: &Condition) -> Option<Vec<Vec<Literal>>> {
-    match condition {
-        Condition::And(parts) => {
-            let mut all = vec![Vec::new()];
-            for part in parts {
-                let part = body(part)?;
-                let both = |left: &Vec<Literal>, right: &Vec<Literal>| [left.clone(), right.clone()].concat();
-                all = all.iter().flat_map(|left| part.iter().map(move |right| both(left, right))).collect();
+fn bind<'k>(operand: &'k Operand, argument: &'k Name, found: &mut Found<'k>) -> bool {
+    match operand {
+        Operand::Constant(name) => name == argument,
+        Operand::Variable(name) => match found.get(name) {
+            Some(known) => *known == argument,
+            None => {
+                found.insert(name, argument);
+                true
             }
-            Some(all)
-        }
-        Condition::Or(parts) => {
-            let parts: Option<Vec<_>> = parts.iter().map(body).collect();
-            Some(parts?.concat())
-        }
-        Condition::Exists(variables, inner) if variables.iter().all(|own| own.r#type.alternatives.is_empty()) => {
-            body(inner)
-        }
-        Condition::Atom(atom) => {
-            let operands = atom.arguments.iter().map(operand).collect();
-            Some(vec![vec![Literal::Holds(atom.predicate.name.clone(), operands)]])
-        }
-        Condition::Equal(left, right, _) => {
-            Some(vec![vec![Literal::Equal(true, operand(left), operand(right))]])
-        }
-        Condition::Not(inner) => match &**inner {
-            Condition::Equal(left, right, _) => {
-                Some(vec![vec![Literal::Equal(false, operand(left), operand(right))]])
-            }
-            _ => None,
         },
-        _ => None,
-    }
-}
-
-fn operand(term: &Term) -> Operand {
-    match term {
-        Term::Variable(own) => Operand::Variable(own.name.clone()),
-        Term::Constant(own) => Operand::Constant(own.name.clone()),
     }
 }

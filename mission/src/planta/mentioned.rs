@@ -13,6 +13,8 @@ pub(super) struct Mentioned {
     pub predicates: BTreeSet<Name>,
     /// Of predicates that actions or events change.
     pub changed: BTreeSet<Name>,
+    /// Of predicates that events change.
+    pub timed: BTreeSet<Name>,
     /// Of objects, in conditions, effects and the initial state.
     pub objects: BTreeSet<Name>,
 }
@@ -48,6 +50,7 @@ impl Mentioned {
                 InitialElement::Timed(_, atom, ..) => {
                     self.atom(atom);
                     self.changed.insert(atom.predicate.name.clone());
+                    self.timed.insert(atom.predicate.name.clone());
                 }
                 InitialElement::Value(atom, ..) => self.terms(&atom.arguments),
             }
@@ -126,4 +129,25 @@ pub(super) fn types(domain: &Domain, problem: &Problem) -> BTreeSet<Name> {
     }
     found.extend(domain.types.iter().map(|entry| entry.identifier.name.clone()));
     found
+}
+
+/// Takes out of a domain the derived predicates that no action, no goal and no other predicate asks for.
+pub(super) fn keep_asked(domain: &mut Domain, problem: &Problem) {
+    let derived = std::mem::take(&mut domain.derived);
+    let mut asked = Mentioned::by_domain(domain).and_problem(problem).predicates;
+    loop {
+        let mut found = Mentioned::default();
+        let axioms = derived.iter().filter(|axiom| asked.contains(&axiom.head.identifier.name));
+        axioms.for_each(|axiom| found.condition(&axiom.condition));
+        let before = asked.len();
+        asked.extend(found.predicates);
+        if asked.len() == before {
+            break;
+        }
+    }
+    let (kept, dropped): (Vec<_>, Vec<_>) =
+        derived.into_iter().partition(|axiom| asked.contains(&axiom.head.identifier.name));
+    domain.derived = kept;
+    let dropped: BTreeSet<Name> = dropped.into_iter().map(|axiom| axiom.head.identifier.name).collect();
+    domain.predicates.retain(|declared| !dropped.contains(&declared.identifier.name));
 }

@@ -11,25 +11,28 @@
 //! \[1\] G. Rezende Silva et al.: PLANTA, `kas-lab/suave_planta` and `kas-lab/navigation_planta`.
 //! \[2\] `remaro-network/dlToPlanning`.
 
+mod clause;
 mod fold;
 mod mentioned;
 mod names;
+mod settle;
 mod swrl;
 mod terms;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use ontology::Ontology;
 use pddl::ast::{
     Declaration, Domain, Identifier, InitialElement, Name, Problem, Term, TypeExpression, TypedName,
 };
-use pddl::Source;
+use pddl::{Source, TypeHierarchy};
 use rules::{Engine, Fact, Value};
 
 use crate::message::Message;
-use fold::Folded;
+use fold::{Folded, Said};
 use names::{EQUAL, LESS, NUMBER_TYPES};
+use settle::Guards;
 pub use terms::Terms;
 use terms::{atom, identifier, untyped};
 
@@ -52,12 +55,21 @@ pub(crate) struct Planta {
     terms: Arc<Terms>,
     /// The type of numbers.
     number: Name,
+    /// What is taken for granted of facts that actions change.
+    guards: Guards,
     folded: Folded,
+    /// The completed domain with all axioms.
+    whole: Option<Arc<Domain>>,
 }
 
 impl Planta {
     /// Completes a domain; what is questionable about that is returned, too.
-    pub(crate) fn new(terms: &Arc<Terms>, domain: &Domain, problem: &Problem) -> (Self, Domain, Vec<Message>) {
+    pub(crate) fn new(
+        terms: &Arc<Terms>,
+        domain: &Domain,
+        problem: &Problem,
+        (engine, stated): (&Engine, Vec<Fact>),
+    ) -> (Self, Domain, Vec<Message>) {
         let mut own = Terms::clone(terms);
         let mut warnings = std::mem::take(&mut own.warnings);
         let mentioned = mentioned::Mentioned::by_domain(domain).and_problem(problem);
@@ -72,9 +84,39 @@ impl Planta {
         // The domain's own axioms come last, as they do in what `OWLToPDDL` writes.
         let rules = own.derived.iter().cloned().chain(std::mem::take(&mut completed.derived));
         completed.derived = rules.collect();
-        let folded = Folded::new(&own.derived, domain, &mentioned.changed);
-        folded.shorten(&mut completed);
-        (Self { terms: Arc::new(own), number, folded }, completed, warnings)
+        let mut guards = settle::guards(domain, &mentioned.changed, &mentioned.timed);
+        let derived = own.derived.clone();
+        let mut planta = Self {
+            terms: Arc::new(own),
+            number,
+            guards: Guards::new(),
+            folded: Folded::default(),
+            whole: None,
+        };
+        let facts = planta.stated(engine, stated.into_iter()).chain(problem.init.iter().filter_map(spelled));
+        let facts: BTreeSet<Said> = facts.collect();
+        guards.retain(|guard| facts.iter().all(|fact| settle::keeps(fact, guard, &facts)));
+        let mut known: BTreeSet<Name> = planta.terms.predicates.keys().cloned().collect();
+        known.extend([LESS, EQUAL].map(Name::new));
+        planta.folded = Folded::new(&derived, domain, &mentioned.changed, &guards, known);
+        planta.guards = guards;
+        planta.whole = Some(Arc::new(completed.clone()));
+        planta.folded.shorten(&mut completed);
+        mentioned::keep_asked(&mut completed, problem);
+        (planta, completed, warnings)
+    }
+
+    /// The completed domain with all axioms, and a problem with what is stated, from which they conclude all else: as `OWLToPDDL`
+    /// writes them.
+    pub(crate) fn merged(
+        &self,
+        problem: &Problem,
+        (engine, stated): (&Engine, Vec<Fact>),
+    ) -> Option<(Domain, Problem)> {
+        let (whole, mut problem) = (Domain::clone(self.whole.as_ref()?), problem.clone());
+        let plain = Self { folded: Folded::default(), guards: Guards::new(), ..self.clone() };
+        plain.fill(&whole, &mut problem, engine, stated.into_iter());
+        Some((whole, problem))
     }
 
     /// Adds to a problem what is stated now, how numbers compare, and what follows whatever the robot does; returns warnings.
@@ -85,12 +127,9 @@ impl Planta {
         engine: &Engine,
         stated: impl Iterator<Item = Fact>,
     ) -> Vec<Message> {
-        let mut facts: BTreeSet<(Name, Vec<Name>)> = BTreeSet::new();
-        for fact in stated {
-            facts.extend(self.fact(&fact, engine));
-        }
-        let warnings = self.replace_values(problem, &facts);
-        let said: BTreeSet<(Name, Vec<Name>)> = problem.init.iter().filter_map(spelled).collect();
+        let mut facts: BTreeSet<Said> = self.stated(engine, stated).collect();
+        let mut messages = self.replace_values(problem, &facts);
+        let said: BTreeSet<Said> = problem.init.iter().filter_map(spelled).collect();
         let constants = domain.constants.iter().chain(&problem.objects);
         let mut known: BTreeSet<Name> = constants.map(|object| object.identifier.name.clone()).collect();
         for name in facts.iter().flat_map(|(_, arguments)| arguments) {
@@ -100,17 +139,51 @@ impl Planta {
             }
         }
         facts.extend(self.comparisons(domain, &known));
-        let folded = self.folded.facts(facts.iter().chain(&said), &known);
+        let hierarchy = TypeHierarchy::of(domain);
+        let mut types: BTreeMap<&Name, Vec<&TypeExpression>> = BTreeMap::new();
+        for declared in domain.constants.iter().chain(&problem.objects) {
+            types.entry(&declared.identifier.name).or_default().push(&declared.r#type);
+        }
+        let is_of = |object: &Name, wanted: &Name| {
+            let wanted = typed(Some(wanted.clone()));
+            types.get(object).is_some_and(|own| own.iter().any(|own| hierarchy.fits(own, &wanted)))
+        };
+        let folded = self.folded.facts(facts.iter().chain(&said), &known, &is_of);
         facts.extend(folded);
+        messages.extend(self.unguarded(&facts, &said));
         problem.init.extend(facts.difference(&said).map(|(predicate, arguments)| {
             let arguments = arguments.iter().map(|name| Term::Constant(identifier(name.clone())));
             InitialElement::Fact(atom(predicate.clone(), arguments.collect()))
         }));
-        warnings
+        messages
+    }
+
+    /// What is stated, in PDDL.
+    fn stated(&self, engine: &Engine, stated: impl Iterator<Item = Fact>) -> impl Iterator<Item = Said> {
+        stated.filter_map(|fact| self.fact(&fact, engine))
+    }
+
+    /// Facts that actions change and of which not all is stated that the actions ask for: the domain was completed without them.
+    fn unguarded(&self, facts: &BTreeSet<Said>, said: &BTreeSet<Said>) -> Vec<Message> {
+        let all: BTreeSet<Said> = facts.union(said).cloned().collect();
+        let mut messages = Vec::new();
+        for fact in &all {
+            for guard @ (_, position, class) in &self.guards {
+                if !settle::keeps(fact, guard, &all) {
+                    let (predicate, arguments) = fact;
+                    let text = format!(
+                        "`{}` is related by `{predicate}`, and nothing states that it is a `{class}`, as the actions ask",
+                        arguments[*position]
+                    );
+                    messages.push(Message::error("M214", text));
+                }
+            }
+        }
+        messages
     }
 
     /// A statement in PDDL; none if it is of nothing that the ontology names.
-    fn fact(&self, fact: &Fact, engine: &Engine) -> Option<(Name, Vec<Name>)> {
+    fn fact(&self, fact: &Fact, engine: &Engine) -> Option<Said> {
         let symbols = engine.symbols();
         let predicate = self.terms.symbols.get(symbols.value(fact.predicate).as_name()?)?.clone();
         let name = |symbol: &rules::Symbol| match symbols.value(*symbol) {
@@ -121,7 +194,7 @@ impl Planta {
     }
 
     /// Of properties that have one value only, that of the knowledge base counts.
-    fn replace_values(&self, problem: &mut Problem, facts: &BTreeSet<(Name, Vec<Name>)>) -> Vec<Message> {
+    fn replace_values(&self, problem: &mut Problem, facts: &BTreeSet<Said>) -> Vec<Message> {
         let mut warnings = Vec::new();
         problem.init.retain(|element| {
             let Some((predicate, arguments)) = spelled(element) else { return true };
@@ -146,8 +219,9 @@ impl Planta {
     }
 
     /// How the numbers that there are compare, if anything asks for it.
-    fn comparisons(&self, domain: &Domain, known: &BTreeSet<Name>) -> Vec<(Name, Vec<Name>)> {
-        let declared = |name: &str| domain.predicates.iter().any(|own| own.identifier.name == Name::new(name));
+    fn comparisons(&self, domain: &Domain, known: &BTreeSet<Name>) -> Vec<Said> {
+        let declared =
+            |name: &str| domain.predicates.iter().any(|own| own.identifier.name == Name::new(name));
         if !declared(LESS) && !declared(EQUAL) {
             return Vec::new();
         }
@@ -194,7 +268,8 @@ impl Terms {
         warnings: &mut Vec<Message>,
     ) {
         let mut known: BTreeSet<Name> = domain.types.iter().map(|own| own.identifier.name.clone()).collect();
-        known.extend(domain.types.iter().flat_map(|own| &own.r#type.alternatives).map(|own| own.name.clone()));
+        known
+            .extend(domain.types.iter().flat_map(|own| &own.r#type.alternatives).map(|own| own.name.clone()));
         known.insert(Name::new("object"));
         let typed: BTreeSet<&Name> = self.constants.values().flatten().chain([number]).collect();
         for name in typed {
@@ -271,7 +346,7 @@ fn object(name: Name, r#type: Option<Name>) -> TypedName {
 }
 
 /// A fact of an initial state as names.
-fn spelled(element: &InitialElement) -> Option<(Name, Vec<Name>)> {
+fn spelled(element: &InitialElement) -> Option<Said> {
     let InitialElement::Fact(atom) = element else { return None };
     let name = |term: &Term| match term {
         Term::Variable(own) | Term::Constant(own) => own.name.clone(),

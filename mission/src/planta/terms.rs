@@ -10,7 +10,9 @@ use ontology::vocab::{owl, pddl as annotation};
 use ontology::{
     ANONYMOUS, Axiom, Characteristic, ClassExpression, EntityKind, Iri, ObjectPropertyExpression, Ontology,
 };
-use pddl::ast::{Atom, Condition, Declaration, Derived, Identifier, Name, Span, Term, TypeExpression, TypedName};
+use pddl::ast::{
+    Atom, Condition, Declaration, Derived, Identifier, Name, Span, Term, TypeExpression, TypedName,
+};
 use rules::Literal;
 
 use super::names::{self, Literals};
@@ -199,7 +201,9 @@ impl Terms {
         match stated {
             Axiom::SubClassOf(lower, upper) => {
                 let (lower, upper) = (named(lower), named(upper));
-                let (Some(lower), Some(upper)) = (lower, upper) else { return Err("SubClassOf of expressions") };
+                let (Some(lower), Some(upper)) = (lower, upper) else {
+                    return Err("SubClassOf of expressions");
+                };
                 if !is_top(upper) && !is_top(lower) {
                     self.follows(upper, &["x"], lower, vec![x], &[])?;
                 }
