@@ -16,7 +16,11 @@ impl Mission {
     /// Warnings about names of the knowledge base that nothing stands for, and about values that nothing gives.
     pub fn doubts(&self) -> Vec<Message> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };
-        let mut doubts = self.actions_without_schema(knowledge);
+        let mut doubts = Vec::new();
+        // In PLANTA's form conditions name the actions of the knowledge base.
+        if self.planta.is_none() {
+            doubts.extend(self.actions_without_schema(knowledge));
+        }
         doubts.extend(components(knowledge));
         doubts.extend(self.functions_without_value());
         doubts.extend(attributes(knowledge));

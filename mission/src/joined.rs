@@ -69,10 +69,10 @@ impl Mission {
                 return Err(errors);
             }
         };
-        let (mut domain, mut warnings) = (domain, warnings);
+        let (mut domain, mut problem, mut warnings) = (domain, problem, warnings);
         let planta = knowledge.as_ref().and_then(|knowledge| {
             let facts = (knowledge.engine(), knowledge.stated());
-            let (planta, completed, more) = Planta::new(knowledge.terms()?, &domain, &problem, facts);
+            let (planta, completed, more) = Planta::new(knowledge.terms()?, &domain, &mut problem, facts);
             domain = completed;
             warnings.extend(more);
             Some(planta)
@@ -167,6 +167,10 @@ impl Mission {
         let (contributed, own): (Vec<_>, Vec<_>) =
             errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
         let mut messages = Message::from_pddl(&own, &sources);
+        if let (Some(planta), true) = (&self.planta, messages.iter().any(|message| message.code == "P134")) {
+            messages.retain(|message| message.code != "P134");
+            messages.extend(planta.unknown(&self.domain));
+        }
         messages.extend(contributed.iter().map(|diagnostic| {
             let text = format!("{} (from a setting or from the knowledge base)", diagnostic.message);
             Message::error(diagnostic.code, text)

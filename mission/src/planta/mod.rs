@@ -29,7 +29,7 @@ use pddl::ast::{
 use pddl::{Source, TypeHierarchy};
 use rules::{Engine, Fact, Value};
 
-use crate::message::Message;
+use crate::message::{Message, did_you_mean};
 use fold::{Folded, Said};
 use names::{EQUAL, LESS, NUMBER_TYPES};
 use settle::Guards;
@@ -67,11 +67,12 @@ impl Planta {
     pub(crate) fn new(
         terms: &Arc<Terms>,
         domain: &Domain,
-        problem: &Problem,
+        problem: &mut Problem,
         (engine, stated): (&Engine, Vec<Fact>),
     ) -> (Self, Domain, Vec<Message>) {
         let mut own = Terms::clone(terms);
         let mut warnings = std::mem::take(&mut own.warnings);
+        warnings.extend(drop_repeated(domain, problem));
         let mentioned = mentioned::Mentioned::by_domain(domain).and_problem(problem);
         let types = mentioned::types(domain, problem);
         let known = |r#type: &&&str| types.contains(&Name::new(r#type));
@@ -104,6 +105,20 @@ impl Planta {
         planta.folded.shorten(&mut completed);
         mentioned::keep_asked(&mut completed, problem);
         (planta, completed, warnings)
+    }
+
+    /// Predicates that a completed domain asks for and that neither it nor the knowledge base has.
+    pub(crate) fn unknown(&self, completed: &Domain) -> Vec<Message> {
+        let declared: Vec<&str> =
+            completed.predicates.iter().map(|declared| declared.identifier.name.as_str()).collect();
+        let unknown = mentioned::undeclared(completed).into_iter().map(|name| {
+            let meant = did_you_mean(name.as_str(), declared.iter().copied());
+            let text = format!(
+                "the domain asks for `{name}`, and the knowledge base has no class or property of that name{meant}"
+            );
+            Message::error("M215", text)
+        });
+        unknown.collect()
     }
 
     /// The completed domain with all axioms, and a problem with what is stated, from which they conclude all else: as `OWLToPDDL`
@@ -335,6 +350,31 @@ impl Terms {
             }
         }
     }
+}
+
+/// Objects of the problem that are constants of the domain, too, and of a type that is declared nowhere: what counts is the constant.
+fn drop_repeated(domain: &Domain, problem: &mut Problem) -> Vec<Message> {
+    let hierarchy = TypeHierarchy::of(domain);
+    let unknown = |object: &TypedName| {
+        object
+            .r#type
+            .alternatives
+            .iter()
+            .find(|own| !hierarchy.contains(&own.name))
+            .map(|own| own.name.clone())
+    };
+    let mut warnings = Vec::new();
+    problem.objects.retain(|object| {
+        let name = &object.identifier.name;
+        let is_constant = domain.constants.iter().any(|constant| constant.identifier.name == *name);
+        let Some(r#type) = unknown(object).filter(|_| is_constant) else { return true };
+        let text = format!(
+            "`{name}` is a constant of the domain; its type in the problem, `{type}`, is declared nowhere"
+        );
+        warnings.push(Message::warning("M213", text));
+        false
+    });
+    warnings
 }
 
 fn typed(r#type: Option<Name>) -> TypeExpression {
