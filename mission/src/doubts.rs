@@ -56,6 +56,9 @@ impl Mission {
 
     /// Numeric functions that are used, and have no value.
     fn functions_without_value(&self) -> Vec<Message> {
+        if self.domain.functions.is_empty() {
+            return Vec::new();
+        }
         let mut problem = self.problem.clone();
         self.fill(&mut problem);
         let valued: BTreeSet<&Name> = problem

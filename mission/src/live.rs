@@ -9,6 +9,7 @@ use crate::binding;
 use crate::joined::Mission;
 use crate::knowledge::Knowledge;
 use crate::message::Message;
+use crate::planta::Planta;
 
 impl Mission {
     /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
@@ -89,16 +90,30 @@ impl Mission {
     /// Says anew which designs of a filled problem are available: those that `allowed` answers with yes, asked with the
     /// name of each design of the knowledge base and whether it is available.
     pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) {
-        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
-        let Some(predicate) = declared.into_iter().find(|name| self.bindings.is_availability(name)) else {
-            return;
-        };
-        let is_own = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate);
-        problem.init.retain(|element| !is_own(element));
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
-        for design in designs.filter(|design| allowed(&design.individual.name, design.available)) {
-            problem.init.push(InitialElement::Fact(binding::atom(predicate, &[&design.individual.name])));
+        let designs = designs.map(|design| (design.individual.name.as_str(), design.available));
+        if let Some(planta) = &self.planta {
+            let says = designs.map(|(design, available)| (design, allowed(design, available)));
+            return planta.allow(problem, says);
         }
+        let allowed: Vec<&str> = designs
+            .filter(|(design, available)| allowed(design, *available))
+            .map(|(design, _)| design)
+            .collect();
+        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
+        for predicate in declared.filter(|name| self.bindings.is_availability(name)) {
+            let is_own = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate);
+            problem.init.retain(|element| !is_own(element));
+            let facts =
+                allowed.iter().map(|design| InitialElement::Fact(binding::atom(predicate, &[design])));
+            problem.init.extend(facts);
+        }
+    }
+
+    /// Whether [`Mission::allow`] can say of the designs of this mission which are available: what the domain asks about that are
+    /// facts of the filled problem, which no action changes.
+    pub fn can_allow(&self) -> bool {
+        self.planta.as_ref().is_none_or(Planta::can_allow)
     }
 
     /// How many arguments an action has in the domain's file, if the knowledge base has added some.

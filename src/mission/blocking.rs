@@ -8,9 +8,9 @@
 //! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
 
 use encodings::{Config, Status, optimize};
-use pddl::ast::{InitialElement, Name, Problem};
+use pddl::ast::Problem;
 
-use ::mission::{Mission, atom};
+use ::mission::Mission;
 
 use crate::mission::planning::Planning as _;
 
@@ -27,6 +27,9 @@ pub enum Blocking {
 /// Why there is no plan for a problem that [`Mission::filled`] has made and that is proved to have none. None if the mission has
 /// no knowledge base, or if a limit was reached before the reason was known.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
+    if !mission.can_allow() {
+        return None;
+    }
     let config = &Config { horizon: None, ..config.clone() };
     let designs = mission.knowledge()?.view().function_designs();
     let missing: Vec<String> =
@@ -57,14 +60,7 @@ fn solvable_with(
     let mut problem = problem.clone();
     // Any plan will do.
     problem.metric = None;
-    let predicates = mission.domain().predicates.iter().map(|declared| &declared.identifier.name);
-    let predicates: Vec<&Name> =
-        predicates.filter(|predicate| mission.bindings().is_availability(predicate)).collect();
-    for design in available {
-        for predicate in &predicates {
-            problem.init.push(InitialElement::Fact(atom(predicate, &[design])));
-        }
-    }
+    mission.allow(&mut problem, &|design, own| own || available.iter().any(|other| other == design));
     let task = mission.ground(&problem, &[], &config.limits).ok()?;
     match optimize(&task, config, &mut |_| {}).status {
         Status::Optimal | Status::Feasible => Some(true),

@@ -10,9 +10,7 @@ use pddl::ast::{Derived, Domain, Name};
 
 use super::clause::{self, Clause, Literal, Operand};
 use super::settle::{Guards, settle};
-
-/// A fact by name.
-pub(super) type Said = (Name, Vec<Name>);
+use super::syntax::Said;
 
 /// The settled derived predicates, and their clauses.
 #[derive(Debug, Clone, Default)]
@@ -64,6 +62,11 @@ impl Folded {
             add(&mut all, head, clauses.clone().filter(|_| !large.contains(head)));
         }
         Self { settled: settle(all, changed, guards) }
+    }
+
+    /// Whether a predicate is settled.
+    pub fn settles(&self, predicate: &Name) -> bool {
+        self.settled.contains_key(predicate)
     }
 
     /// Takes what is settled out of the axioms of a domain.

@@ -11,30 +11,32 @@
 //! \[1\] G. Rezende Silva et al.: PLANTA, `kas-lab/suave_planta` and `kas-lab/navigation_planta`.
 //! \[2\] `remaro-network/dlToPlanning`.
 
+mod axioms;
 mod clause;
+mod complete;
 mod fold;
 mod mentioned;
 mod names;
 mod settle;
 mod swrl;
+mod syntax;
 mod terms;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 
 use ontology::Ontology;
-use pddl::ast::{
-    Declaration, Domain, Identifier, InitialElement, Name, Problem, Term, TypeExpression, TypedName,
-};
+use pddl::ast::{Domain, InitialElement, Name, Problem, Term, TypeExpression};
 use pddl::{Source, TypeHierarchy};
-use rules::{Engine, Fact, Value};
+use rules::{Engine, Fact, Literal, Value};
 
 use crate::message::{Message, did_you_mean};
-use fold::{Folded, Said};
-use names::{EQUAL, LESS, NUMBER_TYPES};
+use complete::drop_repeated;
+use fold::Folded;
+use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
 use settle::Guards;
+use syntax::{Said, atom, identifier, object, spelled, typed};
 pub use terms::Terms;
-use terms::{atom, identifier, untyped};
 
 /// What an ontology adds to a domain in general, if the domain asks for it: it mentions predicates that it does not declare, and
 /// one of them is `inferred-…` or named as a class or a property.
@@ -57,6 +59,8 @@ pub(crate) struct Planta {
     number: Name,
     /// What is taken for granted of facts that actions change.
     guards: Guards,
+    /// The predicates that the knowledge base or a comparison of numbers has something to say of.
+    known: HashSet<Name>,
     folded: Folded,
     /// The completed domain with all axioms.
     whole: Option<Arc<Domain>>,
@@ -87,18 +91,14 @@ impl Planta {
         completed.derived = rules.collect();
         let mut guards = settle::guards(domain, &mentioned.changed, &mentioned.timed);
         let derived = own.derived.clone();
-        let mut planta = Self {
-            terms: Arc::new(own),
-            number,
-            guards: Guards::new(),
-            folded: Folded::default(),
-            whole: None,
-        };
-        let facts = planta.stated(engine, stated.into_iter()).chain(problem.init.iter().filter_map(spelled));
-        let facts: BTreeSet<Said> = facts.collect();
+        let known = own.predicates.keys().cloned().chain([LESS, EQUAL].map(Name::new)).collect();
+        let (terms, folded) = (Arc::new(own), Folded::default());
+        let mut planta = Self { terms, number, guards: Guards::new(), known, folded, whole: None };
+        guards.retain(|(predicate, _, class)| planta.is_known(predicate) && planta.is_known(class));
+        let mut facts: BTreeSet<Said> = planta.stated(engine, stated.into_iter()).collect();
+        facts.extend(planta.said(problem));
         guards.retain(|guard| facts.iter().all(|fact| settle::keeps(fact, guard, &facts)));
-        let mut known: BTreeSet<Name> = planta.terms.predicates.keys().cloned().collect();
-        known.extend([LESS, EQUAL].map(Name::new));
+        let known = planta.known.iter().cloned().collect();
         planta.folded = Folded::new(&derived, domain, &mentioned.changed, &guards, known);
         planta.guards = guards;
         planta.whole = Some(Arc::new(completed.clone()));
@@ -144,7 +144,7 @@ impl Planta {
     ) -> Vec<Message> {
         let mut facts: BTreeSet<Said> = self.stated(engine, stated).collect();
         let mut messages = self.replace_values(problem, &facts);
-        let said: BTreeSet<Said> = problem.init.iter().filter_map(spelled).collect();
+        let said: BTreeSet<Said> = self.said(problem).collect();
         let constants = domain.constants.iter().chain(&problem.objects);
         let mut known: BTreeSet<Name> = constants.map(|object| object.identifier.name.clone()).collect();
         for name in facts.iter().flat_map(|(_, arguments)| arguments) {
@@ -171,6 +171,43 @@ impl Planta {
             InitialElement::Fact(atom(predicate.clone(), arguments.collect()))
         }));
         messages
+    }
+
+    /// Whether it is a fact of a filled problem which designs are not available.
+    pub(crate) fn can_allow(&self) -> bool {
+        self.folded.settles(&Name::new(UNREALISABLE))
+    }
+
+    /// Says anew which designs are available: of the others it holds that they cannot be realised. That a function is not grounded
+    /// is no design that somebody could do without.
+    pub(crate) fn allow<'d>(&self, problem: &mut Problem, designs: impl Iterator<Item = (&'d str, bool)>) {
+        if !self.can_allow() {
+            return;
+        }
+        let (predicate, no) = (Name::new(UNREALISABLE), self.terms.literals.name(&Literal::Boolean(false)));
+        for (design, available) in designs.filter(|(design, _)| *design != UNGROUND) {
+            let arguments = vec![names::plain(design), no.clone()];
+            let own = Some((predicate.clone(), arguments.clone()));
+            problem.init.retain(|element| spelled(element) != own);
+            if !available {
+                let arguments = arguments.into_iter().map(|name| Term::Constant(identifier(name))).collect();
+                problem.init.push(InitialElement::Fact(atom(predicate.clone(), arguments)));
+            }
+        }
+    }
+
+    /// Whether the knowledge base or a comparison of numbers has something to say of a predicate.
+    fn is_known(&self, predicate: &Name) -> bool {
+        self.known.contains(predicate)
+    }
+
+    /// What a problem states of such predicates: all else is of maps and tasks, and there may be very much of it.
+    fn said(&self, problem: &Problem) -> impl Iterator<Item = Said> {
+        let is_known = |element: &&InitialElement| match element {
+            InitialElement::Fact(atom) => self.is_known(&atom.predicate.name),
+            _ => false,
+        };
+        problem.init.iter().filter(is_known).filter_map(spelled)
     }
 
     /// What is stated, in PDDL.
@@ -212,11 +249,14 @@ impl Planta {
     fn replace_values(&self, problem: &mut Problem, facts: &BTreeSet<Said>) -> Vec<Message> {
         let mut warnings = Vec::new();
         problem.init.retain(|element| {
-            let Some((predicate, arguments)) = spelled(element) else { return true };
-            let [subject, value] = &arguments[..] else { return true };
-            if !self.terms.functional.contains(&predicate) {
+            let InitialElement::Fact(atom) = element else { return true };
+            if !self.known.contains(&atom.predicate.name)
+                || !self.terms.functional.contains(&atom.predicate.name)
+            {
                 return true;
             }
+            let Some((predicate, arguments)) = spelled(element) else { return true };
+            let [subject, value] = &arguments[..] else { return true };
             let other = facts.iter().find(|(own, stated)| *own == predicate && stated[0] == *subject);
             match other {
                 Some((_, stated)) if stated[1] != *value => {
@@ -258,138 +298,4 @@ impl Planta {
         }
         facts
     }
-}
-
-impl Terms {
-    /// Numbers keep the names that the files give them.
-    fn name_numbers(&mut self, domain: &Domain, problem: &Problem, mentioned: &BTreeSet<Name>) {
-        let declared = domain.constants.iter().chain(&problem.objects);
-        let declared = declared.map(|object| &object.identifier.name);
-        let mut literals = names::Literals::default();
-        for name in declared.chain(mentioned) {
-            if let Some(value) = names::number(name) {
-                literals.insert(value, name.clone());
-            }
-        }
-        self.literals.prefer(literals);
-    }
-
-    /// Types of individuals and numbers, and those that only objects mention.
-    fn declare_types(
-        &self,
-        domain: &mut Domain,
-        problem: &Problem,
-        number: &Name,
-        warnings: &mut Vec<Message>,
-    ) {
-        let mut known: BTreeSet<Name> = domain.types.iter().map(|own| own.identifier.name.clone()).collect();
-        known
-            .extend(domain.types.iter().flat_map(|own| &own.r#type.alternatives).map(|own| own.name.clone()));
-        known.insert(Name::new("object"));
-        let typed: BTreeSet<&Name> = self.constants.values().flatten().chain([number]).collect();
-        for name in typed {
-            if known.insert(name.clone()) {
-                domain.types.push(object(name.clone(), None));
-            }
-        }
-        let objects = domain.constants.iter().chain(&problem.objects);
-        let mentioned: Vec<Identifier> =
-            objects.flat_map(|object| object.r#type.alternatives.clone()).collect();
-        for r#type in mentioned {
-            if known.insert(r#type.name.clone()) {
-                let text = format!(
-                    "the type `{}` of objects is declared nowhere, and nothing else is of that type",
-                    r#type.name
-                );
-                warnings.push(Message::warning("M213", text));
-                domain.types.push(object(r#type.name, None));
-            }
-        }
-    }
-
-    /// Individuals, values, and the numbers that rules or the files name.
-    fn declare_constants(
-        &self,
-        domain: &mut Domain,
-        problem: &Problem,
-        number: &Name,
-        mentioned: &BTreeSet<Name>,
-    ) {
-        let mut known: BTreeSet<Name> =
-            domain.constants.iter().map(|own| own.identifier.name.clone()).collect();
-        for (name, r#type) in &self.constants {
-            if known.insert(name.clone()) {
-                // An object of the problem that the ontology gives no type keeps its own.
-                let own = problem.objects.iter().find(|object| object.identifier.name == *name);
-                let r#type = match (r#type, own) {
-                    (None, Some(own)) => own.r#type.clone(),
-                    (r#type, _) => typed(r#type.clone()),
-                };
-                domain.constants.push(TypedName { identifier: identifier(name.clone()), r#type });
-            }
-        }
-        known.extend(problem.objects.iter().map(|object| object.identifier.name.clone()));
-        let mentioned = mentioned.iter().filter(|name| names::number(name).is_some());
-        for name in self.numbers.iter().chain(mentioned) {
-            if known.insert(name.clone()) {
-                domain.constants.push(object(name.clone(), Some(number.clone())));
-            }
-        }
-    }
-
-    /// Classes and properties, stated and inferred, and how numbers compare.
-    fn declare_predicates(&self, domain: &mut Domain) {
-        let mut known: BTreeSet<Name> =
-            domain.predicates.iter().map(|own| own.identifier.name.clone()).collect();
-        let compared = [LESS, EQUAL].map(|name| (Name::new(name), 2));
-        let own = self.predicates.iter().map(|(name, arity)| (name.clone(), *arity));
-        for (name, arity) in own.chain(compared) {
-            if known.insert(name.clone()) {
-                let parameters = untyped(&["x", "y"][..arity]);
-                domain.predicates.push(Declaration { identifier: identifier(name), parameters });
-            }
-        }
-    }
-}
-
-/// Objects of the problem that are constants of the domain, too, and of a type that is declared nowhere: what counts is the constant.
-fn drop_repeated(domain: &Domain, problem: &mut Problem) -> Vec<Message> {
-    let hierarchy = TypeHierarchy::of(domain);
-    let unknown = |object: &TypedName| {
-        object
-            .r#type
-            .alternatives
-            .iter()
-            .find(|own| !hierarchy.contains(&own.name))
-            .map(|own| own.name.clone())
-    };
-    let mut warnings = Vec::new();
-    problem.objects.retain(|object| {
-        let name = &object.identifier.name;
-        let is_constant = domain.constants.iter().any(|constant| constant.identifier.name == *name);
-        let Some(r#type) = unknown(object).filter(|_| is_constant) else { return true };
-        let text = format!(
-            "`{name}` is a constant of the domain; its type in the problem, `{type}`, is declared nowhere"
-        );
-        warnings.push(Message::warning("M213", text));
-        false
-    });
-    warnings
-}
-
-fn typed(r#type: Option<Name>) -> TypeExpression {
-    TypeExpression { alternatives: r#type.into_iter().map(identifier).collect() }
-}
-
-fn object(name: Name, r#type: Option<Name>) -> TypedName {
-    TypedName { identifier: identifier(name), r#type: typed(r#type) }
-}
-
-/// A fact of an initial state as names.
-fn spelled(element: &InitialElement) -> Option<Said> {
-    let InitialElement::Fact(atom) = element else { return None };
-    let name = |term: &Term| match term {
-        Term::Variable(own) | Term::Constant(own) => own.name.clone(),
-    };
-    Some((atom.predicate.name.clone(), atom.arguments.iter().map(name).collect()))
 }

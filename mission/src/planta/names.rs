@@ -15,6 +15,10 @@ pub(super) const LESS: &str = "lessThan";
 pub(super) const EQUAL: &str = "equalTo";
 /// That something contradicts an axiom.
 pub(super) const INCONSISTENT: &str = "inferred-Inconsistent";
+/// That a design cannot be realised, or can, where its second argument is true.
+pub(super) const UNREALISABLE: &str = "inferred-Fd_realisability";
+/// What PLANTA's domains ground a function with that is not at work.
+pub(super) const UNGROUND: &str = "fd_unground";
 /// The types that domains give to numbers; the first unless a domain has the second only.
 pub(super) const NUMBER_TYPES: [&str; 2] = ["numerical-object", "owl-number"];
 

@@ -15,8 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use pddl::ast::{ActionBody, Atom, Condition, Domain, Effect, Name, Term};
 
 use super::clause::{Clause, Literal};
-use super::fold::Said;
 use super::names;
+use super::syntax::Said;
 
 /// How often a clause is unfolded, and how many clauses of one predicate that may make.
 const DEPTH: usize = 8;

@@ -11,7 +11,8 @@ use ontology::{Argument, Atom, ClassExpression, Iri, ObjectPropertyExpression, R
 use pddl::ast::{Condition, Derived, Name, Span, Term};
 
 use super::names::{self, EQUAL, LESS};
-use super::terms::{Terms, atom, axiom, exists, identifier, is_top, variable};
+use super::syntax::{atom, axiom, exists, identifier, variable};
+use super::terms::{Terms, is_top};
 
 /// The variables of a rule, each by a name of its own.
 #[derive(Default)]
@@ -155,8 +156,15 @@ fn comparison(iri: &str, left: Term, right: Term) -> Result<Condition, String> {
     Ok(match name {
         "lessThan" => relation(LESS, &left, &right),
         "greaterThan" => relation(LESS, &right, &left),
-        "equal" => relation(EQUAL, &left, &right),
-        "notEqual" => Condition::Not(Box::new(relation(EQUAL, &left, &right))),
+        "equal" => {
+            let same = Condition::Equal(left.clone(), right.clone(), Span::default());
+            Condition::Or(vec![same, relation(EQUAL, &left, &right)])
+        }
+        "notEqual" => {
+            let same = Condition::Equal(left.clone(), right.clone(), Span::default());
+            let either = [same, relation(EQUAL, &left, &right)];
+            Condition::And(either.map(|own| Condition::Not(Box::new(own))).into())
+        }
         "lessThanOrEqual" => {
             Condition::Or(vec![relation(LESS, &left, &right), relation(EQUAL, &left, &right)])
         }
