@@ -1,15 +1,16 @@
 //! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
 
+use std::borrow::Cow;
+
 use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
-use pddl::ast::{Atom, Condition, Declaration, InitialElement, Name, Problem, Term};
+use pddl::ast::{Atom, Condition, Declaration, Domain, InitialElement, Name, Problem, Term};
 use pddl::{self, Severity, Source};
 
 use crate::binding;
 use crate::joined::Mission;
 use crate::knowledge::Knowledge;
 use crate::message::Message;
-use crate::planta::Planta;
 
 impl Mission {
     /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
@@ -88,13 +89,13 @@ impl Mission {
     }
 
     /// Says anew which designs of a filled problem are available: those that `allowed` answers with yes, asked with the
-    /// name of each design of the knowledge base and whether it is available.
-    pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) {
+    /// name of each design of the knowledge base and whether it is available. Returns the domain for that problem.
+    pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) -> Cow<'_, Domain> {
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
         let designs = designs.map(|design| (design.individual.name.as_str(), design.available));
         if let Some(planta) = &self.planta {
             let says = designs.map(|(design, available)| (design, allowed(design, available)));
-            return planta.allow(problem, says);
+            return Cow::Owned(planta.allow(&self.domain, problem, says));
         }
         let allowed: Vec<&str> = designs
             .filter(|(design, available)| allowed(design, *available))
@@ -108,12 +109,7 @@ impl Mission {
                 allowed.iter().map(|design| InitialElement::Fact(binding::atom(predicate, &[design])));
             problem.init.extend(facts);
         }
-    }
-
-    /// Whether [`Mission::allow`] can say of the designs of this mission which are available: what the domain asks about that are
-    /// facts of the filled problem, which no action changes.
-    pub fn can_allow(&self) -> bool {
-        self.planta.as_ref().is_none_or(Planta::can_allow)
+        Cow::Borrowed(&self.domain)
     }
 
     /// How many arguments an action has in the domain's file, if the knowledge base has added some.

@@ -12,7 +12,7 @@ use pddl::ast::Problem;
 
 use ::mission::Mission;
 
-use crate::mission::planning::Planning as _;
+use crate::mission::planning::ground_with;
 
 /// What keeps an unsolvable mission from having a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,9 +27,6 @@ pub enum Blocking {
 /// Why there is no plan for a problem that [`Mission::filled`] has made and that is proved to have none. None if the mission has
 /// no knowledge base, or if a limit was reached before the reason was known.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
-    if !mission.can_allow() {
-        return None;
-    }
     let config = &Config { horizon: None, ..config.clone() };
     let designs = mission.knowledge()?.view().function_designs();
     let missing: Vec<String> =
@@ -60,8 +57,9 @@ fn solvable_with(
     let mut problem = problem.clone();
     // Any plan will do.
     problem.metric = None;
-    mission.allow(&mut problem, &|design, own| own || available.iter().any(|other| other == design));
-    let task = mission.ground(&problem, &[], &config.limits).ok()?;
+    let domain =
+        mission.allow(&mut problem, &|design, own| own || available.iter().any(|other| other == design));
+    let task = ground_with(mission, &domain, &problem, &[], &config.limits).ok()?;
     match optimize(&task, config, &mut |_| {}).status {
         Status::Optimal | Status::Feasible => Some(true),
         Status::Unsolvable => Some(false),

@@ -23,7 +23,7 @@ const CONFIRM_CONFLICTS: u64 = 1_000;
 /// … if the formula has at most this many operator variables.
 const CONFIRM_SIZE: usize = 5_000;
 /// With so many operators times steps it is not even looked at which of them are left.
-const CONFIRM_PRODUCT: usize = 50_000;
+const CONFIRM_PRODUCT: usize = 1_500;
 /// The first formula is for plans within this part of the gap between the lower bound and the best plan known; each further one
 /// for twice as much of it.
 const STAGES: Int = 8;

@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use pddl::ast::{Derived, Domain, Name};
 
 use super::clause::{self, Clause, Literal, Operand};
+use super::possible::Possible;
 use super::settle::{Guards, settle};
 use super::syntax::Said;
 
@@ -16,6 +17,7 @@ use super::syntax::Said;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Folded {
     settled: BTreeMap<Name, Vec<Clause>>,
+    possible: Possible,
 }
 
 impl Folded {
@@ -24,7 +26,7 @@ impl Folded {
     pub fn new(
         derived: &[Derived],
         domain: &Domain,
-        changed: &BTreeSet<Name>,
+        (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),
         guards: &Guards,
         mut known: BTreeSet<Name>,
     ) -> Self {
@@ -61,65 +63,79 @@ impl Folded {
         for (head, clauses) in &own {
             add(&mut all, head, clauses.clone().filter(|_| !large.contains(head)));
         }
-        Self { settled: settle(all, changed, guards) }
-    }
-
-    /// Whether a predicate is settled.
-    pub fn settles(&self, predicate: &Name) -> bool {
-        self.settled.contains_key(predicate)
+        let (settled, open) = settle(all, changed, guards);
+        let possible = Possible::new(domain, &open, (changed, timed), &|class| known.contains(class));
+        Self { settled, possible }
     }
 
     /// Takes what is settled out of the axioms of a domain.
     pub fn shorten(&self, domain: &mut Domain) {
         domain.derived.retain(|own| !self.settled.contains_key(&own.head.identifier.name));
+        self.possible.restrict(domain);
     }
 
-    /// What is settled, given what is stated of which objects.
-    pub fn facts<'f>(
+    /// What is settled, and what is possible of the rest, given what is stated of which objects.
+    pub fn facts(
         &self,
-        stated: impl Iterator<Item = &'f Said>,
+        stated: &BTreeSet<Said>,
         objects: &BTreeSet<Name>,
         is_of: &dyn Fn(&Name, &Name) -> bool,
     ) -> BTreeSet<Said> {
-        let mut known = Known { relations: HashMap::new(), objects };
-        let parts = self.settled.values().flatten().flat_map(|clause| &clause.body);
-        let types: BTreeSet<&Name> = parts.filter(|part| part.is_type()).filter_map(Literal::name).collect();
-        for relation in types {
-            let r#type = Name::new(relation.as_str().split(' ').nth(1).unwrap_or_default());
-            for object in objects.iter().filter(|object| is_of(object, &r#type)) {
-                known.insert(relation, vec![object.clone()]);
+        let settled: Vec<&Clause> = self.settled.values().flatten().collect();
+        let mut facts = fixpoint(&settled, stated, objects, is_of);
+        let all: BTreeSet<Said> =
+            stated.iter().chain(&facts).cloned().chain(self.possible.added(stated)).collect();
+        let open: Vec<&Clause> = self.possible.clauses().collect();
+        facts.extend(self.possible.bounds(fixpoint(&open, &all, objects, is_of)));
+        facts
+    }
+}
+
+/// What follows from facts by clauses.
+fn fixpoint(
+    clauses: &[&Clause],
+    stated: &BTreeSet<Said>,
+    objects: &BTreeSet<Name>,
+    is_of: &dyn Fn(&Name, &Name) -> bool,
+) -> BTreeSet<Said> {
+    let mut known = Known { relations: HashMap::new(), objects };
+    let parts = clauses.iter().flat_map(|clause| &clause.body);
+    let types: BTreeSet<&Name> = parts.filter(|part| part.is_type()).filter_map(Literal::name).collect();
+    for relation in types {
+        let r#type = Name::new(relation.as_str().split(' ').nth(1).unwrap_or_default());
+        for object in objects.iter().filter(|object| is_of(object, &r#type)) {
+            known.insert(relation, vec![object.clone()]);
+        }
+    }
+    for (predicate, arguments) in stated {
+        known.insert(predicate, arguments.clone());
+    }
+    let mut facts = BTreeSet::new();
+    // The predicates that have grown since a clause was last evaluated; in the first round all of them.
+    let mut grown: Option<BTreeSet<Name>> = None;
+    loop {
+        let has_grown = |part: &Literal| {
+            part.name().is_some_and(|name| grown.as_ref().is_none_or(|grown| grown.contains(name)))
+        };
+        let is_due = |clause: &&Clause| grown.is_none() || clause.body.iter().any(has_grown);
+        let mut new = Vec::new();
+        for clause in clauses.iter().copied().filter(is_due) {
+            let order = known.order(&clause.body);
+            known.matches(&order, &mut BTreeMap::new(), &mut |found| {
+                known.heads(clause, found, &mut new);
+            });
+        }
+        let mut more = BTreeSet::new();
+        for (head, arguments) in new {
+            if known.insert(&head, arguments.clone()) {
+                more.insert(head.clone());
+                facts.insert((head, arguments));
             }
         }
-        for (predicate, arguments) in stated {
-            known.insert(predicate, arguments.clone());
+        if more.is_empty() {
+            return facts;
         }
-        let mut facts = BTreeSet::new();
-        // The predicates that have grown since a clause was last evaluated; in the first round all of them.
-        let mut grown: Option<BTreeSet<Name>> = None;
-        loop {
-            let has_grown = |part: &Literal| {
-                part.name().is_some_and(|name| grown.as_ref().is_none_or(|grown| grown.contains(name)))
-            };
-            let is_due = |clause: &&Clause| grown.is_none() || clause.body.iter().any(has_grown);
-            let mut new = Vec::new();
-            for clause in self.settled.values().flatten().filter(is_due) {
-                let order = known.order(&clause.body);
-                known.matches(&order, &mut BTreeMap::new(), &mut |found| {
-                    known.heads(clause, found, &mut new);
-                });
-            }
-            let mut more = BTreeSet::new();
-            for (head, arguments) in new {
-                if known.insert(&head, arguments.clone()) {
-                    more.insert(head.clone());
-                    facts.insert((head, arguments));
-                }
-            }
-            if more.is_empty() {
-                return facts;
-            }
-            grown = Some(more);
-        }
+        grown = Some(more);
     }
 }
 

@@ -17,6 +17,7 @@ mod complete;
 mod fold;
 mod mentioned;
 mod names;
+mod possible;
 mod settle;
 mod swrl;
 mod syntax;
@@ -99,7 +100,7 @@ impl Planta {
         facts.extend(planta.said(problem));
         guards.retain(|guard| facts.iter().all(|fact| settle::keeps(fact, guard, &facts)));
         let known = planta.known.iter().cloned().collect();
-        planta.folded = Folded::new(&derived, domain, &mentioned.changed, &guards, known);
+        planta.folded = Folded::new(&derived, domain, (&mentioned.changed, &mentioned.timed), &guards, known);
         planta.guards = guards;
         planta.whole = Some(Arc::new(completed.clone()));
         planta.folded.shorten(&mut completed);
@@ -163,7 +164,8 @@ impl Planta {
             let wanted = typed(Some(wanted.clone()));
             types.get(object).is_some_and(|own| own.iter().any(|own| hierarchy.fits(own, &wanted)))
         };
-        let folded = self.folded.facts(facts.iter().chain(&said), &known, &is_of);
+        let stated: BTreeSet<Said> = facts.union(&said).cloned().collect();
+        let folded = self.folded.facts(&stated, &known, &is_of);
         facts.extend(folded);
         messages.extend(self.unguarded(&facts, &said));
         problem.init.extend(facts.difference(&said).map(|(predicate, arguments)| {
@@ -173,27 +175,33 @@ impl Planta {
         messages
     }
 
-    /// Whether it is a fact of a filled problem which designs are not available.
-    pub(crate) fn can_allow(&self) -> bool {
-        self.folded.settles(&Name::new(UNREALISABLE))
-    }
-
-    /// Says anew which designs are available: of the others it holds that they cannot be realised. That a function is not grounded
-    /// is no design that somebody could do without.
-    pub(crate) fn allow<'d>(&self, problem: &mut Problem, designs: impl Iterator<Item = (&'d str, bool)>) {
-        if !self.can_allow() {
-            return;
-        }
+    /// Says anew in a filled problem which designs are available: of the others it holds that they cannot be realised. The domain
+    /// that is returned concludes nothing about that. That a function is not grounded is no design that somebody could do without.
+    pub(crate) fn allow<'d>(
+        &self,
+        domain: &Domain,
+        problem: &mut Problem,
+        designs: impl Iterator<Item = (&'d str, bool)>,
+    ) -> Domain {
         let (predicate, no) = (Name::new(UNREALISABLE), self.terms.literals.name(&Literal::Boolean(false)));
+        let mut domain = domain.clone();
+        domain.derived.retain(|own| own.head.identifier.name != predicate);
+        let bound = possible::possible(&predicate);
+        let is_bounded = domain.predicates.iter().any(|own| own.identifier.name == bound);
         for (design, available) in designs.filter(|(design, _)| *design != UNGROUND) {
             let arguments = vec![names::plain(design), no.clone()];
             let own = Some((predicate.clone(), arguments.clone()));
             problem.init.retain(|element| spelled(element) != own);
             if !available {
-                let arguments = arguments.into_iter().map(|name| Term::Constant(identifier(name))).collect();
+                let arguments: Vec<Term> =
+                    arguments.into_iter().map(|name| Term::Constant(identifier(name))).collect();
+                if is_bounded {
+                    problem.init.push(InitialElement::Fact(atom(bound.clone(), arguments.clone())));
+                }
                 problem.init.push(InitialElement::Fact(atom(predicate.clone(), arguments)));
             }
         }
+        domain
     }
 
     /// Whether the knowledge base or a comparison of numbers has something to say of a predicate.

@@ -58,7 +58,7 @@ pub(super) fn guards(domain: &Domain, changed: &BTreeSet<Name>, timed: &BTreeSet
 }
 
 /// The unary atoms that a condition asks for.
-fn classes<'c>(asked: &[&'c Condition], changed: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
+pub(super) fn classes<'c>(asked: &[&'c Condition], changed: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
     let (mut parts, mut found) = (asked.to_vec(), Vec::new());
     while let Some(part) = parts.pop() {
         match part {
@@ -75,7 +75,11 @@ fn classes<'c>(asked: &[&'c Condition], changed: &BTreeSet<Name>) -> Vec<(Name, 
 }
 
 /// The atoms that an effect adds, each with the variables that quantifiers within the effect bind.
-fn additions<'e>(effect: &'e Effect, bound: &[&'e Name], found: &mut Vec<(&'e Atom, Vec<&'e Name>)>) {
+pub(super) fn additions<'e>(
+    effect: &'e Effect,
+    bound: &[&'e Name],
+    found: &mut Vec<(&'e Atom, Vec<&'e Name>)>,
+) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| additions(part, bound, found)),
         Effect::Add(atom) => found.push((atom, bound.to_vec())),
@@ -88,7 +92,7 @@ fn additions<'e>(effect: &'e Effect, bound: &[&'e Name], found: &mut Vec<(&'e At
     }
 }
 
-fn same(left: &Term, right: &Term) -> bool {
+pub(super) fn same(left: &Term, right: &Term) -> bool {
     match (left, right) {
         (Term::Variable(left), Term::Variable(right)) | (Term::Constant(left), Term::Constant(right)) => {
             left.name == right.name
@@ -101,12 +105,15 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
     matches!(term, Term::Variable(own) if bound.contains(&&own.name))
 }
 
+/// The clauses of settled predicates, and those of the others.
+pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
+
 /// The clauses of settled predicates, in which no open predicate occurs.
 pub(super) fn settle(
     mut all: BTreeMap<Name, Option<Vec<Clause>>>,
     changed: &BTreeSet<Name>,
     guards: &Guards,
-) -> BTreeMap<Name, Vec<Clause>> {
+) -> Parted {
     loop {
         let open = open(&all, changed);
         let candidates = all.keys().filter(|head| open.contains(*head));
@@ -119,8 +126,10 @@ pub(super) fn settle(
                 all.insert(head, Some(clauses));
             }
             None => {
-                let settled = all.into_iter().filter(|(head, _)| !open.contains(head));
-                return settled.filter_map(|(head, clauses)| Some((head, clauses?))).collect();
+                let (open, settled): (BTreeMap<_, _>, BTreeMap<_, _>) =
+                    all.into_iter().partition(|(head, _)| open.contains(head));
+                let settled = settled.into_iter().filter_map(|(head, clauses)| Some((head, clauses?)));
+                return (settled.collect(), open);
             }
         }
     }
