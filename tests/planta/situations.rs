@@ -1,7 +1,9 @@
 //! What fails, what is measured, and what is asked of a mission in PLANTA's form; and its maps.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::io::Write as _;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 use pddl::ast::{InitialElement, Problem, Term};
 use serde_json::Value;
@@ -141,6 +143,28 @@ fn a_manifest_serves_scenarios_explanations_and_the_loop() {
     let (_, alone) = explained.split_once("if it were available").expect("what would be");
     assert!(alone.contains("f_generate_search_path = fd_spiral_high"), "{explained}");
     assert!(!alone.contains("fd_spiral_low"), "{explained}");
+    // A report of the robot changes what is decided before planning.
+    let answers =
+        run_with(manifest, r#"{"event":"component_status","component":"c_thruster_1","status":"ERROR"}"#);
+    let plans: Vec<&Value> = answers.iter().filter(|answer| answer["answer"] == "plan_found").collect();
+    let [before, after] = plans[..] else { panic!("{answers:#?}") };
+    assert!(mentioned(before).contains("fd_all_thrusters"), "{before}");
+    let after = mentioned(after);
+    assert!(after.contains("fd_recover_thrusters") && !after.contains("fd_all_thrusters"), "{after:?}");
+}
+
+/// What the loop answers to a line.
+fn run_with(manifest: &str, line: &str) -> Vec<Value> {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
+        .args(["run", manifest, "--quiet"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    child.stdin.take().expect("a pipe").write_all(line.as_bytes()).expect("the program reads");
+    let output = child.wait_with_output().expect("the program ends");
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
 #[test]
