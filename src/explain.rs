@@ -15,7 +15,7 @@ use ontology::vocab::local_name;
 
 use crate::mapek::{PlannedStep, ruled_out};
 use crate::message::Message;
-use crate::mission::{Mission, Planning as _};
+use crate::mission::{Mission, ground_with};
 use crate::number;
 
 /// How finely values are told apart, as a part of the value.
@@ -98,8 +98,8 @@ fn solve(
     allowed: &dyn Fn(&str, bool) -> bool,
 ) -> Result<BestPlan, Vec<Message>> {
     let (mut problem, _) = mission.filled()?;
-    mission.allow(&mut problem, allowed);
-    let task = mission.ground(&problem, &[], limits)?;
+    let domain = mission.allow(&mut problem, allowed);
+    let task = ground_with(mission, &domain, &problem, &[], limits)?;
     let config = Config { limits: limits.clone(), ..Config::default() };
     let solution = optimize(&task, &config, &mut |_| {});
     let proved = matches!(solution.status, Status::Optimal | Status::Unsolvable);

@@ -58,7 +58,6 @@ impl Setup {
     /// All that is wrong with the manifest and with the files that it names.
     pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
         let (sections, origin): (Sections, ManifestPath) = manifest::read(manifest)?;
-        let knowledge = Knowledge::read(&sections.knowledge.sources(&origin));
         let (settings, bindings) =
             match (sections.adaptation.settings(&origin), sections.bindings.bindings(&origin)) {
                 (Ok(settings), Ok(bindings)) => (settings, bindings),
@@ -68,8 +67,10 @@ impl Setup {
             };
         let (domain, problem) =
             (origin.path(&sections.planning.domain), origin.path(&sections.planning.problem));
-        let mission =
-            Mission::new(&sections.name, Some(knowledge), bindings, source(&domain), source(&problem))?;
+        let (domain, problem) = (source(&domain), source(&problem));
+        let text = domain.as_ref().map_or("", |domain| domain.text());
+        let knowledge = Knowledge::read_for(&sections.knowledge.sources(&origin), text);
+        let mission = Mission::new(&sections.name, Some(knowledge), bindings, domain, problem)?;
         let Sections { description, probabilistic: roles, scenarios, .. } = sections;
         Ok(Self { mission, description, settings, roles, scenarios, origin })
     }

@@ -16,7 +16,11 @@ impl Mission {
     /// Warnings about names of the knowledge base that nothing stands for, and about values that nothing gives.
     pub fn doubts(&self) -> Vec<Message> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };
-        let mut doubts = self.actions_without_schema(knowledge);
+        let mut doubts = Vec::new();
+        // In PLANTA's form conditions name the actions of the knowledge base.
+        if self.planta.is_none() {
+            doubts.extend(self.actions_without_schema(knowledge));
+        }
         let never_named = self.never_named.iter();
         doubts.extend(never_named.map(|(iri, text)| warning(knowledge, "M221", iri, text.clone())));
         doubts.extend(components(knowledge));
@@ -56,6 +60,9 @@ impl Mission {
 
     /// Numeric functions that are used, and have no value.
     fn functions_without_value(&self) -> Vec<Message> {
+        if self.domain.functions.is_empty() {
+            return Vec::new();
+        }
         let mut problem = self.problem.clone();
         self.fill(&mut problem);
         let valued: BTreeSet<&Name> = problem

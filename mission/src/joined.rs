@@ -11,6 +11,7 @@ use crate::knowledge::Knowledge;
 use crate::message::Message;
 use crate::names::{self, Meeting, NeverNamed};
 use crate::native::CoAdaptation;
+use crate::planta::Planta;
 
 /// A mission that can be planned.
 #[derive(Debug, Clone)]
@@ -28,6 +29,7 @@ pub struct Mission {
     pub(super) own: BTreeSet<Name>,
     /// That the problem does not name all designs of the knowledge base: the IRI of one, and what is to be said.
     pub(super) never_named: NeverNamed,
+    pub(super) planta: Option<Planta>,
     warnings: Vec<Message>,
 }
 
@@ -66,7 +68,7 @@ impl Mission {
             return Err(errors);
         }
         let parsed = parse(&domain_source, &problem_source);
-        let (domain, problem, mut warnings) = match parsed {
+        let (domain, problem, warnings) = match parsed {
             Ok(parsed) if errors.is_empty() => parsed,
             Ok(_) => return Err(errors),
             Err(more) => {
@@ -74,16 +76,27 @@ impl Mission {
                 return Err(errors);
             }
         };
+        let (mut domain, mut problem, mut warnings) = (domain, problem, warnings);
+        let planta = knowledge.as_ref().and_then(|knowledge| {
+            let facts = (knowledge.engine(), knowledge.stated());
+            let (planta, completed, more) = Planta::new(knowledge.terms()?, &domain, &mut problem, facts);
+            domain = completed;
+            warnings.extend(more);
+            Some(planta)
+        });
         let (own, never_named) = match &mut knowledge {
-            Some(knowledge) => {
+            // A template names what the knowledge base has.
+            Some(knowledge) if planta.is_none() => {
                 let files = ((&domain, &domain_source), (&problem, &problem_source));
                 joined_names(files, knowledge, &bindings, &mut warnings)?
             }
-            None => (BTreeSet::new(), None),
+            _ => (BTreeSet::new(), None),
         };
         let adaptation = match &knowledge {
-            Some(knowledge) => CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?,
-            None => None,
+            Some(knowledge) if planta.is_none() => {
+                CoAdaptation::new(&domain, &problem, &knowledge.view(), &bindings)?
+            }
+            _ => None,
         };
         let domain = adaptation.as_ref().map_or_else(|| domain.clone(), |own| own.explicit(&domain));
         let name = name.to_owned();
@@ -98,6 +111,7 @@ impl Mission {
             adaptation,
             own,
             never_named,
+            planta,
             warnings,
         })
     }
@@ -155,6 +169,9 @@ impl Mission {
     pub fn filled(&self) -> Result<(Problem, Vec<Message>), Vec<Message>> {
         let mut problem = self.problem.clone();
         let mut warnings = self.fill(&mut problem);
+        if warnings.iter().any(Message::is_error) {
+            return Err(warnings);
+        }
         let found = pddl::check(&self.domain, &self.domain_source, &problem, &self.problem_source);
         let (errors, questionable): (Vec<_>, Vec<_>) =
             found.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
@@ -167,11 +184,29 @@ impl Mission {
         let (contributed, own): (Vec<_>, Vec<_>) =
             errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
         let mut messages = Message::from_pddl(&own, &sources);
+        if let (Some(planta), true) = (&self.planta, messages.iter().any(|message| message.code == "P134")) {
+            messages.retain(|message| message.code != "P134");
+            messages.extend(planta.unknown(&self.domain));
+        }
         messages.extend(contributed.iter().map(|diagnostic| {
             let text = format!("{} (from a setting or from the knowledge base)", diagnostic.message);
             Message::error(diagnostic.code, text)
         }));
         Err(messages)
+    }
+
+    /// The domain and the problem as other planners get them: those of [`Mission::filled`], and for a domain in PLANTA's form all
+    /// rules as derived predicates, none of them decided.
+    ///
+    /// # Errors
+    /// As [`Mission::filled`].
+    pub fn merged(&self) -> Result<(Domain, Problem, Vec<Message>), Vec<Message>> {
+        let (filled, warnings) = self.filled()?;
+        let merged = self.planta.as_ref().zip(self.knowledge.as_ref()).and_then(|(planta, knowledge)| {
+            planta.merged(&self.problem, (knowledge.engine(), knowledge.stated()))
+        });
+        let (domain, problem) = merged.unwrap_or_else(|| (self.domain.clone(), filled));
+        Ok((domain, problem, warnings))
     }
 
     /// What the knowledge base adds to the actions of a plain domain; none if the domain is explicit.

@@ -15,6 +15,7 @@ mod live;
 pub mod message;
 mod names;
 mod native;
+mod planta;
 mod set;
 pub mod visible;
 

@@ -1,8 +1,10 @@
 //! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
 
+use std::borrow::Cow;
+
 use num_rational::BigRational;
 use ontology::tomasys::FunctionDesign;
-use pddl::ast::{Atom, Condition, Declaration, InitialElement, Name, Problem, Term};
+use pddl::ast::{Atom, Condition, Declaration, Domain, InitialElement, Name, Problem, Term};
 use pddl::{self, Severity, Source};
 
 use crate::binding;
@@ -14,6 +16,10 @@ impl Mission {
     /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
     pub fn fill(&self, problem: &mut Problem) -> Vec<Message> {
         self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
+            if let Some(planta) = &self.planta {
+                let stated = knowledge.stated().into_iter();
+                return planta.fill(&self.domain, problem, knowledge.engine(), stated);
+            }
             if let Some(adaptation) = &self.adaptation {
                 adaptation.fill(problem, knowledge.catalogue().designs());
             }
@@ -94,19 +100,29 @@ impl Mission {
     }
 
     /// Says anew which designs of a filled problem are available: those that `allowed` answers with yes, asked with the
-    /// name of each design of the knowledge base and whether it is available. Designs that the problem decides on stay.
-    pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) {
-        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
-        let Some(predicate) = declared.into_iter().find(|name| self.bindings.is_availability(name)) else {
-            return;
-        };
-        let decides = |atom: &Atom| atom.arguments.iter().any(|term| self.own.contains(name_of(term)));
-        let is_known = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate && !decides(atom));
-        problem.init.retain(|element| !is_known(element));
+    /// name of each design of the knowledge base and whether it is available. Designs that the problem decides on stay. Returns the
+    /// domain for that problem.
+    pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) -> Cow<'_, Domain> {
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
-        for design in designs.filter(|design| allowed(&design.individual.name, design.available)) {
-            problem.init.push(InitialElement::Fact(binding::atom(predicate, &[&design.individual.name])));
+        let designs = designs.map(|design| (design.individual.name.as_str(), design.available));
+        if let Some(planta) = &self.planta {
+            let says = designs.map(|(design, available)| (design, allowed(design, available)));
+            return Cow::Owned(planta.allow(&self.domain, problem, says));
         }
+        let allowed: Vec<&str> = designs
+            .filter(|(design, available)| allowed(design, *available))
+            .map(|(design, _)| design)
+            .collect();
+        let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
+        if let Some(predicate) = declared.into_iter().find(|name| self.bindings.is_availability(name)) {
+            let decides = |atom: &Atom| atom.arguments.iter().any(|term| self.own.contains(name_of(term)));
+            let is_known = |element: &InitialElement| matches!(element, InitialElement::Fact(atom) if atom.predicate.name == *predicate && !decides(atom));
+            problem.init.retain(|element| !is_known(element));
+            let facts =
+                allowed.iter().map(|design| InitialElement::Fact(binding::atom(predicate, &[design])));
+            problem.init.extend(facts);
+        }
+        Cow::Borrowed(&self.domain)
     }
 
     /// How many arguments an action has in the domain's file, if the knowledge base has added some.

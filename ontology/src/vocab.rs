@@ -132,6 +132,17 @@ vocabulary! {
 }
 
 vocabulary! {
+    /// TOMASys as knowledge bases of SUAVE have it that were merged with all they import: under their own name.
+    suave = "http://www.metacontrol.org/suave#" {
+        FUNCTION = "Function", FUNCTION_DESIGN = "FunctionDesign", COMPONENT = "Component",
+        QUALITY_ATTRIBUTE_TYPE = "QualityAttributeType", QA_VALUE = "QAvalue", ACTION = "Action",
+        SOLVES_F = "solvesF", REQUIRES_F = "requiresF", REQUIRES_C = "requiresC", IS_QA_TYPE = "isQAtype",
+        HAS_VALUE = "hasValue", HAS_QA_ESTIMATION = "hasQAestimation", C_STATUS = "c_status",
+        FD_REALISABILITY = "fd_realisability", FD_UTILITY = "fd_utility",
+    }
+}
+
+vocabulary! {
     /// The extension of TOMASys by MROS.
     mros = "http://ros/mros#" {
         REQUIRED_BY = "requiredBy",

@@ -36,7 +36,8 @@ impl TypeHierarchy {
         self.parents.len() - 1
     }
 
-    pub(crate) fn contains(&self, name: &Name) -> bool {
+    /// Whether there is such a type.
+    pub fn contains(&self, name: &Name) -> bool {
         self.index.contains_key(name)
     }
 

@@ -136,27 +136,19 @@ impl Situation {
                 }
                 let mut names = Names::default();
                 self.names.iter().for_each(|(individual, object)| names.add(individual, object, None));
+                let (domain, problem) = (source(domain), source(problem));
+                let text = domain.as_ref().map_or("", |domain| domain.text());
                 let knowledge = (!self.knowledge.is_empty()).then(|| {
                     let rules = if self.rules.is_empty() {
                         vec![COADAPTATION.to_owned()]
                     } else {
                         self.rules.clone()
                     };
-                    Knowledge::read(&Sources {
-                        documents: self.knowledge.clone(),
-                        rules,
-                        options: self.imports.options(),
-                        ..Sources::default()
-                    })
+                    let (documents, options) = (self.knowledge.clone(), self.imports.options());
+                    Knowledge::read_for(&Sources { documents, rules, options, ..Sources::default() }, text)
                 });
-                Mission::new(
-                    "",
-                    knowledge,
-                    Bindings::default().naming(names),
-                    source(domain),
-                    source(problem),
-                )?
-                .into()
+                let bindings = Bindings::default().naming(names);
+                Mission::new("", knowledge, bindings, domain, problem)?.into()
             }
             _ => {
                 let text = "give a mission's manifest, or a domain and a problem";

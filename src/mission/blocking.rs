@@ -8,11 +8,11 @@
 //! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
 
 use encodings::{Config, Status, optimize};
-use pddl::ast::{InitialElement, Name, Problem};
+use pddl::ast::Problem;
 
-use ::mission::{Mission, atom};
+use ::mission::Mission;
 
-use crate::mission::planning::Planning as _;
+use crate::mission::planning::ground_with;
 
 /// What keeps an unsolvable mission from having a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,15 +57,9 @@ fn solvable_with(
     let mut problem = problem.clone();
     // Any plan will do.
     problem.metric = None;
-    let predicates = mission.domain().predicates.iter().map(|declared| &declared.identifier.name);
-    let predicates: Vec<&Name> =
-        predicates.filter(|predicate| mission.bindings().is_availability(predicate)).collect();
-    for design in available {
-        for predicate in &predicates {
-            problem.init.push(InitialElement::Fact(atom(predicate, &[design])));
-        }
-    }
-    let task = mission.ground(&problem, &[], &config.limits).ok()?;
+    let domain =
+        mission.allow(&mut problem, &|design, own| own || available.iter().any(|other| other == design));
+    let task = ground_with(mission, &domain, &problem, &[], &config.limits).ok()?;
     match optimize(&task, config, &mut |_| {}).status {
         Status::Optimal | Status::Feasible => Some(true),
         Status::Unsolvable => Some(false),

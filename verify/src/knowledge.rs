@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ontology::{Equality, ReadOptions};
+use ontology::ReadOptions;
 use pddl::ast::{Domain, Problem};
 use pddl::{Source, print_domain, print_problem};
 use rules::replay::{Replayed, replay};
@@ -117,7 +117,7 @@ pub fn stated(document: &str, origin: &Origin) -> Result<Stated, String> {
     // What the document imports would lie outside of the certificate.
     let options = ReadOptions { closed: true, ..ReadOptions::default() };
     let sources = Sources { documents, rules, options, ..Sources::default() };
-    let mut stated = Stated::read(&sources, Equality::Owl).map_err(|messages| said_first(&messages))?;
+    let mut stated = Stated::read_for(&sources, &origin.domain).map_err(|messages| said_first(&messages))?;
     for rule in &mut stated.program.rules {
         let file = sources.rules.iter().position(|file| **file == *rule.identity.source);
         if let Some(position) = file {
@@ -142,9 +142,11 @@ fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin),
         stated.program.rules.len()
     );
     let facts = derivation.steps.into_iter().map(|step| step.fact).collect();
-    let knowledge = Knowledge::closed(stated.symbols, facts, stated.program.equality);
+    let Stated { symbols, program, facts: told, terms, .. } = stated;
+    let knowledge = Knowledge::closed(symbols, facts, program.equality);
+    let knowledge = knowledge.map_err(|messages| said_first(&messages))?.with_terms(terms, &told);
     let said = format!("{said}; {}", provenance(&origin)?);
-    Ok((knowledge.map_err(|messages| said_first(&messages))?, said, origin))
+    Ok((knowledge, said, origin))
 }
 
 fn filled(

@@ -259,9 +259,9 @@ impl<'r> Reader<'r> {
                 moment.atoms.push((guard.clone(), key, matches!(effect, Effect::Add(_))));
                 Ok(())
             }
-            Effect::ForAll(bound, inner) => {
-                self.each(bound, &mut |own| own.collect(inner, guard, moment).map(|()| true)).map(|_| ())
-            }
+            Effect::ForAll(bound, inner) => self
+                .each(bound, None, &mut |own| own.collect(inner, guard, moment).map(|()| true))
+                .map(|_| ()),
             Effect::When(condition, inner) => {
                 self.in_when = true;
                 let condition = self.formula(condition, true);

@@ -70,7 +70,7 @@ fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<V
         for rule in rules {
             let mut reader = Reader::new(world, invariant, axioms);
             let names: Vec<_> = rule.head.parameters.iter().map(|own| &own.identifier.name).collect();
-            reader.each(&rule.head.parameters, &mut |own| {
+            reader.each(&rule.head.parameters, Some(&rule.condition), &mut |own| {
                 let objects = names.iter().map(|name| own.binding[name]).collect();
                 heads.insert((symbol, objects));
                 if heads.len() > ATOM_LIMIT {

@@ -114,6 +114,11 @@ impl Invariant {
         self.atoms.contains(key)
     }
 
+    /// The arguments of the atoms of a predicate that may hold.
+    pub(super) fn rows(&self, predicate: u32) -> impl Iterator<Item = &[u32]> {
+        self.atoms.iter().filter(move |key| key.0 == predicate).map(|key| &key.1[..])
+    }
+
     /// A fluent, or the only value that it can have.
     pub(super) fn fluent(&self, key: Key) -> Linear {
         match self.numbers.get(&key).and_then(Interval::value) {

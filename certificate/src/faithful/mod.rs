@@ -21,6 +21,7 @@
 
 mod action;
 mod axioms;
+mod candidates;
 mod case;
 mod compare;
 mod derived;

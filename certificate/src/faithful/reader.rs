@@ -74,8 +74,8 @@ impl<'r> Reader<'r> {
             Condition::Imply(left, right) => {
                 self.junction([(&**left, !holds), (&**right, holds)].into_iter(), !holds)
             }
-            Condition::Exists(bound, inner) => self.quantified(bound, inner, holds, !holds),
-            Condition::ForAll(bound, inner) => self.quantified(bound, inner, holds, holds),
+            Condition::Exists(bound, inner) => self.quantified(bound, (inner, Some(inner)), holds, !holds),
+            Condition::ForAll(bound, inner) => self.quantified(bound, (inner, None), holds, holds),
             Condition::Atom(atom) => {
                 let key = self.world.key(atom, &self.binding)?;
                 self.atom(key, holds)
@@ -135,12 +135,12 @@ impl<'r> Reader<'r> {
     fn quantified(
         &mut self,
         bound: &'r [TypedName],
-        inner: &'r Condition,
+        (inner, within): (&'r Condition, Option<&'r Condition>),
         holds: bool,
         all: bool,
     ) -> Result<Formula, Cause> {
         let mut kept = Vec::new();
-        self.each(bound, &mut |own| {
+        self.each(bound, within, &mut |own| {
             let part = own.formula(inner, holds)?;
             let decided = part.is(!all);
             kept.push(part);
@@ -149,10 +149,11 @@ impl<'r> Reader<'r> {
         Ok(Formula::junction(kept, all))
     }
 
-    /// Calls `visit` with every binding of some variables, until it says `false`.
+    /// Calls `visit` with every binding of some variables, until it says `false`; with none that makes a given condition false.
     pub(super) fn each(
         &mut self,
         bound: &'r [TypedName],
+        within: Option<&'r Condition>,
         visit: &mut dyn FnMut(&mut Self) -> Result<bool, Cause>,
     ) -> Result<bool, Cause> {
         self.count()?;
@@ -160,9 +161,9 @@ impl<'r> Reader<'r> {
         let name = &first.identifier.name;
         let shadowed = self.binding.get(name).copied();
         let mut goes_on = true;
-        for object in self.world.objects_of(&first.r#type) {
+        for object in self.candidates(bound, within) {
             self.binding.insert(name, object);
-            if !self.each(rest, visit)? {
+            if !self.each(rest, within, visit)? {
                 goes_on = false;
                 break;
             }

@@ -67,7 +67,17 @@ pub(super) fn partitions(
     let costs: Vec<Int> = task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect();
     let initial: Vec<u32> = projections.iter().map(|projection| projection.state(&task.initial)).collect();
     let alone = |position: usize| projections[position].to_go(initial[position]).unwrap_or(0);
-    let useful: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
+    let mut useful: Vec<usize> = Vec::new();
+    let mut positions: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
+    positions.sort_by_key(|position| projections[*position].pattern.len());
+    for position in positions {
+        // What another one says with fewer variables is not divided between both.
+        let is_coarser = |known: &usize| projections[position].says_no_more_than(&projections[*known]);
+        if !useful.iter().any(is_coarser) {
+            useful.push(position);
+        }
+    }
+    useful.sort_unstable();
     let transitions: usize = useful.iter().map(|position| projections[*position].effort()).sum();
     if useful.len() < 2 || transitions > EFFORT {
         return Ok(Vec::new());

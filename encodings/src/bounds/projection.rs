@@ -197,6 +197,21 @@ impl Projection {
         })
     }
 
+    /// Whether the estimates are those of a projection to a part of the pattern: the other variables add nothing.
+    pub(crate) fn says_no_more_than(&self, other: &Self) -> bool {
+        let places: Option<Vec<usize>> =
+            other.pattern.iter().map(|own| self.pattern.iter().position(|known| known == own)).collect();
+        let Some(places) = places else { return false };
+        (0..).zip(&self.to_go).all(|(state, cost)| {
+            let values = self.values(state);
+            let parts = other.sizes.iter().zip(&places);
+            let coarse = parts.fold(0, |index: usize, (size, place)| {
+                index.saturating_mul(*size).saturating_add(values[*place] as usize)
+            });
+            other.to_go[coarse] == *cost
+        })
+    }
+
     /// How much has to be looked at to compute costs to go.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn effort(&self) -> usize {

@@ -22,6 +22,8 @@ const FORMULA_LIMIT: usize = 30_000_000;
 const CONFIRM_CONFLICTS: u64 = 1_000;
 /// … if the formula has at most this many operator variables.
 const CONFIRM_SIZE: usize = 5_000;
+/// With so many operators times steps it is not even looked at which of them are left.
+const CONFIRM_PRODUCT: usize = 1_500;
 /// The first formula is for plans within this part of the gap between the lower bound and the best plan known; each further one
 /// for twice as much of it.
 const STAGES: Int = 8;
@@ -68,6 +70,9 @@ fn improve(mut run: Run<'_>, bounds: &Bounds, incumbent: GroundPlan, lower: Int,
         return conclude(run, &best, 0, Some(proof));
     }
     let unproved = exact.then_some(Proof::Search);
+    if exact && run.task.operators.len().saturating_mul(best.plan.steps.len()) > CONFIRM_PRODUCT {
+        return conclude(run, &best, 0, unproved);
+    }
     let mut stage = if exact { Int::MAX } else { best.plan.cost.saturating_sub(lower) / STAGES };
     loop {
         let limit = best.plan.below().min(lower.saturating_add(stage));

@@ -100,7 +100,12 @@ impl Prepared {
         let mut functions: Vec<ObjectId> = configurations.map(|(function, _)| *function).collect();
         functions.sort_unstable();
         functions.dedup();
-        let steps = bounds.projections.iter().map(|projection| projection.steps_to_go(limits));
+        // Where every step costs 1, the number of steps is the cost.
+        let is_unit = |cost: (Int, Int)| cost == (1, 1);
+        let unit = task.operators.iter().all(|own| is_unit((own.cost.minimum(), own.cost.maximum())));
+        let steps = bounds.projections.iter().map(|projection| {
+            if unit { Ok(projection.costs().to_vec()) } else { projection.steps_to_go(limits) }
+        });
         Ok(Self {
             steps_to_go: steps.collect::<Result<_, _>>()?,
             index: OperatorIndex::new(task),

@@ -17,6 +17,7 @@ use crate::knowledge::sources::{Sources, Stated};
 use crate::knowledge::statement::{Statement, Statements};
 use crate::knowledge::waiting::Waiting;
 use crate::message::Message;
+use crate::planta::Terms;
 
 /// From so many names of one individual on, not all of their pairs are listed.
 const MANY_NAMES: usize = 32;
@@ -40,6 +41,10 @@ pub struct Knowledge {
     /// The names of all documents, those that are imported among them.
     documents: Arc<[String]>,
     annotations: Arc<[(Iri, Annotation)]>,
+    /// What the documents add to a domain in PLANTA's form, if they were read for one.
+    terms: Option<Arc<Terms>>,
+    /// What is stated, if what holds is not told apart from it by the engine.
+    stated: Option<Arc<[Fact]>>,
 }
 
 /// Something that the knowledge contradicts.
@@ -65,17 +70,36 @@ impl Knowledge {
     /// # Errors
     /// All that is wrong with the sources.
     pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
-        let Stated { symbols, program, facts, ontology, rule_count, mut warnings } =
-            Stated::read(sources, equality)?;
+        Self::of_stated(sources, Stated::read(sources, equality)?)
+    }
+
+    /// As [`Knowledge::read`], for a domain: if it is in PLANTA's form, what the documents add to it is kept, and every name is
+    /// an individual of its own.
+    ///
+    /// # Errors
+    /// All that is wrong with the sources.
+    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Vec<Message>> {
+        Self::of_stated(sources, Stated::read_for(sources, domain)?)
+    }
+
+    fn of_stated(sources: &Sources, stated: Stated) -> Result<Self, Vec<Message>> {
+        let Stated { symbols, program, facts, ontology, rule_count, mut warnings, terms } = stated;
         let engine = Engine::with_limits(symbols, program, facts, sources.limits.clone())
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let mistakes = ontology::tomasys::check(&ontology, &engine);
-        warnings.extend(mistakes.iter().map(Message::from_ontology_warning));
+        let mistakes = mistakes.iter().map(Message::from_ontology_warning);
+        // With names that are all different, two values of a functional property are not taken for one.
+        warnings.extend(mistakes.filter(|warning| terms.is_none() || warning.code != "O404"));
         let runtime = Runtime::new(engine, Mode::Retract);
         let (sources, entities) = (sources.clone(), ontology.entities.into());
         let documents = ontology.sources.into_iter().map(|source| source.name).collect();
         let annotations = ontology.annotations.into();
-        Ok(Self { documents, annotations, ..Self::of(runtime, rule_count, warnings, sources, entities) })
+        Ok(Self {
+            documents,
+            annotations,
+            terms,
+            ..Self::of(runtime, rule_count, warnings, sources, entities)
+        })
     }
 
     /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
@@ -89,6 +113,27 @@ impl Knowledge {
         let runtime = Runtime::new(engine, Mode::Retract);
         let (sources, entities) = (Sources::default(), Arc::default());
         Ok(Self::of(runtime, 0, Vec::new(), sources, entities))
+    }
+
+    /// As [`Knowledge::closed`], of what was read for a domain in PLANTA's form: with what the documents add to it, and what of
+    /// all that holds is stated.
+    #[must_use]
+    pub fn with_terms(self, terms: Option<Arc<Terms>>, stated: &[Fact]) -> Self {
+        Self { terms, stated: Some(stated.into()), ..self }
+    }
+
+    /// What the documents add to a domain in PLANTA's form, if they were read for one.
+    pub(crate) fn terms(&self) -> Option<&Arc<Terms>> {
+        self.terms.as_ref()
+    }
+
+    /// What is stated now.
+    pub(crate) fn stated(&self) -> Vec<Fact> {
+        let engine = self.engine();
+        match &self.stated {
+            Some(stated) => stated.to_vec(),
+            None => engine.facts().filter(|fact| engine.is_asserted(fact)).collect(),
+        }
     }
 
     fn of(
@@ -112,6 +157,8 @@ impl Knowledge {
             entities,
             documents,
             annotations,
+            terms: None,
+            stated: None,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use ontology::{Equality, Ontology, ReadOptions};
 use rules::{Fact, Limits, Prefixes, Program, Rule, Symbols, Syntax};
@@ -9,6 +10,7 @@ use rules::{Fact, Limits, Prefixes, Program, Rule, Symbols, Syntax};
 use crate::file::{self, discreet};
 use crate::knowledge::statement::Statements;
 use crate::message::Message;
+use crate::planta::{self, Terms};
 
 /// The name under which the shipped co-adaptation rules are asked for.
 pub const COADAPTATION: &str = "coadaptation";
@@ -41,6 +43,8 @@ pub struct Stated {
     /// As [`crate::knowledge::Knowledge::rule_count`] has it.
     pub rule_count: usize,
     pub(super) warnings: Vec<Message>,
+    /// What the documents add to a domain in PLANTA's form, if they were read for one.
+    pub terms: Option<Arc<Terms>>,
 }
 
 impl Stated {
@@ -49,6 +53,24 @@ impl Stated {
     /// # Errors
     /// All that is wrong with them.
     pub fn read(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+        Self::read_with(sources, |_| (equality, None))
+    }
+
+    /// As [`Stated::read`], for a domain. If it is in PLANTA's form, every name is an individual of its own, as in PDDL.
+    ///
+    /// # Errors
+    /// As [`Stated::read`].
+    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Vec<Message>> {
+        Self::read_with(sources, |ontology| match planta::wanted(ontology, domain) {
+            Some(terms) => (Equality::UniqueNames, Some(Arc::new(terms))),
+            None => (Equality::Owl, None),
+        })
+    }
+
+    fn read_with(
+        sources: &Sources,
+        meaning: impl FnOnce(&Ontology) -> (Equality, Option<Arc<Terms>>),
+    ) -> Result<Self, Vec<Message>> {
         let read = ontology::read_files(&sources.documents, &sources.options);
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
@@ -67,10 +89,12 @@ impl Stated {
             }
         };
         let rule_count = ontology.rules.len() + own.len();
+        let (equality, terms) = meaning(&ontology);
         let lowered = ontology::lower_together(&ontology, own, equality, &mut symbols);
         let warnings =
             ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
-        Ok(Self { symbols, program: lowered.program, facts: lowered.facts, ontology, rule_count, warnings })
+        let (program, facts) = (lowered.program, lowered.facts);
+        Ok(Self { symbols, program, facts, ontology, rule_count, warnings, terms })
     }
 
     /// Changes what is stated.

@@ -3,28 +3,30 @@
 //! A notion may have several names; a reader takes all of them, a writer the one that belongs to the individual at
 //! hand. New vocabularies are new entries here, and no code.
 
-use crate::vocab::{mros, navigation, pddl_tomasys as www, tomasys as t};
+use crate::vocab::{mros, navigation, pddl_tomasys as www, suave, tomasys as t};
 
 /// The names of one notion, in order of preference.
 pub(crate) type Term = &'static [&'static str];
 
-pub(crate) const FUNCTION: Term = &[t::FUNCTION, www::FUNCTION];
-pub(crate) const FUNCTION_DESIGN: Term = &[t::FUNCTION_DESIGN, www::FUNCTION_DESIGN];
+pub(crate) const FUNCTION: Term = &[t::FUNCTION, www::FUNCTION, suave::FUNCTION];
+pub(crate) const FUNCTION_DESIGN: Term = &[t::FUNCTION_DESIGN, www::FUNCTION_DESIGN, suave::FUNCTION_DESIGN];
 pub(crate) const FUNCTION_GROUNDING: Term = &[t::FUNCTION_GROUNDING];
-pub(crate) const COMPONENT: Term = &[t::COMPONENT, www::COMPONENT];
-pub(crate) const ATTRIBUTE_TYPE: Term = &[t::QUALITY_ATTRIBUTE_TYPE, www::QUALITY_ATTRIBUTE_TYPE];
-pub(crate) const QA_VALUE: Term = &[t::QA_VALUE, www::QA_VALUE];
-pub(crate) const ACTION: Term = &[t::ACTION, www::ACTION];
+pub(crate) const COMPONENT: Term = &[t::COMPONENT, www::COMPONENT, suave::COMPONENT];
+pub(crate) const ATTRIBUTE_TYPE: Term =
+    &[t::QUALITY_ATTRIBUTE_TYPE, www::QUALITY_ATTRIBUTE_TYPE, suave::QUALITY_ATTRIBUTE_TYPE];
+pub(crate) const QA_VALUE: Term = &[t::QA_VALUE, www::QA_VALUE, suave::QA_VALUE];
+pub(crate) const ACTION: Term = &[t::ACTION, www::ACTION, suave::ACTION];
 
-pub(crate) const SOLVES_F: Term = &[t::SOLVES_F, www::SOLVES_F];
-pub(crate) const REQUIRES_F: Term = &[t::REQUIRES_F, www::REQUIRES_F];
+pub(crate) const SOLVES_F: Term = &[t::SOLVES_F, www::SOLVES_F, suave::SOLVES_F];
+pub(crate) const REQUIRES_F: Term = &[t::REQUIRES_F, www::REQUIRES_F, suave::REQUIRES_F];
 /// From the design to the component.
-pub(crate) const REQUIRES_C: Term = &[t::REQUIRES_C, www::REQUIRES_C];
+pub(crate) const REQUIRES_C: Term = &[t::REQUIRES_C, www::REQUIRES_C, suave::REQUIRES_C];
 /// From the component to the design.
 pub(crate) const REQUIRED_BY: Term = &[mros::REQUIRED_BY, navigation::REQUIRED_BY];
-pub(crate) const HAS_ESTIMATION: Term = &[t::HAS_QA_ESTIMATION, www::HAS_QA_ESTIMATION];
-pub(crate) const IS_TYPE: Term = &[t::IS_QA_TYPE, www::IS_QA_TYPE];
-pub(crate) const HAS_VALUE: Term = &[t::HAS_VALUE, www::QA_HAS_VALUE];
+pub(crate) const HAS_ESTIMATION: Term =
+    &[t::HAS_QA_ESTIMATION, www::HAS_QA_ESTIMATION, suave::HAS_QA_ESTIMATION];
+pub(crate) const IS_TYPE: Term = &[t::IS_QA_TYPE, www::IS_QA_TYPE, suave::IS_QA_TYPE];
+pub(crate) const HAS_VALUE: Term = &[t::HAS_VALUE, www::QA_HAS_VALUE, suave::HAS_VALUE];
 pub(crate) const REQUIREMENT: Term = &[t::REQUIREMENT];
 pub(crate) const HAS_REQUIREMENT: Term = &[t::HAS_REQUIREMENT];
 pub(crate) const HAS_MINIMUM: Term = &[t::HAS_MINIMUM];
@@ -33,12 +35,12 @@ pub(crate) const HAS_MAXIMUM: Term = &[t::HAS_MAXIMUM];
 pub(crate) const REQUIRES_QUALITY: Term = &[t::REQUIRES_QUALITY];
 pub(crate) const IN_CONTEXT: Term = &[t::IN_CONTEXT];
 pub(crate) const IS_MEASURED: Term = &[t::IS_MEASURED];
-pub(crate) const STATUS: Term = &[t::C_STATUS, www::C_STATUS];
-pub(crate) const REALISABILITY: Term = &[t::FD_REALISABILITY, www::FD_REALISABILITY];
+pub(crate) const STATUS: Term = &[t::C_STATUS, www::C_STATUS, suave::C_STATUS];
+pub(crate) const REALISABILITY: Term = &[t::FD_REALISABILITY, www::FD_REALISABILITY, suave::FD_REALISABILITY];
 pub(crate) const AVAILABLE: Term = &[t::FD_AVAILABLE];
-pub(crate) const UTILITY: Term = &[www::FD_UTILITY, t::FD_EFFICACY];
+pub(crate) const UTILITY: Term = &[www::FD_UTILITY, suave::FD_UTILITY, t::FD_EFFICACY];
 /// Utility that a knowledge base concludes by rules.
-pub(crate) const CONCLUDED_UTILITY: Term = &[www::FD_UTILITY];
+pub(crate) const CONCLUDED_UTILITY: Term = &[www::FD_UTILITY, suave::FD_UTILITY];
 pub(crate) const TYPE_FD: Term = &[t::TYPE_FD];
 pub(crate) const HAS_QA_VALUE: Term = &[t::HAS_QA_VALUE];
 pub(crate) const OBJECTIVE: Term = &[t::OBJECTIVE];

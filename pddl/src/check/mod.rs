@@ -86,11 +86,12 @@ fn check_domain_with(domain: &Domain, source: &Source, symbols: &Symbols<'_>) ->
 
 fn template_message(domain: &Domain, source: &Source, evidence: usize) -> Diagnostic {
     let message = format!(
-        "this looks like an input of OWLToPDDL: {evidence} predicates named `inferred-…` are declared nowhere"
+        "this domain asks a knowledge base, as inputs of OWLToPDDL do: {evidence} predicates named `inferred-…` are declared nowhere"
     );
     let mut diagnostic = Diagnostic::new(source, domain.name.span, Severity::Error, "P134", message);
-    diagnostic
-        .help("run OWLToPDDL first; it adds types, constants, predicates and axioms from the knowledge base");
+    diagnostic.help(
+        "give the knowledge base, which has the rest: `--kb FILE`, or `[knowledge]` in a mission's manifest",
+    );
     diagnostic
 }
 

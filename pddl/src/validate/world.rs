@@ -5,7 +5,9 @@ use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
-use crate::ast::{Atom, Domain, InitialElement, Name, Problem, Term, TypeExpression, TypedName};
+use crate::ast::{
+    Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
+};
 use crate::number::dense;
 use crate::strata::Strata;
 use crate::types::TypeHierarchy;
@@ -28,6 +30,8 @@ pub(super) struct World<'p> {
     /// All objects with their types, constants first.
     objects: Vec<(Symbol, Vec<&'p TypeExpression>)>,
     place: FxHashMap<Symbol, usize>,
+    /// The objects of each type that is declared, in order, and as a set.
+    members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
     /// The axioms by layer, lowest first.
     pub(super) layers: Vec<Vec<usize>>,
 }
@@ -51,6 +55,7 @@ impl<'p> World<'p> {
             names: Vec::new(),
             objects: Vec::new(),
             place: FxHashMap::default(),
+            members: FxHashMap::default(),
             layers: layers(domain),
         };
         world.intern(&Name::new("total-cost"));
@@ -59,6 +64,16 @@ impl<'p> World<'p> {
         }
         for entry in domain.constants.iter().chain(&problem.objects) {
             world.insert_object(entry);
+        }
+        let names: Vec<Name> = world.types.names().cloned().collect();
+        for name in names {
+            let identifier = Identifier { name: name.clone(), span: Span::default() };
+            let wanted = TypeExpression { alternatives: vec![identifier] };
+            let fits = |types: &[&TypeExpression]| types.iter().any(|given| world.types.fits(given, &wanted));
+            let own = world.objects.iter().filter(|(_, types)| fits(types)).map(|(object, _)| *object);
+            let own: Vec<Symbol> = own.collect();
+            let set = own.iter().copied().collect();
+            world.members.insert(name, (own, set));
         }
         world
     }
@@ -99,13 +114,26 @@ impl<'p> World<'p> {
 
     /// Whether an object is of a type.
     pub(super) fn is_of(&self, object: Symbol, wanted: &TypeExpression) -> bool {
+        if let [one] = &wanted.alternatives[..]
+            && let Some((_, members)) = self.members.get(&one.name)
+        {
+            return members.contains(&object);
+        }
         let types = self.place.get(&object).map(|place| &self.objects[*place].1);
         types.is_some_and(|types| types.iter().any(|given| self.types.fits(given, wanted)))
     }
 
     /// All objects of a type.
-    pub(super) fn objects_of<'w>(&'w self, wanted: &'w TypeExpression) -> impl Iterator<Item = Symbol> + 'w {
-        self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, wanted))
+    pub(super) fn objects_of<'w>(
+        &'w self,
+        wanted: &'w TypeExpression,
+    ) -> Box<dyn Iterator<Item = Symbol> + 'w> {
+        if let [one] = &wanted.alternatives[..]
+            && let Some((members, _)) = self.members.get(&one.name)
+        {
+            return Box::new(members.iter().copied());
+        }
+        Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, wanted)))
     }
 
     /// A fact or a function with its arguments as written.

@@ -1,0 +1,214 @@
+//! Axioms as derived predicates, of the kinds that `OWLToPDDL` translates; of the others it is said that they are left out.
+
+use std::collections::BTreeMap;
+
+use ontology::{Axiom, Characteristic, ClassExpression, Iri, ObjectPropertyExpression, Ontology};
+use pddl::ast::{Condition, Derived, Name, Span, Term};
+
+use super::names;
+use super::swrl;
+use super::syntax::{atom, axiom, exists, variable};
+use super::terms::{Terms, is_annotation, is_top};
+use crate::message::Message;
+
+impl Terms {
+    /// What an ontology says.
+    pub(crate) fn new(ontology: &Ontology) -> Self {
+        let mut terms = Self::default();
+        terms.signature(ontology);
+        terms.types(ontology);
+        terms.lift();
+        let mut left = Vec::new();
+        for annotated in &ontology.axioms {
+            if let Err(kind) = terms.axiom(&annotated.axiom) {
+                left.push(kind);
+            }
+        }
+        for rule in &ontology.rules {
+            match swrl::derived(rule, &mut terms) {
+                Ok(derived) => terms.derived.extend(derived),
+                Err(reason) => {
+                    let label = rule.label.as_deref().map_or_else(String::new, |label| format!(" ({label})"));
+                    let text = format!(
+                        "the rule {}#{}{label} is left out of the domain: {reason}",
+                        rule.ontology, rule.position
+                    );
+                    terms.warnings.push(Message::warning("M211", text));
+                }
+            }
+        }
+        if !left.is_empty() {
+            left.sort_unstable();
+            left.dedup();
+            let text = format!(
+                "these axioms have no form as derived predicates, and conclude nothing in the domain: {}",
+                left.join(", ")
+            );
+            terms.warnings.push(Message::warning("M212", text));
+        }
+        // Rules that several documents state are one, and the order is that of the text.
+        let mut derived: BTreeMap<String, Derived> = BTreeMap::new();
+        for axiom in terms.derived.drain(..) {
+            derived.insert(format!("{:?} {:?}", axiom.head, axiom.condition), axiom);
+        }
+        terms.derived = derived.into_values().collect();
+        terms
+    }
+
+    /// An axiom as a derived predicate.
+    ///
+    /// # Errors
+    /// It has no such form: what kind of axiom it is.
+    fn axiom(&mut self, stated: &Axiom) -> Result<(), &'static str> {
+        let [x, y, z] = [variable("x"), variable("y"), variable("z")];
+        match stated {
+            Axiom::SubClassOf(lower, upper) => {
+                let (lower, upper) = (named(lower), named(upper));
+                let (Some(lower), Some(upper)) = (lower, upper) else {
+                    return Err("SubClassOf of expressions");
+                };
+                if !is_top(upper) && !is_top(lower) {
+                    self.follows(upper, &["x"], lower, vec![x], &[])?;
+                }
+            }
+            Axiom::SubObjectPropertyOf(lower, upper) => {
+                let (Some(lower), Some(upper)) = (property(lower), property(upper)) else {
+                    return Err("SubObjectPropertyOf with inverses");
+                };
+                self.follows(upper, &["x", "y"], lower, vec![x, y], &[])?;
+            }
+            Axiom::ObjectPropertyDomain(own, class) => {
+                let (Some(own), Some(class)) = (property(own), named(class)) else {
+                    return Err("ObjectPropertyDomain of expressions");
+                };
+                if !is_annotation(own) && !is_top(class) {
+                    self.follows(class, &["x"], own, vec![x, y], &["y"])?;
+                }
+            }
+            Axiom::ObjectPropertyRange(own, class) => {
+                let (Some(own), Some(class)) = (property(own), named(class)) else {
+                    return Err("ObjectPropertyRange of expressions");
+                };
+                if !is_annotation(own) && !is_top(class) {
+                    self.follows(class, &["y"], own, vec![x, y], &["x"])?;
+                }
+            }
+            Axiom::DataPropertyDomain(own, class) => {
+                let Some(class) = named(class) else { return Err("DataPropertyDomain of expressions") };
+                if !is_annotation(own) && !is_top(class) {
+                    self.follows(class, &["x"], own, vec![x, y], &["y"])?;
+                }
+            }
+            Axiom::DisjointClasses(classes) => {
+                let classes: Option<Vec<&Iri>> = classes.iter().map(named).collect();
+                self.disjoint(&classes.ok_or("DisjointClasses of expressions")?)?;
+            }
+            Axiom::ObjectPropertyCharacteristic(Characteristic::Functional, own) => {
+                let own = property(own).ok_or("FunctionalObjectProperty of an inverse")?;
+                // As `OWLToPDDL` has it, see docs/decisions/planta-form.md.
+                self.functional(own, Condition::Equal(y, z, Span::default()))?;
+            }
+            Axiom::FunctionalDataProperty(own) => {
+                let equal = Condition::Equal(y, z, Span::default());
+                let plain = self.functional(own, Condition::Not(Box::new(equal)))?;
+                self.functional.insert(plain);
+            }
+            // Statements are no axioms in general, and what a literal's datatype is PDDL cannot say.
+            Axiom::ClassAssertion(ClassExpression::Class(_), _)
+            | Axiom::ObjectPropertyAssertion(ObjectPropertyExpression::Property(_), ..)
+            | Axiom::DataPropertyAssertion(..)
+            | Axiom::DataPropertyRange(..)
+            | Axiom::DifferentIndividuals(_) => {}
+            other => return Err(kind(other)),
+        }
+        Ok(())
+    }
+
+    /// `head(parameters) ← body(arguments)`, with bound variables.
+    fn follows(
+        &mut self,
+        head: &Iri,
+        parameters: &[&str],
+        body: &Iri,
+        arguments: Vec<Term>,
+        bound: &[&str],
+    ) -> Result<(), &'static str> {
+        let clash = |_| "axioms of names that are a class and a property";
+        let head = self.plain(head, parameters.len()).map_err(clash)?;
+        let condition = self.inferred(body, arguments).map_err(clash)?;
+        self.derived.push(axiom(names::inferred(&head), parameters, exists(bound, condition)));
+        Ok(())
+    }
+
+    fn disjoint(&mut self, classes: &[&Iri]) -> Result<(), &'static str> {
+        let mut alternatives = Vec::new();
+        for (position, left) in classes.iter().enumerate() {
+            for right in &classes[position + 1..] {
+                let both = [*left, *right].map(|class| self.inferred(class, vec![variable("x")]));
+                let both: Result<Vec<Condition>, String> = both.into_iter().collect();
+                alternatives.push(Condition::And(both.map_err(|_| "DisjointClasses of punned names")?));
+            }
+        }
+        self.contradiction(exists(&["x"], Condition::Or(alternatives)));
+        Ok(())
+    }
+
+    fn functional(&mut self, own: &Iri, test: Condition) -> Result<Name, &'static str> {
+        let plain = self.plain(own, 2).map_err(|_| "functional properties that are classes, too")?;
+        let inferred = names::inferred(&plain);
+        let value = |v: &str| Condition::Atom(atom(inferred.clone(), vec![variable("x"), variable(v)]));
+        let body = Condition::And(vec![value("y"), value("z"), test]);
+        self.contradiction(exists(&["x", "y", "z"], body));
+        Ok(plain)
+    }
+
+    fn contradiction(&mut self, body: Condition) {
+        self.predicates.insert(Name::new(names::INCONSISTENT), 0);
+        self.derived.push(axiom(Name::new(names::INCONSISTENT), &[], body));
+    }
+}
+
+/// The kind of an axiom, as the specification names it.
+fn kind(axiom: &Axiom) -> &'static str {
+    match axiom {
+        Axiom::EquivalentClasses(_) => "EquivalentClasses",
+        Axiom::DisjointUnion(..) => "DisjointUnion",
+        Axiom::SubPropertyChainOf(..) => "SubPropertyChainOf",
+        Axiom::EquivalentObjectProperties(_) => "EquivalentObjectProperties",
+        Axiom::DisjointObjectProperties(_) => "DisjointObjectProperties",
+        Axiom::InverseObjectProperties(..) => "InverseObjectProperties",
+        Axiom::ObjectPropertyCharacteristic(characteristic, _) => match characteristic {
+            Characteristic::Functional => "FunctionalObjectProperty",
+            Characteristic::InverseFunctional => "InverseFunctionalObjectProperty",
+            Characteristic::Reflexive => "ReflexiveObjectProperty",
+            Characteristic::Irreflexive => "IrreflexiveObjectProperty",
+            Characteristic::Symmetric => "SymmetricObjectProperty",
+            Characteristic::Asymmetric => "AsymmetricObjectProperty",
+            Characteristic::Transitive => "TransitiveObjectProperty",
+        },
+        Axiom::SubDataPropertyOf(..) => "SubDataPropertyOf",
+        Axiom::EquivalentDataProperties(_) => "EquivalentDataProperties",
+        Axiom::DisjointDataProperties(_) => "DisjointDataProperties",
+        Axiom::DatatypeDefinition(..) => "DatatypeDefinition",
+        Axiom::HasKey(..) => "HasKey",
+        Axiom::SameIndividual(_) => "SameIndividual",
+        Axiom::NegativeObjectPropertyAssertion(..) | Axiom::NegativeDataPropertyAssertion(..) => {
+            "negative assertions"
+        }
+        _ => "assertions of expressions",
+    }
+}
+
+fn named(class: &ClassExpression) -> Option<&Iri> {
+    match class {
+        ClassExpression::Class(iri) => Some(iri),
+        _ => None,
+    }
+}
+
+fn property(property: &ObjectPropertyExpression) -> Option<&Iri> {
+    match property {
+        ObjectPropertyExpression::Property(iri) => Some(iri),
+        ObjectPropertyExpression::Inverse(_) => None,
+    }
+}

@@ -1,0 +1,212 @@
+//! Derived predicates of a knowledge base as clauses: a head, and a conjunction of atoms and (in)equalities.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pddl::ast::{Condition, Derived, Name, Term, TypedName};
+
+/// `head(arguments) ← body`; all variables are bound by the clause.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Clause {
+    pub head: Name,
+    pub arguments: Vec<Operand>,
+    pub body: Vec<Literal>,
+}
+
+/// A conjunct.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Literal {
+    /// An atom.
+    Holds(Name, Vec<Operand>),
+    /// Two terms are equal, or not.
+    Equal(bool, Operand, Operand),
+}
+
+/// An argument.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Operand {
+    Variable(Name),
+    Constant(Name),
+}
+
+impl Literal {
+    /// The predicate of an atom.
+    pub fn name(&self) -> Option<&Name> {
+        match self {
+            Self::Holds(name, _) => Some(name),
+            Self::Equal(..) => None,
+        }
+    }
+
+    /// Whether it says that something is of a type.
+    pub fn is_type(&self) -> bool {
+        matches!(self, Self::Holds(name, _) if name.as_str().contains(' '))
+    }
+
+    pub fn operands(&self) -> Vec<&Operand> {
+        match self {
+            Self::Holds(_, operands) => operands.iter().collect(),
+            Self::Equal(_, left, right) => vec![left, right],
+        }
+    }
+}
+
+/// The name of the relation that holds of the objects of a type; no predicate has a blank in its name.
+pub(super) fn of_type(r#type: &Name) -> Name {
+    Name::new(&format!("type {type}"))
+}
+
+/// The clauses of a derived predicate, without equalities; none if its condition has another form: disjunctions and existential
+/// quantifiers over atoms, equalities and negated equalities, each variable with a name of its own.
+pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
+    let head = &derived.head;
+    let mut variables: BTreeSet<Name> = BTreeSet::new();
+    let typed = typed(&head.parameters, &mut variables)?;
+    let parameters = head.parameters.iter().map(|own| Operand::Variable(own.identifier.name.clone()));
+    let arguments: Vec<Operand> = parameters.collect();
+    let name = &head.identifier.name;
+    let clause = |body: Vec<Literal>| {
+        let body = [typed.clone(), body].concat();
+        Clause { head: name.clone(), arguments: arguments.clone(), body }.resolved()
+    };
+    Some(disjuncts(&derived.condition, &mut variables)?.into_iter().filter_map(clause).collect())
+}
+
+/// That variables are of their types; none if one of them has the name of another.
+fn typed(variables: &[TypedName], known: &mut BTreeSet<Name>) -> Option<Vec<Literal>> {
+    let mut types = Vec::new();
+    for own in variables {
+        let name = &own.identifier.name;
+        if !known.insert(name.clone()) {
+            return None;
+        }
+        match &own.r#type.alternatives[..] {
+            [] => {}
+            [r#type] => {
+                types.push(Literal::Holds(of_type(&r#type.name), vec![Operand::Variable(name.clone())]))
+            }
+            _ => return None,
+        }
+    }
+    Some(types)
+}
+
+/// A condition as a disjunction of conjunctions.
+fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Vec<Vec<Literal>>> {
+    let single = |literal| Some(vec![vec![literal]]);
+    match condition {
+        Condition::And(parts) => {
+            let mut all = vec![Vec::new()];
+            for part in parts {
+                let part = disjuncts(part, variables)?;
+                let both = |left: &Vec<Literal>, right: &Vec<Literal>| [left.clone(), right.clone()].concat();
+                all = all.iter().flat_map(|left| part.iter().map(move |right| both(left, right))).collect();
+            }
+            Some(all)
+        }
+        Condition::Or(parts) => {
+            let parts: Option<Vec<_>> =
+                parts.iter().map(|part| disjuncts(part, &mut variables.clone())).collect();
+            Some(parts?.concat())
+        }
+        Condition::Exists(bound, inner) => {
+            let types = typed(bound, variables)?;
+            let inner = disjuncts(inner, variables)?;
+            Some(inner.into_iter().map(|part| [types.clone(), part].concat()).collect())
+        }
+        Condition::Atom(atom) => {
+            single(Literal::Holds(atom.predicate.name.clone(), atom.arguments.iter().map(operand).collect()))
+        }
+        Condition::Equal(left, right, _) => single(Literal::Equal(true, operand(left), operand(right))),
+        Condition::Not(inner) => match &**inner {
+            Condition::Equal(left, right, _) => single(Literal::Equal(false, operand(left), operand(right))),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+pub(super) fn operand(term: &Term) -> Operand {
+    match term {
+        Term::Variable(own) => Operand::Variable(own.name.clone()),
+        Term::Constant(own) => Operand::Constant(own.name.clone()),
+    }
+}
+
+impl Clause {
+    /// Whether all its variables are bound by atoms that are no types: it holds of few things, however many objects there are.
+    pub fn is_bound(&self) -> bool {
+        let atoms = self.body.iter().filter(|part| matches!(part, Literal::Holds(..)) && !part.is_type());
+        let bound: BTreeSet<&Operand> = atoms.flat_map(Literal::operands).collect();
+        let all = self.body.iter().flat_map(Literal::operands).chain(&self.arguments);
+        all.into_iter().all(|own| matches!(own, Operand::Constant(_)) || bound.contains(own))
+    }
+
+    /// The same without equalities, each atom once; none if its body never holds.
+    fn resolved(mut self) -> Option<Self> {
+        while let Some(at) = self.body.iter().position(|part| matches!(part, Literal::Equal(true, ..))) {
+            let Literal::Equal(_, left, right) = self.body.remove(at) else { continue };
+            match (left, right) {
+                (left, right) if left == right => {}
+                (Operand::Variable(name), other) | (other, Operand::Variable(name)) => {
+                    self = self.with(&BTreeMap::from([(name, other)]));
+                }
+                _ => return None,
+            }
+        }
+        let constant = |own: &Operand| matches!(own, Operand::Constant(_));
+        for part in &self.body {
+            if let Literal::Equal(false, left, right) = part
+                && left == right
+            {
+                return None;
+            }
+        }
+        self.body.retain(|part| match part {
+            Literal::Equal(false, left, right) => !(constant(left) && constant(right)),
+            _ => true,
+        });
+        self.body.sort();
+        self.body.dedup();
+        Some(self)
+    }
+
+    /// Every variable that the map has is replaced.
+    fn with(self, map: &BTreeMap<Name, Operand>) -> Self {
+        let one = |own: Operand| match &own {
+            Operand::Variable(name) => map.get(name).cloned().unwrap_or(own),
+            Operand::Constant(_) => own,
+        };
+        let all = |own: Vec<Operand>| own.into_iter().map(one).collect();
+        let part = |part: Literal| match part {
+            Literal::Holds(name, operands) => Literal::Holds(name, all(operands)),
+            Literal::Equal(same, left, right) => Literal::Equal(same, one(left), one(right)),
+        };
+        Self {
+            head: self.head,
+            arguments: all(self.arguments),
+            body: self.body.into_iter().map(part).collect(),
+        }
+    }
+
+    /// The clause with a conjunct replaced by the body of a clause that concludes it, whose variables are renamed by `depth`;
+    /// none if the two do not meet.
+    pub fn unfolded(&self, at: usize, by: &Self, depth: usize) -> Option<Self> {
+        let Literal::Holds(_, wanted) = &self.body[at] else { return None };
+        let own = by.body.iter().flat_map(Literal::operands).chain(&by.arguments);
+        let names = own.filter_map(|own| match own {
+            Operand::Variable(name) => Some(name.clone()),
+            Operand::Constant(_) => None,
+        });
+        let fresh = names.map(|name| {
+            let renamed = Name::new(&format!("{name}~{depth}"));
+            (name, Operand::Variable(renamed))
+        });
+        let by = by.clone().with(&fresh.collect());
+        let mut body = self.body.clone();
+        body.remove(at);
+        let pairs = wanted.iter().cloned().zip(by.arguments);
+        body.extend(pairs.map(|(left, right)| Literal::Equal(true, left, right)));
+        body.extend(by.body);
+        Self { head: self.head.clone(), arguments: self.arguments.clone(), body }.resolved()
+    }
+}

@@ -1,0 +1,276 @@
+//! What follows whatever the robot does, decided once: derived predicates to initial facts.
+//!
+//! The clauses of settled predicates (`settle`) have no negated atoms, so that what they hold of is their least fixpoint over the
+//! facts that are stated: the same set in every state. It is computed by naive evaluation, in which each clause asks first for
+//! what restricts most.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use pddl::ast::{Derived, Domain, Name};
+
+use super::clause::{self, Clause, Literal, Operand};
+use super::possible::Possible;
+use super::settle::{Guards, settle};
+use super::syntax::Said;
+
+/// The settled derived predicates, and their clauses.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Folded {
+    settled: BTreeMap<Name, Vec<Clause>>,
+    possible: Possible,
+}
+
+impl Folded {
+    /// What is settled of the rules of a knowledge base in a domain whose actions and events change some predicates, and of the
+    /// domain's own axioms about nothing but the given predicates of the knowledge base.
+    pub fn new(
+        derived: &[Derived],
+        domain: &Domain,
+        (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),
+        guards: &Guards,
+        mut known: BTreeSet<Name>,
+    ) -> Self {
+        let mut all: BTreeMap<Name, Option<Vec<Clause>>> = BTreeMap::new();
+        for axiom in derived {
+            add(&mut all, &axiom.head.identifier.name, clause::clauses(axiom));
+        }
+        let own: Vec<(&Name, Option<Vec<Clause>>)> = domain
+            .derived
+            .iter()
+            .map(|axiom| (&axiom.head.identifier.name, clause::clauses(axiom)))
+            .collect();
+        // Axioms about maps may hold of very much; they are left to the planner.
+        let mut large: BTreeSet<&Name> = own.iter().map(|(head, _)| *head).collect();
+        loop {
+            let small = |clauses: &Option<Vec<Clause>>| {
+                clauses.iter().all(|all| {
+                    all.iter().all(|clause| {
+                        clause.is_bound()
+                            && clause.body.iter().all(|part| match part {
+                                Literal::Holds(name, _) => part.is_type() || known.contains(name),
+                                Literal::Equal(..) => true,
+                            })
+                    })
+                })
+            };
+            let next = large.iter().copied().find(|head| {
+                own.iter().all(|(other, clauses)| other != head || clauses.is_some() && small(clauses))
+            });
+            let Some(next) = next else { break };
+            large.remove(next);
+            known.insert(next.clone());
+        }
+        for (head, clauses) in &own {
+            add(&mut all, head, clauses.clone().filter(|_| !large.contains(head)));
+        }
+        let (settled, open) = settle(all, changed, guards);
+        let possible = Possible::new(domain, &open, (changed, timed), &|class| known.contains(class));
+        Self { settled, possible }
+    }
+
+    /// Takes what is settled out of the axioms of a domain.
+    pub fn shorten(&self, domain: &mut Domain) {
+        domain.derived.retain(|own| !self.settled.contains_key(&own.head.identifier.name));
+        self.possible.restrict(domain);
+    }
+
+    /// What is settled, and what is possible of the rest, given what is stated of which objects.
+    pub fn facts(
+        &self,
+        stated: &BTreeSet<Said>,
+        objects: &BTreeSet<Name>,
+        is_of: &dyn Fn(&Name, &Name) -> bool,
+    ) -> BTreeSet<Said> {
+        let settled: Vec<&Clause> = self.settled.values().flatten().collect();
+        let mut facts = fixpoint(&settled, stated, objects, is_of);
+        let all: BTreeSet<Said> =
+            stated.iter().chain(&facts).cloned().chain(self.possible.added(stated)).collect();
+        let open: Vec<&Clause> = self.possible.clauses().collect();
+        facts.extend(self.possible.bounds(fixpoint(&open, &all, objects, is_of)));
+        facts
+    }
+}
+
+/// What follows from facts by clauses.
+fn fixpoint(
+    clauses: &[&Clause],
+    stated: &BTreeSet<Said>,
+    objects: &BTreeSet<Name>,
+    is_of: &dyn Fn(&Name, &Name) -> bool,
+) -> BTreeSet<Said> {
+    let mut known = Known { relations: HashMap::new(), objects };
+    let parts = clauses.iter().flat_map(|clause| &clause.body);
+    let types: BTreeSet<&Name> = parts.filter(|part| part.is_type()).filter_map(Literal::name).collect();
+    for relation in types {
+        let r#type = Name::new(relation.as_str().split(' ').nth(1).unwrap_or_default());
+        for object in objects.iter().filter(|object| is_of(object, &r#type)) {
+            known.insert(relation, vec![object.clone()]);
+        }
+    }
+    for (predicate, arguments) in stated {
+        known.insert(predicate, arguments.clone());
+    }
+    let mut facts = BTreeSet::new();
+    // The predicates that have grown since a clause was last evaluated; in the first round all of them.
+    let mut grown: Option<BTreeSet<Name>> = None;
+    loop {
+        let has_grown = |part: &Literal| {
+            part.name().is_some_and(|name| grown.as_ref().is_none_or(|grown| grown.contains(name)))
+        };
+        let is_due = |clause: &&Clause| grown.is_none() || clause.body.iter().any(has_grown);
+        let mut new = Vec::new();
+        for clause in clauses.iter().copied().filter(is_due) {
+            let order = known.order(&clause.body);
+            known.matches(&order, &mut BTreeMap::new(), &mut |found| {
+                known.heads(clause, found, &mut new);
+            });
+        }
+        let mut more = BTreeSet::new();
+        for (head, arguments) in new {
+            if known.insert(&head, arguments.clone()) {
+                more.insert(head.clone());
+                facts.insert((head, arguments));
+            }
+        }
+        if more.is_empty() {
+            return facts;
+        }
+        grown = Some(more);
+    }
+}
+
+fn add(all: &mut BTreeMap<Name, Option<Vec<Clause>>>, head: &Name, more: Option<Vec<Clause>>) {
+    let entry = all.entry(head.clone()).or_insert_with(|| Some(Vec::new()));
+    match (entry.as_mut(), more) {
+        (Some(known), Some(more)) => known.extend(more),
+        _ => *entry = None,
+    }
+}
+
+/// What variables stand for.
+type Found<'k> = BTreeMap<&'k Name, &'k Name>;
+
+/// What holds so far.
+struct Known<'o> {
+    relations: HashMap<Name, (Vec<Vec<Name>>, HashSet<Vec<Name>>)>,
+    objects: &'o BTreeSet<Name>,
+}
+
+impl Known<'_> {
+    fn insert(&mut self, predicate: &Name, arguments: Vec<Name>) -> bool {
+        let (rows, all) = self.relations.entry(predicate.clone()).or_default();
+        let is_new = all.insert(arguments.clone());
+        if is_new {
+            rows.push(arguments);
+        }
+        is_new
+    }
+
+    fn rows(&self, predicate: &Name) -> &[Vec<Name>] {
+        self.relations.get(predicate).map_or(&[], |(rows, _)| rows)
+    }
+
+    /// The conjuncts: those that share variables with others before them first, small relations first; types and inequalities as soon
+    /// as they are tests.
+    fn order<'b>(&self, body: &'b [Literal]) -> Vec<&'b Literal> {
+        let (mut left, mut order): (Vec<&Literal>, Vec<&Literal>) = (body.iter().collect(), Vec::new());
+        let mut bound: BTreeSet<&Name> = BTreeSet::new();
+        while !left.is_empty() {
+            let cost = |part: &Literal| {
+                let operands = part.operands();
+                let is_free =
+                    |own: &&&Operand| matches!(own, Operand::Variable(name) if !bound.contains(name));
+                let free = operands.iter().filter(is_free).count();
+                let rows = part.name().map_or(0, |name| self.rows(name).len());
+                let is_test = part.name().is_none() || part.is_type();
+                let is_apart = free == operands.len() && !bound.is_empty();
+                (free > 0, is_test && free > 0, is_apart && free > 0, free, rows)
+            };
+            let best = (0..left.len()).min_by_key(|&index| cost(left[index])).unwrap_or(0);
+            let next = left.remove(best);
+            bound.extend(next.operands().into_iter().filter_map(|own| match own {
+                Operand::Variable(name) => Some(name),
+                Operand::Constant(_) => None,
+            }));
+            order.push(next);
+        }
+        order
+    }
+
+    fn matches<'k>(&'k self, order: &[&'k Literal], found: &mut Found<'k>, each: &mut dyn FnMut(&Found<'k>)) {
+        let Some((part, rest)) = order.split_first() else { return each(found) };
+        let free = part.operands().into_iter().find(|own| value(own, found).is_none());
+        match (part, free) {
+            // No atom binds this variable: it stands for anything.
+            (Literal::Equal(..), Some(Operand::Variable(name))) => {
+                for object in self.objects {
+                    found.insert(name, object);
+                    self.matches(order, found, each);
+                    found.remove(name);
+                }
+            }
+            (Literal::Equal(same, left, right), _) => {
+                if (value(left, found) == value(right, found)) == *same {
+                    self.matches(rest, found, each);
+                }
+            }
+            (Literal::Holds(predicate, operands), _) => {
+                for row in self.rows(predicate) {
+                    let before = found.clone();
+                    if row.len() == operands.len()
+                        && operands.iter().zip(row).all(|(operand, argument)| bind(operand, argument, found))
+                    {
+                        self.matches(rest, found, each);
+                    }
+                    *found = before;
+                }
+            }
+        }
+    }
+
+    /// The instances of a head; arguments that the body does not bind stand for anything.
+    fn heads(&self, clause: &Clause, found: &Found<'_>, new: &mut Vec<Said>) {
+        let mut rows: Vec<(Vec<Name>, Found<'_>)> = vec![(Vec::new(), found.clone())];
+        for argument in &clause.arguments {
+            rows = rows
+                .into_iter()
+                .flat_map(|(row, found)| {
+                    let values = match (value(argument, &found), argument) {
+                        (Some(known), _) => vec![(known.clone(), found)],
+                        (None, Operand::Variable(name)) => {
+                            let with = |object| {
+                                let mut own = found.clone();
+                                own.insert(name, object);
+                                (Name::clone(object), own)
+                            };
+                            self.objects.iter().map(with).collect()
+                        }
+                        (None, Operand::Constant(_)) => Vec::new(),
+                    };
+                    values.into_iter().map(move |(value, found)| ([row.clone(), vec![value]].concat(), found))
+                })
+                .collect();
+        }
+        new.extend(rows.into_iter().map(|(row, _)| (clause.head.clone(), row)));
+    }
+}
+
+fn value<'k>(operand: &'k Operand, found: &Found<'k>) -> Option<&'k Name> {
+    match operand {
+        Operand::Variable(name) => found.get(name).copied(),
+        Operand::Constant(name) => Some(name),
+    }
+}
+
+fn bind<'k>(operand: &'k Operand, argument: &'k Name, found: &mut Found<'k>) -> bool {
+    match operand {
+        Operand::Constant(name) => name == argument,
+        Operand::Variable(name) => match found.get(name) {
+            Some(known) => *known == argument,
+            None => {
+                found.insert(name, argument);
+                true
+            }
+        },
+    }
+}

@@ -1,0 +1,215 @@
+//! What derived predicates can hold of at most, whatever actions do.
+//!
+//! A predicate that is not settled stays derived. That it can hold of few things only, though its parameters have no types, is
+//! known all the same: nothing else than what actions add can make it hold of more. So for each such predicate there is one more,
+//! `possible-…`, which no action changes and which holds wherever the predicate can; an atom and the conjunction of both are the
+//! same in every state. Who goes through all objects that a variable can stand for, as the checker of certificates does, goes
+//! through few.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pddl::ast::{ActionBody, Atom, Condition, Declaration, Derived, Domain, Effect, Name, Term};
+
+use super::clause::{Clause, Literal};
+use super::settle::{additions, classes, same};
+use super::syntax::{Said, identifier, untyped};
+
+/// A fact that an action may add.
+#[derive(Debug, Clone)]
+struct Addition {
+    predicate: Name,
+    arguments: Vec<Argument>,
+}
+
+/// What an argument of it can be: one object, or what some classes hold of.
+#[derive(Debug, Clone)]
+enum Argument {
+    Object(Name),
+    Of(Vec<Name>),
+}
+
+/// The predicates that have a bound, and what it is made of.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Possible {
+    bounded: BTreeSet<Name>,
+    additions: Vec<Addition>,
+    /// The clauses of those predicates.
+    clauses: Vec<Clause>,
+}
+
+impl Possible {
+    /// Which of the open predicates, with clauses or without, have a bound: those that depend on changed ones of which it is asked
+    /// that their arguments are in classes of the knowledge base.
+    pub fn new(
+        domain: &Domain,
+        open: &BTreeMap<Name, Option<Vec<Clause>>>,
+        (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),
+        is_class: &dyn Fn(&Name) -> bool,
+    ) -> Self {
+        let mut free = timed.clone();
+        free.extend(open.iter().filter(|(_, own)| own.is_none()).map(|(name, _)| name.clone()));
+        let mut all = Vec::new();
+        for action in &domain.actions {
+            let (asked, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
+                ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
+                ActionBody::Durative { conditions, effects, .. } => (
+                    conditions.iter().map(|(_, own)| own).collect(),
+                    effects.iter().map(|(_, own)| own).collect(),
+                ),
+            };
+            let asked = classes(&asked, changed);
+            let mut added = Vec::new();
+            effects.iter().for_each(|effect| additions(effect, &[], &mut added));
+            for (atom, bound) in added {
+                let argument = |term: &Term| match term {
+                    Term::Constant(own) => Some(Argument::Object(own.name.clone())),
+                    Term::Variable(own) if bound.contains(&&own.name) => None,
+                    term => {
+                        let own = asked.iter().filter(|(class, of)| is_class(class) && same(of, term));
+                        let own: Vec<Name> = own.map(|(class, _)| class.clone()).collect();
+                        (!own.is_empty()).then_some(Argument::Of(own))
+                    }
+                };
+                let predicate = atom.predicate.name.clone();
+                match atom.arguments.iter().map(argument).collect() {
+                    Some(arguments) => all.push(Addition { predicate, arguments }),
+                    None => {
+                        free.insert(predicate);
+                    }
+                }
+            }
+        }
+        loop {
+            let is_free = |part: &Literal| part.name().is_some_and(|name| free.contains(name));
+            let asks = |clauses: &Vec<Clause>| {
+                clauses.iter().any(|own| !own.is_bound() || own.body.iter().any(is_free))
+            };
+            let more =
+                open.iter().filter(|(name, own)| !free.contains(*name) && own.as_ref().is_none_or(asks));
+            let more: Vec<Name> = more.map(|(name, _)| name.clone()).collect();
+            if more.is_empty() {
+                break;
+            }
+            free.extend(more);
+        }
+        let bounded: BTreeSet<Name> = open.keys().filter(|name| !free.contains(*name)).cloned().collect();
+        let clauses = bounded.iter().filter_map(|name| open[name].clone()).flatten().collect();
+        Self { bounded, additions: all, clauses }
+    }
+
+    pub fn clauses(&self) -> impl Iterator<Item = &Clause> {
+        self.clauses.iter()
+    }
+
+    /// Facts that actions may add, where so much is stated.
+    pub fn added(&self, stated: &BTreeSet<Said>) -> BTreeSet<Said> {
+        let members = |class: &Name| -> BTreeSet<Name> {
+            let own = stated.iter().filter(|(name, row)| name == class && row.len() == 1);
+            own.map(|(_, row)| row[0].clone()).collect()
+        };
+        let mut facts = BTreeSet::new();
+        for addition in &self.additions {
+            let mut rows: Vec<Vec<Name>> = vec![Vec::new()];
+            for argument in &addition.arguments {
+                let own: BTreeSet<Name> = match argument {
+                    Argument::Object(object) => BTreeSet::from([object.clone()]),
+                    Argument::Of(classes) => {
+                        let mut all = classes.iter().map(members);
+                        let first = all.next().unwrap_or_default();
+                        all.fold(first, |one, other| one.intersection(&other).cloned().collect())
+                    }
+                };
+                let longer = |row: &Vec<Name>| -> Vec<Vec<Name>> {
+                    own.iter().map(|object| [row.clone(), vec![object.clone()]].concat()).collect()
+                };
+                rows = rows.iter().flat_map(longer).collect();
+            }
+            facts.extend(rows.into_iter().map(|row| (addition.predicate.clone(), row)));
+        }
+        facts
+    }
+
+    /// The bounds of the predicates, from all that can be derived.
+    pub fn bounds(&self, derived: BTreeSet<Said>) -> impl Iterator<Item = Said> {
+        let own = derived.into_iter().filter(|(name, _)| self.bounded.contains(name));
+        own.map(|(name, row)| (possible(&name), row))
+    }
+
+    /// Says in a domain of each atom that has a bound that it is possible.
+    pub fn restrict(&self, domain: &mut Domain) {
+        let declared: Vec<Declaration> = domain
+            .predicates
+            .iter()
+            .filter(|own| self.bounded.contains(&own.identifier.name))
+            .cloned()
+            .collect();
+        for own in declared {
+            let names: Vec<&str> = own.parameters.iter().map(|own| own.identifier.name.as_str()).collect();
+            let parameters = untyped(&names);
+            let identifier = identifier(possible(&own.identifier.name));
+            domain.predicates.push(Declaration { identifier, parameters });
+        }
+        for Derived { head, condition, .. } in &mut domain.derived {
+            self.condition(condition);
+            if self.bounded.contains(&head.identifier.name) {
+                let arguments =
+                    head.parameters.iter().map(|own| Term::Variable(own.identifier.clone())).collect();
+                let own = Atom { predicate: head.identifier.clone(), arguments, span: head.identifier.span };
+                let inner = std::mem::replace(condition, Condition::And(Vec::new()));
+                *condition = Condition::And(vec![possible_atom(&own), inner]);
+            }
+        }
+        for action in &mut domain.actions {
+            match &mut action.body {
+                ActionBody::Instantaneous { precondition, effect } => {
+                    self.condition(precondition);
+                    self.effect(effect);
+                }
+                ActionBody::Durative { conditions, effects, .. } => {
+                    conditions.iter_mut().for_each(|(_, condition)| self.condition(condition));
+                    effects.iter_mut().for_each(|(_, effect)| self.effect(effect));
+                }
+            }
+        }
+    }
+
+    fn condition(&self, condition: &mut Condition) {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter_mut().for_each(|part| self.condition(part))
+            }
+            Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+                self.condition(inner);
+            }
+            Condition::Imply(left, right) => {
+                self.condition(left);
+                self.condition(right);
+            }
+            Condition::Atom(own) if self.bounded.contains(&own.predicate.name) => {
+                *condition = Condition::And(vec![possible_atom(own), Condition::Atom(own.clone())]);
+            }
+            Condition::Atom(_) | Condition::Equal(..) | Condition::Compare(..) => {}
+        }
+    }
+
+    fn effect(&self, effect: &mut Effect) {
+        match effect {
+            Effect::And(parts) => parts.iter_mut().for_each(|part| self.effect(part)),
+            Effect::ForAll(_, inner) => self.effect(inner),
+            Effect::When(condition, inner) => {
+                self.condition(condition);
+                self.effect(inner);
+            }
+            Effect::Add(_) | Effect::Delete(_) | Effect::Assign(..) => {}
+        }
+    }
+}
+
+/// The name of the bound of a predicate.
+pub(super) fn possible(name: &Name) -> Name {
+    Name::new(&format!("possible-{name}"))
+}
+
+fn possible_atom(own: &Atom) -> Condition {
+    Condition::Atom(Atom { predicate: identifier(possible(&own.predicate.name)), ..own.clone() })
+}

@@ -1,0 +1,176 @@
+//! SWRL rules as derived predicates.
+//!
+//! Variables keep their names. What a head says of a constant is said of a parameter that equals it, as PDDL asks. Comparisons
+//! of numbers become relations between the objects that stand for numbers, `sameAs` and `differentFrom` become equality: every
+//! name is an object of its own.
+
+use std::collections::BTreeMap;
+
+use ontology::vocab::{local_name, swrlb};
+use ontology::{Argument, Atom, ClassExpression, Iri, ObjectPropertyExpression, Rule};
+use pddl::ast::{Condition, Derived, Name, Span, Term};
+
+use super::names::{self, EQUAL, LESS};
+use super::syntax::{atom, axiom, exists, identifier, variable};
+use super::terms::{Terms, is_top};
+
+/// The variables of a rule, each by a name of its own.
+#[derive(Default)]
+struct Variables {
+    names: BTreeMap<Iri, String>,
+}
+
+impl Variables {
+    fn name(&mut self, iri: &Iri) -> String {
+        if let Some(known) = self.names.get(iri) {
+            return known.clone();
+        }
+        let plain = names::plain(iri).to_string();
+        let taken = |name: &str| self.names.values().any(|other| other.eq_ignore_ascii_case(name));
+        let numbered = (2..).map(|number| format!("{plain}_{number}"));
+        let free = std::iter::once(plain.clone()).chain(numbered).find(|name| !taken(name));
+        let name = free.unwrap_or(plain);
+        self.names.insert(iri.clone(), name.clone());
+        name
+    }
+}
+
+/// A rule as derived predicates, one for each atom of its head.
+///
+/// # Errors
+/// Why it has no such form.
+pub(super) fn derived(rule: &Rule, terms: &mut Terms) -> Result<Vec<Derived>, String> {
+    if rule.head.is_empty() {
+        return Err("it concludes nothing".to_owned());
+    }
+    let mut variables = Variables::default();
+    let mut body = Vec::new();
+    for atom in &rule.body {
+        body.extend(condition(atom, &mut variables, terms)?);
+    }
+    let heads = rule.head.iter().map(|head| conclude(head, &body, &mut variables, terms));
+    heads.collect()
+}
+
+fn conclude(
+    head: &Atom,
+    body: &[Condition],
+    variables: &mut Variables,
+    terms: &mut Terms,
+) -> Result<Derived, String> {
+    let (iri, arguments) = match head {
+        Atom::Class(ClassExpression::Class(class), own) if !is_top(class) => (class, vec![own]),
+        Atom::ObjectProperty(ObjectPropertyExpression::Property(property), own, other) => {
+            (property, vec![own, other])
+        }
+        Atom::ObjectProperty(ObjectPropertyExpression::Inverse(property), other, own) => {
+            (property, vec![own, other])
+        }
+        Atom::DataProperty(property, own, value) => (property, vec![own, value]),
+        _ => return Err("its head is neither of a named class nor of a property".to_owned()),
+    };
+    let plain = terms.plain(iri, arguments.len())?;
+    let (mut parameters, mut equal) = (Vec::<String>::new(), Vec::new());
+    for argument in arguments {
+        let known = term(argument, variables, terms);
+        let own = match &known {
+            Term::Variable(own) if !parameters.iter().any(|other| *other == own.name.as_str()) => {
+                own.name.to_string()
+            }
+            Term::Variable(own) | Term::Constant(own) => {
+                let own = format!("{}_{}", own.name, parameters.len() + 1);
+                equal.push(Condition::Equal(variable(&own), known, Span::default()));
+                own
+            }
+        };
+        parameters.push(own);
+    }
+    let bound: Vec<String> =
+        variables.names.values().filter(|name| !parameters.contains(name)).cloned().collect();
+    let bound: Vec<&str> = bound.iter().map(String::as_str).collect();
+    let parameters: Vec<&str> = parameters.iter().map(String::as_str).collect();
+    let inner = exists(&bound, Condition::And(body.to_vec()));
+    equal.push(inner);
+    let condition = if equal.len() == 1 { equal.remove(0) } else { Condition::And(equal) };
+    Ok(axiom(names::inferred(&plain), &parameters, condition))
+}
+
+fn term(argument: &Argument, variables: &mut Variables, terms: &mut Terms) -> Term {
+    match argument {
+        Argument::Variable(iri) => variable(&variables.name(iri)),
+        Argument::Individual(iri) => Term::Constant(identifier(terms.individual(iri))),
+        Argument::Literal(literal) => Term::Constant(identifier(terms.literal(literal, true))),
+    }
+}
+
+/// An atom of a body; none if it holds of everything.
+fn condition(
+    stated: &Atom,
+    variables: &mut Variables,
+    terms: &mut Terms,
+) -> Result<Option<Condition>, String> {
+    let mut pair = |left: &Argument, right: &Argument, terms: &mut Terms| {
+        [term(left, variables, terms), term(right, variables, terms)]
+    };
+    let found = match stated {
+        Atom::Class(ClassExpression::Class(class), own) => {
+            let own = term(own, variables, terms);
+            if is_top(class) {
+                return Ok(None);
+            }
+            terms.inferred(class, vec![own])?
+        }
+        Atom::ObjectProperty(ObjectPropertyExpression::Property(property), own, other)
+        | Atom::ObjectProperty(ObjectPropertyExpression::Inverse(property), other, own)
+        | Atom::DataProperty(property, own, other) => {
+            let arguments = pair(own, other, terms).to_vec();
+            terms.inferred(property, arguments)?
+        }
+        Atom::SameIndividual(left, right) => {
+            let [left, right] = pair(left, right, terms);
+            Condition::Equal(left, right, Span::default())
+        }
+        Atom::DifferentIndividuals(left, right) => {
+            let [left, right] = pair(left, right, terms);
+            Condition::Not(Box::new(Condition::Equal(left, right, Span::default())))
+        }
+        Atom::BuiltIn(iri, arguments) => {
+            let [left, right] = &arguments[..] else {
+                return Err(format!("PDDL has no form for the built-in `{}`", local_name(iri)));
+            };
+            let [left, right] = pair(left, right, terms);
+            comparison(iri, left, right)?
+        }
+        Atom::Class(..) => return Err("it asks for a class expression".to_owned()),
+        Atom::DataRange(..) => return Err("it asks for a data range".to_owned()),
+    };
+    Ok(Some(found))
+}
+
+/// A comparison of numbers.
+fn comparison(iri: &str, left: Term, right: Term) -> Result<Condition, String> {
+    let relation = |name: &str, left: &Term, right: &Term| {
+        Condition::Atom(atom(Name::new(name), vec![left.clone(), right.clone()]))
+    };
+    let name = iri.strip_prefix(swrlb::NS).unwrap_or(iri);
+    Ok(match name {
+        "lessThan" => relation(LESS, &left, &right),
+        "greaterThan" => relation(LESS, &right, &left),
+        "equal" => {
+            let same = Condition::Equal(left.clone(), right.clone(), Span::default());
+            Condition::Or(vec![same, relation(EQUAL, &left, &right)])
+        }
+        "notEqual" => {
+            let same = Condition::Equal(left.clone(), right.clone(), Span::default());
+            let either = [same, relation(EQUAL, &left, &right)];
+            Condition::And(either.map(|own| Condition::Not(Box::new(own))).into())
+        }
+        "lessThanOrEqual" => {
+            Condition::Or(vec![relation(LESS, &left, &right), relation(EQUAL, &left, &right)])
+        }
+        "greaterThanOrEqual" => {
+            Condition::Or(vec![relation(LESS, &right, &left), relation(EQUAL, &left, &right)])
+        }
+        _ => return Err(format!("PDDL has no form for the built-in `{}`", local_name(iri))),
+    })
+}

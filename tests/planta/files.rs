@@ -1,0 +1,88 @@
+//! The files of examples, and the program.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use metaplan::file::source;
+use metaplan::knowledge::{Knowledge, Sources};
+use metaplan::message::Message;
+use metaplan::mission::{Bindings, Mission};
+use ontology::ReadOptions;
+use pddl::ast::{Domain, Problem};
+
+/// An input of the converter.
+#[derive(Debug, Clone)]
+pub struct Input {
+    pub domain: PathBuf,
+    pub problem: PathBuf,
+    pub knowledge: PathBuf,
+    /// Where imports lie.
+    pub directory: PathBuf,
+}
+
+/// The directory with the real files, where it is there.
+pub fn real() -> Option<PathBuf> {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/real");
+    if directory.is_dir() {
+        return Some(directory);
+    }
+    // The reason for the skip belongs into the test's own output.
+    #[allow(clippy::print_stderr)]
+    {
+        eprintln!("skipped: there is no ../shared beside the project");
+    }
+    None
+}
+
+/// What a run of the program answers: its status, and what it writes.
+pub fn metaplan(arguments: &[&str]) -> (i32, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_metaplan")).args(arguments).output().expect("it runs");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    (output.status.code().unwrap_or(-1), text(output.stdout), text(output.stderr))
+}
+
+impl Input {
+    /// Files in a directory.
+    pub fn new(directory: &Path, domain: &str, problem: &str, knowledge: &str) -> Self {
+        Self {
+            domain: directory.join(domain),
+            problem: directory.join(problem),
+            knowledge: directory.join(knowledge),
+            directory: real().expect("the files are there").join("owl/pddl_tomasys"),
+        }
+    }
+
+    /// The arguments of a command on these files, and further ones.
+    pub fn arguments<'a>(&'a self, command: &'a str, further: &[&'a str]) -> Vec<&'a str> {
+        let path = |path: &'a Path| path.to_str().expect("UTF-8");
+        let mut all = vec![command, path(&self.domain), path(&self.problem), "--quiet"];
+        all.extend(["--kb", path(&self.knowledge), "--directory", path(&self.directory)]);
+        all.extend(further);
+        all
+    }
+
+    /// As a mission.
+    pub fn mission(&self) -> Mission {
+        let (domain, problem) = (source(&self.domain), source(&self.problem));
+        let options = ReadOptions { directories: vec![self.directory.clone()], ..ReadOptions::default() };
+        let documents = vec![self.knowledge.clone()];
+        let sources = Sources { documents, options, ..Sources::default() };
+        let text = domain.as_ref().map_or("", |domain| domain.text());
+        let knowledge = Some(Knowledge::read_for(&sources, text));
+        let mission = Mission::new("", knowledge, Bindings::default(), domain, problem);
+        mission.unwrap_or_else(|messages| panic!("{}", shown(&messages)))
+    }
+}
+
+/// Messages as text.
+pub fn shown(messages: &[Message]) -> String {
+    messages.iter().map(Message::text).collect()
+}
+
+/// A domain and a problem as they stand in files, whether or not all of it is declared.
+pub fn parsed(domain: &Path, problem: &Path) -> (Domain, Problem) {
+    let read = |path: &Path| pddl::Source::new("file", std::fs::read_to_string(path).expect("a file"));
+    let (domain, problem) = (read(domain), read(problem));
+    let both = (pddl::parse_domain(&domain).0, pddl::parse_problem(&problem).0);
+    (both.0.expect("a domain"), both.1.expect("a problem"))
+}
