@@ -184,9 +184,9 @@ impl Mission {
         let (contributed, own): (Vec<_>, Vec<_>) =
             errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
         let mut messages = Message::from_pddl(&own, &sources);
-        if let (Some(planta), true) = (&self.planta, messages.iter().any(|message| message.code == "P134")) {
+        if self.planta.is_some() && messages.iter().any(|message| message.code == "P134") {
             messages.retain(|message| message.code != "P134");
-            messages.extend(planta.unknown(&self.domain));
+            messages.extend(Planta::unknown(&self.domain));
         }
         messages.extend(contributed.iter().map(|diagnostic| {
             let text = format!("{} (from a setting or from the knowledge base)", diagnostic.message);

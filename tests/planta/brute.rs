@@ -464,7 +464,9 @@ fn is_bound(part: &Part, binding: &Binding, hidden: &mut Vec<String>) -> bool {
 fn mentioned(condition: &Condition, negated: bool, found: &mut Vec<(String, bool)>) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
-            parts.iter().for_each(|part| mentioned(part, negated, found));
+            for part in parts {
+                mentioned(part, negated, found);
+            }
         }
         Condition::Not(inner) => mentioned(inner, !negated, found),
         Condition::Exists(_, inner) | Condition::ForAll(_, inner) => mentioned(inner, negated, found),

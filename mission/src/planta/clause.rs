@@ -82,7 +82,7 @@ fn typed(variables: &[TypedName], known: &mut BTreeSet<Name>) -> Option<Vec<Lite
         match &own.r#type.alternatives[..] {
             [] => {}
             [r#type] => {
-                types.push(Literal::Holds(of_type(&r#type.name), vec![Operand::Variable(name.clone())]))
+                types.push(Literal::Holds(of_type(&r#type.name), vec![Operand::Variable(name.clone())]));
             }
             _ => return None,
         }

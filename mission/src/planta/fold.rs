@@ -150,9 +150,12 @@ fn add(all: &mut BTreeMap<Name, Option<Vec<Clause>>>, head: &Name, more: Option<
 /// What variables stand for.
 type Found<'k> = BTreeMap<&'k Name, &'k Name>;
 
+/// The arguments for which a predicate holds, in the order of their discovery and as a set.
+type Rows = (Vec<Vec<Name>>, HashSet<Vec<Name>>);
+
 /// What holds so far.
 struct Known<'o> {
-    relations: HashMap<Name, (Vec<Vec<Name>>, HashSet<Vec<Name>>)>,
+    relations: HashMap<Name, Rows>,
     objects: &'o BTreeSet<Name>,
 }
 
@@ -265,12 +268,12 @@ fn value<'k>(operand: &'k Operand, found: &Found<'k>) -> Option<&'k Name> {
 fn bind<'k>(operand: &'k Operand, argument: &'k Name, found: &mut Found<'k>) -> bool {
     match operand {
         Operand::Constant(name) => name == argument,
-        Operand::Variable(name) => match found.get(name) {
-            Some(known) => *known == argument,
-            None => {
-                found.insert(name, argument);
-                true
+        Operand::Variable(name) => {
+            if let Some(known) = found.get(name) {
+                return *known == argument;
             }
-        },
+            found.insert(name, argument);
+            true
+        }
     }
 }

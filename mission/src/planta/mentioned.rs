@@ -33,8 +33,12 @@ impl Mentioned {
                     found.effect(effect);
                 }
                 ActionBody::Durative { conditions, effects, .. } => {
-                    conditions.iter().for_each(|(_, condition)| found.condition(condition));
-                    effects.iter().for_each(|(_, effect)| found.effect(effect));
+                    for (_, condition) in conditions {
+                        found.condition(condition);
+                    }
+                    for (_, effect) in effects {
+                        found.effect(effect);
+                    }
                 }
             }
         }
@@ -73,7 +77,9 @@ impl Mentioned {
     fn condition(&mut self, condition: &Condition) {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
-                parts.iter().for_each(|part| self.condition(part));
+                for part in parts {
+                    self.condition(part);
+                }
             }
             Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
                 self.condition(inner);
@@ -90,7 +96,11 @@ impl Mentioned {
 
     fn effect(&mut self, effect: &Effect) {
         match effect {
-            Effect::And(parts) => parts.iter().for_each(|part| self.effect(part)),
+            Effect::And(parts) => {
+                for part in parts {
+                    self.effect(part);
+                }
+            }
             Effect::Add(atom) | Effect::Delete(atom) => {
                 self.atom(atom);
                 self.changed.insert(atom.predicate.name.clone());
@@ -138,7 +148,9 @@ pub(super) fn keep_asked(domain: &mut Domain, problem: &Problem) {
     loop {
         let mut found = Mentioned::default();
         let axioms = derived.iter().filter(|axiom| asked.contains(&axiom.head.identifier.name));
-        axioms.for_each(|axiom| found.condition(&axiom.condition));
+        for axiom in axioms {
+            found.condition(&axiom.condition);
+        }
         let before = asked.len();
         asked.extend(found.predicates);
         if asked.len() == before {

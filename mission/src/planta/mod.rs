@@ -109,7 +109,7 @@ impl Planta {
     }
 
     /// Predicates that a completed domain asks for and that neither it nor the knowledge base has.
-    pub(crate) fn unknown(&self, completed: &Domain) -> Vec<Message> {
+    pub(crate) fn unknown(completed: &Domain) -> Vec<Message> {
         let declared: Vec<&str> =
             completed.predicates.iter().map(|declared| declared.identifier.name.as_str()).collect();
         let unknown = mentioned::undeclared(completed).into_iter().map(|name| {
@@ -154,7 +154,7 @@ impl Planta {
                 problem.objects.push(object(name.clone(), r#type));
             }
         }
-        facts.extend(self.comparisons(domain, &known));
+        facts.extend(Self::comparisons(domain, &known));
         let hierarchy = TypeHierarchy::of(domain);
         let mut types: BTreeMap<&Name, Vec<&TypeExpression>> = BTreeMap::new();
         for declared in domain.constants.iter().chain(&problem.objects) {
@@ -282,7 +282,7 @@ impl Planta {
     }
 
     /// How the numbers that there are compare, if anything asks for it.
-    fn comparisons(&self, domain: &Domain, known: &BTreeSet<Name>) -> Vec<Said> {
+    fn comparisons(domain: &Domain, known: &BTreeSet<Name>) -> Vec<Said> {
         let declared =
             |name: &str| domain.predicates.iter().any(|own| own.identifier.name == Name::new(name));
         if !declared(LESS) && !declared(EQUAL) {

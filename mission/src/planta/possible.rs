@@ -59,12 +59,14 @@ impl Possible {
             };
             let asked = classes(&asked, changed);
             let mut added = Vec::new();
-            effects.iter().for_each(|effect| additions(effect, &[], &mut added));
+            for effect in effects {
+                additions(effect, &[], &mut added);
+            }
             for (atom, bound) in added {
                 let argument = |term: &Term| match term {
                     Term::Constant(own) => Some(Argument::Object(own.name.clone())),
                     Term::Variable(own) if bound.contains(&&own.name) => None,
-                    term => {
+                    Term::Variable(_) => {
                         let own = asked.iter().filter(|(class, of)| is_class(class) && same(of, term));
                         let own: Vec<Name> = own.map(|(class, _)| class.clone()).collect();
                         (!own.is_empty()).then_some(Argument::Of(own))
@@ -166,8 +168,12 @@ impl Possible {
                     self.effect(effect);
                 }
                 ActionBody::Durative { conditions, effects, .. } => {
-                    conditions.iter_mut().for_each(|(_, condition)| self.condition(condition));
-                    effects.iter_mut().for_each(|(_, effect)| self.effect(effect));
+                    for (_, condition) in conditions {
+                        self.condition(condition);
+                    }
+                    for (_, effect) in effects {
+                        self.effect(effect);
+                    }
                 }
             }
         }
@@ -176,7 +182,9 @@ impl Possible {
     fn condition(&self, condition: &mut Condition) {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
-                parts.iter_mut().for_each(|part| self.condition(part))
+                for part in parts {
+                    self.condition(part);
+                }
             }
             Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
                 self.condition(inner);
@@ -194,7 +202,11 @@ impl Possible {
 
     fn effect(&self, effect: &mut Effect) {
         match effect {
-            Effect::And(parts) => parts.iter_mut().for_each(|part| self.effect(part)),
+            Effect::And(parts) => {
+                for part in parts {
+                    self.effect(part);
+                }
+            }
             Effect::ForAll(_, inner) => self.effect(inner),
             Effect::When(condition, inner) => {
                 self.condition(condition);

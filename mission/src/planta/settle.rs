@@ -39,7 +39,9 @@ pub(super) fn guards(domain: &Domain, changed: &BTreeSet<Name>, timed: &BTreeSet
         };
         let classes = classes(&asked, changed);
         let mut added = Vec::new();
-        effects.iter().for_each(|effect| additions(effect, &[], &mut added));
+        for effect in effects {
+            additions(effect, &[], &mut added);
+        }
         for (atom, bound) in added {
             for (position, argument) in atom.arguments.iter().enumerate() {
                 let is_asked = |of: &Term| same(of, argument) && !is_bound(argument, &bound);
@@ -81,7 +83,11 @@ pub(super) fn additions<'e>(
     found: &mut Vec<(&'e Atom, Vec<&'e Name>)>,
 ) {
     match effect {
-        Effect::And(parts) => parts.iter().for_each(|part| additions(part, bound, found)),
+        Effect::And(parts) => {
+            for part in parts {
+                additions(part, bound, found);
+            }
+        }
         Effect::Add(atom) => found.push((atom, bound.to_vec())),
         Effect::ForAll(variables, inner) => {
             let own = variables.iter().map(|own| &own.identifier.name);
@@ -121,17 +127,13 @@ pub(super) fn settle(
             let clauses = Unfold { all: &all, open: &open, guards, head }.clauses()?;
             Some((head.clone(), clauses))
         });
-        match found {
-            Some((head, clauses)) => {
-                all.insert(head, Some(clauses));
-            }
-            None => {
-                let (open, settled): (BTreeMap<_, _>, BTreeMap<_, _>) =
-                    all.into_iter().partition(|(head, _)| open.contains(head));
-                let settled = settled.into_iter().filter_map(|(head, clauses)| Some((head, clauses?)));
-                return (settled.collect(), open);
-            }
-        }
+        let Some((head, clauses)) = found else {
+            let (open, settled): (BTreeMap<_, _>, BTreeMap<_, _>) =
+                all.into_iter().partition(|(head, _)| open.contains(head));
+            let settled = settled.into_iter().filter_map(|(head, clauses)| Some((head, clauses?)));
+            return (settled.collect(), open);
+        };
+        all.insert(head, Some(clauses));
     }
 }
 

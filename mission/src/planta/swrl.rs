@@ -60,13 +60,9 @@ fn conclude(
 ) -> Result<Derived, String> {
     let (iri, arguments) = match head {
         Atom::Class(ClassExpression::Class(class), own) if !is_top(class) => (class, vec![own]),
-        Atom::ObjectProperty(ObjectPropertyExpression::Property(property), own, other) => {
-            (property, vec![own, other])
-        }
-        Atom::ObjectProperty(ObjectPropertyExpression::Inverse(property), other, own) => {
-            (property, vec![own, other])
-        }
-        Atom::DataProperty(property, own, value) => (property, vec![own, value]),
+        Atom::ObjectProperty(ObjectPropertyExpression::Property(property), own, other)
+        | Atom::ObjectProperty(ObjectPropertyExpression::Inverse(property), other, own)
+        | Atom::DataProperty(property, own, other) => (property, vec![own, other]),
         _ => return Err("its head is neither of a named class nor of a property".to_owned()),
     };
     let plain = terms.plain(iri, arguments.len())?;
@@ -139,7 +135,7 @@ fn condition(
                 return Err(format!("PDDL has no form for the built-in `{}`", local_name(iri)));
             };
             let [left, right] = pair(left, right, terms);
-            comparison(iri, left, right)?
+            comparison(iri, &left, &right)?
         }
         Atom::Class(..) => return Err("it asks for a class expression".to_owned()),
         Atom::DataRange(..) => return Err("it asks for a data range".to_owned()),
@@ -148,28 +144,26 @@ fn condition(
 }
 
 /// A comparison of numbers.
-fn comparison(iri: &str, left: Term, right: Term) -> Result<Condition, String> {
+fn comparison(iri: &str, left: &Term, right: &Term) -> Result<Condition, String> {
     let relation = |name: &str, left: &Term, right: &Term| {
         Condition::Atom(atom(Name::new(name), vec![left.clone(), right.clone()]))
     };
     let name = iri.strip_prefix(swrlb::NS).unwrap_or(iri);
     Ok(match name {
-        "lessThan" => relation(LESS, &left, &right),
-        "greaterThan" => relation(LESS, &right, &left),
+        "lessThan" => relation(LESS, left, right),
+        "greaterThan" => relation(LESS, right, left),
         "equal" => {
             let same = Condition::Equal(left.clone(), right.clone(), Span::default());
-            Condition::Or(vec![same, relation(EQUAL, &left, &right)])
+            Condition::Or(vec![same, relation(EQUAL, left, right)])
         }
         "notEqual" => {
             let same = Condition::Equal(left.clone(), right.clone(), Span::default());
-            let either = [same, relation(EQUAL, &left, &right)];
+            let either = [same, relation(EQUAL, left, right)];
             Condition::And(either.map(|own| Condition::Not(Box::new(own))).into())
         }
-        "lessThanOrEqual" => {
-            Condition::Or(vec![relation(LESS, &left, &right), relation(EQUAL, &left, &right)])
-        }
+        "lessThanOrEqual" => Condition::Or(vec![relation(LESS, left, right), relation(EQUAL, left, right)]),
         "greaterThanOrEqual" => {
-            Condition::Or(vec![relation(LESS, &right, &left), relation(EQUAL, &left, &right)])
+            Condition::Or(vec![relation(LESS, right, left), relation(EQUAL, left, right)])
         }
         _ => return Err(format!("PDDL has no form for the built-in `{}`", local_name(iri))),
     })
