@@ -60,12 +60,13 @@ enum Setting {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs)?;
-    let (domain, problem, warnings) = mission.merged()?;
-    output::warnings(common, mission.warnings().chain(&warnings));
     if !matches!(arguments.target, Language::Pddl) {
-        let (problem, _) = mission.filled()?;
+        let (problem, warnings) = mission.filled()?;
+        output::warnings(common, mission.warnings().chain(&warnings));
         return process(arguments, common, &mission, &problem, &roles);
     }
+    let (domain, problem, warnings) = mission.merged()?;
+    output::warnings(common, mission.warnings().chain(&warnings));
     let (domain, problem) = portable(&domain, &problem);
     let (domain, problem) = (print_domain(&domain), print_problem(&problem));
     match &arguments.output {

@@ -79,8 +79,8 @@ impl Situation {
 
     /// The knowledge of documents in this situation, without a mission.
     pub(super) fn knowledge(&self, documents: &[PathBuf]) -> Result<Knowledge, Failure> {
-        if !self.knowledge.is_empty() || self.scenario.is_some() {
-            let text = "with `--configure` the knowledge bases are the arguments, and there is neither `--kb` nor `--scenario`";
+        if !self.knowledge.is_empty() || !self.names.is_empty() || self.scenario.is_some() {
+            let text = "with `--configure` the knowledge bases are the arguments, and there is no `--kb`, `--name` or `--scenario`";
             return Err(Failure::usage(Message::error("M107", text)));
         }
         knowledge(documents, &self.rules, &self.imports, &self.fail, &self.set)

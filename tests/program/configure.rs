@@ -79,6 +79,7 @@ fn all_wrong_names_are_told() {
     for arguments in [
         &["run", "missions/ugv.toml", "--budget", "safety=1"][..],
         &["run", "--configure", "ontology/kb/ugv.ttl", "--scenario", "x"],
+        &["run", "--configure", "ontology/kb/ugv.ttl", "--name", "a=b"],
         &["run", "--configure", "ontology/kb/ugv.ttl", "--journal", "x"],
     ] {
         assert_eq!(metaplan(arguments).status, 2, "{arguments:?}");
