@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::configure::{Choice, Configuration, Considered, KeeperAnswer, Verdict};
+use crate::configure::{Choice, Configuration, Considered, Verdict};
 use crate::mapek::FORMAT;
 use crate::message::Message;
 use crate::number::to_json;
@@ -99,20 +99,5 @@ impl KeeperReadyLine {
     /// A loop with these objectives.
     pub fn new(objectives: Vec<String>) -> Self {
         Self { answer: "ready", format: FORMAT, objectives }
-    }
-}
-
-/// An answer of the loop with the number of the line that it is about.
-#[derive(Debug, Clone, Serialize)]
-pub struct NumberedKeeperAnswer<'a> {
-    #[serde(flatten)]
-    answer: &'a KeeperAnswer,
-    line: u64,
-}
-
-impl<'a> NumberedKeeperAnswer<'a> {
-    /// An answer to a line.
-    pub fn new(answer: &'a KeeperAnswer, line: u64) -> Self {
-        Self { answer, line }
     }
 }

@@ -19,7 +19,7 @@ pub use ::mission::message::ErrorAnswer;
 pub use ::verify::VerificationAnswer;
 pub use check::CheckAnswer;
 pub use compare::{CompareAnswer, ComparisonAnswer, MEASURES, Pair, Row, begun_rows, rows};
-pub use configure::{ConfigureAnswer, KeeperReadyLine, NumberedKeeperAnswer};
+pub use configure::{ConfigureAnswer, KeeperReadyLine};
 pub use explain::{ChangesAnswer, DesignAnswer};
 pub use export::{ImportAnswer, MissionExport, ModelExport};
 pub use journal::JournalAnswer;

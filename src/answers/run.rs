@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::journal::Recovery;
-use crate::mapek::{Answer, Beliefs, FORMAT, Planning};
+use crate::mapek::{Beliefs, FORMAT, Planning};
 use crate::number::to_json;
 use crate::simulate::Strategy;
 
@@ -71,15 +71,15 @@ impl PlanningLine {
 
 /// An answer with the number of the line that it is about.
 #[derive(Debug, Clone, Serialize)]
-pub struct NumberedAnswer<'a> {
+pub struct NumberedAnswer<'a, A> {
     #[serde(flatten)]
-    answer: &'a Answer,
+    answer: &'a A,
     line: u64,
 }
 
-impl<'a> NumberedAnswer<'a> {
+impl<'a, A> NumberedAnswer<'a, A> {
     /// An answer to a line.
-    pub fn new(answer: &'a Answer, line: u64) -> Self {
+    pub fn new(answer: &'a A, line: u64) -> Self {
         Self { answer, line }
     }
 }

@@ -8,15 +8,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use metaplan::answers::{
-    HandledLine, KeeperReadyLine, NumberedAnswer, NumberedKeeperAnswer, PlanningLine, ReadyLine,
-};
+use metaplan::answers::{HandledLine, KeeperReadyLine, NumberedAnswer, PlanningLine, ReadyLine};
 use metaplan::configure::Keeper;
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::mapek::{Answer, Clock as _, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
+use metaplan::mapek::{Clock as _, LONGEST_LINE, Loop, Observation, SystemClock, Watch};
 use metaplan::message::Message;
 use metaplan::setup::Setup;
 use metaplan::visible::visible_json;
+use serde::Serialize;
 
 use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::configure::Wanted;
@@ -92,13 +91,11 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             Some(journal)
         }
     };
-    let lost = |error: io::Error| Message::error("M109", format!("the answer cannot be written: {error}"));
-    let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
     let first = write!(stdout, "{}", visible_json(&output::line(&ready))).and_then(|()| stdout.flush());
     match first {
         // Who does not read any more has had enough.
         Err(error) if is_gone(&error) => return Ok(Exit::Done),
-        other => other.map_err(lost)?,
+        other => other.map_err(|error| lost(&error))?,
     }
     let line = Arc::new(AtomicU64::new(control.beliefs().lines()));
     heartbeat(control.watch(), Arc::clone(&line));
@@ -110,7 +107,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let number = control.beliefs().lines();
     match write(&mut stdout, number, &answers, read) {
         Err(error) if is_gone(&error) => return Ok(Exit::Done),
-        other => other.map_err(lost)?,
+        other => other.map_err(|error| lost(&error))?,
     }
     let mut clock = SystemClock::default();
     let begun = control.beliefs().now();
@@ -126,7 +123,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let written = write(&mut stdout, number, &answers, read);
         match written {
             Err(error) if is_gone(&error) => return Ok(Exit::Done),
-            other => other.map_err(lost)?,
+            other => other.map_err(|error| lost(&error))?,
         }
     }
     Ok(Exit::Done)
@@ -141,28 +138,31 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let objectives = configurator.objectives().into_iter().map(|own| own.individual.name).collect();
     let mut keeper = Keeper::new(configurator, None);
     let mut events = Lines::open(&arguments.events)?;
-    let mut line = 0;
-    let mut text = output::line(&KeeperReadyLine::new(objectives));
-    let mut read = Instant::now();
+    let mut stdout = io::stdout();
+    let ready = output::line(&KeeperReadyLine::new(objectives));
+    let mut written = stdout.write_all(visible_json(&ready).as_bytes()).and_then(|()| stdout.flush());
+    let (mut line, mut read) = (0, Instant::now());
     let mut answers = keeper.start();
     loop {
-        for answer in &answers {
-            text += &output::line(&NumberedKeeperAnswer::new(answer, line));
-        }
-        text += &output::line(&HandledLine::new(line, read.elapsed().as_micros()));
-        let mut stdout = io::stdout();
-        match stdout.write_all(visible_json(&text).as_bytes()).and_then(|()| stdout.flush()) {
+        match written.and_then(|()| write(&mut stdout, line, &answers, read)) {
             // Who does not read any more has had enough.
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Done),
-            other => other
-                .map_err(|error| Message::error("M109", format!("the answer cannot be written: {error}")))?,
+            Err(error) if is_gone(&error) => return Ok(Exit::Done),
+            other => other.map_err(|error| lost(&error))?,
         }
         let Some(next) = events.next()? else { return Ok(Exit::Done) };
         read = Instant::now();
         line += 1;
-        text.clear();
         answers = keeper.handle(&Observation::parse(&next));
+        written = Ok(());
     }
+}
+
+fn lost(error: &io::Error) -> Message {
+    Message::error("M109", format!("the answer cannot be written: {error}"))
+}
+
+fn is_gone(error: &io::Error) -> bool {
+    error.kind() == io::ErrorKind::BrokenPipe
 }
 
 fn unwritten(error: &io::Error) -> Message {
@@ -200,7 +200,12 @@ fn heartbeat(watch: Watch, line: Arc<AtomicU64>) {
 }
 
 /// Writes the answers to a line, each with the line's number, and that it was handled.
-fn write(stdout: &mut impl io::Write, line: u64, answers: &[Answer], read: Instant) -> io::Result<()> {
+fn write(
+    stdout: &mut impl io::Write,
+    line: u64,
+    answers: &[impl Serialize],
+    read: Instant,
+) -> io::Result<()> {
     let mut text = String::new();
     for answer in answers {
         text += &output::line(&NumberedAnswer::new(answer, line));

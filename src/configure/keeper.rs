@@ -4,37 +4,30 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use encodings::Limits;
-use ontology::runtime::Objective;
 use serde::Serialize;
 
 use crate::configure::choice::{Choice, Verdict, current};
 use crate::configure::configurator::{Configurator, Goal};
-use crate::knowledge::{Contradiction, RobotReport};
-use crate::mapek::{
-    DesignChange, Event, Numbers, ObjectiveChange, Observation, Place, Refusal, available, ruled_out,
-    why_objective,
-};
+use crate::knowledge::{Fault, RobotReport};
+use crate::mapek::{Answer, Event, Numbers, Observation, Refusal, available, changes, doubts, inferred};
 use crate::message::Message;
 
 /// One line of output, in the format `metaplan-events/1`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(tag = "answer")]
+#[serde(untagged)]
 #[non_exhaustive]
 pub enum KeeperAnswer {
-    /// What follows has changed.
-    #[serde(rename = "inferred")]
-    Inferred {
-        /// Designs whose availability has changed.
-        designs: Vec<DesignChange>,
-        /// Objectives whose status has changed.
-        objectives: Vec<ObjectiveChange>,
-    },
-    /// What is known contradicts itself, or does so no more. Nothing is chosen meanwhile.
-    #[serde(rename = "contradicted")]
-    Contradicted {
-        /// All contradictions from now on.
-        contradictions: Vec<Contradiction>,
-    },
+    /// As the loop with a plan says it.
+    Loop(Answer),
+    /// What becomes of an objective.
+    Service(Service),
+}
+
+/// What becomes of an objective.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "answer")]
+#[non_exhaustive]
+pub enum Service {
     /// A function is to get another design.
     #[serde(rename = "reconfigure")]
     Reconfigure {
@@ -63,28 +56,6 @@ pub enum KeeperAnswer {
         /// Why each of the designs cannot: sentences.
         because: Vec<String>,
     },
-    /// The line was seen before and has changed nothing.
-    #[serde(rename = "duplicate")]
-    Duplicate {
-        /// Its number.
-        seq: u64,
-    },
-    /// The line has changed nothing: its number is so old that nobody knows whether it was seen.
-    #[serde(rename = "stale")]
-    Stale {
-        /// Its number.
-        seq: u64,
-        /// Up to which number lines are too old, in a sentence.
-        because: String,
-    },
-    /// The line, or a part of it, has changed nothing.
-    #[serde(rename = "error")]
-    Error {
-        /// A stable code.
-        code: String,
-        /// One sentence.
-        message: String,
-    },
 }
 
 /// A change of design that was asked for, to be undone if it fails.
@@ -105,7 +76,8 @@ pub struct Keeper {
     asked: BTreeMap<u64, Asked>,
     available: BTreeSet<String>,
     statuses: BTreeMap<String, Vec<String>>,
-    violated: Vec<Contradiction>,
+    violated: BTreeSet<String>,
+    fault: Option<Fault>,
     /// What was said last of objectives that no design can serve.
     unserved: BTreeMap<String, Vec<String>>,
 }
@@ -122,7 +94,8 @@ impl Keeper {
             asked: BTreeMap::new(),
             available,
             statuses: BTreeMap::new(),
-            violated: Vec::new(),
+            violated: BTreeSet::new(),
+            fault: None,
             unserved: BTreeMap::new(),
         }
     }
@@ -142,15 +115,15 @@ impl Keeper {
     /// Takes a line over and says what follows.
     pub fn handle(&mut self, observation: &Observation) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
-        if let Some(refusal) = observation.sequence.and_then(|seq| self.refused(seq)) {
-            return vec![refusal];
+        if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {
+            return vec![KeeperAnswer::Loop(refusal)];
         }
         let mut understood = false;
         for event in &observation.events {
             match event.clone().and_then(|event| self.take(&event, &mut answers)) {
                 Ok(()) => understood = true,
                 Err(Refusal { code, message }) => {
-                    answers.push(KeeperAnswer::Error { code: code.to_owned(), message });
+                    answers.push(KeeperAnswer::Loop(Answer::Error { code: code.to_owned(), message }));
                 }
             }
         }
@@ -159,25 +132,6 @@ impl Keeper {
         }
         self.adapt(&mut answers);
         answers
-    }
-
-    /// The answer to a line that changes nothing because of its number.
-    fn refused(&self, seq: u64) -> Option<KeeperAnswer> {
-        match self.numbers.place(seq) {
-            Place::New => None,
-            Place::Seen => Some(KeeperAnswer::Duplicate { seq }),
-            Place::Stale(mark) => {
-                let because = format!(
-                    "too many numbers are missing: of those up to {mark} it is not known any more which were seen"
-                );
-                Some(KeeperAnswer::Stale { seq, because })
-            }
-            Place::Ahead(most) => {
-                let message =
-                    format!("the number {seq} is too far ahead; the greatest that can be is {most}");
-                Some(KeeperAnswer::Error { code: "M307".to_owned(), message })
-            }
-        }
     }
 
     fn take(&mut self, event: &Event, answers: &mut Vec<KeeperAnswer>) -> Result<(), Refusal> {
@@ -216,14 +170,15 @@ impl Keeper {
 
     fn give_up(&mut self, name: &str, answers: &mut Vec<KeeperAnswer>) -> Result<(), Refusal> {
         let objectives = self.configurator.objectives();
-        let is_it = |own: &&Objective| own.individual.name == name || own.individual.iri == name;
+        let is_it =
+            |own: &&ontology::runtime::Objective| own.individual.name == name || own.individual.iri == name;
         let found = objectives.iter().find(is_it);
         self.configurator.give_up(name).map_err(|message| Refusal::new("M306", message.message.clone()))?;
         if let Some(objective) = found
             && let Some(design) = current(objective)
         {
             self.effects += 1;
-            answers.push(KeeperAnswer::Reconfigure {
+            answers.push(KeeperAnswer::Service(Service::Reconfigure {
                 objective: objective.individual.name.clone(),
                 function: objective.function.as_ref().map(|function| function.name.clone()),
                 from: Some(design.to_owned()),
@@ -231,7 +186,7 @@ impl Keeper {
                 because: vec!["the objective was given up".to_owned()],
                 optimal: true,
                 effect: self.effects,
-            });
+            }));
         }
         self.asked.retain(|_, asked| asked.objective != name);
         self.unserved.remove(name);
@@ -241,13 +196,11 @@ impl Keeper {
     /// Reports what follows, and chooses for the objectives in need.
     fn adapt(&mut self, answers: &mut Vec<KeeperAnswer>) {
         self.infer(answers);
-        let contradictions = self.configurator.knowledge().contradictions();
-        if contradictions != self.violated {
-            self.violated.clone_from(&contradictions);
-            answers.push(KeeperAnswer::Contradicted { contradictions });
-        }
+        let knowledge = self.configurator.knowledge();
+        let doubts = doubts(knowledge, &mut self.fault, &mut self.violated);
+        answers.extend(doubts.into_iter().map(KeeperAnswer::Loop));
         // MROS adapts nothing while there is a contradiction, and where it is not known what follows nothing is available.
-        if !self.violated.is_empty() || self.configurator.knowledge().fault().is_some() {
+        if !self.violated.is_empty() || self.fault.is_some() {
             return;
         }
         let limits = self.limit.map_or_else(Limits::none, |time| Limits::none().with_time(time));
@@ -272,7 +225,7 @@ impl Keeper {
             let because = said(choice);
             if self.unserved.get(&objective) != Some(&because) {
                 self.unserved.insert(objective.clone(), because.clone());
-                answers.push(KeeperAnswer::Unserved { objective, function, because });
+                answers.push(KeeperAnswer::Service(Service::Unserved { objective, function, because }));
             }
             return;
         };
@@ -284,7 +237,7 @@ impl Keeper {
             self.asked.insert(self.effects, asked);
             let (from, to) = (choice.before.clone(), choice.design.clone());
             let (because, effect) = (said(choice), self.effects);
-            answers.push(KeeperAnswer::Reconfigure {
+            answers.push(KeeperAnswer::Service(Service::Reconfigure {
                 objective,
                 function,
                 from,
@@ -292,44 +245,20 @@ impl Keeper {
                 because,
                 optimal,
                 effect,
-            });
+            }));
         }
     }
 
     /// Reports designs and objectives of which something else follows than before.
     fn infer(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let knowledge = self.configurator.knowledge();
-        let now = available(knowledge);
-        let changed = self.available.symmetric_difference(&now);
-        let designs: Vec<DesignChange> = changed
-            .map(|design| {
-                let available = now.contains(design);
-                let because = if available { Vec::new() } else { ruled_out(knowledge, design) };
-                DesignChange { design: design.clone(), available, because }
-            })
-            .collect();
-        let in_error = knowledge.runtime().objectives().into_iter().filter(Objective::is_in_error);
-        let statuses: BTreeMap<String, Vec<String>> =
-            in_error.map(|objective| (objective.individual.name, objective.statuses)).collect();
-        let names: BTreeSet<&String> = statuses.keys().chain(self.statuses.keys()).collect();
-        let changed = names.into_iter().filter(|name| statuses.get(*name) != self.statuses.get(*name));
-        let objectives: Vec<ObjectiveChange> = changed
-            .map(|name| ObjectiveChange {
-                objective: name.clone(),
-                statuses: statuses.get(name).cloned().unwrap_or_default(),
-                because: why_objective(knowledge, name),
-            })
-            .collect();
-        self.available = now;
-        self.statuses = statuses;
-        if !designs.is_empty() || !objectives.is_empty() {
-            answers.push(KeeperAnswer::Inferred { designs, objectives });
-        }
+        let (designs, objectives) = changes(knowledge, &mut self.available, &mut self.statuses);
+        answers.extend(inferred(designs, objectives).map(KeeperAnswer::Loop));
     }
 }
 
 fn wrong(message: &Message) -> KeeperAnswer {
-    KeeperAnswer::Error { code: message.code.clone(), message: message.message.clone() }
+    KeeperAnswer::Loop(Answer::Error { code: message.code.clone(), message: message.message.clone() })
 }
 
 fn unknown_effect(effect: u64) -> Refusal {

@@ -14,4 +14,4 @@ mod keeper;
 
 pub use choice::{Choice, Configuration, Considered, Verdict, Wishes, Worth};
 pub use configurator::{Configurator, Goal};
-pub use keeper::{Keeper, KeeperAnswer};
+pub use keeper::{Keeper, KeeperAnswer, Service};

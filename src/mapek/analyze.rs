@@ -32,19 +32,30 @@ pub(crate) fn available(knowledge: &Knowledge) -> BTreeSet<String> {
 /// Reports what contradicts itself, and that it is not known what follows, where that has changed; what was observed stays.
 pub(super) fn contradict(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
     let Some(knowledge) = beliefs.mission.knowledge() else { return };
-    if knowledge.fault() != beliefs.fault.as_ref() {
-        beliefs.fault = knowledge.fault().cloned();
-        answers.push(Answer::Unconcluded { fault: beliefs.fault.clone() });
+    answers.extend(doubts(knowledge, &mut beliefs.fault, &mut beliefs.violated));
+}
+
+/// That it is not known what follows, and what contradicts itself, where that is something else than before.
+pub(crate) fn doubts(
+    knowledge: &Knowledge,
+    fault: &mut Option<Fault>,
+    violated: &mut BTreeSet<String>,
+) -> Vec<Answer> {
+    let mut answers = Vec::new();
+    if knowledge.fault() != fault.as_ref() {
+        *fault = knowledge.fault().cloned();
+        answers.push(Answer::Unconcluded { fault: fault.clone() });
     }
     let mut contradictions = knowledge.contradictions();
     for fact in contradictions.iter_mut().flat_map(|own| own.facts.iter_mut()) {
         *fact = local(fact);
     }
-    let violated: BTreeSet<String> = contradictions.iter().map(|own| own.violated.clone()).collect();
-    if violated != beliefs.violated {
-        beliefs.violated = violated;
+    let now: BTreeSet<String> = contradictions.iter().map(|own| own.violated.clone()).collect();
+    if now != *violated {
+        *violated = now;
         answers.push(Answer::Contradicted { contradictions });
     }
+    answers
 }
 
 /// What a change of the knowledge base has led to: contradictions are reported, and where what is watched has changed, what
@@ -60,45 +71,54 @@ pub(super) fn follow(beliefs: &mut Beliefs, base: Base, answers: &mut Vec<Answer
 pub(super) fn analyze(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) -> Findings {
     let mut findings = Findings::default();
     let Some(knowledge) = beliefs.mission.knowledge() else { return findings };
-    let now = available(knowledge);
-    let changed: Vec<String> = beliefs.available.symmetric_difference(&now).cloned().collect();
-    let designs: Vec<DesignChange> = changed
-        .into_iter()
-        .map(|design| {
-            let available = now.contains(&design);
-            let because = match knowledge.fault() {
-                _ if available => Vec::new(),
-                Some(fault) => vec![unknown(fault)],
-                None => ruled_out(knowledge, &design),
-            };
-            DesignChange { design, available, because }
-        })
-        .collect();
+    let (designs, objectives) = changes(knowledge, &mut beliefs.available, &mut beliefs.statuses);
     for change in &designs {
         let set = if change.available { &mut findings.gained } else { &mut findings.lost };
         set.insert(change.design.clone());
     }
-    let statuses = statuses(knowledge);
-    let mut objectives = Vec::new();
-    let names: BTreeSet<&String> = statuses.keys().chain(beliefs.statuses.keys()).collect();
-    for name in names {
-        let (before, after) = (beliefs.statuses.get(name), statuses.get(name));
-        if before == after {
-            continue;
-        }
-        let statuses = after.cloned().unwrap_or_default();
-        if !statuses.is_empty() {
-            findings.errors.push(format!("{name} is {}", statuses.join(", ")));
-        }
-        let because = why_objective(knowledge, name);
-        objectives.push(ObjectiveChange { objective: name.clone(), statuses, because });
-    }
-    beliefs.available = now;
-    beliefs.statuses = statuses;
-    if !designs.is_empty() || !objectives.is_empty() {
-        answers.push(Answer::Inferred { designs, objectives });
-    }
+    let errors = objectives.iter().filter(|change| !change.statuses.is_empty());
+    findings.errors =
+        errors.map(|change| format!("{} is {}", change.objective, change.statuses.join(", "))).collect();
+    answers.extend(inferred(designs, objectives));
     findings
+}
+
+/// What has changed, as an answer; none if nothing has.
+pub(crate) fn inferred(designs: Vec<DesignChange>, objectives: Vec<ObjectiveChange>) -> Option<Answer> {
+    let is_something = !designs.is_empty() || !objectives.is_empty();
+    is_something.then_some(Answer::Inferred { designs, objectives })
+}
+
+/// The designs that are available now and were not, or the other way round, and the objectives that have another status, with the
+/// reasons; what was before is brought up to date.
+pub(crate) fn changes(
+    knowledge: &Knowledge,
+    designs: &mut BTreeSet<String>,
+    objectives: &mut BTreeMap<String, Vec<String>>,
+) -> (Vec<DesignChange>, Vec<ObjectiveChange>) {
+    let now = available(knowledge);
+    let design = |design: &String| {
+        let available = now.contains(design);
+        let because = match knowledge.fault() {
+            _ if available => Vec::new(),
+            Some(fault) => vec![unknown(fault)],
+            None => ruled_out(knowledge, design),
+        };
+        DesignChange { design: design.clone(), available, because }
+    };
+    let changed = designs.symmetric_difference(&now).map(design).collect();
+    *designs = now;
+    let now = statuses(knowledge);
+    let names: BTreeSet<&String> = now.keys().chain(objectives.keys()).collect();
+    let other = names.into_iter().filter(|name| now.get(*name) != objectives.get(*name));
+    let objective = |name: &String| ObjectiveChange {
+        objective: name.clone(),
+        statuses: now.get(name).cloned().unwrap_or_default(),
+        because: why_objective(knowledge, name),
+    };
+    let others = other.map(objective).collect();
+    *objectives = now;
+    (changed, others)
 }
 
 /// Why nothing counts as available, and no plan is looked for.
@@ -140,8 +160,7 @@ pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
     because
 }
 
-/// The rules and stated facts by which an objective has its status.
-pub(crate) fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
+fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
     let derivations = knowledge.runtime().why(objective).unwrap_or_default();
     derivations.iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
 }

@@ -17,7 +17,6 @@ use crate::mapek::execute::execute;
 use crate::mapek::monitor::{Base, Changes, Monitor};
 use crate::mapek::plan::Planner;
 use crate::mapek::record::{self, Decision, Snapshot};
-use crate::mapek::sequence::Place;
 use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
@@ -92,7 +91,9 @@ impl Loop {
         self.planner.made.clear();
         self.beliefs.lines += 1;
         self.beliefs.now = self.beliefs.now.max(observation.time.unwrap_or(now));
-        if let Some(refusal) = observation.sequence.and_then(|sequence| self.refused(sequence)) {
+        if let Some(refusal) =
+            observation.sequence.and_then(|sequence| self.beliefs.numbers.refused(sequence))
+        {
             return vec![refusal];
         }
         let mut changes = Changes::default();
@@ -126,21 +127,6 @@ impl Loop {
     /// The station that decides.
     fn adapting(&mut self) -> Adapting<'_> {
         Adapting { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
-    }
-
-    /// Why a line with this number is not taken over, if it is not.
-    fn refused(&self, sequence: u64) -> Option<Answer> {
-        match self.beliefs.numbers.place(sequence) {
-            Place::New => None,
-            Place::Seen => Some(Answer::Duplicate { sequence }),
-            Place::Stale(mark) => Some(Answer::Stale { sequence, mark }),
-            Place::Ahead(most) => {
-                let text = format!(
-                    "`seq` is {sequence}, but may be {most} at most: numbers grow from line to line, and skip a million at most"
-                );
-                Some(Answer::Error { code: "M307".to_owned(), message: text })
-            }
-        }
     }
 
     /// Effects that were asked for and not acknowledged, to be asked for again after a restart.

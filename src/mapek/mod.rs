@@ -36,7 +36,7 @@ mod settings;
 mod step;
 mod watch;
 
-pub(crate) use analyze::{available, ruled_out, why_objective};
+pub(crate) use analyze::{available, changes, doubts, inferred, ruled_out};
 pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange};
 pub use beliefs::Beliefs;
 pub use control::Loop;
@@ -44,7 +44,7 @@ pub use drive::{Clock, Effector, Observer, SystemClock, drive};
 pub use event::{Event, FORMAT, LONGEST_LINE, Observation, Refusal};
 pub use record::{Decision, Snapshot};
 pub(crate) use resume::resume;
-pub(crate) use sequence::{Numbers, Place};
+pub(crate) use sequence::Numbers;
 pub use settings::{AdaptationSection, Settings};
 pub use step::PlannedStep;
 pub use watch::{Planning, Watch};

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
+use crate::mapek::answer::Answer;
+
 /// So many ranges are kept.
 const RANGES: usize = 256;
 
@@ -20,7 +22,7 @@ const FIRST: u64 = 1 << 62;
 
 /// What a number is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Place {
+enum Place {
     /// It was not seen.
     New,
     /// It was seen.
@@ -42,7 +44,7 @@ pub(crate) struct Numbers {
 
 impl Numbers {
     /// What a number is.
-    pub(crate) fn place(&self, number: u64) -> Place {
+    fn place(&self, number: u64) -> Place {
         let range = self.ranges.range(..=number).next_back();
         if range.is_some_and(|(_, &last)| number <= last) {
             return Place::Seen;
@@ -52,6 +54,21 @@ impl Numbers {
             Some(mark) if number <= mark => Place::Stale(mark),
             _ if number > most => Place::Ahead(most),
             _ => Place::New,
+        }
+    }
+
+    /// The answer to a line with this number that is not taken over, if it is not.
+    pub(crate) fn refused(&self, sequence: u64) -> Option<Answer> {
+        match self.place(sequence) {
+            Place::New => None,
+            Place::Seen => Some(Answer::Duplicate { sequence }),
+            Place::Stale(mark) => Some(Answer::Stale { sequence, mark }),
+            Place::Ahead(most) => {
+                let text = format!(
+                    "`seq` is {sequence}, but may be {most} at most: numbers grow from line to line, and skip a million at most"
+                );
+                Some(Answer::Error { code: "M307".to_owned(), message: text })
+            }
         }
     }
 

@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use encodings::Limits;
-use metaplan::configure::{Configurator, Goal, Keeper, KeeperAnswer, Wishes, Worth};
+use metaplan::configure::{Configurator, Goal, Keeper, KeeperAnswer, Service, Wishes, Worth};
 use metaplan::knowledge::{Knowledge, RobotReport, Sources};
-use metaplan::mapek::Observation;
+use metaplan::mapek::{Answer, Observation};
 use num_rational::BigRational;
 use ontology::ReadOptions;
 use ontology::tomasys::change::Status;
@@ -212,7 +212,7 @@ fn said(keeper: &mut Keeper, line: &str) -> Vec<KeeperAnswer> {
 /// What is asked for: objective, from, to.
 fn asked(answers: &[KeeperAnswer]) -> Vec<(&str, Option<&str>, Option<&str>)> {
     let asked = answers.iter().filter_map(|answer| match answer {
-        KeeperAnswer::Reconfigure { objective, from, to, .. } => {
+        KeeperAnswer::Service(Service::Reconfigure { objective, from, to, .. }) => {
             Some((objective.as_str(), from.as_deref(), to.as_deref()))
         }
         _ => None,
@@ -236,7 +236,10 @@ fn the_loop_asks_for_designs_and_takes_failures_back() {
     // No camera, no design; the one that there is stays. With the camera back it is served again.
     let answers =
         said(&mut keeper, r#"{"event":"component_status","component":"c_camera","status":"FALSE"}"#);
-    assert!(answers.iter().any(|answer| matches!(answer, KeeperAnswer::Unserved { .. })), "{answers:?}");
+    assert!(
+        answers.iter().any(|answer| matches!(answer, KeeperAnswer::Service(Service::Unserved { .. }))),
+        "{answers:?}"
+    );
     assert_eq!(asked(&answers), []);
     assert_eq!(asked(&said(&mut keeper, r#"{"event":"tick"}"#)), []);
     said(&mut keeper, r#"{"event":"component_status","component":"c_arm","status":"RECOVERED"}"#);
@@ -244,7 +247,7 @@ fn the_loop_asks_for_designs_and_takes_failures_back() {
         said(&mut keeper, r#"{"event":"component_status","component":"c_camera","status":"RECOVERED"}"#);
     assert_eq!(asked(&answers), [("o1", Some("fd_look_far"), Some("fd_look_close"))]);
     let again = r#"{"event":"objective_added","objective":"o1","function":"f_look","seq":1}"#;
-    assert_eq!(said(&mut keeper, again), [KeeperAnswer::Duplicate { seq: 1 }]);
+    assert_eq!(said(&mut keeper, again), [KeeperAnswer::Loop(Answer::Duplicate { sequence: 1 })]);
     for (line, code) in [
         (r#"{"event":"objective_added","objective":"o2","function":"f_lok"}"#, "M306"),
         (r#"{"event":"objective_added","objective":"o1","function":"f_look"}"#, "M306"),
@@ -257,8 +260,7 @@ fn the_loop_asks_for_designs_and_takes_failures_back() {
         ),
     ] {
         let answers = said(&mut keeper, line);
-        let is_refused =
-            |answer: &KeeperAnswer| matches!(answer, KeeperAnswer::Error { code: own, .. } if own == code);
+        let is_refused = |answer: &KeeperAnswer| matches!(answer, KeeperAnswer::Loop(Answer::Error { code: own, .. }) if own == code);
         assert!(matches!(&answers[..], [only] if is_refused(only)), "{line}: {answers:?}");
     }
     let answers = said(&mut keeper, r#"{"event":"objective_removed","objective":"o1"}"#);
