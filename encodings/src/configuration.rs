@@ -381,6 +381,86 @@ mod tests {
         assert!((300..2700).contains(&partly), "the choices are of one kind: {partly}");
     }
 
+    /// Numbers as sensors and spreadsheets write them: 16 digits, huge and tiny ones, side by side.
+    #[test]
+    fn numbers_of_the_field_are_exact() {
+        let mut draw = Random(11);
+        let power = |exponent: usize| {
+            BigRational::from_integer(BigInt::from(10).pow(u32::try_from(exponent).expect("small")))
+        };
+        for round in 0..300 {
+            let number = |draw: &mut Random| {
+                let digits = number(draw.below(1 << 53)) / power(16);
+                match draw.below(6) {
+                    0 => digits * power(320),
+                    1 => digits / power(320),
+                    _ => digits,
+                }
+            };
+            let functions: Vec<Vec<DesignChoice>> = (0..=draw.below(3))
+                .map(|_| {
+                    let design = |draw: &mut Random| DesignChoice {
+                        missed: 0,
+                        utility: number(draw),
+                        demands: vec![number(draw)],
+                        components: BTreeSet::new(),
+                    };
+                    (0..=draw.below(3)).map(|_| design(&mut draw)).collect()
+                })
+                .collect();
+            // Just enough for some choice, or too little for it by as little as can be.
+            let some: BigRational =
+                functions.iter().filter_map(|own| own.first()).map(|own| own.demands[0].clone()).sum();
+            for budget in [some.clone(), some - power(0) / power(640)] {
+                let budgets = [budget.max(BigRational::zero())];
+                let chosen = configure(&functions, &budgets, &Limits::none());
+                let ((_, _, utility), designs) = by_enumeration(&functions, &budgets);
+                assert_eq!(
+                    (chosen.designs, chosen.utility),
+                    (designs, utility),
+                    "round {round}: {functions:?} {budgets:?}"
+                );
+            }
+        }
+    }
+
+    /// The multiple-choice knapsack problem by dynamic programming over each amount that can be spent.
+    fn by_amounts(functions: &[Vec<(i64, usize)>], budget: usize) -> (usize, i64) {
+        let mut best = vec![(0, 0); budget + 1];
+        for designs in functions {
+            let with = |left: usize| {
+                let fitting = designs.iter().filter(|(_, demand)| *demand <= left);
+                let worths = fitting
+                    .map(|(utility, demand)| (best[left - demand].0 + 1, best[left - demand].1 + utility));
+                worths.chain([best[left]]).max()
+            };
+            best = (0..=budget).map(|left| with(left).expect("one")).collect();
+        }
+        best[budget]
+    }
+
+    #[test]
+    fn thousands_of_designs_are_as_by_dynamic_programming() {
+        let mut draw = Random(5);
+        for (count, designs, budget) in [(40, 50, 300), (20, 200, 90), (100, 20, 450), (8, 3, 9)] {
+            let functions: Vec<Vec<(i64, usize)>> = (0..count)
+                .map(|_| (0..designs).map(|_| (draw.below(1000), 1 + draw.below(30) as usize)).collect())
+                .collect();
+            let item = |(utility, demand): &(i64, usize)| DesignChoice {
+                missed: 0,
+                utility: number(*utility),
+                demands: vec![number(*demand as i64)],
+                components: BTreeSet::new(),
+            };
+            let choices: Vec<Vec<DesignChoice>> =
+                functions.iter().map(|own| own.iter().map(item).collect()).collect();
+            let chosen = configure(&choices, &[number(budget)], &Limits::none());
+            let (served, utility) = by_amounts(&functions, budget as usize);
+            assert!(chosen.optimal);
+            assert_eq!((chosen.designs.iter().flatten().count(), chosen.utility), (served, number(utility)));
+        }
+    }
+
     #[test]
     fn a_limit_leaves_a_choice_that_is_allowed() {
         let item = |utility: i64, demand: i64| DesignChoice {
