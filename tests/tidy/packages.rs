@@ -1,10 +1,7 @@
 //! What a package is linked with.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::process::Command;
-use std::sync::OnceLock;
-
-use serde_json::Value;
 
 /// Packages that plan, decide or search, which nothing that has to be believed is linked with.
 const PLANNERS: [&str; 7] =
@@ -14,51 +11,17 @@ const PLANNERS: [&str; 7] =
 /// its replay, and with OWL for its reading.
 const KNOWLEDGE: [&str; 3] = ["metaplan-ontology", "metaplan-rules", "crepe"];
 
-/// What cargo says of all packages.
-fn metadata() -> &'static Value {
-    static METADATA: OnceLock<Value> = OnceLock::new();
-    METADATA.get_or_init(|| {
-        let output = Command::new(env!("CARGO"))
-            .args(["metadata", "--format-version", "1", "--offline", "--locked", "--all-features"])
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .output()
-            .expect("cargo");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice(&output.stdout).expect("JSON")
-    })
-}
-
 /// The names of all packages that one is linked with, itself among them, whatever the platform and the features.
 pub fn linked(package: &str) -> BTreeSet<String> {
-    let metadata = metadata();
-    let packages = &metadata["packages"];
-    let names: BTreeMap<_, _> =
-        list(packages).iter().map(|own| (text(&own["id"]), text(&own["name"]))).collect();
-    let nodes = &metadata["resolve"]["nodes"];
-    let nodes: BTreeMap<_, _> = list(nodes).iter().map(|node| (text(&node["id"]), node)).collect();
-    let mut open: Vec<_> = nodes.keys().copied().filter(|id| names[id] == package).collect();
-    assert_eq!(open.len(), 1, "one package has the name {package}");
-    let mut seen = BTreeSet::new();
-    while let Some(id) = open.pop() {
-        if !seen.insert(id) {
-            continue;
-        }
-        // What only tests need has the kind `dev`.
-        let needed =
-            |dependency: &&Value| list(&dependency["dep_kinds"]).iter().any(|kind| kind["kind"] != "dev");
-        open.extend(
-            list(&nodes[id]["deps"]).iter().filter(needed).map(|dependency| text(&dependency["pkg"])),
-        );
-    }
-    seen.iter().map(|id| names[id].to_owned()).collect()
-}
-
-fn list(value: &Value) -> &[Value] {
-    value.as_array().map_or(&[], Vec::as_slice)
-}
-
-fn text(value: &Value) -> &str {
-    value.as_str().expect("a text")
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--package", package, "--edges", "normal,build", "--all-features", "--target", "all"])
+        .args(["--prefix", "none", "--format", "{p}", "--locked", "--quiet"])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("cargo");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let lines = String::from_utf8(output.stdout).expect("text");
+    lines.lines().filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect()
 }
 
 /// Those of some packages that one is linked with.

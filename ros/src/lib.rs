@@ -1,0 +1,1 @@
+//! Metaplan on a ROS 2 robot, over DDS and without a ROS installation.

@@ -1,0 +1,3 @@
+//! The program `metaplan-ros`.
+
+fn main() {}
