@@ -152,10 +152,23 @@ impl Adapting<'_> {
         self.beliefs.stuck = false;
         if self.is_current(steps) {
             answers.push(Answer::PlanKept { because: "it is still the best".to_owned() });
+            self.configure_again(answers);
         } else if let Some(because) = (!must).then(|| self.not_worth_it(&outcome)).flatten() {
             answers.push(Answer::PlanKept { because });
         } else {
             self.adopt(outcome, answers);
+        }
+    }
+
+    /// Gives the functions of the action under way their designs where they have lost them.
+    fn configure_again(&mut self, answers: &mut Vec<Answer>) {
+        let Some(running) = &self.beliefs.running else { return };
+        let has = |(function, design): &(String, String)| {
+            self.beliefs.configuration.get(function).is_some_and(|own| own == design)
+        };
+        if !running.step.configuration.iter().all(has) {
+            let (action, step) = (running.action, running.step.clone());
+            reconfigure(self.beliefs, action, &step, answers);
         }
     }
 

@@ -100,11 +100,27 @@ pub enum Event {
         /// The number of the effect.
         effect: u64,
     },
-    /// An effect could not be carried out.
+    /// A change of designs could not be carried out: the design counts as not realisable until [`Event::Design`] says otherwise.
     #[serde(rename = "reconfiguration_failed")]
     ReconfigurationFailed {
         /// The number of the effect.
         effect: u64,
+    },
+    /// A function says whether it can take a design, whatever follows from components and measurements.
+    #[serde(rename = "design_status")]
+    Design {
+        /// Local name or IRI.
+        design: String,
+        /// Whether it can.
+        realisable: bool,
+    },
+    /// A function was seen to have a design that nobody here has asked for.
+    #[serde(rename = "configuration_observed")]
+    Observed {
+        /// Local name.
+        function: String,
+        /// Local name; none where the function has no design.
+        design: Option<String>,
     },
     /// A function is needed from now on.
     #[serde(rename = "objective_added")]
@@ -317,6 +333,27 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
         "reconfiguration_failed" => Event::ReconfigurationFailed {
             effect: need(fields, "effect", "the number of an effect", Value::as_u64)?,
         },
+        "design_status" => Event::Design {
+            design: need(fields, "design", "the name of a function design", text)?,
+            realisable: need(fields, "realisable", "true or false", Value::as_bool)?,
+        },
+        "configuration_observed" => Event::Observed {
+            function: need(fields, "function", "the name of a function", text)?,
+            design: match fields.remove("design") {
+                Some(Value::Null) => None,
+                Some(value) => {
+                    let wrong =
+                        || Refusal::new("M302", format!("`design` is {value}, but should be a name or null"));
+                    Some(text(&value).ok_or_else(wrong)?)
+                }
+                None => {
+                    return Err(Refusal::new(
+                        "M302",
+                        "the field `design` is missing; it should be a name or null",
+                    ));
+                }
+            },
+        },
         "objective_added" => Event::ObjectiveAdded {
             objective: need(fields, "objective", "a name", text)?,
             function: need(fields, "function", "the name of a function", text)?,
@@ -346,7 +383,7 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
     }
 }
 
-const KINDS: [&str; 14] = [
+const KINDS: [&str; 16] = [
     "measured",
     "component_status",
     "action_started",
@@ -360,6 +397,8 @@ const KINDS: [&str; 14] = [
     "reconfiguration_failed",
     "objective_added",
     "objective_removed",
+    "design_status",
+    "configuration_observed",
     "tick",
 ];
 

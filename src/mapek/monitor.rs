@@ -8,6 +8,7 @@ use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
 use crate::knowledge::RobotReport;
+use crate::mapek::answer::Command;
 use crate::mapek::beliefs::{Beliefs, Running};
 use crate::mapek::event::{Event, Refusal};
 use crate::mapek::step::PlannedStep;
@@ -111,17 +112,13 @@ impl Taking<'_> {
         match event {
             Event::Measured { attribute, value } => self.measured(attribute, value),
             Event::Component { component, status } => {
-                let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
-                    let text = format!("there is no knowledge base that has a component `{component}`");
-                    return Err(Refusal::new("M306", text));
-                };
-                let was_known = knowledge.fault().is_none();
-                let delta = knowledge
-                    .take(component, RobotReport::Component(*status))
-                    .map_err(|message| fault(&message))?;
-                self.note(&delta, was_known);
-                Ok(())
+                self.report("component", component, RobotReport::Component(*status))
             }
+            Event::Design { design, realisable } => {
+                self.report("design", design, RobotReport::Design(*realisable))
+            }
+            Event::Observed { function, design } => self.observed(function, design.as_deref()),
+            Event::ReconfigurationFailed { effect } => self.not_configured(*effect),
             Event::Started { action } => self.running(*action).map(|_| ()),
             Event::Progress { action, fraction } => {
                 self.running(*action)?;
@@ -153,15 +150,77 @@ impl Taking<'_> {
                 None if *effect >= 1 && *effect <= self.beliefs.effects => Ok(()),
                 None => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
             },
-            Event::ReconfigurationFailed { .. }
-            | Event::ObjectiveAdded { .. }
-            | Event::ObjectiveRemoved { .. } => {
+            Event::ObjectiveAdded { .. } | Event::ObjectiveRemoved { .. } => {
                 let text =
                     format!("`{}` goes with `run --configure`; here the plan needs functions", event.kind());
                 Err(Refusal::new("M306", text))
             }
             Event::Tick => Ok(()),
         }
+    }
+
+    /// Tells the knowledge base something about one of its individuals.
+    fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
+        let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
+            let text = format!("there is no knowledge base that has a {kind} `{name}`");
+            return Err(Refusal::new("M306", text));
+        };
+        let was_known = knowledge.fault().is_none();
+        let delta = knowledge.take(name, report).map_err(|message| fault(&message))?;
+        self.note(&delta, was_known);
+        Ok(())
+    }
+
+    /// A function could not take the design that was asked for: it has the one before, and nobody asks for the other again until the
+    /// function says that it can take it.
+    fn not_configured(&mut self, effect: u64) -> Result<(), Refusal> {
+        let asked = self.beliefs.outstanding.get(&effect).map(|effect| &effect.command);
+        let Some(Command::Reconfigure { function, from, to }) = asked.cloned() else {
+            return Err(Refusal::new("M305", format!("no reconfiguration {effect} is waited for")));
+        };
+        self.report("design", &to, RobotReport::Design(false))?;
+        self.beliefs.outstanding.remove(&effect);
+        if self.beliefs.configuration.get(&function) == Some(&to) {
+            self.beliefs.configuration.remove(&function);
+            self.beliefs.configuration.extend(from.map(|from| (function, from)));
+        }
+        Ok(())
+    }
+
+    /// A function was seen with a design that was not asked for: it has it from now on, and so has the action under way. Whether that is
+    /// worth a change is asked as when a design comes back.
+    fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
+        let designs = self.beliefs.mission.designs_of(function);
+        if designs.is_empty() {
+            return Err(Refusal::new("M306", format!("there is no function `{function}` that has designs")));
+        }
+        if let Some(design) = design.filter(|design| designs.iter().all(|known| known != design)) {
+            let meant = did_you_mean(design, designs.iter().map(String::as_str));
+            let text = format!("{function} has no design `{design}`; it has {}{meant}", designs.join(", "));
+            return Err(Refusal::new("M306", text));
+        }
+        let before = match design {
+            Some(design) => self.beliefs.configuration.insert(function.to_owned(), design.to_owned()),
+            None => self.beliefs.configuration.remove(function),
+        };
+        if before.as_deref() == design {
+            return Ok(());
+        }
+        let Some(running) = self.beliefs.running.as_mut().filter(|own| own.step.design(function).is_some())
+        else {
+            return Ok(());
+        };
+        if let Some(design) = design {
+            running.step = running.step.with_design(function, design);
+            self.changes.facts = true;
+            self.changes.predicates = true;
+        } else {
+            let action = running.action;
+            self.changes
+                .must
+                .push(format!("{function} has no design any more, and action {action} needs it"));
+        }
+        Ok(())
     }
 
     fn measured(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {

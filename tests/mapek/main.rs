@@ -3,6 +3,7 @@
 mod common;
 mod configure;
 mod damage;
+mod designs;
 mod experiments;
 mod failures;
 mod faults;

@@ -59,12 +59,12 @@ impl Knowledge {
         for (name, report) in reports {
             let delta = report.update(engine, name)?;
             let word = match report {
-                RobotReport::Component(_) => None,
+                RobotReport::Component(_) | RobotReport::Design(_) => None,
                 RobotReport::Measured(value) => engine.symbols().find_literal(value),
             };
             for fact in delta.insert {
                 let is_word =
-                    matches!(report, RobotReport::Component(_)) || fact.arguments.get(1) == word.as_ref();
+                    !matches!(report, RobotReport::Measured(_)) || fact.arguments.get(1) == word.as_ref();
                 if is_word && fact.arguments.len() == 2 {
                     words.insert((fact.predicate, fact.arguments[0]), fact);
                 } else {

@@ -14,6 +14,8 @@ pub enum RobotReport {
     Component(Status),
     /// What an attribute measures.
     Measured(Literal),
+    /// Whether a design can be taken, as its function says: not by what follows from its components.
+    Design(bool),
 }
 
 /// That what follows is not known.
@@ -39,13 +41,14 @@ pub struct Waiting {
 
 impl RobotReport {
     pub(super) fn is_alike(&self, other: &Self) -> bool {
-        matches!(self, Self::Component(_)) == matches!(other, Self::Component(_))
+        std::mem::discriminant(self) == std::mem::discriminant(other)
     }
 
     pub(super) fn update(&self, engine: &mut rules::Engine, name: &str) -> Result<Delta, ontology::Error> {
         match self {
             Self::Component(status) => change::component_status(engine, name, *status),
             Self::Measured(value) => change::measured_value(engine, name, value.clone()),
+            Self::Design(realisable) => change::design_realisable(engine, name, *realisable),
         }
     }
 
@@ -60,6 +63,7 @@ impl RobotReport {
             Self::Component(Status::Recovered) => ("component", "RECOVERED".to_owned()),
             Self::Component(Status::Working) => ("component", "TRUE".to_owned()),
             Self::Measured(value) => ("measured", value.lexical()),
+            Self::Design(realisable) => ("design", realisable.to_string()),
         }
     }
 
@@ -68,6 +72,7 @@ impl RobotReport {
             ("component", "FALSE") => Some(Self::Component(Status::Failed)),
             ("component", "RECOVERED") => Some(Self::Component(Status::Recovered)),
             ("component", "TRUE") => Some(Self::Component(Status::Working)),
+            ("design", word) => word.parse().ok().map(Self::Design),
             ("measured", number) => {
                 let value = Literal::parse(number, Some(ontology::vocab::xsd::DECIMAL), None);
                 value.as_rational().is_some().then_some(Self::Measured(value))

@@ -83,6 +83,18 @@ pub fn clear_component_status(engine: &mut Engine, component: &str) -> Result<De
     Ok(replace(engine, property, subject, None))
 }
 
+/// The update after which a function design, named by its IRI or local name, is said not to be realisable whatever its components and
+/// measurements are like, or after which nobody says so any more.
+///
+/// # Errors
+/// [`Error::Unknown`] where the knowledge base has no such design.
+pub fn design_realisable(engine: &mut Engine, design: &str, realisable: bool) -> Result<Delta, Error> {
+    let (subject, class) = Facts::new(engine).find("function design", terms::FUNCTION_DESIGN, design)?;
+    let property = engine.symbols_mut().name(beside(terms::REALISABILITY, class));
+    let value = (!realisable).then(|| engine.symbols_mut().literal(Literal::Boolean(false)));
+    Ok(replace(engine, property, subject, value))
+}
+
 /// The update that sets the measured value of a quality attribute, named by the IRI or local name of its type.
 ///
 /// Where nothing holds measurements of that type yet, an individual `obs_<type>` is made. Groundings whose design has
