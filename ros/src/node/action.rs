@@ -1,0 +1,522 @@
+//! Actions: serving them, and having them done by others.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+
+use futures::{FutureExt as _, StreamExt as _};
+use metaplan::message::Message;
+use ros2_client::ActionTypeName;
+use ros2_client::action::{
+    ActionClient, ActionClientQosPolicies, ActionServer, ActionServerQosPolicies, GetResultResponse, GoalId, GoalInfo,
+    GoalStatusEnum, SendGoalResponse,
+};
+use ros2_client::action_msgs::{CancelGoalResponse, CancelGoalResponseEnum, GoalStatus, GoalStatusArray};
+use ros2_client::builtin_interfaces::Time;
+use ros2_client::request_id::RmwRequestId;
+use smol::{Timer, channel};
+
+use crate::interfaces::action_msgs::srv::CancelGoalRequest;
+use crate::interfaces::{Action, Service, Structure as _};
+use crate::node::graph::{Expected, Graph};
+use crate::node::rmw::Mapping;
+use crate::node::{Node, Severity, client_name, dds_type, latched, not_made, qos};
+
+/// The client library has no stream of all that an action server hears: it is asked so often.
+const POLL: Duration = Duration::from_millis(2);
+
+/// So long a result is kept for those who ask for it, as in `rcl_action`.
+const KEPT: Duration = Duration::from_secs(15 * 60);
+
+type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
+type Client<A> = ActionClient<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
+
+/// How a goal has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GoalEnd {
+    /// As it should.
+    Succeeded,
+    /// It was cancelled.
+    Canceled,
+    /// It could not be reached.
+    Aborted,
+}
+
+impl GoalEnd {
+    fn status(self) -> GoalStatusEnum {
+        match self {
+            Self::Succeeded => GoalStatusEnum::Succeeded,
+            Self::Canceled => GoalStatusEnum::Canceled,
+            Self::Aborted => GoalStatusEnum::Aborted,
+        }
+    }
+}
+
+/// What a client of an action of ours wants.
+#[derive(Debug)]
+pub enum GoalEvent<A: Action> {
+    /// A new goal, to be answered with [`Goals::accept`] or [`Goals::reject`].
+    Wanted(Wanted, A::Goal),
+    /// A goal is to be cancelled: [`Goals::canceling`] says whether it will be.
+    Cancel(GoalId, CancelRequest),
+}
+
+/// A goal that waits for an answer.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted {
+    request: RmwRequestId,
+    goal: GoalId,
+}
+
+/// A request to cancel that waits for an answer.
+#[derive(Debug, Clone, Copy)]
+pub struct CancelRequest {
+    request: RmwRequestId,
+    info: Time,
+    goal: GoalId,
+}
+
+/// A goal that was accepted.
+#[derive(Debug)]
+struct Known<R> {
+    accepted: Time,
+    status: GoalStatusEnum,
+    /// With the time when it has ended.
+    result: Option<(R, Instant)>,
+    /// Who waits for the result.
+    asked: Vec<RmwRequestId>,
+}
+
+/// The goals of an action that is served here.
+pub struct Goals<A: Action> {
+    server: OnceLock<Server<A>>,
+    goals: Mutex<BTreeMap<GoalId, Known<A::Result>>>,
+}
+
+impl<A: Action> std::fmt::Debug for Goals<A> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("Goals").field(&A::NAME).finish()
+    }
+}
+
+impl<A: Action> Goals<A> {
+    fn goals(&self) -> MutexGuard<'_, BTreeMap<GoalId, Known<A::Result>>> {
+        self.goals.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Accepts a goal, which is under way from then on.
+    pub fn accept(&self, wanted: Wanted) -> GoalId {
+        let accepted = Time::now();
+        let known = Known { accepted, status: GoalStatusEnum::Executing, result: None, asked: Vec::new() };
+        self.goals().insert(wanted.goal, known);
+        self.answer(wanted, true, accepted);
+        self.tell();
+        wanted.goal
+    }
+
+    /// Does not accept a goal.
+    pub fn reject(&self, wanted: Wanted) {
+        self.answer(wanted, false, Time::now());
+    }
+
+    fn answer(&self, wanted: Wanted, accepted: bool, stamp: Time) {
+        if let Some(server) = self.server.get() {
+            // What cannot be written is lost, and the client's time runs out.
+            let _ = server.send_goal_response(wanted.request, SendGoalResponse { accepted, stamp });
+        }
+    }
+
+    /// Says whether a goal will be cancelled.
+    pub fn canceling(&self, request: CancelRequest, will_be: bool) {
+        let goals_canceling =
+            if will_be { vec![GoalInfo { goal_id: request.goal, stamp: request.info }] } else { Vec::new() };
+        if will_be && let Some(known) = self.goals().get_mut(&request.goal) {
+            known.status = GoalStatusEnum::Canceling;
+        }
+        let code = if will_be { CancelGoalResponseEnum::None } else { CancelGoalResponseEnum::Rejected };
+        self.answer_cancel(request.request, code, goals_canceling);
+        self.tell();
+    }
+
+    fn answer_cancel(&self, request: RmwRequestId, code: CancelGoalResponseEnum, goals: Vec<GoalInfo>) {
+        if let Some(server) = self.server.get() {
+            let _ = server
+                .send_cancel_response(request, CancelGoalResponse { return_code: code, goals_canceling: goals });
+        }
+    }
+
+    /// Says how it goes.
+    pub fn feedback(&self, goal: GoalId, feedback: A::Feedback) {
+        if let Some(server) = self.server.get() {
+            let _ = server.send_feedback(goal, feedback);
+        }
+    }
+
+    /// Ends a goal.
+    pub fn finish(&self, goal: GoalId, end: GoalEnd, result: A::Result) {
+        let mut goals = self.goals();
+        let Some(known) = goals.get_mut(&goal) else { return };
+        known.status = end.status();
+        known.result = Some((result, Instant::now()));
+        for request in std::mem::take(&mut known.asked) {
+            self.send_result(request, known);
+        }
+        goals.retain(|_, own| own.result.as_ref().is_none_or(|(_, ended)| ended.elapsed() < KEPT));
+        drop(goals);
+        self.tell();
+    }
+
+    fn send_result(&self, request: RmwRequestId, known: &Known<A::Result>) {
+        if let (Some(server), Some((result, _))) = (self.server.get(), &known.result) {
+            let _ = server.send_result(request, GetResultResponse { status: known.status, result: result.clone() });
+        }
+    }
+
+    /// Publishes the status of all goals.
+    fn tell(&self) {
+        let status = |(goal_id, known): (&GoalId, &Known<A::Result>)| GoalStatus {
+            goal_info: GoalInfo { goal_id: *goal_id, stamp: known.accepted },
+            status: known.status,
+        };
+        let status_list = self.goals().iter().map(status).collect();
+        if let Some(server) = self.server.get() {
+            let _ = server.send_goal_statuses(GoalStatusArray { status_list });
+        }
+    }
+
+    /// Takes what has been heard since; returns what went wrong.
+    fn poll(&self, take: &mut impl FnMut(GoalEvent<A>)) -> Vec<String> {
+        let Some(server) = self.server.get() else { return Vec::new() };
+        let mut wrong = Vec::new();
+        match server.receive_goal() {
+            Ok(Some((request, goal))) if !self.goals().contains_key(&goal.goal_id) => {
+                take(GoalEvent::Wanted(Wanted { request, goal: goal.goal_id }, goal.goal));
+            }
+            // A goal that is known already was sent twice.
+            Ok(_) => {}
+            Err(error) => wrong.push(error.to_string()),
+        }
+        match server.receive_cancel_request() {
+            Ok(Some((request, cancel))) => self.cancel(request, &cancel, take),
+            Ok(None) => {}
+            Err(error) => wrong.push(error.to_string()),
+        }
+        match server.receive_result_request() {
+            Ok(Some((request, wanted))) => self.result(request, wanted.goal_id),
+            Ok(None) => {}
+            Err(error) => wrong.push(error.to_string()),
+        }
+        wrong
+    }
+
+    fn result(&self, request: RmwRequestId, goal: GoalId) {
+        let mut goals = self.goals();
+        match goals.get_mut(&goal) {
+            Some(known) if known.result.is_some() => self.send_result(request, known),
+            Some(known) => known.asked.push(request),
+            None => {
+                drop(goals);
+                let response =
+                    GetResultResponse { status: GoalStatusEnum::Unknown, result: A::Result::default() };
+                if let Some(server) = self.server.get() {
+                    let _ = server.send_result(request, response);
+                }
+            }
+        }
+    }
+
+    /// Which goals are meant: one, all, or those accepted up to a time (`action_msgs/srv/CancelGoal`).
+    fn cancel(
+        &self,
+        request: RmwRequestId,
+        cancel: &ros2_client::action::CancelGoalRequest,
+        take: &mut impl FnMut(GoalEvent<A>),
+    ) {
+        // The library keeps the fields to itself, and shows them only as data.
+        let Some(cancel) =
+            serde_json::to_value(cancel).ok().and_then(|data| serde_json::from_value::<CancelGoalRequest>(data).ok())
+        else {
+            self.answer_cancel(request, CancelGoalResponseEnum::UnknownGoal, Vec::new());
+            return;
+        };
+        let (wanted, stamp) = (cancel.goal_info.goal_id.uuid, cancel.goal_info.stamp);
+        let until = i128::from(stamp.sec) * 1_000_000_000 + i128::from(stamp.nanosec);
+        let nanoseconds = |time: Time| i128::from(ros2_client::ros_time::ROSTime::from(time).to_nanos());
+        let (any, always) = (wanted == [0; 16], until == 0);
+        let is_meant = |(goal, known): &(&GoalId, &Known<A::Result>)| {
+            let is_it = goal.uuid.into_bytes() == wanted;
+            let is_before = nanoseconds(known.accepted) <= until;
+            known.result.is_none() && if any { always || is_before } else { is_it || (!always && is_before) }
+        };
+        let goals = self.goals();
+        let meant: Vec<(GoalId, Time)> =
+            goals.iter().filter(is_meant).map(|(goal, known)| (*goal, known.accepted)).collect();
+        let is_known = any || goals.keys().any(|goal| goal.uuid.into_bytes() == wanted);
+        drop(goals);
+        if meant.is_empty() {
+            let code = match (is_known, any) {
+                (true, false) => CancelGoalResponseEnum::GoalTerminated,
+                (true, true) => CancelGoalResponseEnum::Rejected,
+                (false, _) => CancelGoalResponseEnum::UnknownGoal,
+            };
+            self.answer_cancel(request, code, Vec::new());
+        }
+        for (goal, info) in meant {
+            take(GoalEvent::Cancel(goal, CancelRequest { request, info, goal }));
+        }
+    }
+}
+
+/// What is heard of a goal that somebody else has accepted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Accepted<A: Action> {
+    /// How it goes.
+    Feedback(A::Feedback),
+    /// How it has ended.
+    Ended(GoalEnd, A::Result),
+    /// Nobody knows how it ends.
+    Lost(String),
+}
+
+/// Why a goal is not pursued.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum GoalError {
+    /// Nobody serves the action, or whoever does does not answer.
+    #[error("{action}: {because}")]
+    Unreachable {
+        /// Its full name.
+        action: String,
+        /// What has happened.
+        because: String,
+    },
+    /// The server does not want it.
+    #[error("{0} has rejected the goal")]
+    Rejected(String),
+}
+
+/// Has actions done by somebody else.
+pub struct ActionCaller<A: Action> {
+    node: Arc<Node>,
+    full: String,
+    connection: smol::lock::Mutex<Option<(Mapping, Arc<Client<A>>)>>,
+}
+
+/// A goal that somebody else pursues.
+#[derive(Debug)]
+pub struct Pursued<A: Action> {
+    goal: GoalId,
+    /// What is heard of it; ends with its end.
+    pub events: channel::Receiver<Accepted<A>>,
+    cancel: channel::Sender<()>,
+}
+
+impl<A: Action> Pursued<A> {
+    /// The goal's number, as in logs.
+    pub fn goal(&self) -> GoalId {
+        self.goal
+    }
+
+    /// Asks for a safe end, which is heard of as any other.
+    pub fn cancel(&self) {
+        let _ = self.cancel.try_send(());
+    }
+}
+
+impl<A: Action> std::fmt::Debug for ActionCaller<A> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("ActionCaller").field(&self.full).finish()
+    }
+}
+
+impl<A: Action + 'static> ActionCaller<A> {
+    /// Sends a goal; `within` is how long a server is waited for, and its answer.
+    ///
+    /// # Errors
+    /// There is no server, no answer, or the goal is rejected.
+    pub async fn pursue(&self, goal: A::Goal, within: Duration) -> Result<Pursued<A>, GoalError> {
+        let begun = Instant::now();
+        let unreachable = |because: String| GoalError::Unreachable { action: self.full.clone(), because };
+        let (mapping, client) = self.connect(within).await.map_err(unreachable)?;
+        let left = within.saturating_sub(begun.elapsed());
+        let mut timer = FutureExt::fuse(Timer::after(left));
+        let mut sent = Box::pin(client.async_send_goal(goal)).fuse();
+        let (id, response) = futures::select! {
+            sent = sent => sent.map_err(|error| unreachable(error.to_string()))?,
+            _ = timer => {
+                let text = format!(
+                    "no answer to a goal after {:.1} s; it was sent with the mapping of {mapping}, `--rmw {}` has the other one",
+                    within.as_secs_f64(),
+                    mapping.other()
+                );
+                return Err(unreachable(text));
+            }
+        };
+        drop(sent);
+        if !response.accepted {
+            return Err(GoalError::Rejected(self.full.clone()));
+        }
+        let (sender, events) = channel::unbounded();
+        let (cancel, cancelled) = channel::bounded(1);
+        smol::spawn(follow::<A>(client, id, sender, cancelled)).detach();
+        Ok(Pursued { goal: id, events, cancel })
+    }
+
+    async fn connect(&self, within: Duration) -> Result<(Mapping, Arc<Client<A>>), String> {
+        let (requests, replies) = goal_topics(&self.full);
+        let found = self.node.graph.wait(within, |graph| graph.server(&requests, &replies)).await;
+        let mapping = found.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
+        let mut connection = self.connection.lock().await;
+        if let Some((own, client)) = connection.as_ref().filter(|(own, _)| *own == mapping) {
+            return Ok((*own, Arc::clone(client)));
+        }
+        let name = client_name(&self.full).map_err(|message| message.message.clone())?;
+        let policies = ActionClientQosPolicies {
+            goal_service: qos::service(),
+            result_service: qos::service(),
+            cancel_service: qos::service(),
+            feedback_subscription: qos::depth(10),
+            status_subscription: latched(1),
+        };
+        let kind = ActionTypeName::new(A::PACKAGE, A::NAME);
+        let made = self
+            .node
+            .inner()
+            .create_action_client(mapping.service_mapping(), &name, &kind, policies)
+            .map_err(|error| error.to_string())?;
+        // What is answered before the server has discovered us is lost.
+        Timer::after(Duration::from_millis(100).min(within)).await;
+        let client = Arc::new(made);
+        *connection = Some((mapping, Arc::clone(&client)));
+        Ok((mapping, client))
+    }
+}
+
+/// Hands on what is heard of a goal, up to its end.
+async fn follow<A: Action + 'static>(
+    client: Arc<Client<A>>,
+    id: GoalId,
+    events: channel::Sender<Accepted<A>>,
+    cancelled: channel::Receiver<()>,
+) {
+    let mut result = Box::pin(client.async_request_result(id)).fuse();
+    let mut feedback = Box::pin(client.feedback_stream(id));
+    let mut cancelled = Box::pin(cancelled);
+    loop {
+        let event = futures::select! {
+            ended = result => match ended {
+                Ok((status, result)) => {
+                    let end = match status {
+                        GoalStatusEnum::Succeeded => GoalEnd::Succeeded,
+                        GoalStatusEnum::Canceled => GoalEnd::Canceled,
+                        _ => GoalEnd::Aborted,
+                    };
+                    Accepted::Ended(end, result)
+                }
+                Err(error) => Accepted::Lost(error.to_string()),
+            },
+            heard = feedback.next() => match heard {
+                Some(Ok(feedback)) => Accepted::Feedback(feedback),
+                Some(Err(_)) | None => continue,
+            },
+            // The end of the channel is no wish to cancel; the goal goes on.
+            wish = cancelled.next() => {
+                if wish.is_some() {
+                    let _ = client.cancel_goal(id);
+                }
+                continue;
+            }
+        };
+        let is_end = !matches!(event, Accepted::Feedback(_));
+        if events.send(event).await.is_err() || is_end {
+            return;
+        }
+    }
+}
+
+/// The topics of the requests and replies of the service that takes goals.
+fn goal_topics(full: &str) -> (String, String) {
+    (format!("rq{full}/_action/send_goalRequest"), format!("rr{full}/_action/send_goalReply"))
+}
+
+/// The types of all topics of an action.
+fn expect_action<A: Action>(graph: &Graph, full: &str) {
+    use crate::interfaces::action_msgs::srv::CancelGoal;
+    let services = [("send_goal", "SendGoal", A::SEND_GOAL_RIHS01), ("get_result", "GetResult", A::GET_RESULT_RIHS01)];
+    for (service, name, hash) in services {
+        for (topic, part) in [("rq", "Request"), ("rr", "Reply")] {
+            let end = if part == "Reply" { "Response" } else { part };
+            let type_name = dds_type(A::PACKAGE, "action", &format!("{}_{name}_{end}", A::NAME));
+            graph.expect(format!("{topic}{full}/_action/{service}{part}"), Expected { type_name, hash });
+        }
+    }
+    let package = CancelGoal::PACKAGE;
+    for (topic, part, end) in [("rq", "Request", "Request"), ("rr", "Reply", "Response")] {
+        let type_name = dds_type(package, "srv", &format!("CancelGoal_{end}"));
+        let expected = Expected { type_name, hash: CancelGoal::RIHS01 };
+        graph.expect(format!("{topic}{full}/_action/cancel_goal{part}"), expected);
+    }
+    let type_name = dds_type(A::PACKAGE, "action", &format!("{}_FeedbackMessage", A::NAME));
+    graph.expect(format!("rt{full}/_action/feedback"), Expected { type_name, hash: A::FEEDBACK_RIHS01 });
+    let status = crate::interfaces::action_msgs::msg::GoalStatusArray::RIHS01;
+    let type_name = dds_type("action_msgs", "msg", "GoalStatusArray");
+    graph.expect(format!("rt{full}/_action/status"), Expected { type_name, hash: status });
+}
+
+impl Node {
+    /// To have an action done by somebody else.
+    pub fn action_caller<A: Action>(self: &Arc<Self>, name: &str) -> ActionCaller<A> {
+        let full = self.resolve(name);
+        expect_action::<A>(&self.graph, &full);
+        ActionCaller { node: Arc::clone(self), full, connection: smol::lock::Mutex::new(None) }
+    }
+
+    /// Serves an action as soon as it is known how services are mapped.
+    ///
+    /// # Errors
+    /// The name is wrong.
+    pub fn serve_action<A: Action + 'static>(
+        self: &Arc<Self>,
+        name: &str,
+        mut take: impl FnMut(GoalEvent<A>) + Send + 'static,
+    ) -> Result<Arc<Goals<A>>, Message> {
+        let full = self.resolve(name);
+        let action_name = client_name(&full)?;
+        expect_action::<A>(&self.graph, &full);
+        let goals = Arc::new(Goals { server: OnceLock::new(), goals: Mutex::default() });
+        let (graph, weak, served) = (Arc::clone(&self.graph), Arc::downgrade(self), Arc::clone(&goals));
+        smol::spawn(async move {
+            let mapping = graph.mapping().await;
+            let Some(node) = weak.upgrade() else { return };
+            let policies = ActionServerQosPolicies {
+                goal_service: qos::service(),
+                result_service: qos::service(),
+                cancel_service: qos::service(),
+                feedback_publisher: qos::depth(10),
+                status_publisher: latched(1),
+            };
+            let kind = ActionTypeName::new(A::PACKAGE, A::NAME);
+            let made =
+                node.inner().create_action_server(mapping.service_mapping(), &action_name, &kind, policies);
+            match made {
+                Ok(server) => drop(served.server.set(server)),
+                Err(error) => {
+                    node.log(Severity::Fatal, &not_made(&full, &error).message);
+                    return;
+                }
+            }
+            drop(node);
+            loop {
+                for wrong in served.poll(&mut take) {
+                    let Some(node) = weak.upgrade() else { return };
+                    node.log(Severity::Warn, &format!("what {full} has heard is wrong: {wrong}"));
+                }
+                if weak.strong_count() == 0 {
+                    return;
+                }
+                Timer::after(POLL).await;
+            }
+        })
+        .detach();
+        Ok(goals)
+    }
+}

@@ -1,0 +1,279 @@
+//! What stands behind `--ros-args` on a command line: names to other names, parameters, and files of parameters.
+//!
+//! The syntax is that of `rcl` (ROS 2 design, articles "ROS 2 command line arguments" and "Remapping names"): `-r from:=to`,
+//! `-r node:from:=to`, `-r __node:=name`, `-r __ns:=/namespace`, `-p name:=value` (the value is YAML), `--params-file FILE`,
+//! `--log-level LEVEL`, each as often as wanted; `--` ends the group.
+
+use std::path::{Path, PathBuf};
+
+use metaplan::message::Message;
+use ros2_client::ParameterValue;
+use serde_yaml_ng::Value;
+
+use crate::node::names::{FullName, is_match};
+
+/// The words of a command line that are for ROS.
+#[derive(Debug, Clone, Default)]
+pub struct RosArguments {
+    rules: Vec<Rule>,
+    parameters: Vec<Assigned>,
+    /// The least level of what is logged, as `--log-level` has it.
+    pub log_level: Option<String>,
+}
+
+/// One name in place of another, for all nodes or for one.
+#[derive(Debug, Clone)]
+struct Rule {
+    node: Option<String>,
+    from: String,
+    to: String,
+}
+
+/// A value of a parameter, for the nodes whose full names match a pattern.
+#[derive(Debug, Clone)]
+struct Assigned {
+    nodes: String,
+    name: String,
+    value: ParameterValue,
+}
+
+impl RosArguments {
+    /// Parts the words of a command line: those of the program, and what stands behind `--ros-args`.
+    ///
+    /// # Errors
+    /// All that is wrong with the latter, and with the files that it names.
+    pub fn split(words: impl IntoIterator<Item = String>) -> Result<(Vec<String>, Self), Vec<Message>> {
+        let (mut own, mut ros) = (Vec::new(), Vec::new());
+        let mut is_ros = false;
+        for word in words {
+            match word.as_str() {
+                "--ros-args" => is_ros = true,
+                "--" if is_ros => is_ros = false,
+                _ if is_ros => ros.push(word),
+                _ => own.push(word),
+            }
+        }
+        let mut arguments = Self::default();
+        let mut messages = Vec::new();
+        let mut words = ros.into_iter();
+        while let Some(word) = words.next() {
+            if let Err(more) = arguments.take(&word, &mut words) {
+                messages.extend(more);
+            }
+        }
+        if messages.is_empty() { Ok((own, arguments)) } else { Err(messages) }
+    }
+
+    fn take(&mut self, word: &str, words: &mut impl Iterator<Item = String>) -> Result<(), Vec<Message>> {
+        let mut next = || words.next().ok_or_else(|| vec![wrong(format!("`{word}` wants a value"))]);
+        match word {
+            "-r" | "--remap" => self.rules.push(rule(&next()?).map_err(|message| vec![message])?),
+            "-p" | "--param" => self.parameters.push(parameter(&next()?).map_err(|message| vec![message])?),
+            "--params-file" => self.parameters.extend(parameters_file(&PathBuf::from(next()?))?),
+            "--log-level" => self.log_level = Some(next()?.to_lowercase()),
+            // What these set has no counterpart here: the enclave of security, files of log4 libraries, where logs go.
+            "-e" | "--enclave" | "--log-config-file" | "--log-file-name" => drop(next()?),
+            _ if word.starts_with("--enable-") || word.starts_with("--disable-") => {}
+            _ => {
+                let text = format!(
+                    "`{word}` is not known behind `--ros-args`; -r, -p, --params-file and --log-level are"
+                );
+                return Err(vec![wrong(text)]);
+            }
+        }
+        Ok(())
+    }
+
+    /// What a node is called that calls itself so in this namespace, after `__node` and `__ns`.
+    pub(crate) fn node(&self, name: &str) -> FullName {
+        let rule = |key: &str| {
+            let is_it = |own: &&Rule| own.from == key && own.node.as_deref().is_none_or(|node| node == name);
+            self.rules.iter().find(is_it).map(|own| own.to.clone())
+        };
+        let namespace = rule("__ns").unwrap_or_else(|| "/".to_owned());
+        FullName::new(&namespace, &rule("__node").or_else(|| rule("__name")).unwrap_or_else(|| name.to_owned()))
+    }
+
+    /// The full name of a topic, a service or an action of a node, after the first rule that fits.
+    pub(crate) fn remap(&self, name: &str, node: &FullName) -> String {
+        let full = node.expand(name);
+        let fits = |own: &&Rule| {
+            let is_for = own.node.as_deref().is_none_or(|for_node| for_node == node.name());
+            is_for && !own.from.starts_with("__") && node.expand(&own.from) == full
+        };
+        self.rules.iter().find(fits).map_or(full, |rule| node.expand(&rule.to))
+    }
+
+    /// The values given to parameters of a node, later ones last.
+    pub(crate) fn parameters(&self, node: &FullName) -> Vec<(String, ParameterValue)> {
+        let full = node.to_string();
+        let mine = self.parameters.iter().filter(|own| is_match(&own.nodes, &full, node.name()));
+        mine.map(|own| (own.name.clone(), own.value.clone())).collect()
+    }
+}
+
+fn wrong(text: String) -> Message {
+    Message::error("N101", text)
+}
+
+/// `from:=to` or `node:from:=to`.
+fn rule(text: &str) -> Result<Rule, Message> {
+    let wanted = || wrong(format!("`{text}` is not a rule; it should be `from:=to`, or `node:from:=to`"));
+    let (left, to) = text.split_once(":=").ok_or_else(wanted)?;
+    let (node, from) = match left.split_once(':') {
+        // `rostopic://` and `rosservice://` say which kind of name is meant.
+        Some((_, from)) if from.starts_with("//") => (None, from.trim_start_matches('/')),
+        Some((node, from)) => (Some(node.to_owned()), from),
+        None => (None, left),
+    };
+    if from.is_empty() || to.is_empty() {
+        return Err(wanted());
+    }
+    Ok(Rule { node, from: from.to_owned(), to: to.to_owned() })
+}
+
+/// `name:=value`, for every node, or `node:name:=value`.
+fn parameter(text: &str) -> Result<Assigned, Message> {
+    let wanted = || wrong(format!("`{text}` is not a parameter; it should be `name:=value`"));
+    let (left, value) = text.split_once(":=").ok_or_else(wanted)?;
+    let (nodes, name) = left.split_once(':').unwrap_or(("/**", left));
+    let value: Value = serde_yaml_ng::from_str(value)
+        .map_err(|error| wrong(format!("the value of the parameter `{name}` is not YAML: {error}")))?;
+    let value = parameter_value(&value)
+        .ok_or_else(|| wrong(format!("the parameter `{name}` has a value that no parameter can have")))?;
+    Ok(Assigned { nodes: nodes.to_owned(), name: name.to_owned(), value })
+}
+
+/// A file of parameters: names or patterns of nodes, and below `ros__parameters` their parameters.
+fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Vec<Message>> {
+    let file = path.display().to_string();
+    let fault = |text: String| vec![Message::at("N102", &file, None, text)];
+    let text = std::fs::read_to_string(path).map_err(|error| fault(format!("cannot be read: {error}")))?;
+    let root: Value = serde_yaml_ng::from_str(&text).map_err(|error| fault(format!("is not YAML: {error}")))?;
+    let (mut found, mut messages) = (Vec::new(), Vec::new());
+    nodes("", &root, &mut found, &mut messages);
+    let messages: Vec<Message> =
+        messages.into_iter().map(|text| Message::at("N102", &file, None, text)).collect();
+    if messages.is_empty() { Ok(found) } else { Err(messages) }
+}
+
+/// Goes down to each `ros__parameters`; the keys on the way are parts of the nodes' names.
+fn nodes(path: &str, value: &Value, found: &mut Vec<Assigned>, messages: &mut Vec<String>) {
+    let Some(fields) = value.as_mapping() else {
+        messages.push(format!("`{path}` should hold names of nodes, or `ros__parameters`"));
+        return;
+    };
+    for (key, below) in fields {
+        let Some(key) = key.as_str() else {
+            messages.push(format!("a key below `{path}` is not a name"));
+            continue;
+        };
+        if key == "ros__parameters" {
+            let nodes = if path.starts_with('/') { path.to_owned() } else { format!("/{path}") };
+            flatten("", below, &nodes, found, messages);
+        } else {
+            let path = if path.is_empty() { key.to_owned() } else { format!("{path}/{}", key.trim_start_matches('/')) };
+            nodes(&path, below, found, messages);
+        }
+    }
+}
+
+/// Parameters below parameters are joined with a point.
+fn flatten(name: &str, value: &Value, nodes: &str, found: &mut Vec<Assigned>, messages: &mut Vec<String>) {
+    if let Some(fields) = value.as_mapping() {
+        for (key, below) in fields {
+            let key = key.as_str().unwrap_or_default();
+            let name = if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
+            flatten(&name, below, nodes, found, messages);
+        }
+    } else if let Some(value) = parameter_value(value) {
+        found.push(Assigned { nodes: nodes.to_owned(), name: name.to_owned(), value });
+    } else {
+        messages.push(format!("the parameter `{name}` of {nodes} has a value that no parameter can have"));
+    }
+}
+
+/// A YAML value as a parameter; none for mappings, null, and lists of unlike members.
+fn parameter_value(value: &Value) -> Option<ParameterValue> {
+    Some(match value {
+        Value::Bool(truth) => ParameterValue::Boolean(*truth),
+        Value::Number(number) => match number.as_i64() {
+            Some(whole) => ParameterValue::Integer(whole),
+            None => ParameterValue::Double(number.as_f64()?),
+        },
+        Value::String(text) => ParameterValue::String(text.clone()),
+        Value::Sequence(list) => {
+            let all = |of: fn(&Value) -> bool| list.iter().all(of);
+            if list.is_empty() || all(Value::is_string) {
+                ParameterValue::StringArray(list.iter().filter_map(Value::as_str).map(str::to_owned).collect())
+            } else if all(Value::is_bool) {
+                ParameterValue::BooleanArray(list.iter().filter_map(Value::as_bool).collect())
+            } else if all(Value::is_i64) {
+                ParameterValue::IntegerArray(list.iter().filter_map(Value::as_i64).collect())
+            } else if all(Value::is_number) {
+                ParameterValue::DoubleArray(list.iter().filter_map(Value::as_f64).collect())
+            } else {
+                return None;
+            }
+        }
+        Value::Null | Value::Mapping(_) | Value::Tagged(_) => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use ros2_client::ParameterValue;
+
+    use super::RosArguments;
+
+    fn read(line: &str) -> (Vec<String>, RosArguments) {
+        RosArguments::split(line.split(' ').map(str::to_owned)).expect("right arguments")
+    }
+
+    #[test]
+    fn words_behind_ros_args_are_for_ros() {
+        let (own, ros) = read(
+            "metaplan-ros --ros-args -r __node:=boss -r __ns:=/uuv -r /diagnostics:=/d2 -r ~/plan:=plan -p speed:=2 -- --as manager",
+        );
+        assert_eq!(own, ["metaplan-ros", "--as", "manager"]);
+        let node = ros.node("metaplan");
+        assert_eq!(node.to_string(), "/uuv/boss");
+        let name = |name: &str| ros.remap(name, &node);
+        assert_eq!(name("/diagnostics"), "/d2");
+        assert_eq!(name("task/request"), "/uuv/task/request");
+        assert_eq!(name("~/plan"), "/uuv/plan");
+        assert_eq!(name("/uuv/boss/plan"), "/uuv/plan");
+        assert_eq!(ros.parameters(&node), [("speed".to_owned(), ParameterValue::Integer(2))]);
+    }
+
+    #[test]
+    fn rules_for_another_node_do_not_count() {
+        let (_, ros) = read("p --ros-args -r other:a:=b -r metaplan:a:=c -r other:__node:=x");
+        let node = ros.node("metaplan");
+        assert_eq!(node.to_string(), "/metaplan");
+        assert_eq!(ros.remap("a", &node), "/c");
+    }
+
+    #[test]
+    fn files_of_parameters_are_read_for_the_nodes_they_name() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let file = directory.path().join("p.yaml");
+        let text = "/**:\n  ros__parameters:\n    a: 1\n    b: {c: [1.5, 2]}\n/uuv/*:\n  ros__parameters: {d: yes it is}\nother:\n  ros__parameters: {a: 2}\n";
+        std::fs::write(&file, text).expect("written");
+        let (_, ros) = read(&format!("p --ros-args -r __ns:=/uuv --params-file {}", file.display()));
+        let values = ros.parameters(&ros.node("metaplan"));
+        let names: Vec<&str> = values.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["a", "b.c", "d"]);
+        assert_eq!(values[1].1, ParameterValue::DoubleArray(vec![1.5, 2.0]));
+        let other = ros.node("metaplan");
+        assert!(ros.parameters(&other).iter().all(|(_, value)| *value != ParameterValue::Integer(2)));
+    }
+
+    #[test]
+    fn all_that_is_wrong_is_said() {
+        let line = "p --ros-args -r nothing -p x --fly -p";
+        let messages = RosArguments::split(line.split(' ').map(str::to_owned)).expect_err("wrong");
+        assert_eq!(messages.len(), 4, "{messages:?}");
+        assert!(messages.iter().all(|message| message.code == "N101"), "{messages:?}");
+    }
+}

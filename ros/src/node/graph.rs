@@ -1,0 +1,297 @@
+//! Who else is there: participants with their vendors, and endpoints with their types, as discovery tells.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use futures::StreamExt as _;
+use ros2_client::Gid;
+use ros2_client::dds::rustdds::{
+    DomainParticipant, DomainParticipantStatusEvent, EndpointDescription, GUID, StatusEvented as _,
+};
+
+use smol::Timer;
+
+use crate::node::rmw::{Mapping, Rmw, Vendor};
+
+/// How often is looked at what has been discovered while something is waited for.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// So long other participants are waited for where all that were seen speak either mapping.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What is known of the other participants.
+#[derive(Debug)]
+pub(crate) struct Graph {
+    rmw: Rmw,
+    own: [u8; 12],
+    seen: Mutex<Seen>,
+}
+
+#[derive(Debug, Default)]
+struct Seen {
+    /// Participants by the first bytes of their GUIDs, and the time of the first.
+    participants: BTreeMap<[u8; 12], Vendor>,
+    first: Option<Instant>,
+    endpoints: BTreeMap<[u8; 16], Endpoint>,
+    /// The mapping that our own services have, once it is decided on.
+    mapping: Option<Mapping>,
+    /// The types that we have for topics, as DDS names both, with the type hash.
+    expected: BTreeMap<String, Expected>,
+    /// What was found wrong and is to be reported.
+    complaints: Vec<String>,
+}
+
+/// The type of a topic.
+#[derive(Debug, Clone)]
+pub(crate) struct Expected {
+    /// As DDS names it.
+    pub(crate) type_name: String,
+    /// `RIHS01_…`; what is compared where the other side says its own.
+    pub(crate) hash: &'static str,
+}
+
+/// A reader or a writer of another participant.
+#[derive(Debug, Clone)]
+struct Endpoint {
+    is_reader: bool,
+    topic: String,
+    type_name: String,
+    hash: Option<String>,
+}
+
+impl Graph {
+    /// Begins to watch. Nobody else may listen to the status of the participant.
+    pub(crate) fn watch(participant: &DomainParticipant, own: [u8; 12], rmw: Rmw) -> Arc<Self> {
+        let graph = Arc::new(Self { rmw, own, seen: Mutex::default() });
+        let (listener, watching) = (participant.status_listener(), Arc::clone(&graph));
+        smol::spawn(async move {
+            let mut events = listener.as_async_status_stream();
+            while let Some(event) = events.next().await {
+                watching.take(event);
+            }
+        })
+        .detach();
+        graph
+    }
+
+    fn seen(&self) -> MutexGuard<'_, Seen> {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn take(&self, event: DomainParticipantStatusEvent) {
+        use DomainParticipantStatusEvent as Event;
+        match event {
+            Event::ParticipantDiscovered { dpd } => {
+                let prefix = prefix(dpd.guid);
+                if prefix != self.own {
+                    self.seen().met(prefix, Vendor::new(dpd.vendor_id.as_bytes()));
+                }
+            }
+            Event::ParticipantLost { id, .. } => {
+                let lost: &[u8] = id.as_ref();
+                let mut seen = self.seen();
+                seen.participants.retain(|prefix, _| prefix != lost);
+                seen.endpoints.retain(|guid, _| &guid[..12] != lost);
+            }
+            Event::ReaderDetected { reader } => self.found(true, reader),
+            Event::WriterDetected { writer } => self.found(false, writer),
+            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
+                self.seen().endpoints.remove(&bytes(guid));
+            }
+            Event::RemoteReaderQosIncompatible { remote_reader, .. } => self.incompatible(remote_reader),
+            Event::RemoteWriterQosIncompatible { remote_writer, .. } => self.incompatible(remote_writer),
+            _ => {}
+        }
+    }
+
+    fn found(&self, is_reader: bool, description: EndpointDescription) {
+        let guid = bytes(description.guid);
+        if guid[..12] == self.own {
+            return;
+        }
+        let EndpointDescription { topic_name: topic, type_name, user_data, .. } = description;
+        let endpoint = Endpoint { is_reader, topic, type_name, hash: type_hash(&user_data) };
+        let mut seen = self.seen();
+        let complaint = seen.expected.get(&endpoint.topic).and_then(|expected| endpoint.complaint(expected));
+        seen.complaints.extend(complaint);
+        seen.endpoints.insert(guid, endpoint);
+    }
+
+    fn incompatible(&self, guid: GUID) {
+        let mut seen = self.seen();
+        let topic = seen.endpoints.get(&bytes(guid)).map(|endpoint| endpoint.topic.clone());
+        if let Some(topic) = topic {
+            seen.complaints.push(format!("an endpoint of {topic} has a quality of service that does not fit ours"));
+        }
+    }
+
+    /// The type of a topic that we use; endpoints with another one are complained of, and not heard.
+    pub(crate) fn expect(&self, topic: String, expected: Expected) {
+        let mut seen = self.seen();
+        let found: Vec<String> = seen
+            .endpoints
+            .values()
+            .filter(|endpoint| endpoint.topic == topic)
+            .filter_map(|endpoint| endpoint.complaint(&expected))
+            .collect();
+        seen.complaints.extend(found);
+        seen.expected.insert(topic, expected);
+    }
+
+    /// What was found wrong since it was asked last.
+    pub(crate) fn complaints(&self) -> Vec<String> {
+        std::mem::take(&mut self.seen().complaints)
+    }
+
+    /// Whether what this writer writes has another type than ours.
+    pub(crate) fn is_unfit(&self, writer: Gid) -> bool {
+        let seen = self.seen();
+        seen.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {
+            seen.expected.get(&endpoint.topic).is_some_and(|expected| endpoint.complaint(expected).is_some())
+        })
+    }
+
+    /// Whether somebody writes on a topic, named as DDS does.
+    pub(crate) fn has_writer(&self, topic: &str) -> bool {
+        self.seen().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
+    }
+
+    /// The mapping of whoever serves a service, if somebody does who reads what we send, by the topics of requests and replies.
+    pub(crate) fn server(&self, requests: &str, replies: &str) -> Option<Result<Mapping, String>> {
+        let seen = self.seen();
+        let of = |topic: &str, is_reader: bool| {
+            let is_it = |own: &(&[u8; 16], &Endpoint)| own.1.is_reader == is_reader && own.1.topic == topic;
+            seen.endpoints.iter().find(is_it)
+        };
+        let ((guid, reader), (_, writer)) = (of(requests, true)?, of(replies, false)?);
+        for endpoint in [reader, writer] {
+            let expected = seen.expected.get(&endpoint.topic);
+            if let Some(complaint) = expected.and_then(|expected| endpoint.complaint(expected)) {
+                return Some(Err(complaint));
+            }
+        }
+        let vendor = Vendor::new([guid[0], guid[1]]);
+        let mapping = self.rmw.fixed().or_else(|| vendor.mapping()).or(seen.mapping);
+        Some(Ok(mapping.unwrap_or(Mapping::Enhanced)))
+    }
+
+    /// The mapping of our own services: that of the first participant that has only one.
+    pub(crate) async fn mapping(&self) -> Mapping {
+        loop {
+            if let Some(mapping) = self.decide() {
+                return mapping;
+            }
+            Timer::after(LOOK).await;
+        }
+    }
+
+    fn decide(&self) -> Option<Mapping> {
+        let mut seen = self.seen();
+        if seen.mapping.is_none() {
+            let met = seen.participants.values().find_map(|vendor| vendor.mapping());
+            let waited = seen.first.is_some_and(|first| first.elapsed() >= PATIENCE);
+            seen.mapping = self.rmw.fixed().or(met).or_else(|| waited.then_some(Mapping::Enhanced));
+        }
+        seen.mapping
+    }
+
+    /// The topics that have endpoints, with the types, as DDS names them.
+    pub(crate) fn topics(&self) -> Vec<(String, String)> {
+        let seen = self.seen();
+        let mut topics: Vec<_> =
+            seen.endpoints.values().map(|own| (own.topic.clone(), own.type_name.clone())).collect();
+        topics.sort();
+        topics.dedup();
+        topics
+    }
+
+    /// Waits until something can be said, or time is up.
+    pub(crate) async fn wait<T>(&self, within: Duration, look: impl Fn(&Self) -> Option<T>) -> Option<T> {
+        let until = Instant::now() + within;
+        loop {
+            match look(self) {
+                Some(found) => return Some(found),
+                None if Instant::now() >= until => return None,
+                None => {
+                    Timer::after(LOOK).await;
+                }
+            }
+        }
+    }
+}
+
+impl Seen {
+    fn met(&mut self, prefix: [u8; 12], vendor: Vendor) {
+        self.first.get_or_insert_with(Instant::now);
+        let is_new = self.participants.insert(prefix, vendor).is_none();
+        if let (true, Some(own), Some(other)) = (is_new, self.mapping, vendor.mapping())
+            && own != other
+        {
+            self.complaints.push(format!(
+                "a participant with {other} was discovered, and our services are mapped as by {own}: it cannot call them; `--rmw {}` \
+                 maps them the other way",
+                own.other()
+            ));
+        }
+    }
+}
+
+impl Endpoint {
+    /// What is wrong with it where this is expected.
+    fn complaint(&self, expected: &Expected) -> Option<String> {
+        let what = if self.is_reader { "reader" } else { "writer" };
+        if self.type_name != expected.type_name {
+            return Some(format!(
+                "a {what} of {} has the type {}, and should have {}",
+                self.topic, self.type_name, expected.type_name
+            ));
+        }
+        let hash = self.hash.as_deref().filter(|hash| *hash != expected.hash && !expected.hash.is_empty())?;
+        Some(format!(
+            "a {what} of {} has another definition of {}: its type hash is {hash}, ours is {}",
+            self.topic, self.type_name, expected.hash
+        ))
+    }
+}
+
+/// What an endpoint of ROS 2 Jazzy and later says of its type: `typehash=RIHS01_…;` in its user data (REP 2011).
+fn type_hash(user_data: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(user_data);
+    let hash = text.split(';').find_map(|part| part.trim_matches('\0').strip_prefix("typehash="))?;
+    // What an RMW does not know is all zero, or another version.
+    let digits = hash.strip_prefix("RIHS01_")?;
+    digits.bytes().any(|digit| digit != b'0').then(|| hash.to_owned())
+}
+
+fn bytes(guid: GUID) -> [u8; 16] {
+    guid.to_bytes()
+}
+
+fn prefix(guid: GUID) -> [u8; 12] {
+    let mut prefix = [0; 12];
+    prefix.copy_from_slice(&guid.to_bytes()[..12]);
+    prefix
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Endpoint, Expected, type_hash};
+
+    #[test]
+    fn types_and_their_hashes_are_compared() {
+        let expected = Expected { type_name: "a::msg::dds_::B_".to_owned(), hash: "RIHS01_12" };
+        let endpoint = |type_name: &str, data: &str| Endpoint {
+            is_reader: false,
+            topic: "rt/t".to_owned(),
+            type_name: type_name.to_owned(),
+            hash: type_hash(data.as_bytes()),
+        };
+        let complaint = |name: &str, data: &str| endpoint(name, data).complaint(&expected).is_some();
+        assert!(!complaint("a::msg::dds_::B_", ""));
+        assert!(!complaint("a::msg::dds_::B_", "typehash=RIHS01_12;"));
+        assert!(!complaint("a::msg::dds_::B_", "enclave=/;typehash=RIHS01_00;"));
+        assert!(complaint("a::msg::dds_::B_", "typehash=RIHS01_13;\0"));
+        assert!(complaint("a::msg::dds_::C_", ""));
+    }
+}

@@ -1,0 +1,184 @@
+//! A managed node (ROS 2 design article "Managed nodes"): its primary states, and the services by which others move it between them.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use metaplan::message::Message;
+
+use crate::interfaces::lifecycle_msgs::msg::{State, Transition, TransitionDescription, TransitionEvent};
+use crate::interfaces::lifecycle_msgs::srv::{
+    ChangeState, ChangeStateResponse, GetAvailableStates, GetAvailableStatesResponse, GetAvailableTransitions,
+    GetAvailableTransitionsResponse, GetState, GetStateResponse,
+};
+use crate::node::{Node, Publisher, Severity, depth};
+
+/// A primary state of a managed node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// It has read nothing.
+    Unconfigured,
+    /// It knows its mission and does nothing.
+    Inactive,
+    /// It does its work.
+    Active,
+    /// It ends.
+    Finalized,
+}
+
+/// A way from one primary state to another.
+struct Way {
+    id: u8,
+    label: &'static str,
+    from: Phase,
+    to: Phase,
+    /// The state on the way.
+    via: (u8, &'static str),
+}
+
+const WAYS: [Way; 7] = [
+    way(Transition::TRANSITION_CONFIGURE, "configure", Phase::Unconfigured, Phase::Inactive, 10, "configuring"),
+    way(Transition::TRANSITION_CLEANUP, "cleanup", Phase::Inactive, Phase::Unconfigured, 11, "cleaningup"),
+    way(Transition::TRANSITION_ACTIVATE, "activate", Phase::Inactive, Phase::Active, 13, "activating"),
+    way(Transition::TRANSITION_DEACTIVATE, "deactivate", Phase::Active, Phase::Inactive, 14, "deactivating"),
+    way(Transition::TRANSITION_UNCONFIGURED_SHUTDOWN, "shutdown", Phase::Unconfigured, Phase::Finalized, 12, "shuttingdown"),
+    way(Transition::TRANSITION_INACTIVE_SHUTDOWN, "shutdown", Phase::Inactive, Phase::Finalized, 12, "shuttingdown"),
+    way(Transition::TRANSITION_ACTIVE_SHUTDOWN, "shutdown", Phase::Active, Phase::Finalized, 12, "shuttingdown"),
+];
+
+const fn way(id: u8, label: &'static str, from: Phase, to: Phase, via: u8, name: &'static str) -> Way {
+    Way { id, label, from, to, via: (via, name) }
+}
+
+impl Phase {
+    fn state(self) -> State {
+        let (id, label) = match self {
+            Self::Unconfigured => (State::PRIMARY_STATE_UNCONFIGURED, "unconfigured"),
+            Self::Inactive => (State::PRIMARY_STATE_INACTIVE, "inactive"),
+            Self::Active => (State::PRIMARY_STATE_ACTIVE, "active"),
+            Self::Finalized => (State::PRIMARY_STATE_FINALIZED, "finalized"),
+        };
+        State { id, label: label.to_owned() }
+    }
+}
+
+impl Way {
+    fn transition(&self) -> Transition {
+        Transition { id: self.id, label: self.label.to_owned() }
+    }
+
+    fn via(&self) -> State {
+        State { id: self.via.0, label: self.via.1.to_owned() }
+    }
+}
+
+/// The states of a managed node.
+pub struct Lifecycle {
+    node: Arc<Node>,
+    phase: Mutex<Phase>,
+    events: Publisher<TransitionEvent>,
+    /// Does what a change needs; without success the node stays where it is.
+    change: Box<dyn Fn(Phase) -> bool + Send + Sync>,
+}
+
+impl std::fmt::Debug for Lifecycle {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("Lifecycle").field(&self.phase()).finish()
+    }
+}
+
+impl Lifecycle {
+    /// Serves the states of a node that is not configured. `change` is asked before each change, with the state that will be.
+    ///
+    /// # Errors
+    /// A topic cannot be made.
+    pub fn serve(
+        node: &Arc<Node>,
+        change: impl Fn(Phase) -> bool + Send + Sync + 'static,
+    ) -> Result<Arc<Self>, Message> {
+        let events = node.publisher("~/transition_event", depth(1))?;
+        let own = Arc::new(Self {
+            node: Arc::clone(node),
+            phase: Mutex::new(Phase::Unconfigured),
+            events,
+            change: Box::new(change),
+        });
+        let lifecycle = Arc::clone(&own);
+        node.serve::<ChangeState>("~/change_state", move |request, answer| {
+            answer.send(ChangeStateResponse { success: lifecycle.take(&request.transition) });
+        })?;
+        let lifecycle = Arc::clone(&own);
+        node.serve::<GetState>("~/get_state", move |_, answer| {
+            answer.send(GetStateResponse { current_state: lifecycle.phase().state() });
+        })?;
+        node.serve::<GetAvailableStates>("~/get_available_states", |_, answer| {
+            let phases = [Phase::Unconfigured, Phase::Inactive, Phase::Active, Phase::Finalized];
+            let unknown = State { id: State::PRIMARY_STATE_UNKNOWN, label: "unknown".to_owned() };
+            let mut available_states = vec![unknown];
+            available_states.extend(phases.map(Phase::state));
+            for way in &WAYS {
+                if !available_states.contains(&way.via()) {
+                    available_states.push(way.via());
+                }
+            }
+            answer.send(GetAvailableStatesResponse { available_states });
+        })?;
+        let lifecycle = Arc::clone(&own);
+        node.serve::<GetAvailableTransitions>("~/get_available_transitions", move |_, answer| {
+            let phase = lifecycle.phase();
+            answer.send(described(|way| way.from == phase));
+        })?;
+        node.serve::<GetAvailableTransitions>("~/get_transition_graph", |_, answer| {
+            answer.send(described(|_| true));
+        })?;
+        Ok(own)
+    }
+
+    /// The state now.
+    pub fn phase(&self) -> Phase {
+        *self.phase.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Goes to a state to which there is a way, as if asked.
+    pub fn go(&self, to: Phase) -> bool {
+        let from = self.phase();
+        WAYS.iter().find(|way| way.from == from && way.to == to).is_some_and(|way| self.walk(way))
+    }
+
+    fn take(&self, wanted: &Transition) -> bool {
+        let from = self.phase();
+        // A label counts where there is no number, as in rcl_lifecycle; any number of a shutdown means that of the state.
+        let is_it = |way: &&Way| {
+            way.from == from && if wanted.id == 0 { way.label == wanted.label } else { way.id == wanted.id }
+        };
+        let Some(way) = WAYS.iter().find(is_it) else {
+            let text = format!("no transition {} ({}) from {}", wanted.id, wanted.label, from.state().label);
+            self.node.log(Severity::Warn, &text);
+            return false;
+        };
+        self.walk(way)
+    }
+
+    fn walk(&self, way: &Way) -> bool {
+        self.tell(way, way.from.state(), way.via());
+        let success = (self.change)(way.to);
+        let end = if success { way.to } else { way.from };
+        *self.phase.lock().unwrap_or_else(PoisonError::into_inner) = end;
+        self.tell(way, way.via(), end.state());
+        success
+    }
+
+    fn tell(&self, way: &Way, start_state: State, goal_state: State) {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let timestamp = u64::try_from(since.as_nanos()).unwrap_or_default();
+        self.events.publish(TransitionEvent { timestamp, transition: way.transition(), start_state, goal_state });
+    }
+}
+
+fn described(wanted: impl Fn(&&Way) -> bool) -> GetAvailableTransitionsResponse {
+    let describe = |way: &Way| TransitionDescription {
+        transition: way.transition(),
+        start_state: way.from.state(),
+        goal_state: way.to.state(),
+    };
+    GetAvailableTransitionsResponse { available_transitions: WAYS.iter().filter(wanted).map(describe).collect() }
+}

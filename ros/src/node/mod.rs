@@ -1,0 +1,156 @@
+//! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle, without a ROS installation.
+//!
+//! Names are expanded and remapped as ROS 2 does. What is heard is handed to closures on a thread of the executor, which must be quick;
+//! samples that are no message of their type, and endpoints whose type is not ours, are reported and left out. Our own services wait for
+//! the first participant that tells how services are mapped, see [`rmw`].
+
+mod action;
+mod arguments;
+mod graph;
+mod lifecycle;
+mod log;
+mod names;
+mod network;
+mod parameters;
+mod qos;
+mod rmw;
+mod service;
+mod topic;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use metaplan::message::Message;
+use ros2_client::dds::Context;
+use ros2_client::{NodeName, NodeOptions};
+use smol::Timer;
+
+pub use action::{
+    Accepted, ActionCaller, CancelRequest, GoalEnd, GoalError, GoalEvent, Goals, Pursued, Wanted,
+};
+pub use arguments::RosArguments;
+pub use lifecycle::{Lifecycle, Phase};
+pub use log::Severity;
+pub use network::Network;
+pub use parameters::Declared;
+pub use rmw::Rmw;
+pub use service::{CallError, Caller, Responder};
+pub use topic::Publisher;
+
+use graph::Graph;
+use names::FullName;
+
+pub(crate) use qos::{depth, keep_all, latched};
+
+/// What a node is made with.
+#[derive(Debug, Clone)]
+pub struct Opening {
+    /// Its name, unless `__node` is remapped.
+    pub name: String,
+    /// What stands behind `--ros-args`.
+    pub arguments: RosArguments,
+    /// Domain and network.
+    pub network: Network,
+    /// The middleware of the others.
+    pub rmw: Rmw,
+}
+
+/// A node.
+pub struct Node {
+    inner: Mutex<ros2_client::Node>,
+    name: FullName,
+    arguments: RosArguments,
+    graph: Arc<Graph>,
+    least: Severity,
+}
+
+impl std::fmt::Debug for Node {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("Node").field(&self.name.to_string()).finish()
+    }
+}
+
+impl Node {
+    /// Enters the graph. Parameters are declared with [`Node::declare`], which has to follow.
+    ///
+    /// # Errors
+    /// The name is wrong, or there is no network.
+    pub fn open(opening: Opening) -> Result<Arc<Self>, Message> {
+        let Opening { name, arguments, network, rmw } = opening;
+        let name = arguments.node(&name);
+        let failed = |error: &dyn std::fmt::Display| {
+            let text = format!("no participant in domain {}: {error}", network.domain);
+            Message::error("N120", text)
+        };
+        let participant = network.participant().build().map_err(|error| failed(&error))?;
+        let own = ros2_client::dds::rustdds::RTPSEntity::guid(&participant).to_bytes();
+        let mut prefix = [0; 12];
+        prefix.copy_from_slice(&own[..12]);
+        let graph = Graph::watch(&participant, prefix, rmw);
+        let context = Context::from_domain_participant(participant).map_err(|error| failed(&error))?;
+        let node_name = NodeName::new(name.namespace(), name.name())
+            .map_err(|error| Message::error("N121", format!("`{name}` is not the name of a node: {error}")))?;
+        let options = NodeOptions::new().start_parameter_services(false).allow_undeclared_parameters(true);
+        let inner = context.new_node(node_name, options).map_err(|error| failed(&error))?;
+        let least = match arguments.log_level.as_deref() {
+            None => Severity::Info,
+            Some(level) => Severity::parse(level).ok_or_else(|| {
+                Message::error("N101", format!("`{level}` is not a level of the log; debug, info, warn, error and fatal are"))
+            })?,
+        };
+        let node = Arc::new(Self { inner: Mutex::new(inner), name, arguments, graph, least });
+        node.report_complaints();
+        Ok(node)
+    }
+
+    /// With namespace, as in `/uuv/metaplan`.
+    pub fn full_name(&self) -> String {
+        self.name.to_string()
+    }
+
+    /// The full name of a topic, service or action that this node calls so, after remapping.
+    pub fn resolve(&self, name: &str) -> String {
+        self.arguments.remap(name, &self.name)
+    }
+
+    /// Whether anybody writes on a topic.
+    pub fn is_written(&self, topic: &str) -> bool {
+        self.graph.has_writer(&format!("rt{}", self.resolve(topic)))
+    }
+
+    fn inner(&self) -> MutexGuard<'_, ros2_client::Node> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Logs from time to time what the graph complains of.
+    fn report_complaints(self: &Arc<Self>) {
+        const PERIOD: Duration = Duration::from_millis(100);
+        let node = Arc::downgrade(self);
+        smol::spawn(async move {
+            while let Some(node) = node.upgrade() {
+                for complaint in node.graph.complaints() {
+                    node.log(Severity::Warn, &complaint);
+                }
+                drop(node);
+                Timer::after(PERIOD).await;
+            }
+        })
+        .detach();
+    }
+}
+
+/// The type of a message, as DDS names it.
+fn dds_type(package: &str, kind: &str, name: &str) -> String {
+    format!("{package}::{kind}::dds_::{name}_")
+}
+
+/// A name for the client library, from a full name.
+fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
+    ros2_client::Name::parse(full)
+        .map_err(|error| Message::error("N121", format!("`{full}` is not the name of a topic or service: {error}")))
+}
+
+/// Why something could not be made.
+fn not_made(what: &str, error: &dyn std::fmt::Display) -> Message {
+    Message::error("N122", format!("{what} could not be made: {error}"))
+}

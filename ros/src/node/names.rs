@@ -1,0 +1,68 @@
+//! Names of nodes, topics and services, as ROS 2 expands and matches them (design article "Topic and service names").
+
+use std::fmt;
+
+/// The full name of a node.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct FullName {
+    /// `/` or `/a/b`.
+    namespace: String,
+    name: String,
+}
+
+impl FullName {
+    /// A node in a namespace, with or without its first slash.
+    pub(crate) fn new(namespace: &str, name: &str) -> Self {
+        let namespace = format!("/{}", namespace.trim_matches('/'));
+        Self { namespace, name: name.to_owned() }
+    }
+
+    pub(crate) fn namespace(&self) -> &str {
+        &self.namespace
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// A name as this node means it, with all namespaces: `~/x` is below the node, `x` is below its namespace.
+    pub(crate) fn expand(&self, name: &str) -> String {
+        if name.starts_with('/') {
+            name.to_owned()
+        } else if let Some(private) = name.strip_prefix('~') {
+            format!("{self}{private}")
+        } else if self.namespace == "/" {
+            format!("/{name}")
+        } else {
+            format!("{}/{name}", self.namespace)
+        }
+    }
+}
+
+impl fmt::Display for FullName {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let namespace = self.namespace.trim_end_matches('/');
+        write!(formatter, "{namespace}/{}", self.name)
+    }
+}
+
+/// Whether a pattern of a file of parameters is for a node: `*` is one part of a name, `**` any number of them. A pattern without
+/// namespace is for the node of that name in any.
+pub(crate) fn is_match(pattern: &str, full: &str, name: &str) -> bool {
+    let bare = pattern.trim_start_matches('/');
+    if bare == name {
+        return true;
+    }
+    let pattern: Vec<&str> = bare.split('/').collect();
+    let parts: Vec<&str> = full.trim_start_matches('/').split('/').collect();
+    fits(&pattern, &parts)
+}
+
+fn fits(pattern: &[&str], parts: &[&str]) -> bool {
+    match (pattern.split_first(), parts.split_first()) {
+        (None, None) => true,
+        (Some((&"**", rest)), _) => (0..=parts.len()).any(|skipped| fits(rest, &parts[skipped..])),
+        (Some((first, pattern)), Some((part, parts))) => (*first == "*" || first == part) && fits(pattern, parts),
+        _ => false,
+    }
+}

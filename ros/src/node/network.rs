@@ -1,0 +1,99 @@
+//! Which network and which domain a node is in, from the environment as ROS 2 reads it.
+
+use std::net::Ipv4Addr;
+
+use metaplan::message::Message;
+use ros2_client::dds::rustdds::DomainParticipantBuilder;
+
+/// The greatest domain for which there are ports (RTPS 2.5, section 9.6.1.1).
+const GREATEST_DOMAIN: u16 = 232;
+
+/// Where other participants are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Network {
+    /// `ROS_DOMAIN_ID`.
+    pub domain: u16,
+    /// Only on this machine: `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`, or `ROS_LOCALHOST_ONLY=1` of older distributions.
+    pub loopback: bool,
+}
+
+impl Network {
+    /// From variables of the environment; warnings about what is not supported.
+    ///
+    /// # Errors
+    /// A value that is wrong.
+    pub fn from_environment(
+        variable: impl Fn(&str) -> Option<String>,
+    ) -> Result<(Self, Vec<Message>), Message> {
+        let value = |name: &str| variable(name).filter(|value| !value.trim().is_empty());
+        let mut warnings = Vec::new();
+        let domain = match value("ROS_DOMAIN_ID") {
+            None => 0,
+            Some(text) => text.trim().parse().ok().filter(|domain| *domain <= GREATEST_DOMAIN).ok_or_else(
+                || wrong(format!("ROS_DOMAIN_ID is `{text}`, but should be a number from 0 to {GREATEST_DOMAIN}")),
+            )?,
+        };
+        let only = value("ROS_LOCALHOST_ONLY").is_some_and(|value| value.trim() == "1");
+        let loopback = match value("ROS_AUTOMATIC_DISCOVERY_RANGE").map(|range| range.to_uppercase()).as_deref() {
+            None | Some("SYSTEM_DEFAULT") => only,
+            Some("LOCALHOST") => true,
+            // ROS_LOCALHOST_ONLY counts where both are there (Jazzy's release notes).
+            Some("SUBNET") => only,
+            Some("OFF") => {
+                warnings.push(Message::warning(
+                    "N111",
+                    "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF is not supported: participants on this machine are found",
+                ));
+                true
+            }
+            Some(other) => {
+                return Err(wrong(format!(
+                    "ROS_AUTOMATIC_DISCOVERY_RANGE is `{other}`, but should be SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT"
+                )));
+            }
+        };
+        if let Some(peers) = value("ROS_STATIC_PEERS") {
+            let text = format!("ROS_STATIC_PEERS ({peers}) is not supported: only what multicast finds is there");
+            warnings.push(Message::warning("N111", text));
+        }
+        Ok((Self { domain, loopback }, warnings))
+    }
+
+    /// A participant to be built in this network.
+    pub(crate) fn participant(self) -> DomainParticipantBuilder {
+        let builder = DomainParticipantBuilder::new(self.domain);
+        if self.loopback { builder.with_only_networks([Ipv4Addr::LOCALHOST]) } else { builder }
+    }
+}
+
+fn wrong(text: String) -> Message {
+    Message::error("N110", text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Network;
+
+    /// Domain and whether loopback only; or nothing for an error.
+    fn check(variables: &[(&str, &str)], expected: Option<(u16, bool, usize)>) {
+        let value = |name: &str| {
+            variables.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
+        };
+        let found = Network::from_environment(value).ok();
+        let found = found.map(|(network, warnings)| (network.domain, network.loopback, warnings.len()));
+        assert_eq!(found, expected, "{variables:?}");
+    }
+
+    #[test]
+    fn variables_of_all_distributions_count() {
+        check(&[], Some((0, false, 0)));
+        check(&[("ROS_DOMAIN_ID", "42"), ("ROS_LOCALHOST_ONLY", "0")], Some((42, false, 0)));
+        check(&[("ROS_LOCALHOST_ONLY", "1")], Some((0, true, 0)));
+        check(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "localhost")], Some((0, true, 0)));
+        check(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"), ("ROS_LOCALHOST_ONLY", "1")], Some((0, true, 0)));
+        check(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"), ("ROS_STATIC_PEERS", "a;b")], Some((0, true, 2)));
+        check(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "MOON")], None);
+        check(&[("ROS_DOMAIN_ID", "233")], None);
+        check(&[("ROS_DOMAIN_ID", "robot")], None);
+    }
+}

@@ -1,0 +1,278 @@
+//! Parameters: declared, overridden from the command line, and served to `ros2 param`.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use metaplan::message::{Message, did_you_mean};
+use ros2_client::ParameterValue;
+
+use crate::interfaces::rcl_interfaces::msg;
+use crate::interfaces::rcl_interfaces::srv::{
+    DescribeParameters, DescribeParametersResponse, GetParameterTypes, GetParameterTypesResponse, GetParameters,
+    GetParametersResponse, ListParameters, ListParametersResponse, SetParameters, SetParametersAtomically,
+    SetParametersAtomicallyResponse, SetParametersResponse,
+};
+use crate::node::Node;
+
+/// A parameter of a node.
+#[derive(Debug, Clone)]
+pub struct Declared {
+    /// Parts are joined with points.
+    pub name: &'static str,
+    /// What it is for, with its unit.
+    pub description: &'static str,
+    /// Its value unless the command line says otherwise; it keeps the type.
+    pub value: ParameterValue,
+    /// Whether it can be set while the node runs.
+    pub is_dynamic: bool,
+}
+
+type Table = BTreeMap<String, Declared>;
+
+impl Node {
+    /// Declares the parameters of the node, gives them the values of the command line, and serves them. `changed` hears of each that is set
+    /// from then on.
+    ///
+    /// # Errors
+    /// The command line gives a value of another type. A parameter that is not declared is a warning, returned.
+    pub fn declare(
+        self: &Arc<Self>,
+        declared: Vec<Declared>,
+        changed: impl Fn(&str, &ParameterValue) + Send + Sync + 'static,
+    ) -> Result<Vec<Message>, Vec<Message>> {
+        let mut table: Table =
+            declared.into_iter().map(|own| (own.name.to_owned(), own)).collect();
+        table.insert(
+            "use_sim_time".to_owned(),
+            Declared {
+                name: "use_sim_time",
+                description: "accepted as by every node; times are those of the system",
+                value: ParameterValue::Boolean(false),
+                is_dynamic: true,
+            },
+        );
+        let (mut warnings, mut errors) = (Vec::new(), Vec::new());
+        for (name, value) in self.arguments.parameters(&self.name) {
+            match table.get_mut(&name) {
+                None => {
+                    let meant = did_you_mean(&name, table.keys().map(String::as_str));
+                    warnings.push(Message::warning("N103", format!("there is no parameter `{name}`{meant}")));
+                }
+                Some(own) => match fitting(&own.value, value) {
+                    Ok(value) => own.value = value,
+                    Err(text) => errors.push(Message::error("N103", format!("the parameter `{name}` {text}"))),
+                },
+            }
+        }
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        for own in table.values() {
+            // Undeclared ones are allowed underneath; what is allowed is decided here.
+            let _ = self.inner().set_parameter(own.name, own.value.clone());
+        }
+        self.serve_parameters(Arc::new(Mutex::new(table)), Arc::new(changed)).map_err(|message| vec![message])?;
+        Ok(warnings)
+    }
+
+    /// The value of a parameter that was declared.
+    pub fn parameter(&self, name: &str) -> Option<ParameterValue> {
+        self.inner().get_parameter(name)
+    }
+
+    fn serve_parameters(
+        self: &Arc<Self>,
+        table: Arc<Mutex<Table>>,
+        changed: Arc<dyn Fn(&str, &ParameterValue) + Send + Sync>,
+    ) -> Result<(), Message> {
+        let read = {
+            let table = Arc::clone(&table);
+            move |name: &str| {
+                let table = table.lock().unwrap_or_else(PoisonError::into_inner);
+                table.get(name).map(|own| own.value.clone())
+            }
+        };
+        let values = read.clone();
+        self.serve::<GetParameters>("~/get_parameters", move |request, answer| {
+            let value = |name: &String| values(name).map_or_else(msg::ParameterValue::default, raw);
+            answer.send(GetParametersResponse { values: request.names.iter().map(value).collect() });
+        })?;
+        self.serve::<GetParameterTypes>("~/get_parameter_types", move |request, answer| {
+            let kind = |name: &String| read(name).map_or(0, |value| raw(value).r#type);
+            answer.send(GetParameterTypesResponse { types: request.names.iter().map(kind).collect() });
+        })?;
+        let known = Arc::clone(&table);
+        self.serve::<ListParameters>("~/list_parameters", move |request, answer| {
+            let names: Vec<String> = known.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect();
+            answer.send(ListParametersResponse { result: listed(names, &request.prefixes, request.depth) });
+        })?;
+        let known = Arc::clone(&table);
+        self.serve::<DescribeParameters>("~/describe_parameters", move |request, answer| {
+            let table = known.lock().unwrap_or_else(PoisonError::into_inner);
+            let describe = |name: &String| described(name, table.get(name));
+            answer.send(DescribeParametersResponse { descriptors: request.names.iter().map(describe).collect() });
+        })?;
+        let (node, known, hear) = (Arc::downgrade(self), Arc::clone(&table), Arc::clone(&changed));
+        self.serve::<SetParameters>("~/set_parameters", move |request, answer| {
+            let Some(node) = node.upgrade() else { return };
+            let set = |own: msg::Parameter| result(node.set(&known, &*hear, vec![own]));
+            answer.send(SetParametersResponse { results: request.parameters.into_iter().map(set).collect() });
+        })?;
+        let node = Arc::downgrade(self);
+        self.serve::<SetParametersAtomically>("~/set_parameters_atomically", move |request, answer| {
+            let Some(node) = node.upgrade() else { return };
+            let set = node.set(&table, &*changed, request.parameters);
+            answer.send(SetParametersAtomicallyResponse { result: result(set) });
+        })
+    }
+
+    /// Sets all of these, or none.
+    fn set(
+        &self,
+        table: &Mutex<Table>,
+        changed: &(dyn Fn(&str, &ParameterValue) + Send + Sync),
+        parameters: Vec<msg::Parameter>,
+    ) -> Result<(), String> {
+        let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut values = Vec::new();
+        for msg::Parameter { name, value } in parameters {
+            let own = table.get(&name).ok_or_else(|| format!("there is no parameter `{name}`"))?;
+            if !own.is_dynamic {
+                return Err(format!("`{name}` cannot be set while the node runs"));
+            }
+            let value = parameter(value).ok_or_else(|| format!("`{name}` cannot be deleted"))?;
+            let value = fitting(&own.value, value).map_err(|text| format!("`{name}` {text}"))?;
+            values.push((name, value));
+        }
+        for (name, value) in values {
+            if let Some(own) = table.get_mut(&name) {
+                own.value = value.clone();
+            }
+            // Tells `/parameter_events`, too.
+            self.inner().set_parameter(&name, value.clone())?;
+            changed(&name, &value);
+        }
+        Ok(())
+    }
+}
+
+/// A value of the type of another one; a whole number serves as a double.
+fn fitting(own: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
+    match (own, value) {
+        (ParameterValue::Double(_), ParameterValue::Integer(whole)) => Ok(ParameterValue::Double(whole as f64)),
+        (ParameterValue::StringArray(_), ParameterValue::StringArray(list)) => Ok(ParameterValue::StringArray(list)),
+        (own, value) if raw(own.clone()).r#type == raw(value.clone()).r#type => Ok(value),
+        (own, _) => Err(format!("has another type; it is {}", kind(own))),
+    }
+}
+
+fn kind(value: &ParameterValue) -> &'static str {
+    match value {
+        ParameterValue::NotSet => "not set",
+        ParameterValue::Boolean(_) => "a truth value",
+        ParameterValue::Integer(_) => "an integer",
+        ParameterValue::Double(_) => "a double",
+        ParameterValue::String(_) => "a string",
+        ParameterValue::ByteArray(_)
+        | ParameterValue::BooleanArray(_)
+        | ParameterValue::IntegerArray(_)
+        | ParameterValue::DoubleArray(_)
+        | ParameterValue::StringArray(_) => "a list",
+    }
+}
+
+fn result(outcome: Result<(), String>) -> msg::SetParametersResult {
+    msg::SetParametersResult { successful: outcome.is_ok(), reason: outcome.err().unwrap_or_default() }
+}
+
+/// The names below some prefixes, not deeper than `depth` below them (0: however deep), and the prefixes of these names.
+fn listed(names: Vec<String>, prefixes: &[String], depth: u64) -> msg::ListParametersResult {
+    let is_near = |below: &str| depth == 0 || (below.matches('.').count() as u64) < depth;
+    let is_wanted = |name: &String| {
+        let below = |prefix: &String| match name.strip_prefix(prefix.as_str()) {
+            Some("") => true,
+            Some(rest) => rest.strip_prefix('.').is_some_and(is_near),
+            None => false,
+        };
+        if prefixes.is_empty() { is_near(name) } else { prefixes.iter().any(below) }
+    };
+    let names: Vec<String> = names.into_iter().filter(is_wanted).collect();
+    let mut found: Vec<String> =
+        names.iter().filter_map(|name| name.rsplit_once('.')).map(|(prefix, _)| prefix.to_owned()).collect();
+    found.dedup();
+    msg::ListParametersResult { names, prefixes: found }
+}
+
+fn described(name: &str, own: Option<&Declared>) -> msg::ParameterDescriptor {
+    msg::ParameterDescriptor {
+        name: name.to_owned(),
+        r#type: own.map_or(0, |own| raw(own.value.clone()).r#type),
+        description: own.map_or_else(String::new, |own| own.description.to_owned()),
+        read_only: own.is_some_and(|own| !own.is_dynamic),
+        ..msg::ParameterDescriptor::default()
+    }
+}
+
+/// A value as it is sent.
+pub(crate) fn raw(value: ParameterValue) -> msg::ParameterValue {
+    use msg::{ParameterType as Kind, ParameterValue as Raw};
+    let none = Raw::default();
+    match value {
+        ParameterValue::NotSet => none,
+        ParameterValue::Boolean(bool_value) => Raw { r#type: Kind::PARAMETER_BOOL, bool_value, ..none },
+        ParameterValue::Integer(integer_value) => Raw { r#type: Kind::PARAMETER_INTEGER, integer_value, ..none },
+        ParameterValue::Double(double_value) => Raw { r#type: Kind::PARAMETER_DOUBLE, double_value, ..none },
+        ParameterValue::String(string_value) => Raw { r#type: Kind::PARAMETER_STRING, string_value, ..none },
+        ParameterValue::ByteArray(byte_array_value) => {
+            Raw { r#type: Kind::PARAMETER_BYTE_ARRAY, byte_array_value, ..none }
+        }
+        ParameterValue::BooleanArray(bool_array_value) => {
+            Raw { r#type: Kind::PARAMETER_BOOL_ARRAY, bool_array_value, ..none }
+        }
+        ParameterValue::IntegerArray(integer_array_value) => {
+            Raw { r#type: Kind::PARAMETER_INTEGER_ARRAY, integer_array_value, ..none }
+        }
+        ParameterValue::DoubleArray(double_array_value) => {
+            Raw { r#type: Kind::PARAMETER_DOUBLE_ARRAY, double_array_value, ..none }
+        }
+        ParameterValue::StringArray(string_array_value) => {
+            Raw { r#type: Kind::PARAMETER_STRING_ARRAY, string_array_value, ..none }
+        }
+    }
+}
+
+/// A value that was received; none where it is not set.
+pub(crate) fn parameter(value: msg::ParameterValue) -> Option<ParameterValue> {
+    use msg::ParameterType as Kind;
+    Some(match value.r#type {
+        Kind::PARAMETER_BOOL => ParameterValue::Boolean(value.bool_value),
+        Kind::PARAMETER_INTEGER => ParameterValue::Integer(value.integer_value),
+        Kind::PARAMETER_DOUBLE => ParameterValue::Double(value.double_value),
+        Kind::PARAMETER_STRING => ParameterValue::String(value.string_value),
+        Kind::PARAMETER_BYTE_ARRAY => ParameterValue::ByteArray(value.byte_array_value),
+        Kind::PARAMETER_BOOL_ARRAY => ParameterValue::BooleanArray(value.bool_array_value),
+        Kind::PARAMETER_INTEGER_ARRAY => ParameterValue::IntegerArray(value.integer_array_value),
+        Kind::PARAMETER_DOUBLE_ARRAY => ParameterValue::DoubleArray(value.double_array_value),
+        Kind::PARAMETER_STRING_ARRAY => ParameterValue::StringArray(value.string_array_value),
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::listed;
+
+    #[test]
+    fn names_are_listed_below_prefixes() {
+        let names = || ["a", "b.c", "b.d.e", "bc"].map(str::to_owned).to_vec();
+        let list = |prefixes: &[&str], depth| {
+            listed(names(), &prefixes.iter().map(|own| (*own).to_owned()).collect::<Vec<_>>(), depth).names
+        };
+        assert_eq!(list(&[], 0), names());
+        assert_eq!(list(&[], 1), ["a", "bc"]);
+        assert_eq!(list(&["b"], 0), ["b.c", "b.d.e"]);
+        assert_eq!(list(&["b"], 1), ["b.c"]);
+        assert_eq!(list(&["a"], 1), ["a"]);
+        assert_eq!(listed(names(), &[], 0).prefixes, ["b", "b.d"]);
+    }
+}

@@ -1,0 +1,98 @@
+//! How services are mapped onto DDS, which depends on the middleware of the other side.
+//!
+//! `rmw_fastrtps` (and Connext) relate a reply to its request beside the data (OMG DDS-RPC 1.0, section 7.8.2, "enhanced");
+//! `rmw_cyclonedds` writes a header in front of the data. With the wrong mapping a service is found, and never answers.
+
+use std::fmt;
+
+use clap::ValueEnum;
+use ros2_client::dds::ServiceMapping;
+
+/// The middleware that the other participants have.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum Rmw {
+    /// As the vendors of the discovered participants say.
+    #[default]
+    Auto,
+    /// `rmw_fastrtps_cpp`, the default of ROS 2.
+    Fastrtps,
+    /// `rmw_cyclonedds_cpp`.
+    Cyclonedds,
+}
+
+/// A mapping that is decided on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Mapping {
+    Enhanced,
+    Cyclone,
+}
+
+impl Mapping {
+    pub(crate) fn service_mapping(self) -> ServiceMapping {
+        match self {
+            Self::Enhanced => ServiceMapping::Enhanced,
+            Self::Cyclone => ServiceMapping::Cyclone,
+        }
+    }
+
+    /// The value of `--rmw` that chooses the other one.
+    pub(crate) fn other(self) -> &'static str {
+        match self {
+            Self::Enhanced => "cyclonedds",
+            Self::Cyclone => "fastrtps",
+        }
+    }
+}
+
+impl fmt::Display for Mapping {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Enhanced => "rmw_fastrtps",
+            Self::Cyclone => "rmw_cyclonedds",
+        })
+    }
+}
+
+impl Rmw {
+    /// The mapping that is chosen whatever is discovered.
+    pub(crate) fn fixed(self) -> Option<Mapping> {
+        match self {
+            Self::Auto => None,
+            Self::Fastrtps => Some(Mapping::Enhanced),
+            Self::Cyclonedds => Some(Mapping::Cyclone),
+        }
+    }
+}
+
+/// Who has made a participant (RTPS 2.5, section 8.3.3.1.3; the numbers are assigned by the OMG).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Vendor {
+    /// RTI Connext, 01.01, or eProsima Fast DDS, 01.0F.
+    Enhanced,
+    /// Eclipse Cyclone DDS, 01.10.
+    Cyclone,
+    /// `RustDDS`, 01.12: what this program uses, which speaks either.
+    Own,
+    /// Another one.
+    Other,
+}
+
+impl Vendor {
+    pub(crate) fn new(id: [u8; 2]) -> Self {
+        match id {
+            [1, 0x01 | 0x0F] => Self::Enhanced,
+            [1, 0x10] => Self::Cyclone,
+            [1, 0x12] => Self::Own,
+            _ => Self::Other,
+        }
+    }
+
+    /// The mapping that it has, if it has only one.
+    pub(crate) fn mapping(self) -> Option<Mapping> {
+        match self {
+            Self::Enhanced => Some(Mapping::Enhanced),
+            Self::Cyclone => Some(Mapping::Cyclone),
+            Self::Own | Self::Other => None,
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! Services: serving them, and calling those of others.
+
+use std::fmt;
+use std::marker::PhantomData;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use futures::{FutureExt as _, StreamExt as _};
+use metaplan::message::Message;
+use ros2_client::ServiceTypeName;
+use ros2_client::dds::Client;
+use ros2_client::request_id::RmwRequestId;
+use smol::{Timer, channel};
+
+use crate::interfaces::Service;
+use crate::node::graph::Expected;
+use crate::node::qos;
+use crate::node::rmw::Mapping;
+use crate::node::{Node, Severity, client_name, dds_type, not_made};
+
+/// After a server was discovered, so long is waited for it to discover us: what it answers before is lost.
+const MATCHING: Duration = Duration::from_millis(100);
+
+/// Where the answer to one request goes. Dropped without an answer, the client hears none.
+pub struct Responder<S: Service> {
+    id: RmwRequestId,
+    answers: channel::Sender<(RmwRequestId, S::Response)>,
+}
+
+impl<S: Service> fmt::Debug for Responder<S> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_tuple("Responder").field(&self.id.sequence_number).finish()
+    }
+}
+
+impl<S: Service> Responder<S> {
+    /// Answers.
+    pub fn send(self, response: S::Response) {
+        // The node may be gone.
+        let _ = self.answers.try_send((self.id, response));
+    }
+}
+
+/// Why a call has no answer.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CallError {
+    /// Nobody serves it.
+    #[error("nobody serves {service} after {waited:.1} s")]
+    Absent {
+        /// Its full name.
+        service: String,
+        /// In seconds.
+        waited: String,
+    },
+    /// Whoever serves it has another type.
+    #[error("{service} is not what it should be: {complaint}")]
+    Unfit {
+        /// Its full name.
+        service: String,
+        /// What is wrong.
+        complaint: String,
+    },
+    /// There was no answer in time.
+    #[error(
+        "no answer from {service} after {waited:.1} s; it was called with the mapping of {mapping}, `--rmw {other}` has the other one"
+    )]
+    Silent {
+        /// Its full name.
+        service: String,
+        /// In seconds.
+        waited: String,
+        /// Which middleware's mapping.
+        mapping: String,
+        /// The value of `--rmw` for the other mapping.
+        other: &'static str,
+    },
+    /// The answer is no message of its type, or the request could not be written.
+    #[error("{service}: {because}")]
+    Broken {
+        /// Its full name.
+        service: String,
+        /// What has happened.
+        because: String,
+    },
+}
+
+type Connection<S> = (Mapping, Client<<S as Service>::Request, <S as Service>::Response>);
+
+/// Calls a service, one request at a time.
+pub struct Caller<S: Service> {
+    node: Arc<Node>,
+    full: String,
+    connection: smol::lock::Mutex<Option<Connection<S>>>,
+    service: PhantomData<fn() -> S>,
+}
+
+impl<S: Service> fmt::Debug for Caller<S> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_tuple("Caller").field(&self.full).finish()
+    }
+}
+
+impl<S: Service> Caller<S> {
+    /// The full name of the service.
+    pub fn service(&self) -> &str {
+        &self.full
+    }
+
+    /// Whether somebody serves it now.
+    pub fn is_served(&self) -> bool {
+        self.node.graph.server(&self.requests(), &self.replies()).is_some()
+    }
+
+    /// Makes ready to call, as soon as somebody serves it, so that the first call need not wait for discovery.
+    ///
+    /// # Errors
+    /// Nobody serves it in time, or with another type.
+    pub async fn ready(&self, within: Duration) -> Result<(), CallError> {
+        self.connect(&mut *self.connection.lock().await, within).await.map(|_| ())
+    }
+
+    /// Calls it.
+    ///
+    /// # Errors
+    /// There is no answer in time, or none that is understood.
+    pub async fn call(&self, request: S::Request, within: Duration) -> Result<S::Response, CallError> {
+        let begun = Instant::now();
+        let mut connection = self.connection.lock().await;
+        let (mapping, client) = self.connect(&mut connection, within).await?;
+        let left = within.saturating_sub(begun.elapsed());
+        let broken = |because: String| CallError::Broken { service: self.full.clone(), because };
+        let id = client.async_send_request(request).await.map_err(|error| broken(error.to_string()))?;
+        let (mut answer, mut timer) =
+            (Box::pin(client.async_receive_response(id)).fuse(), FutureExt::fuse(Timer::after(left)));
+        futures::select! {
+            answer = answer => answer.map_err(|error| broken(format!("the answer is none: {error}"))),
+            _ = timer => Err(CallError::Silent {
+                service: self.full.clone(),
+                waited: seconds(within),
+                mapping: mapping.to_string(),
+                other: mapping.other(),
+            }),
+        }
+    }
+
+    /// A client with the mapping of whoever serves it now.
+    async fn connect<'c>(
+        &self,
+        connection: &'c mut Option<Connection<S>>,
+        within: Duration,
+    ) -> Result<&'c Connection<S>, CallError> {
+        let (requests, replies) = (self.requests(), self.replies());
+        let absent = || CallError::Absent { service: self.full.clone(), waited: seconds(within) };
+        let found = self.node.graph.wait(within, |graph| graph.server(&requests, &replies)).await;
+        let mapping = found.ok_or_else(absent)?.map_err(|complaint| CallError::Unfit {
+            service: self.full.clone(),
+            complaint,
+        })?;
+        if connection.as_ref().is_some_and(|(own, _)| *own == mapping) {
+            return connection.as_ref().ok_or_else(absent);
+        }
+        let made = self.client(mapping).map_err(|message| CallError::Broken {
+            service: self.full.clone(),
+            because: message.message.clone(),
+        })?;
+        Timer::after(MATCHING.min(within)).await;
+        Ok(connection.insert((mapping, made)))
+    }
+
+    fn client(&self, mapping: Mapping) -> Result<Client<S::Request, S::Response>, Message> {
+        let name = client_name(&self.full)?;
+        let kind = ServiceTypeName::new(S::PACKAGE, S::NAME);
+        self.node
+            .inner()
+            .create_client(mapping.service_mapping(), &name, &kind, qos::service(), qos::service())
+            .map_err(|error| not_made(&self.full, &error))
+    }
+
+    fn requests(&self) -> String {
+        format!("rq{}Request", self.full)
+    }
+
+    fn replies(&self) -> String {
+        format!("rr{}Reply", self.full)
+    }
+}
+
+fn seconds(duration: Duration) -> String {
+    format!("{:.1}", duration.as_secs_f64())
+}
+
+impl Node {
+    /// To call a service of somebody else.
+    pub fn caller<S: Service>(self: &Arc<Self>, name: &str) -> Caller<S> {
+        let full = self.resolve(name);
+        self.expect_service::<S>(&full);
+        Caller { node: Arc::clone(self), full, connection: smol::lock::Mutex::new(None), service: PhantomData }
+    }
+
+    /// Serves a service as soon as it is known how services are mapped. The closure gets a request, and where the answer goes.
+    ///
+    /// # Errors
+    /// The name is wrong.
+    pub fn serve<S: Service + 'static>(
+        self: &Arc<Self>,
+        name: &str,
+        mut take: impl FnMut(S::Request, Responder<S>) + Send + 'static,
+    ) -> Result<(), Message> {
+        let full = self.resolve(name);
+        let service_name = client_name(&full)?;
+        self.expect_service::<S>(&full);
+        let (graph, weak) = (Arc::clone(&self.graph), Arc::downgrade(self));
+        smol::spawn(async move {
+            let mapping = graph.mapping().await;
+            let Some(node) = weak.upgrade() else { return };
+            let kind = ServiceTypeName::new(S::PACKAGE, S::NAME);
+            let made = node.inner().create_server::<S::Request, S::Response>(
+                mapping.service_mapping(),
+                &service_name,
+                &kind,
+                qos::service(),
+                qos::service(),
+            );
+            let server = match made {
+                Ok(server) => server,
+                Err(error) => {
+                    node.log(Severity::Fatal, &not_made(&full, &error).message);
+                    return;
+                }
+            };
+            drop(node);
+            let (sender, answers) = channel::unbounded();
+            let mut requests = Box::pin(server.receive_request_stream());
+            let mut answers = Box::pin(answers);
+            loop {
+                futures::select! {
+                    request = requests.next() => match request {
+                        Some(Ok((id, request))) => take(request, Responder { id, answers: sender.clone() }),
+                        Some(Err(error)) => {
+                            let Some(node) = weak.upgrade() else { return };
+                            node.log(Severity::Warn, &format!("a request to {full} is none: {error}"));
+                            drop(node);
+                            Timer::after(Duration::from_millis(1)).await;
+                        }
+                        None => return,
+                    },
+                    answer = answers.next() => {
+                        let Some((id, response)) = answer else { return };
+                        if let Err(error) = server.async_send_response(id, response).await
+                            && let Some(node) = weak.upgrade()
+                        {
+                            node.log(Severity::Error, &format!("an answer of {full} could not be written: {error}"));
+                        }
+                    }
+                }
+            }
+        })
+        .detach();
+        Ok(())
+    }
+
+    fn expect_service<S: Service>(&self, full: &str) {
+        for (topic, part) in [(format!("rq{full}Request"), "Request"), (format!("rr{full}Reply"), "Response")] {
+            let type_name = dds_type(S::PACKAGE, "srv", &format!("{}_{part}", S::NAME));
+            self.graph.expect(topic, Expected { type_name, hash: S::RIHS01 });
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Topics.
+
+use std::sync::Arc;
+
+use futures::StreamExt as _;
+use metaplan::message::Message;
+use ros2_client::MessageTypeName;
+use ros2_client::qos::QosProfile;
+use smol::Timer;
+
+use crate::interfaces::Msg;
+use crate::node::graph::Expected;
+use crate::node::{Node, Severity, client_name, dds_type, not_made};
+
+/// So often is said that samples of a topic are no messages of its type.
+const RUBBISH: u64 = 1000;
+
+/// Writes messages on a topic.
+pub struct Publisher<M: Msg> {
+    inner: ros2_client::dds::Publisher<M>,
+}
+
+impl<M: Msg> std::fmt::Debug for Publisher<M> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("Publisher").field(&M::TYPE).finish()
+    }
+}
+
+impl<M: Msg> Publisher<M> {
+    /// Writes a message. One that cannot be written is lost, as on any topic.
+    pub fn publish(&self, message: M) {
+        // Readers that are too slow lose samples; nobody waits for them.
+        let _ = self.inner.publish(message);
+    }
+}
+
+impl Node {
+    /// Writes on a topic.
+    ///
+    /// # Errors
+    /// The name is wrong, or the topic is there with another type.
+    pub(crate) fn publisher<M: Msg>(&self, name: &str, qos: QosProfile) -> Result<Publisher<M>, Message> {
+        let full = self.resolve(name);
+        let topic_name = client_name(&full)?;
+        let mut node = self.inner();
+        let made = node
+            .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
+            .and_then(|topic| node.create_publisher(&topic, Some(qos)));
+        drop(node);
+        let inner = made.map_err(|error| not_made(&full, &error))?;
+        self.expect_message::<M>(&full);
+        Ok(Publisher { inner })
+    }
+
+    /// Hears a topic for as long as the node is there.
+    ///
+    /// # Errors
+    /// The name is wrong, or the topic is there with another type.
+    pub(crate) fn subscribe<M: Msg>(
+        self: &Arc<Self>,
+        name: &str,
+        qos: QosProfile,
+        mut take: impl FnMut(M) + Send + 'static,
+    ) -> Result<(), Message> {
+        let full = self.resolve(name);
+        let topic_name = client_name(&full)?;
+        let mut node = self.inner();
+        let made = node
+            .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
+            .and_then(|topic| node.create_subscription::<M>(&topic, Some(qos)));
+        drop(node);
+        let subscription = made.map_err(|error| not_made(&full, &error))?;
+        self.expect_message::<M>(&full);
+        let weak = Arc::downgrade(self);
+        smol::spawn(async move {
+            let mut samples = Box::pin(subscription.async_stream());
+            let mut wrong = 0;
+            while let Some(sample) = samples.next().await {
+                let Some(node) = weak.upgrade() else { return };
+                match sample {
+                    Ok((_, info)) if node.graph.is_unfit(info.publisher_gid()) => {}
+                    Ok((message, _)) => take(message),
+                    Err(error) => {
+                        if wrong % RUBBISH == 0 {
+                            let text = format!("what was heard on {full} is no {}: {error}", M::TYPE);
+                            node.log(Severity::Warn, &text);
+                        }
+                        wrong += 1;
+                        drop(node);
+                        // An error that repeats itself must not take all of the time.
+                        Timer::after(std::time::Duration::from_millis(1)).await;
+                    }
+                }
+            }
+        })
+        .detach();
+        Ok(())
+    }
+
+    fn expect_message<M: Msg>(&self, full: &str) {
+        let type_name = dds_type(M::PACKAGE, "msg", M::NAME);
+        self.graph.expect(format!("rt{full}"), Expected { type_name, hash: M::RIHS01 });
+    }
+}
