@@ -1,1 +1,3 @@
 //! Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
+
+pub mod interfaces;
