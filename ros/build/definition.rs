@@ -1,0 +1,119 @@
+//! Files of ROS definitions → interfaces: a message, a service of two parts, an action of three.
+//!
+//! `PACKAGE/msg/X.msg`, `PACKAGE/srv/X.srv`, `PACKAGE/action/X.action`; what another ROS distribution or version of a package has otherwise
+//! stands below `variants/VARIANT/`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use hiroz_codegen::parser::msg::parse_msg_string;
+use hiroz_codegen::parser::parse_field;
+use hiroz_codegen::types::{Constant, Field};
+
+/// A structure of an interface.
+pub struct Part {
+    /// What follows the interface's name: nothing, `_Request`, `_Goal`, …
+    pub suffix: &'static str,
+    /// In the order of the definition, of which the bytes follow. Never empty.
+    pub fields: Vec<Field>,
+    /// Named values.
+    pub constants: Vec<Constant>,
+}
+
+/// A message, service or action.
+pub struct Interface {
+    /// The distribution or version that it belongs to, if it is not the default.
+    pub variant: Option<String>,
+    /// As in `std_msgs`.
+    pub package: String,
+    /// `msg`, `srv` or `action`.
+    pub folder: &'static str,
+    /// As in `String`.
+    pub name: String,
+    /// One for a message, two for a service, three for an action.
+    pub parts: Vec<Part>,
+}
+
+impl Interface {
+    /// As in `std_msgs/msg/String`.
+    pub fn full_name(&self) -> String {
+        format!("{}/{}/{}", self.package, self.folder, self.name)
+    }
+}
+
+/// Folders, and the parts of what lies there.
+const FOLDERS: [(&str, &[&str]); 3] =
+    [("msg", &[""]), ("srv", &["_Request", "_Response"]), ("action", &["_Goal", "_Result", "_Feedback"])];
+
+/// All interfaces below a directory, sorted; those of variants follow the others.
+pub fn read(root: &Path) -> Result<Vec<Interface>, Box<dyn Error>> {
+    let variants = root.join("variants");
+    let mut interfaces = Vec::new();
+    for package in entries(root)?.into_iter().filter(|path| *path != variants) {
+        read_package(&package, None, &mut interfaces)?;
+    }
+    for variant in entries(&variants)? {
+        for package in entries(&variant)? {
+            read_package(&package, Some(&file_stem(&variant)), &mut interfaces)?;
+        }
+    }
+    Ok(interfaces)
+}
+
+fn entries(directory: &Path) -> Result<Vec<PathBuf>, Box<dyn Error>> {
+    let found = std::fs::read_dir(directory).map_err(|error| format!("{}: {error}", directory.display()))?;
+    let mut paths = found.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, std::io::Error>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+fn file_stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn read_package(
+    path: &Path,
+    variant: Option<&str>,
+    interfaces: &mut Vec<Interface>,
+) -> Result<(), Box<dyn Error>> {
+    let package = file_stem(path);
+    for (folder, suffixes) in FOLDERS.iter().filter(|(folder, _)| path.join(folder).is_dir()) {
+        for file in entries(&path.join(folder))? {
+            let text = std::fs::read_to_string(&file)?;
+            let parts = parts(&text, suffixes, &package, &file)
+                .map_err(|error| format!("{}: {error}", file.display()))?;
+            interfaces.push(Interface {
+                variant: variant.map(str::to_owned),
+                package: package.clone(),
+                folder,
+                name: file_stem(&file),
+                parts,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn parts(
+    text: &str,
+    suffixes: &[&'static str],
+    package: &str,
+    file: &Path,
+) -> Result<Vec<Part>, Box<dyn Error>> {
+    let lines: Vec<&str> = text.lines().collect();
+    let sections: Vec<String> =
+        lines.split(|line| line.trim() == "---").map(|part| part.join("\n")).collect();
+    if sections.len() != suffixes.len() {
+        return Err(format!("{} sections instead of {}", sections.len(), suffixes.len()).into());
+    }
+    let parts = sections.iter().zip(suffixes).map(|(section, suffix)| {
+        let parsed = parse_msg_string(section, package, file)?;
+        let (mut fields, constants) = (parsed.fields, parsed.constants);
+        if fields.is_empty() {
+            // As rosidl has it: C structures are not empty.
+            fields.push(parse_field("uint8 structure_needs_at_least_one_member", package, 0)?);
+        }
+        Ok(Part { suffix, fields, constants })
+    });
+    parts.collect()
+}

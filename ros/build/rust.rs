@@ -1,0 +1,208 @@
+//! Interfaces and their hashes → the text of Rust modules `[VARIANT::]PACKAGE::{msg, srv, action}`.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fmt::Write;
+
+use hiroz_codegen::types::{ArrayType, Constant, Field};
+
+use crate::definition::{Interface, Part};
+use crate::description::Hashes;
+
+/// Words of Rust that are names of fields.
+const KEYWORDS: [&str; 1] = ["type"];
+
+/// Texts of modules, by variant, package and folder.
+type Modules<'i> = BTreeMap<Option<&'i str>, BTreeMap<&'i str, BTreeMap<&'i str, String>>>;
+
+/// The modules of all interfaces.
+pub fn modules(interfaces: &[Interface], hashes: &Hashes) -> Result<String, Box<dyn Error>> {
+    let mut modules = Modules::new();
+    for interface in interfaces {
+        let packages = modules.entry(interface.variant.as_deref()).or_default();
+        let text = packages.entry(&interface.package).or_default().entry(interface.folder).or_default();
+        for part in &interface.parts {
+            structure(text, interface, part, interfaces, hashes)?;
+        }
+        whole(text, interface, hashes)?;
+    }
+    let mut text = String::new();
+    for (variant, packages) in modules {
+        if let Some(variant) = variant {
+            writeln!(text, "/// Interfaces that are otherwise in `{variant}`.\npub mod {variant} {{")?;
+        }
+        for (package, folders) in packages {
+            writeln!(text, "/// Interfaces of the package `{package}`.\npub mod {package} {{")?;
+            for (folder, body) in folders {
+                writeln!(
+                    text,
+                    "/// What is defined in `{package}/{folder}`.\npub mod {folder} {{\n{body}}}"
+                )?;
+            }
+            writeln!(text, "}}")?;
+        }
+        if variant.is_some() {
+            writeln!(text, "}}")?;
+        }
+    }
+    Ok(text)
+}
+
+/// A slice of entries, one for each structure (`Entry::of::<T>(variant, name)`) and one for each other type that has a hash
+/// (`Entry::hash(variant, name, hash)`).
+pub fn table(interfaces: &[Interface], hashes: &Hashes) -> String {
+    let mut lines = Vec::new();
+    let mut structures = Vec::new();
+    for interface in interfaces {
+        for part in &interface.parts {
+            let name = format!("{}{}", interface.full_name(), part.suffix);
+            let path = format!("metaplan_ros::interfaces::{}", path(interface, part));
+            lines.push(format!("Entry::of::<{path}>({:?}, {name:?}),", interface.variant));
+            structures.push((interface.variant.clone(), name));
+        }
+    }
+    let others = hashes.iter().filter(|(key, _)| !structures.contains(key));
+    lines.extend(
+        others.map(|((variant, name), hash)| format!("Entry::hash({variant:?}, {name:?}, {hash:?}),")),
+    );
+    format!("&[\n{}\n]", lines.join("\n"))
+}
+
+/// The name of a structure in Rust.
+fn rust_name(interface: &Interface, part: &Part) -> String {
+    format!("{}{}", interface.name, part.suffix.trim_start_matches('_'))
+}
+
+fn path(interface: &Interface, part: &Part) -> String {
+    let variant = interface.variant.as_ref().map(|variant| format!("{variant}::")).unwrap_or_default();
+    format!("{variant}{}::{}::{}", interface.package, interface.folder, rust_name(interface, part))
+}
+
+fn hash<'h>(hashes: &'h Hashes, interface: &Interface, suffix: &str) -> Result<&'h str, Box<dyn Error>> {
+    let key = (interface.variant.clone(), format!("{}{suffix}", interface.full_name()));
+    Ok(hashes.get(&key).ok_or_else(|| format!("no hash of {}", key.1))?)
+}
+
+fn structure(
+    text: &mut String,
+    interface: &Interface,
+    part: &Part,
+    all: &[Interface],
+    hashes: &Hashes,
+) -> Result<(), Box<dyn Error>> {
+    let name = rust_name(interface, part);
+    let full_name = format!("{}{}", interface.full_name(), part.suffix);
+    writeln!(text, "/// The structure `{full_name}`.")?;
+    writeln!(text, "#[derive(Debug, Clone, Default, PartialEq, ::serde::Serialize, ::serde::Deserialize)]")?;
+    writeln!(text, "pub struct {name} {{")?;
+    for field in &part.fields {
+        let raw = if KEYWORDS.contains(&field.name.as_str()) { "r#" } else { "" };
+        let kind = rust_type(field, interface, all)?;
+        writeln!(text, "/// The field `{0}`.\npub {raw}{0}: {kind},", field.name)?;
+    }
+    writeln!(text, "}}")?;
+    constants(text, &name, &part.constants)?;
+    let hash = hash(hashes, interface, part.suffix)?;
+    writeln!(
+        text,
+        "impl ::ros2_client::Message for {name} {{}}\n\
+         impl crate::interfaces::Structure for {name} {{\n\
+         const TYPE: &'static str = {full_name:?};\nconst RIHS01: &'static str = {hash:?};\n}}"
+    )?;
+    Ok(())
+}
+
+fn constants(text: &mut String, name: &str, constants: &[Constant]) -> Result<(), Box<dyn Error>> {
+    if constants.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "impl {name} {{")?;
+    for Constant { name, const_type, value } in constants {
+        let kind = primitive(const_type).ok_or_else(|| format!("{name}: a constant of type {const_type}"))?;
+        writeln!(text, "/// The value `{name}`.\npub const {name}: {kind} = {value};")?;
+    }
+    writeln!(text, "}}")?;
+    Ok(())
+}
+
+/// What is said of a message, service or action as a whole.
+fn whole(text: &mut String, interface: &Interface, hashes: &Hashes) -> Result<(), Box<dyn Error>> {
+    let Interface { package, folder, name, .. } = interface;
+    let of = |suffix| hash(hashes, interface, suffix);
+    let names = format!("const PACKAGE: &'static str = {package:?};\nconst NAME: &'static str = {name:?};");
+    if *folder == "msg" {
+        writeln!(text, "impl crate::interfaces::Msg for {name} {{\n{names}\n}}")?;
+        return Ok(());
+    }
+    writeln!(text, "/// `{}`.", interface.full_name())?;
+    writeln!(text, "#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]\npub struct {name};")?;
+    if *folder == "srv" {
+        writeln!(
+            text,
+            "impl crate::interfaces::Service for {name} {{\n\
+             type Request = {name}Request;\ntype Response = {name}Response;\n{names}\n\
+             const RIHS01: &'static str = {:?};\n}}",
+            of("")?
+        )?;
+    } else {
+        writeln!(
+            text,
+            "impl crate::interfaces::Action for {name} {{\n\
+             type Goal = {name}Goal;\ntype Result = {name}Result;\ntype Feedback = {name}Feedback;\n{names}\n\
+             const SEND_GOAL_RIHS01: &'static str = {:?};\nconst GET_RESULT_RIHS01: &'static str = {:?};\n\
+             const FEEDBACK_RIHS01: &'static str = {:?};\n}}",
+            of("_SendGoal")?,
+            of("_GetResult")?,
+            of("_FeedbackMessage")?
+        )?;
+    }
+    Ok(())
+}
+
+fn primitive(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "bool" => "bool",
+        "byte" | "char" | "uint8" => "u8",
+        "int8" => "i8",
+        "uint16" => "u16",
+        "int16" => "i16",
+        "uint32" => "u32",
+        "int32" => "i32",
+        "uint64" => "u64",
+        "int64" => "i64",
+        "float32" => "f32",
+        "float64" => "f64",
+        "string" => "::std::string::String",
+        _ => return None,
+    })
+}
+
+/// Bounds are not seen in the bytes, and not in the type.
+fn rust_type(field: &Field, interface: &Interface, all: &[Interface]) -> Result<String, Box<dyn Error>> {
+    let kind = &field.field_type;
+    let known = primitive(&kind.base_type).map(str::to_owned);
+    let single =
+        known.map_or_else(|| nested_type(&kind.base_type, kind.package.as_deref(), interface, all), Ok)?;
+    Ok(match kind.array {
+        ArrayType::Single => single,
+        ArrayType::Fixed(size) => format!("[{single}; {size}]"),
+        ArrayType::Bounded(_) | ArrayType::Unbounded => format!("::std::vec::Vec<{single}>"),
+    })
+}
+
+/// The path to a message that an interface refers to: the variant's own, or the common one.
+fn nested_type(
+    name: &str,
+    package: Option<&str>,
+    interface: &Interface,
+    all: &[Interface],
+) -> Result<String, Box<dyn Error>> {
+    let package = package.unwrap_or(&interface.package);
+    let full_name = format!("{package}/msg/{name}");
+    let find = |variant: &Option<String>| {
+        all.iter().find(|other| other.variant == *variant && other.full_name() == full_name)
+    };
+    let found = find(&interface.variant).or_else(|| find(&None));
+    let found = found.ok_or_else(|| format!("{}: there is no {full_name}", interface.full_name()))?;
+    Ok(format!("crate::interfaces::{}", path(found, &found.parts[0])))
+}

@@ -1,0 +1,57 @@
+//! What is known of an interface at compile time: its name, its parts and its type hash.
+//!
+//! A type hash (RIHS01, [1]) is what ROS 2 since Iron puts into an endpoint's user data; Humble has none.
+//!
+//! [1] REP-2011, Evolving Message Types; REP-2016, ROS 2 Interface Type Descriptions.
+
+use ros2_client::Message;
+
+/// What is sent as one piece: a message, or a part of a service or an action.
+pub trait Structure: Message + Clone + Default + Send + 'static {
+    /// As in `std_srvs/srv/Trigger_Response`.
+    const TYPE: &'static str;
+    /// The type hash, as in `RIHS01_f49f…`.
+    const RIHS01: &'static str;
+}
+
+/// A message, as on a topic.
+pub trait Msg: Structure {
+    /// As in `std_msgs`.
+    const PACKAGE: &'static str;
+    /// As in `String`.
+    const NAME: &'static str;
+}
+
+/// A service.
+pub trait Service {
+    /// What the client sends.
+    type Request: Structure;
+    /// What the server answers.
+    type Response: Structure;
+    /// As in `std_srvs`.
+    const PACKAGE: &'static str;
+    /// As in `Trigger`.
+    const NAME: &'static str;
+    /// The type hash of the service, which both of its topics carry.
+    const RIHS01: &'static str;
+}
+
+/// An action.
+pub trait Action {
+    /// What the client wants.
+    type Goal: Structure;
+    /// What has come of it.
+    type Result: Structure;
+    /// What is told on the way.
+    type Feedback: Structure;
+    /// As in `nav2_msgs`.
+    const PACKAGE: &'static str;
+    /// As in `NavigateToPose`.
+    const NAME: &'static str;
+    /// The type hash of the service `send_goal`.
+    const SEND_GOAL_RIHS01: &'static str;
+    /// The type hash of the service `get_result`.
+    const GET_RESULT_RIHS01: &'static str;
+    /// The type hash of the topic `feedback`.
+    const FEEDBACK_RIHS01: &'static str;
+}
