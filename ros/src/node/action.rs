@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use futures::{FutureExt as _, StreamExt as _};
+use futures::FutureExt as _;
 use metaplan::message::Message;
 use ros2_client::ActionTypeName;
 use ros2_client::action::{
-    ActionClient, ActionClientQosPolicies, ActionServer, ActionServerQosPolicies, GetResultResponse, GoalId, GoalInfo,
-    GoalStatusEnum, SendGoalResponse,
+    ActionClient, ActionClientQosPolicies, ActionServer, ActionServerQosPolicies, GetResultResponse, GoalId,
+    GoalInfo, GoalStatusEnum, SendGoalResponse,
 };
 use ros2_client::action_msgs::{CancelGoalResponse, CancelGoalResponseEnum, GoalStatus, GoalStatusArray};
 use ros2_client::builtin_interfaces::Time;
@@ -27,6 +27,12 @@ const POLL: Duration = Duration::from_millis(2);
 
 /// So long a result is kept for those who ask for it, as in `rcl_action`.
 const KEPT: Duration = Duration::from_secs(15 * 60);
+
+/// After a server was discovered, so long is waited for it to discover us.
+const MATCHING: Duration = Duration::from_millis(100);
+
+/// A server that is missing when it is looked for more often than this in a row is gone.
+const GONE: u32 = 250;
 
 type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 type Client<A> = ActionClient<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
@@ -140,8 +146,10 @@ impl<A: Action> Goals<A> {
 
     fn answer_cancel(&self, request: RmwRequestId, code: CancelGoalResponseEnum, goals: Vec<GoalInfo>) {
         if let Some(server) = self.server.get() {
-            let _ = server
-                .send_cancel_response(request, CancelGoalResponse { return_code: code, goals_canceling: goals });
+            let _ = server.send_cancel_response(
+                request,
+                CancelGoalResponse { return_code: code, goals_canceling: goals },
+            );
         }
     }
 
@@ -168,7 +176,8 @@ impl<A: Action> Goals<A> {
 
     fn send_result(&self, request: RmwRequestId, known: &Known<A::Result>) {
         if let (Some(server), Some((result, _))) = (self.server.get(), &known.result) {
-            let _ = server.send_result(request, GetResultResponse { status: known.status, result: result.clone() });
+            let _ = server
+                .send_result(request, GetResultResponse { status: known.status, result: result.clone() });
         }
     }
 
@@ -233,8 +242,9 @@ impl<A: Action> Goals<A> {
         take: &mut impl FnMut(GoalEvent<A>),
     ) {
         // The library keeps the fields to itself, and shows them only as data.
-        let Some(cancel) =
-            serde_json::to_value(cancel).ok().and_then(|data| serde_json::from_value::<CancelGoalRequest>(data).ok())
+        let Some(cancel) = serde_json::to_value(cancel)
+            .ok()
+            .and_then(|data| serde_json::from_value::<CancelGoalRequest>(data).ok())
         else {
             self.answer_cancel(request, CancelGoalResponseEnum::UnknownGoal, Vec::new());
             return;
@@ -298,7 +308,22 @@ pub enum GoalError {
 pub struct ActionCaller<A: Action> {
     node: Arc<Node>,
     full: String,
-    connection: smol::lock::Mutex<Option<(Mapping, Arc<Client<A>>)>>,
+    connection: smol::lock::Mutex<Option<Arc<Connection<A>>>>,
+}
+
+/// A client with the goals that are under way. The client library gives what is heard to whoever asks first, whichever goal it is
+/// about; so one task asks for all goals.
+struct Connection<A: Action> {
+    mapping: Mapping,
+    client: Client<A>,
+    goals: Mutex<BTreeMap<GoalId, Followed<A>>>,
+}
+
+/// Who is told of a goal.
+struct Followed<A: Action> {
+    result: RmwRequestId,
+    events: channel::Sender<Accepted<A>>,
+    cancelled: channel::Receiver<()>,
 }
 
 /// A goal that somebody else pursues.
@@ -318,6 +343,7 @@ impl<A: Action> Pursued<A> {
 
     /// Asks for a safe end, which is heard of as any other.
     pub fn cancel(&self) {
+        // Asked twice is asked once.
         let _ = self.cancel.try_send(());
     }
 }
@@ -336,9 +362,12 @@ impl<A: Action + 'static> ActionCaller<A> {
     pub async fn pursue(&self, goal: A::Goal, within: Duration) -> Result<Pursued<A>, GoalError> {
         let begun = Instant::now();
         let unreachable = |because: String| GoalError::Unreachable { action: self.full.clone(), because };
-        let (mapping, client) = self.connect(within).await.map_err(unreachable)?;
+        // Held until there is an answer: two who wait would take each other's.
+        let mut connection = self.connection.lock().await;
+        let connection = self.connect(&mut connection, within).await.map_err(unreachable)?;
+        let (client, mapping) = (&connection.client, connection.mapping);
         let left = within.saturating_sub(begun.elapsed());
-        let mut timer = FutureExt::fuse(Timer::after(left));
+        let mut timer = futures::FutureExt::fuse(Timer::after(left));
         let mut sent = Box::pin(client.async_send_goal(goal)).fuse();
         let (id, response) = futures::select! {
             sent = sent => sent.map_err(|error| unreachable(error.to_string()))?,
@@ -351,25 +380,41 @@ impl<A: Action + 'static> ActionCaller<A> {
                 return Err(unreachable(text));
             }
         };
-        drop(sent);
         if !response.accepted {
             return Err(GoalError::Rejected(self.full.clone()));
         }
+        let result = client.request_result(id).map_err(|error| unreachable(error.to_string()))?;
         let (sender, events) = channel::unbounded();
         let (cancel, cancelled) = channel::bounded(1);
-        smol::spawn(follow::<A>(client, id, sender, cancelled)).detach();
+        let is_first = connection.follow(id, Followed { result, events: sender, cancelled });
+        if is_first {
+            let (graph, full, followed) =
+                (Arc::clone(&self.node.graph), self.full.clone(), Arc::clone(connection));
+            smol::spawn(async move { followed.run(&graph, &full).await }).detach();
+        }
         Ok(Pursued { goal: id, events, cancel })
     }
 
-    async fn connect(&self, within: Duration) -> Result<(Mapping, Arc<Client<A>>), String> {
+    async fn connect<'c>(
+        &self,
+        connection: &'c mut Option<Arc<Connection<A>>>,
+        within: Duration,
+    ) -> Result<&'c Arc<Connection<A>>, String> {
         let (requests, replies) = goal_topics(&self.full);
         let found = self.node.graph.wait(within, |graph| graph.server(&requests, &replies)).await;
-        let mapping = found.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
-        let mut connection = self.connection.lock().await;
-        if let Some((own, client)) = connection.as_ref().filter(|(own, _)| *own == mapping) {
-            return Ok((*own, Arc::clone(client)));
+        let mapping =
+            found.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
+        if connection.as_ref().is_none_or(|own| own.mapping != mapping) {
+            let client = self.client(mapping).map_err(|message| message.message.clone())?;
+            // What is answered before the server has discovered us is lost.
+            Timer::after(MATCHING.min(within)).await;
+            *connection = Some(Arc::new(Connection { mapping, client, goals: Mutex::default() }));
         }
-        let name = client_name(&self.full).map_err(|message| message.message.clone())?;
+        connection.as_ref().ok_or_else(String::new)
+    }
+
+    fn client(&self, mapping: Mapping) -> Result<Client<A>, Message> {
+        let name = client_name(&self.full)?;
         let policies = ActionClientQosPolicies {
             goal_service: qos::service(),
             result_service: qos::service(),
@@ -378,57 +423,73 @@ impl<A: Action + 'static> ActionCaller<A> {
             status_subscription: latched(1),
         };
         let kind = ActionTypeName::new(A::PACKAGE, A::NAME);
-        let made = self
-            .node
+        self.node
             .inner()
             .create_action_client(mapping.service_mapping(), &name, &kind, policies)
-            .map_err(|error| error.to_string())?;
-        // What is answered before the server has discovered us is lost.
-        Timer::after(Duration::from_millis(100).min(within)).await;
-        let client = Arc::new(made);
-        *connection = Some((mapping, Arc::clone(&client)));
-        Ok((mapping, client))
+            .map_err(|error| not_made(&self.full, &error))
     }
 }
 
-/// Hands on what is heard of a goal, up to its end.
-async fn follow<A: Action + 'static>(
-    client: Arc<Client<A>>,
-    id: GoalId,
-    events: channel::Sender<Accepted<A>>,
-    cancelled: channel::Receiver<()>,
-) {
-    let mut result = Box::pin(client.async_request_result(id)).fuse();
-    let mut feedback = Box::pin(client.feedback_stream(id));
-    let mut cancelled = Box::pin(cancelled);
-    loop {
-        let event = futures::select! {
-            ended = result => match ended {
-                Ok((status, result)) => {
-                    let end = match status {
-                        GoalStatusEnum::Succeeded => GoalEnd::Succeeded,
-                        GoalStatusEnum::Canceled => GoalEnd::Canceled,
-                        _ => GoalEnd::Aborted,
-                    };
-                    Accepted::Ended(end, result)
+impl<A: Action + 'static> Connection<A> {
+    fn goals(&self) -> MutexGuard<'_, BTreeMap<GoalId, Followed<A>>> {
+        self.goals.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds a goal; returns whether nobody asks for what is heard yet.
+    fn follow(&self, goal: GoalId, followed: Followed<A>) -> bool {
+        let mut goals = self.goals();
+        let is_first = goals.is_empty();
+        goals.insert(goal, followed);
+        is_first
+    }
+
+    /// Hands on what is heard of all goals, as long as there are any.
+    async fn run(&self, graph: &Graph, full: &str) {
+        let (requests, replies) = goal_topics(full);
+        let mut absent = 0;
+        loop {
+            self.poll();
+            absent = if graph.server(&requests, &replies).is_some() { 0 } else { absent + 1 };
+            if absent > GONE {
+                for followed in std::mem::take(&mut *self.goals()).into_values() {
+                    let because = format!("nobody serves {full} any more");
+                    let _ = followed.events.try_send(Accepted::Lost(because));
                 }
-                Err(error) => Accepted::Lost(error.to_string()),
-            },
-            heard = feedback.next() => match heard {
-                Some(Ok(feedback)) => Accepted::Feedback(feedback),
-                Some(Err(_)) | None => continue,
-            },
-            // The end of the channel is no wish to cancel; the goal goes on.
-            wish = cancelled.next() => {
-                if wish.is_some() {
-                    let _ = client.cancel_goal(id);
-                }
-                continue;
             }
-        };
-        let is_end = !matches!(event, Accepted::Feedback(_));
-        if events.send(event).await.is_err() || is_end {
-            return;
+            if self.goals().is_empty() {
+                return;
+            }
+            Timer::after(POLL).await;
+        }
+    }
+
+    fn poll(&self) {
+        // What is no answer is left out; a goal whose result is none is never heard of again, as with any client.
+        while let Ok(Some((message, _))) = self.client.feedback_subscription().take() {
+            if let Some(followed) = self.goals().get(&message.goal_id) {
+                let _ = followed.events.try_send(Accepted::Feedback(message.feedback));
+            }
+        }
+        while let Ok(Some((request, response))) = self.client.result_client().receive_response() {
+            let mut goals = self.goals();
+            let goal = goals.iter().find(|(_, own)| own.result == request).map(|(goal, _)| *goal);
+            let end = match response.status {
+                GoalStatusEnum::Succeeded => GoalEnd::Succeeded,
+                GoalStatusEnum::Canceled => GoalEnd::Canceled,
+                _ => GoalEnd::Aborted,
+            };
+            if let Some(followed) = goal.and_then(|goal| goals.remove(&goal)) {
+                let _ = followed.events.try_send(Accepted::Ended(end, response.result));
+            }
+        }
+        let wishes: Vec<GoalId> = self
+            .goals()
+            .iter()
+            .filter(|(_, own)| own.cancelled.try_recv().is_ok())
+            .map(|(goal, _)| *goal)
+            .collect();
+        for goal in wishes {
+            let _ = self.client.cancel_goal(goal);
         }
     }
 }
@@ -441,7 +502,8 @@ fn goal_topics(full: &str) -> (String, String) {
 /// The types of all topics of an action.
 fn expect_action<A: Action>(graph: &Graph, full: &str) {
     use crate::interfaces::action_msgs::srv::CancelGoal;
-    let services = [("send_goal", "SendGoal", A::SEND_GOAL_RIHS01), ("get_result", "GetResult", A::GET_RESULT_RIHS01)];
+    let services =
+        [("send_goal", "SendGoal", A::SEND_GOAL_RIHS01), ("get_result", "GetResult", A::GET_RESULT_RIHS01)];
     for (service, name, hash) in services {
         for (topic, part) in [("rq", "Request"), ("rr", "Reply")] {
             let end = if part == "Reply" { "Response" } else { part };
@@ -484,7 +546,7 @@ impl Node {
         expect_action::<A>(&self.graph, &full);
         let goals = Arc::new(Goals { server: OnceLock::new(), goals: Mutex::default() });
         let (graph, weak, served) = (Arc::clone(&self.graph), Arc::downgrade(self), Arc::clone(&goals));
-        smol::spawn(async move {
+        self.spawn(async move {
             let mapping = graph.mapping().await;
             let Some(node) = weak.upgrade() else { return };
             let policies = ActionServerQosPolicies {
@@ -515,8 +577,7 @@ impl Node {
                 }
                 Timer::after(POLL).await;
             }
-        })
-        .detach();
+        });
         Ok(goals)
     }
 }

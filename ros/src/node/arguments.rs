@@ -91,7 +91,10 @@ impl RosArguments {
             self.rules.iter().find(is_it).map(|own| own.to.clone())
         };
         let namespace = rule("__ns").unwrap_or_else(|| "/".to_owned());
-        FullName::new(&namespace, &rule("__node").or_else(|| rule("__name")).unwrap_or_else(|| name.to_owned()))
+        FullName::new(
+            &namespace,
+            &rule("__node").or_else(|| rule("__name")).unwrap_or_else(|| name.to_owned()),
+        )
     }
 
     /// The full name of a topic, a service or an action of a node, after the first rule that fits.
@@ -149,7 +152,8 @@ fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Vec<Message>> {
     let file = path.display().to_string();
     let fault = |text: String| vec![Message::at("N102", &file, None, text)];
     let text = std::fs::read_to_string(path).map_err(|error| fault(format!("cannot be read: {error}")))?;
-    let root: Value = serde_yaml_ng::from_str(&text).map_err(|error| fault(format!("is not YAML: {error}")))?;
+    let root: Value =
+        serde_yaml_ng::from_str(&text).map_err(|error| fault(format!("is not YAML: {error}")))?;
     let (mut found, mut messages) = (Vec::new(), Vec::new());
     nodes("", &root, &mut found, &mut messages);
     let messages: Vec<Message> =
@@ -172,7 +176,11 @@ fn nodes(path: &str, value: &Value, found: &mut Vec<Assigned>, messages: &mut Ve
             let nodes = if path.starts_with('/') { path.to_owned() } else { format!("/{path}") };
             flatten("", below, &nodes, found, messages);
         } else {
-            let path = if path.is_empty() { key.to_owned() } else { format!("{path}/{}", key.trim_start_matches('/')) };
+            let path = if path.is_empty() {
+                key.to_owned()
+            } else {
+                format!("{path}/{}", key.trim_start_matches('/'))
+            };
             nodes(&path, below, found, messages);
         }
     }
@@ -205,7 +213,9 @@ fn parameter_value(value: &Value) -> Option<ParameterValue> {
         Value::Sequence(list) => {
             let all = |of: fn(&Value) -> bool| list.iter().all(of);
             if list.is_empty() || all(Value::is_string) {
-                ParameterValue::StringArray(list.iter().filter_map(Value::as_str).map(str::to_owned).collect())
+                ParameterValue::StringArray(
+                    list.iter().filter_map(Value::as_str).map(str::to_owned).collect(),
+                )
             } else if all(Value::is_bool) {
                 ParameterValue::BooleanArray(list.iter().filter_map(Value::as_bool).collect())
             } else if all(Value::is_i64) {

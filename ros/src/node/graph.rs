@@ -1,6 +1,6 @@
 //! Who else is there: participants with their vendors, and endpoints with their types, as discovery tells.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -10,7 +10,7 @@ use ros2_client::dds::rustdds::{
     DomainParticipant, DomainParticipantStatusEvent, EndpointDescription, GUID, StatusEvented as _,
 };
 
-use smol::Timer;
+use smol::{Task, Timer};
 
 use crate::node::rmw::{Mapping, Rmw, Vendor};
 
@@ -40,6 +40,8 @@ struct Seen {
     expected: BTreeMap<String, Expected>,
     /// What was found wrong and is to be reported.
     complaints: Vec<String>,
+    /// What was reported.
+    reported: BTreeSet<String>,
 }
 
 /// The type of a topic.
@@ -61,18 +63,17 @@ struct Endpoint {
 }
 
 impl Graph {
-    /// Begins to watch. Nobody else may listen to the status of the participant.
-    pub(crate) fn watch(participant: &DomainParticipant, own: [u8; 12], rmw: Rmw) -> Arc<Self> {
+    /// Begins to watch, until the task is dropped. Nobody else may listen to the status of the participant.
+    pub(crate) fn watch(participant: &DomainParticipant, own: [u8; 12], rmw: Rmw) -> (Arc<Self>, Task<()>) {
         let graph = Arc::new(Self { rmw, own, seen: Mutex::default() });
         let (listener, watching) = (participant.status_listener(), Arc::clone(&graph));
-        smol::spawn(async move {
+        let task = smol::spawn(async move {
             let mut events = listener.as_async_status_stream();
             while let Some(event) = events.next().await {
                 watching.take(event);
             }
-        })
-        .detach();
-        graph
+        });
+        (graph, task)
     }
 
     fn seen(&self) -> MutexGuard<'_, Seen> {
@@ -122,7 +123,8 @@ impl Graph {
         let mut seen = self.seen();
         let topic = seen.endpoints.get(&bytes(guid)).map(|endpoint| endpoint.topic.clone());
         if let Some(topic) = topic {
-            seen.complaints.push(format!("an endpoint of {topic} has a quality of service that does not fit ours"));
+            seen.complaints
+                .push(format!("an endpoint of {topic} has a quality of service that does not fit ours"));
         }
     }
 
@@ -139,9 +141,11 @@ impl Graph {
         seen.expected.insert(topic, expected);
     }
 
-    /// What was found wrong since it was asked last.
+    /// What was found wrong since it was asked last, each thing once.
     pub(crate) fn complaints(&self) -> Vec<String> {
-        std::mem::take(&mut self.seen().complaints)
+        let mut seen = self.seen();
+        let new = std::mem::take(&mut seen.complaints);
+        new.into_iter().filter(|complaint| seen.reported.insert(complaint.clone())).collect()
     }
 
     /// Whether what this writer writes has another type than ours.
@@ -194,16 +198,6 @@ impl Graph {
             seen.mapping = self.rmw.fixed().or(met).or_else(|| waited.then_some(Mapping::Enhanced));
         }
         seen.mapping
-    }
-
-    /// The topics that have endpoints, with the types, as DDS names them.
-    pub(crate) fn topics(&self) -> Vec<(String, String)> {
-        let seen = self.seen();
-        let mut topics: Vec<_> =
-            seen.endpoints.values().map(|own| (own.topic.clone(), own.type_name.clone())).collect();
-        topics.sort();
-        topics.dedup();
-        topics
     }
 
     /// Waits until something can be said, or time is up.

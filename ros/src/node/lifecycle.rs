@@ -7,8 +7,8 @@ use metaplan::message::Message;
 
 use crate::interfaces::lifecycle_msgs::msg::{State, Transition, TransitionDescription, TransitionEvent};
 use crate::interfaces::lifecycle_msgs::srv::{
-    ChangeState, ChangeStateResponse, GetAvailableStates, GetAvailableStatesResponse, GetAvailableTransitions,
-    GetAvailableTransitionsResponse, GetState, GetStateResponse,
+    ChangeState, ChangeStateResponse, GetAvailableStates, GetAvailableStatesResponse,
+    GetAvailableTransitions, GetAvailableTransitionsResponse, GetState, GetStateResponse,
 };
 use crate::node::{Node, Publisher, Severity, depth};
 
@@ -36,13 +36,41 @@ struct Way {
 }
 
 const WAYS: [Way; 7] = [
-    way(Transition::TRANSITION_CONFIGURE, "configure", Phase::Unconfigured, Phase::Inactive, 10, "configuring"),
+    way(
+        Transition::TRANSITION_CONFIGURE,
+        "configure",
+        Phase::Unconfigured,
+        Phase::Inactive,
+        10,
+        "configuring",
+    ),
     way(Transition::TRANSITION_CLEANUP, "cleanup", Phase::Inactive, Phase::Unconfigured, 11, "cleaningup"),
     way(Transition::TRANSITION_ACTIVATE, "activate", Phase::Inactive, Phase::Active, 13, "activating"),
     way(Transition::TRANSITION_DEACTIVATE, "deactivate", Phase::Active, Phase::Inactive, 14, "deactivating"),
-    way(Transition::TRANSITION_UNCONFIGURED_SHUTDOWN, "shutdown", Phase::Unconfigured, Phase::Finalized, 12, "shuttingdown"),
-    way(Transition::TRANSITION_INACTIVE_SHUTDOWN, "shutdown", Phase::Inactive, Phase::Finalized, 12, "shuttingdown"),
-    way(Transition::TRANSITION_ACTIVE_SHUTDOWN, "shutdown", Phase::Active, Phase::Finalized, 12, "shuttingdown"),
+    way(
+        Transition::TRANSITION_UNCONFIGURED_SHUTDOWN,
+        "shutdown",
+        Phase::Unconfigured,
+        Phase::Finalized,
+        12,
+        "shuttingdown",
+    ),
+    way(
+        Transition::TRANSITION_INACTIVE_SHUTDOWN,
+        "shutdown",
+        Phase::Inactive,
+        Phase::Finalized,
+        12,
+        "shuttingdown",
+    ),
+    way(
+        Transition::TRANSITION_ACTIVE_SHUTDOWN,
+        "shutdown",
+        Phase::Active,
+        Phase::Finalized,
+        12,
+        "shuttingdown",
+    ),
 ];
 
 const fn way(id: u8, label: &'static str, from: Phase, to: Phase, via: u8, name: &'static str) -> Way {
@@ -170,7 +198,12 @@ impl Lifecycle {
     fn tell(&self, way: &Way, start_state: State, goal_state: State) {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let timestamp = u64::try_from(since.as_nanos()).unwrap_or_default();
-        self.events.publish(TransitionEvent { timestamp, transition: way.transition(), start_state, goal_state });
+        self.events.publish(TransitionEvent {
+            timestamp,
+            transition: way.transition(),
+            start_state,
+            goal_state,
+        });
     }
 }
 
@@ -180,5 +213,7 @@ fn described(wanted: impl Fn(&&Way) -> bool) -> GetAvailableTransitionsResponse 
         start_state: way.from.state(),
         goal_state: way.to.state(),
     };
-    GetAvailableTransitionsResponse { available_transitions: WAYS.iter().filter(wanted).map(describe).collect() }
+    GetAvailableTransitionsResponse {
+        available_transitions: WAYS.iter().filter(wanted).map(describe).collect(),
+    }
 }

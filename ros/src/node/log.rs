@@ -68,7 +68,12 @@ impl Node {
         }
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let name = self.name.to_string().trim_start_matches('/').replace('/', ".");
-        let line = format!("[{}] [{}.{:09}] [{name}]: {text}\n", severity.word(), since.as_secs(), since.subsec_nanos());
+        let line = format!(
+            "[{}] [{}.{:09}] [{name}]: {text}\n",
+            severity.word(),
+            since.as_secs(),
+            since.subsec_nanos()
+        );
         // Who has closed standard error does not want to know.
         let _ = std::io::stderr().write_all(visible(&line).as_bytes());
         self.inner().rosout_raw(Time::now(), severity.level(), &name, text, file!(), "", line!());

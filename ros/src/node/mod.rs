@@ -23,7 +23,7 @@ use std::time::Duration;
 use metaplan::message::Message;
 use ros2_client::dds::Context;
 use ros2_client::{NodeName, NodeOptions};
-use smol::Timer;
+use smol::{Task, Timer};
 
 pub use action::{
     Accepted, ActionCaller, CancelRequest, GoalEnd, GoalError, GoalEvent, Goals, Pursued, Wanted,
@@ -40,7 +40,7 @@ pub use topic::Publisher;
 use graph::Graph;
 use names::FullName;
 
-pub(crate) use qos::{depth, keep_all, latched};
+pub use qos::{depth, keep_all, latched};
 
 /// What a node is made with.
 #[derive(Debug, Clone)]
@@ -62,6 +62,8 @@ pub struct Node {
     arguments: RosArguments,
     graph: Arc<Graph>,
     least: Severity,
+    /// What goes on for as long as the node is there.
+    tasks: Mutex<Vec<Task<()>>>,
 }
 
 impl std::fmt::Debug for Node {
@@ -86,19 +88,30 @@ impl Node {
         let own = ros2_client::dds::rustdds::RTPSEntity::guid(&participant).to_bytes();
         let mut prefix = [0; 12];
         prefix.copy_from_slice(&own[..12]);
-        let graph = Graph::watch(&participant, prefix, rmw);
+        let (graph, watching) = Graph::watch(&participant, prefix, rmw);
         let context = Context::from_domain_participant(participant).map_err(|error| failed(&error))?;
-        let node_name = NodeName::new(name.namespace(), name.name())
-            .map_err(|error| Message::error("N121", format!("`{name}` is not the name of a node: {error}")))?;
+        let node_name = NodeName::new(name.namespace(), name.name()).map_err(|error| {
+            Message::error("N121", format!("`{name}` is not the name of a node: {error}"))
+        })?;
         let options = NodeOptions::new().start_parameter_services(false).allow_undeclared_parameters(true);
         let inner = context.new_node(node_name, options).map_err(|error| failed(&error))?;
         let least = match arguments.log_level.as_deref() {
             None => Severity::Info,
             Some(level) => Severity::parse(level).ok_or_else(|| {
-                Message::error("N101", format!("`{level}` is not a level of the log; debug, info, warn, error and fatal are"))
+                Message::error(
+                    "N101",
+                    format!("`{level}` is not a level of the log; debug, info, warn, error and fatal are"),
+                )
             })?,
         };
-        let node = Arc::new(Self { inner: Mutex::new(inner), name, arguments, graph, least });
+        let node = Arc::new(Self {
+            inner: Mutex::new(inner),
+            name,
+            arguments,
+            graph,
+            least,
+            tasks: Mutex::new(vec![watching]),
+        });
         node.report_complaints();
         Ok(node)
     }
@@ -122,11 +135,18 @@ impl Node {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Lets something go on until it ends, or the node is dropped.
+    fn spawn(&self, work: impl Future<Output = ()> + Send + 'static) {
+        let mut tasks = self.tasks.lock().unwrap_or_else(PoisonError::into_inner);
+        tasks.retain(|task| !task.is_finished());
+        tasks.push(smol::spawn(work));
+    }
+
     /// Logs from time to time what the graph complains of.
     fn report_complaints(self: &Arc<Self>) {
         const PERIOD: Duration = Duration::from_millis(100);
         let node = Arc::downgrade(self);
-        smol::spawn(async move {
+        self.spawn(async move {
             while let Some(node) = node.upgrade() {
                 for complaint in node.graph.complaints() {
                     node.log(Severity::Warn, &complaint);
@@ -134,8 +154,7 @@ impl Node {
                 drop(node);
                 Timer::after(PERIOD).await;
             }
-        })
-        .detach();
+        });
     }
 }
 
@@ -146,8 +165,9 @@ fn dds_type(package: &str, kind: &str, name: &str) -> String {
 
 /// A name for the client library, from a full name.
 fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
-    ros2_client::Name::parse(full)
-        .map_err(|error| Message::error("N121", format!("`{full}` is not the name of a topic or service: {error}")))
+    ros2_client::Name::parse(full).map_err(|error| {
+        Message::error("N121", format!("`{full}` is not the name of a topic or service: {error}"))
+    })
 }
 
 /// Why something could not be made.

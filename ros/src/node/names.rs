@@ -62,7 +62,9 @@ fn fits(pattern: &[&str], parts: &[&str]) -> bool {
     match (pattern.split_first(), parts.split_first()) {
         (None, None) => true,
         (Some((&"**", rest)), _) => (0..=parts.len()).any(|skipped| fits(rest, &parts[skipped..])),
-        (Some((first, pattern)), Some((part, parts))) => (*first == "*" || first == part) && fits(pattern, parts),
+        (Some((first, pattern)), Some((part, parts))) => {
+            (*first == "*" || first == part) && fits(pattern, parts)
+        }
         _ => false,
     }
 }

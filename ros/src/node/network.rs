@@ -29,16 +29,22 @@ impl Network {
         let mut warnings = Vec::new();
         let domain = match value("ROS_DOMAIN_ID") {
             None => 0,
-            Some(text) => text.trim().parse().ok().filter(|domain| *domain <= GREATEST_DOMAIN).ok_or_else(
-                || wrong(format!("ROS_DOMAIN_ID is `{text}`, but should be a number from 0 to {GREATEST_DOMAIN}")),
-            )?,
+            Some(text) => {
+                text.trim().parse().ok().filter(|domain| *domain <= GREATEST_DOMAIN).ok_or_else(|| {
+                    wrong(format!(
+                        "ROS_DOMAIN_ID is `{text}`, but should be a number from 0 to {GREATEST_DOMAIN}"
+                    ))
+                })?
+            }
         };
         let only = value("ROS_LOCALHOST_ONLY").is_some_and(|value| value.trim() == "1");
-        let loopback = match value("ROS_AUTOMATIC_DISCOVERY_RANGE").map(|range| range.to_uppercase()).as_deref() {
-            None | Some("SYSTEM_DEFAULT") => only,
-            Some("LOCALHOST") => true,
+        let loopback = match value("ROS_AUTOMATIC_DISCOVERY_RANGE")
+            .map(|range| range.to_uppercase())
+            .as_deref()
+        {
             // ROS_LOCALHOST_ONLY counts where both are there (Jazzy's release notes).
-            Some("SUBNET") => only,
+            None | Some("SYSTEM_DEFAULT" | "SUBNET") => only,
+            Some("LOCALHOST") => true,
             Some("OFF") => {
                 warnings.push(Message::warning(
                     "N111",
@@ -53,7 +59,8 @@ impl Network {
             }
         };
         if let Some(peers) = value("ROS_STATIC_PEERS") {
-            let text = format!("ROS_STATIC_PEERS ({peers}) is not supported: only what multicast finds is there");
+            let text =
+                format!("ROS_STATIC_PEERS ({peers}) is not supported: only what multicast finds is there");
             warnings.push(Message::warning("N111", text));
         }
         Ok((Self { domain, loopback }, warnings))
@@ -90,7 +97,10 @@ mod tests {
         check(&[("ROS_DOMAIN_ID", "42"), ("ROS_LOCALHOST_ONLY", "0")], Some((42, false, 0)));
         check(&[("ROS_LOCALHOST_ONLY", "1")], Some((0, true, 0)));
         check(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "localhost")], Some((0, true, 0)));
-        check(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"), ("ROS_LOCALHOST_ONLY", "1")], Some((0, true, 0)));
+        check(
+            &[("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"), ("ROS_LOCALHOST_ONLY", "1")],
+            Some((0, true, 0)),
+        );
         check(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"), ("ROS_STATIC_PEERS", "a;b")], Some((0, true, 2)));
         check(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "MOON")], None);
         check(&[("ROS_DOMAIN_ID", "233")], None);

@@ -8,9 +8,9 @@ use ros2_client::ParameterValue;
 
 use crate::interfaces::rcl_interfaces::msg;
 use crate::interfaces::rcl_interfaces::srv::{
-    DescribeParameters, DescribeParametersResponse, GetParameterTypes, GetParameterTypesResponse, GetParameters,
-    GetParametersResponse, ListParameters, ListParametersResponse, SetParameters, SetParametersAtomically,
-    SetParametersAtomicallyResponse, SetParametersResponse,
+    DescribeParameters, DescribeParametersResponse, GetParameterTypes, GetParameterTypesResponse,
+    GetParameters, GetParametersResponse, ListParameters, ListParametersResponse, SetParameters,
+    SetParametersAtomically, SetParametersAtomicallyResponse, SetParametersResponse,
 };
 use crate::node::Node;
 
@@ -29,6 +29,9 @@ pub struct Declared {
 
 type Table = BTreeMap<String, Declared>;
 
+/// Hears of parameters that are set.
+type Listener = dyn Fn(&str, &ParameterValue) + Send + Sync;
+
 impl Node {
     /// Declares the parameters of the node, gives them the values of the command line, and serves them. `changed` hears of each that is set
     /// from then on.
@@ -40,8 +43,7 @@ impl Node {
         declared: Vec<Declared>,
         changed: impl Fn(&str, &ParameterValue) + Send + Sync + 'static,
     ) -> Result<Vec<Message>, Vec<Message>> {
-        let mut table: Table =
-            declared.into_iter().map(|own| (own.name.to_owned(), own)).collect();
+        let mut table: Table = declared.into_iter().map(|own| (own.name.to_owned(), own)).collect();
         table.insert(
             "use_sim_time".to_owned(),
             Declared {
@@ -60,7 +62,9 @@ impl Node {
                 }
                 Some(own) => match fitting(&own.value, value) {
                     Ok(value) => own.value = value,
-                    Err(text) => errors.push(Message::error("N103", format!("the parameter `{name}` {text}"))),
+                    Err(text) => {
+                        errors.push(Message::error("N103", format!("the parameter `{name}` {text}")));
+                    }
                 },
             }
         }
@@ -71,7 +75,8 @@ impl Node {
             // Undeclared ones are allowed underneath; what is allowed is decided here.
             let _ = self.inner().set_parameter(own.name, own.value.clone());
         }
-        self.serve_parameters(Arc::new(Mutex::new(table)), Arc::new(changed)).map_err(|message| vec![message])?;
+        self.serve_parameters(Arc::new(Mutex::new(table)), Arc::new(changed))
+            .map_err(|message| vec![message])?;
         Ok(warnings)
     }
 
@@ -83,7 +88,7 @@ impl Node {
     fn serve_parameters(
         self: &Arc<Self>,
         table: Arc<Mutex<Table>>,
-        changed: Arc<dyn Fn(&str, &ParameterValue) + Send + Sync>,
+        changed: Arc<Listener>,
     ) -> Result<(), Message> {
         let read = {
             let table = Arc::clone(&table);
@@ -103,14 +108,17 @@ impl Node {
         })?;
         let known = Arc::clone(&table);
         self.serve::<ListParameters>("~/list_parameters", move |request, answer| {
-            let names: Vec<String> = known.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect();
+            let names: Vec<String> =
+                known.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect();
             answer.send(ListParametersResponse { result: listed(names, &request.prefixes, request.depth) });
         })?;
         let known = Arc::clone(&table);
         self.serve::<DescribeParameters>("~/describe_parameters", move |request, answer| {
             let table = known.lock().unwrap_or_else(PoisonError::into_inner);
             let describe = |name: &String| described(name, table.get(name));
-            answer.send(DescribeParametersResponse { descriptors: request.names.iter().map(describe).collect() });
+            answer.send(DescribeParametersResponse {
+                descriptors: request.names.iter().map(describe).collect(),
+            });
         })?;
         let (node, known, hear) = (Arc::downgrade(self), Arc::clone(&table), Arc::clone(&changed));
         self.serve::<SetParameters>("~/set_parameters", move |request, answer| {
@@ -130,7 +138,7 @@ impl Node {
     fn set(
         &self,
         table: &Mutex<Table>,
-        changed: &(dyn Fn(&str, &ParameterValue) + Send + Sync),
+        changed: &Listener,
         parameters: Vec<msg::Parameter>,
     ) -> Result<(), String> {
         let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
@@ -159,8 +167,12 @@ impl Node {
 /// A value of the type of another one; a whole number serves as a double.
 fn fitting(own: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
     match (own, value) {
-        (ParameterValue::Double(_), ParameterValue::Integer(whole)) => Ok(ParameterValue::Double(whole as f64)),
-        (ParameterValue::StringArray(_), ParameterValue::StringArray(list)) => Ok(ParameterValue::StringArray(list)),
+        (ParameterValue::Double(_), ParameterValue::Integer(whole)) => {
+            Ok(ParameterValue::Double(whole as f64))
+        }
+        (ParameterValue::StringArray(_), ParameterValue::StringArray(list)) => {
+            Ok(ParameterValue::StringArray(list))
+        }
         (own, value) if raw(own.clone()).r#type == raw(value.clone()).r#type => Ok(value),
         (own, _) => Err(format!("has another type; it is {}", kind(own))),
     }
@@ -220,7 +232,9 @@ pub(crate) fn raw(value: ParameterValue) -> msg::ParameterValue {
     match value {
         ParameterValue::NotSet => none,
         ParameterValue::Boolean(bool_value) => Raw { r#type: Kind::PARAMETER_BOOL, bool_value, ..none },
-        ParameterValue::Integer(integer_value) => Raw { r#type: Kind::PARAMETER_INTEGER, integer_value, ..none },
+        ParameterValue::Integer(integer_value) => {
+            Raw { r#type: Kind::PARAMETER_INTEGER, integer_value, ..none }
+        }
         ParameterValue::Double(double_value) => Raw { r#type: Kind::PARAMETER_DOUBLE, double_value, ..none },
         ParameterValue::String(string_value) => Raw { r#type: Kind::PARAMETER_STRING, string_value, ..none },
         ParameterValue::ByteArray(byte_array_value) => {

@@ -3,17 +3,17 @@
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 
 /// Reliable and volatile, the last ones kept: what `rclcpp` has for a depth.
-pub(crate) fn depth(depth: usize) -> QosProfile {
+pub fn depth(depth: usize) -> QosProfile {
     QosProfile::default().reliability_reliable(WhenFull::DEFAULT).history(History::KeepLast { depth })
 }
 
 /// Reliable and volatile, nothing dropped.
-pub(crate) fn keep_all() -> QosProfile {
+pub fn keep_all() -> QosProfile {
     QosProfile::default().reliability_reliable(WhenFull::DEFAULT).history(History::KeepAll)
 }
 
 /// Reliable, and kept for those who come later.
-pub(crate) fn latched(depth: usize) -> QosProfile {
+pub fn latched(depth: usize) -> QosProfile {
     self::depth(depth).durability(Durability::TransientLocal)
 }
 

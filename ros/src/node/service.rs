@@ -45,7 +45,7 @@ impl<S: Service> Responder<S> {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
     /// Nobody serves it.
-    #[error("nobody serves {service} after {waited:.1} s")]
+    #[error("nobody serves {service} after {waited} s")]
     Absent {
         /// Its full name.
         service: String,
@@ -62,7 +62,7 @@ pub enum CallError {
     },
     /// There was no answer in time.
     #[error(
-        "no answer from {service} after {waited:.1} s; it was called with the mapping of {mapping}, `--rmw {other}` has the other one"
+        "no answer from {service} after {waited} s; it was called with the mapping of {mapping}, `--rmw {other}` has the other one"
     )]
     Silent {
         /// Its full name.
@@ -130,8 +130,10 @@ impl<S: Service> Caller<S> {
         let left = within.saturating_sub(begun.elapsed());
         let broken = |because: String| CallError::Broken { service: self.full.clone(), because };
         let id = client.async_send_request(request).await.map_err(|error| broken(error.to_string()))?;
-        let (mut answer, mut timer) =
-            (Box::pin(client.async_receive_response(id)).fuse(), FutureExt::fuse(Timer::after(left)));
+        let (mut answer, mut timer) = (
+            Box::pin(client.async_receive_response(id)).fuse(),
+            futures::FutureExt::fuse(Timer::after(left)),
+        );
         futures::select! {
             answer = answer => answer.map_err(|error| broken(format!("the answer is none: {error}"))),
             _ = timer => Err(CallError::Silent {
@@ -152,10 +154,9 @@ impl<S: Service> Caller<S> {
         let (requests, replies) = (self.requests(), self.replies());
         let absent = || CallError::Absent { service: self.full.clone(), waited: seconds(within) };
         let found = self.node.graph.wait(within, |graph| graph.server(&requests, &replies)).await;
-        let mapping = found.ok_or_else(absent)?.map_err(|complaint| CallError::Unfit {
-            service: self.full.clone(),
-            complaint,
-        })?;
+        let mapping = found
+            .ok_or_else(absent)?
+            .map_err(|complaint| CallError::Unfit { service: self.full.clone(), complaint })?;
         if connection.as_ref().is_some_and(|(own, _)| *own == mapping) {
             return connection.as_ref().ok_or_else(absent);
         }
@@ -194,7 +195,12 @@ impl Node {
     pub fn caller<S: Service>(self: &Arc<Self>, name: &str) -> Caller<S> {
         let full = self.resolve(name);
         self.expect_service::<S>(&full);
-        Caller { node: Arc::clone(self), full, connection: smol::lock::Mutex::new(None), service: PhantomData }
+        Caller {
+            node: Arc::clone(self),
+            full,
+            connection: smol::lock::Mutex::new(None),
+            service: PhantomData,
+        }
     }
 
     /// Serves a service as soon as it is known how services are mapped. The closure gets a request, and where the answer goes.
@@ -210,7 +216,7 @@ impl Node {
         let service_name = client_name(&full)?;
         self.expect_service::<S>(&full);
         let (graph, weak) = (Arc::clone(&self.graph), Arc::downgrade(self));
-        smol::spawn(async move {
+        self.spawn(async move {
             let mapping = graph.mapping().await;
             let Some(node) = weak.upgrade() else { return };
             let kind = ServiceTypeName::new(S::PACKAGE, S::NAME);
@@ -254,13 +260,13 @@ impl Node {
                     }
                 }
             }
-        })
-        .detach();
+        });
         Ok(())
     }
 
     fn expect_service<S: Service>(&self, full: &str) {
-        for (topic, part) in [(format!("rq{full}Request"), "Request"), (format!("rr{full}Reply"), "Response")] {
+        for (topic, part) in [(format!("rq{full}Request"), "Request"), (format!("rr{full}Reply"), "Response")]
+        {
             let type_name = dds_type(S::PACKAGE, "srv", &format!("{}_{part}", S::NAME));
             self.graph.expect(topic, Expected { type_name, hash: S::RIHS01 });
         }

@@ -39,7 +39,7 @@ impl Node {
     ///
     /// # Errors
     /// The name is wrong, or the topic is there with another type.
-    pub(crate) fn publisher<M: Msg>(&self, name: &str, qos: QosProfile) -> Result<Publisher<M>, Message> {
+    pub fn publisher<M: Msg>(&self, name: &str, qos: QosProfile) -> Result<Publisher<M>, Message> {
         let full = self.resolve(name);
         let topic_name = client_name(&full)?;
         let mut node = self.inner();
@@ -56,7 +56,7 @@ impl Node {
     ///
     /// # Errors
     /// The name is wrong, or the topic is there with another type.
-    pub(crate) fn subscribe<M: Msg>(
+    pub fn subscribe<M: Msg>(
         self: &Arc<Self>,
         name: &str,
         qos: QosProfile,
@@ -72,7 +72,7 @@ impl Node {
         let subscription = made.map_err(|error| not_made(&full, &error))?;
         self.expect_message::<M>(&full);
         let weak = Arc::downgrade(self);
-        smol::spawn(async move {
+        self.spawn(async move {
             let mut samples = Box::pin(subscription.async_stream());
             let mut wrong = 0;
             while let Some(sample) = samples.next().await {
@@ -92,8 +92,7 @@ impl Node {
                     }
                 }
             }
-        })
-        .detach();
+        });
         Ok(())
     }
 

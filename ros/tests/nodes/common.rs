@@ -1,0 +1,35 @@
+//! Nodes to test, each pair in a domain of its own.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU16, Ordering};
+use std::time::{Duration, Instant};
+
+use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments};
+
+/// Domains from here on are used; a machine that runs these tests twice at a time has others for the second.
+const FIRST: u16 = 20;
+
+/// A domain that no other test of this process uses.
+pub fn domain() -> u16 {
+    static USED: AtomicU16 = AtomicU16::new(0);
+    let slot = (std::process::id() % 20) as u16 * 10;
+    FIRST + slot + USED.fetch_add(1, Ordering::Relaxed) % 10
+}
+
+/// A node on loopback, with the words behind `--ros-args`.
+pub fn node(domain: u16, name: &str, words: &str) -> Arc<Node> {
+    let words = ["p", "--ros-args"].into_iter().chain(words.split_whitespace()).map(str::to_owned);
+    let (_, arguments) = RosArguments::split(words).expect("arguments");
+    let network = Network { domain, loopback: true };
+    let opening = Opening { name: name.to_owned(), arguments, network, rmw: Rmw::Auto };
+    Node::open(opening).expect("a node")
+}
+
+/// Waits until something is so.
+pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let begun = Instant::now();
+    while !is_so() {
+        assert!(begun.elapsed() < Duration::from_secs(20), "{what}: not within 20 s");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}

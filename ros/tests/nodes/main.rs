@@ -1,0 +1,4 @@
+//! Two of our own nodes over loopback.
+
+mod common;
+mod graph;
