@@ -1,3 +1,4 @@
 //! Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 
 pub mod interfaces;
+pub mod perform;

@@ -7,7 +7,7 @@
 use ros2_client::Message;
 
 /// What is sent as one piece: a message, or a part of a service or an action.
-pub trait Structure: Message + Clone + Default + Send + 'static {
+pub trait Structure: Message + Clone + Default + Send + Sync + 'static {
     /// As in `std_srvs/srv/Trigger_Response`.
     const TYPE: &'static str;
     /// The type hash, as in `RIHS01_f49f…`.
