@@ -2,3 +2,4 @@
 
 pub mod interfaces;
 pub mod node;
+pub mod perform;

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use encodings::{Alternatives, Config, Solution, Task};
-use metaplan::mission::{Mission, Planning as _};
+use metaplan::mission::{Mission, Planning as _, Reading};
 use pddl::ast::Problem;
 
 use crate::cli::common::Failure;
-use crate::cli::confirm::{Reading, confirm};
+use crate::cli::confirm::confirm;
 use crate::cli::plan_text::steps_text;
 
 /// Looks for further plans; each is executed by the validator as the first one is.

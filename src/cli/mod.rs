@@ -21,7 +21,6 @@ mod plan;
 mod plan_answer;
 mod plan_exact;
 mod plan_text;
-mod plan_verdict;
 mod reason;
 mod reason_ask;
 mod run;

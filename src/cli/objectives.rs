@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use encodings::{Front, Point, Status};
 use metaplan::answers::{Objective, ParetoAnswer, Preparation};
 use metaplan::message::Message;
-use metaplan::mission::Mission;
+use metaplan::mission::{Mission, Reading};
 use pddl::ast::{Metric, Problem};
 
 use crate::cli::common::Failure;
-use crate::cli::confirm::{Reading, confirm};
+use crate::cli::confirm::confirm;
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_text::steps_text;
 

@@ -12,20 +12,19 @@ use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::answers::{PlanAnswer, Preparation};
 use metaplan::certificate::{self, Ground};
 use metaplan::message::Message;
-use metaplan::mission::{Blocking, Mission, Planning as _, blocking};
+use metaplan::mission::{Blocking, Mission, Planning as _, Reading, blocking, blocking_text, verdict};
 use pddl::ast::Problem;
 
 use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::concurrent::{self, Overlap};
-use crate::cli::confirm::{Reading, fault};
+use crate::cli::confirm::fault;
 use crate::cli::limits::Guard;
 use crate::cli::objectives::Objectives;
 use crate::cli::output;
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_exact;
 use crate::cli::plan_text::{PlanFormat, plan_text};
-use crate::cli::plan_verdict::{blocking_text, verdict};
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
 
@@ -258,10 +257,7 @@ fn finish(
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let status = point.solution.status;
-    match (
-        show(&point, beside, &mission.name, objectives, preparation, (arguments, common)),
-        &arguments.output,
-    ) {
+    match (show(&point, beside, mission, objectives, preparation, (arguments, common)), &arguments.output) {
         (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
             output::note(&verdict(&point.solution));
@@ -284,12 +280,12 @@ struct Beside {
 fn show(
     point: &Point,
     beside: &Beside,
-    name: &str,
+    mission: &Mission,
     objectives: &Objectives,
     preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Option<String> {
-    let solution = &point.solution;
+    let (solution, name) = (&point.solution, mission.name.as_str());
     match (arguments.plan_format, common.format) {
         (Some(PlanFormat::Json), _) | (None, Format::Json) => {
             let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
@@ -308,7 +304,7 @@ fn show(
             let makespan = concurrent::makespan_text(overlaps);
             Some(plan + &objectives.values_text(point) + &makespan + &others.or(blocking).unwrap_or_default())
         }
-        (Some(format), _) => solution.plan.as_ref().map(|plan| plan_text(plan, format)),
+        (Some(format), _) => solution.plan.as_ref().map(|plan| plan_text(mission, plan, format)),
     }
 }
 
@@ -321,7 +317,8 @@ fn certify(
     limits: &Limits,
 ) -> Result<(), Message> {
     let Some(directory) = &arguments.certificate else { return Ok(()) };
-    let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(plan, PlanFormat::Ipc));
+    let plan =
+        solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(mission, plan, PlanFormat::Ipc));
     let mut problem = problem.clone();
     if let [metric] = &objectives.metrics[..] {
         problem.metric = Some(metric.clone());

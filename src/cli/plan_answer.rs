@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use encodings::{Solution, Status};
 use metaplan::answers::{Preparation, milliseconds};
+use metaplan::mission::verdict;
 
 use crate::cli::plan_text::steps_text;
-use crate::cli::plan_verdict::verdict;
 
 pub(super) fn answer_text(
     name: &str,

@@ -2,10 +2,9 @@
 
 use encodings::{Config, ExactTask, Point, optimize_exact};
 use metaplan::message::Message;
-use metaplan::mission::{Mission, Planning as _};
+use metaplan::mission::{Mission, Planning as _, Reading};
 use pddl::ast::Problem;
 
-use crate::cli::confirm::Reading;
 use crate::cli::objectives::Objectives;
 use crate::cli::output;
 

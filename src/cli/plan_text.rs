@@ -3,7 +3,8 @@
 use clap::ValueEnum;
 use std::fmt::Write as _;
 
-use encodings::{Exact, Plan, Step};
+use encodings::{Plan, Step};
+use metaplan::mission::{Mission, decimal, plan_lines, popf_text};
 
 use crate::cli::output;
 
@@ -18,10 +19,13 @@ pub(super) enum PlanFormat {
 }
 
 /// The plan in the formats of the planning competitions and of `PlanSys2`.
-pub(super) fn plan_text(plan: &Plan, format: PlanFormat) -> String {
+pub(super) fn plan_text(mission: &Mission, plan: &Plan, format: PlanFormat) -> String {
+    if format == PlanFormat::Plansys2 {
+        return popf_text(&plan_lines(mission, plan));
+    }
     let timed = |step: &Step| !step.duration.is_zero() || !step.start.is_zero();
-    let temporal = plan.steps.iter().any(timed) || format == PlanFormat::Plansys2;
-    let mut text = if format == PlanFormat::Plansys2 { "Solution Found\n".to_owned() } else { String::new() };
+    let temporal = plan.steps.iter().any(timed);
+    let mut text = String::new();
     for step in &plan.steps {
         let call: Vec<&str> =
             std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
@@ -59,36 +63,4 @@ fn route(step: &Step) -> Vec<&str> {
     let configured =
         |argument: &String| step.configuration.iter().any(|(f, design)| f == argument || design == argument);
     step.arguments.iter().filter(|argument| !configured(argument)).map(String::as_str).collect()
-}
-
-/// A time with three decimals, or as many more as it has: an action must not start before what it waits for.
-fn decimal(time: &Exact) -> String {
-    let text = time.to_string();
-    match text.split_once('.') {
-        _ if text.contains('/') => format!("{:.9}", time.to_f64()),
-        Some((_, decimals)) => text.clone() + &"0".repeat(3_usize.saturating_sub(decimals.len())),
-        None => text + ".000",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use num_bigint::BigInt;
-    use num_rational::BigRational;
-
-    use super::*;
-
-    #[test]
-    fn times_are_not_rounded() {
-        for (numerator, denominator, expected) in [
-            (5, 1, "5.000"),
-            (5, 2, "2.500"),
-            (1, 8, "0.125"),
-            (100_001, 10_000, "10.0001"),
-            (1, 3, "0.333333333"),
-        ] {
-            let time = BigRational::new(BigInt::from(numerator), BigInt::from(denominator));
-            assert_eq!(decimal(&time.into()), expected);
-        }
-    }
 }

@@ -3,11 +3,17 @@
 //! The only room that sees both OWL and the planner.
 
 mod blocking;
+mod confirm;
 mod planning;
+mod plansys2;
 mod sections;
+mod verdict;
 
 pub use ::mission::{Bindings, CoAdaptation, Mission, Names};
 pub use blocking::{Blocking, blocking};
+pub use confirm::{Reading, confirm};
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
+pub use plansys2::{PlanLine, decimal, plan_lines, popf_text};
 pub use sections::{BindingsSection, KnowledgeSection, PlanningSection, Scenario};
+pub use verdict::{blocking_text, verdict};

@@ -40,7 +40,7 @@ fn plans_without_a_knowledge_base() {
     let outcome = plan(DOMAIN, PROBLEM, &["--plan-format", "ipc"]);
     assert_eq!(outcome.stdout, "(go a b)\n(go b c)\n");
     let outcome = plan(DOMAIN, PROBLEM, &["--plan-format", "plansys2"]);
-    assert_eq!(outcome.stdout, "Solution Found\n0.000: (go a b)  [0.000]\n0.000: (go b c)  [0.000]\n");
+    assert_eq!(outcome.stdout, "Solution Found\n0.000: (go a b)  [0.001]\n0.002: (go b c)  [0.001]\n");
 }
 
 #[test]

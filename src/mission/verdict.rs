@@ -1,10 +1,11 @@
-//! The answer of `metaplan plan` in sentences: what is claimed, and why.
+//! What is claimed of a solution, in sentences, and why.
 
 use encodings::{Proof, Solution, Status, Unbounded};
-use metaplan::mission::Blocking;
+
+use crate::mission::blocking::Blocking;
 
 /// The answer in a sentence: what is claimed, and whether it is proved.
-pub(super) fn verdict(solution: &Solution) -> String {
+pub fn verdict(solution: &Solution) -> String {
     let horizon = solution.horizon;
     let program = solution.statistics.unchecked.as_ref();
     let proved =
@@ -56,7 +57,7 @@ pub(super) fn verdict(solution: &Solution) -> String {
 }
 
 /// Why there is no plan, as far as designs are the reason.
-pub(super) fn blocking_text(blocking: &Blocking) -> String {
+pub fn blocking_text(blocking: &Blocking) -> String {
     match blocking {
         Blocking::Designs(designs) => format!(
             "it is for designs that are not available: there is no plan without {}; with any one of them, and all \
