@@ -160,6 +160,14 @@ impl Mission {
         if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source])) }
     }
 
+    /// The functions of the knowledge base that have designs, in alphabetical order.
+    pub fn functions(&self) -> Vec<String> {
+        let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
+        let names: std::collections::BTreeSet<String> =
+            designs.flat_map(|design| design.solves.iter().map(|function| function.name.clone())).collect();
+        names.into_iter().collect()
+    }
+
     /// The designs that solve a function, as the problem calls them, whether or not they are available.
     pub fn designs_of(&self, function: &str) -> Vec<String> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };

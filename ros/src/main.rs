@@ -1,3 +1,83 @@
 //! The program `metaplan-ros`.
+#![expect(
+    clippy::print_stderr,
+    reason = "what is wrong with the command line is said before there is a node"
+)]
 
-fn main() {}
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::{Parser, ValueEnum};
+use metaplan::message::Message;
+use metaplan_ros::manager;
+use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
+
+/// Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
+///
+/// What stands behind `--ros-args` is as for every node: `-r from:=to`, `-p name:=value`, `--params-file FILE`, `--log-level LEVEL`.
+/// `ROS_DOMAIN_ID`, `ROS_LOCALHOST_ONLY` and `ROS_AUTOMATIC_DISCOVERY_RANGE` count.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Arguments {
+    /// A mission's manifest.
+    #[arg(long, value_name = "FILE")]
+    mission: PathBuf,
+    /// Whose place to take.
+    #[arg(long = "as", value_enum, default_value_t = Role::Manager)]
+    role: Role,
+    /// How the mission meets the robot; `ros.toml` beside the mission, if there is one, unless said otherwise.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Write events and decisions there first, and go on from there after a crash.
+    #[arg(long, value_name = "DIR")]
+    journal: Option<PathBuf>,
+    /// How services are mapped: as the discovered participants say, or as this middleware does.
+    #[arg(long, value_enum, default_value_t = Rmw::Auto)]
+    rmw: Rmw,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Role {
+    /// Of the manager of tasks: SUAVE's task bridge, MROS's reasoner and the planner in one.
+    Manager,
+}
+
+fn main() -> ExitCode {
+    match start() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(messages) => {
+            for message in &messages {
+                eprint!("{}", message.text());
+            }
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn start() -> Result<(), Vec<Message>> {
+    let (words, ros) = RosArguments::split(std::env::args())?;
+    let arguments = Arguments::parse_from(words);
+    let (network, warnings) =
+        Network::from_environment(|name| std::env::var(name).ok()).map_err(|message| vec![message])?;
+    let opening = Opening { name: "metaplan".to_owned(), arguments: ros, network, rmw: arguments.rmw };
+    let node = Node::open(opening).map_err(|message| vec![message])?;
+    for warning in warnings {
+        node.log(Severity::Warn, warning.text().trim_end());
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    // A second signal ends the program at once.
+    let handler = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    };
+    ctrlc::set_handler(handler)
+        .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
+    let Arguments { mission, settings, journal, .. } = arguments;
+    match arguments.role {
+        Role::Manager => manager::run(&node, &manager::Options { mission, settings, journal }, &stop),
+    }
+}

@@ -113,6 +113,11 @@ impl Beliefs {
         &self.mission
     }
 
+    /// The goal, if it is another one than the problem's.
+    pub fn goal(&self) -> Option<&str> {
+        self.goal.as_deref()
+    }
+
     /// The designs that are available, by local name.
     pub fn available(&self) -> &BTreeSet<String> {
         &self.available

@@ -144,6 +144,12 @@ pub enum Event {
     /// Time passes.
     #[serde(rename = "tick")]
     Tick,
+    /// A remark for who reads the journal. It changes nothing.
+    #[serde(rename = "note")]
+    Note {
+        /// What is to be remembered.
+        text: String,
+    },
 }
 
 /// Why a line, or a part of it, is no event.
@@ -333,6 +339,7 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
         "reconfiguration_failed" => Event::ReconfigurationFailed {
             effect: need(fields, "effect", "the number of an effect", Value::as_u64)?,
         },
+        "note" => Event::Note { text: need(fields, "text", "a sentence", text)? },
         "design_status" => Event::Design {
             design: need(fields, "design", "the name of a function design", text)?,
             realisable: need(fields, "realisable", "true or false", Value::as_bool)?,
@@ -383,7 +390,7 @@ fn event(fields: &mut Map<String, Value>) -> Result<Event, Refusal> {
     }
 }
 
-const KINDS: [&str; 16] = [
+const KINDS: [&str; 17] = [
     "measured",
     "component_status",
     "action_started",
@@ -400,6 +407,7 @@ const KINDS: [&str; 16] = [
     "design_status",
     "configuration_observed",
     "tick",
+    "note",
 ];
 
 const STATUSES: &str = "`FALSE` or `ERROR`, `RECOVERED`, `TRUE` or `OK`, or a truth value";

@@ -155,7 +155,7 @@ impl Taking<'_> {
                     format!("`{}` goes with `run --configure`; here the plan needs functions", event.kind());
                 Err(Refusal::new("M306", text))
             }
-            Event::Tick => Ok(()),
+            Event::Tick | Event::Note { .. } => Ok(()),
         }
     }
 

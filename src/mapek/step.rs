@@ -67,6 +67,11 @@ impl PlannedStep {
         self.arguments.iter().map(|word| (!is_design(word)).then_some(word.as_str())).collect()
     }
 
+    /// How long it takes, in the domain's time unit, as the nearest double.
+    pub fn duration_rounded(&self) -> f64 {
+        number::to_f64(&self.duration)
+    }
+
     /// The design of a function.
     pub fn design(&self, function: &str) -> Option<&str> {
         self.configuration.iter().find(|(known, _)| known == function).map(|(_, design)| design.as_str())

@@ -174,3 +174,12 @@ fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
 fn not_made(what: &str, error: &dyn std::fmt::Display) -> Message {
     Message::error("N122", format!("{what} could not be made: {error}"))
 }
+
+/// The time now, for stamps.
+pub(crate) fn now() -> crate::interfaces::builtin_interfaces::msg::Time {
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    crate::interfaces::builtin_interfaces::msg::Time {
+        sec: i32::try_from(since.as_secs()).unwrap_or(i32::MAX),
+        nanosec: since.subsec_nanos(),
+    }
+}

@@ -1,0 +1,245 @@
+//! The thread that has the machine: inputs one by one, and their outputs to the robot.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::time::{Duration, Instant};
+
+use metaplan::journal::{Journal, Policy};
+use metaplan::mapek::Loop;
+use metaplan::message::{Message, did_you_mean};
+use metaplan::setup::Setup;
+use ros2_client::ParameterValue;
+use serde_json::json;
+
+use crate::interfaces::diagnostic_msgs::msg::DiagnosticStatus;
+use crate::manager::machine::{Input, Machine, Output, State};
+use crate::manager::robot::Robot;
+use crate::manager::settings::Settings;
+use crate::node::{Declared, Node, Severity};
+use crate::perform::{Perform, performers};
+
+/// Time is told the machine so often, and how it is on `/diagnostics`.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// What is missing of the graph is said so often.
+const GRAPH: Duration = Duration::from_secs(5);
+
+/// What the manager is started with.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// A mission's manifest.
+    pub mission: PathBuf,
+    /// How it meets the robot; a file `ros.toml` beside the mission unless said otherwise.
+    pub settings: Option<PathBuf>,
+    /// Where the journal is.
+    pub journal: Option<PathBuf>,
+}
+
+/// Manages the tasks of a robot until told to stop.
+///
+/// # Errors
+/// The mission, its settings or the journal are wrong, or the journal cannot be written any more.
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
+    let Setup { mission, settings: adaptation, .. } = Setup::read(&options.mission)?;
+    let settings =
+        Settings::read(options.settings.as_deref(), &options.mission).map_err(|message| vec![message])?;
+    for warning in mission.warnings() {
+        node.log(Severity::Warn, warning.text().trim_end());
+    }
+    let timeout = parameters(node)?;
+    let ticks = !adaptation.settle.is_zero();
+    let mut control = Loop::new(mission, adaptation)?;
+    let journal = journal(node, options, &mut control).map_err(|message| vec![message])?;
+    let begun = control.beliefs().now();
+    let performers: BTreeMap<String, Box<dyn Perform>> =
+        performers(node, &settings.actions, &settings.poses).map_err(|message| vec![message])?;
+    let machine = Machine::new(control, journal, settings.clone(), ticks);
+    let (sender, inputs) = mpsc::channel();
+    let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())
+        .map_err(|message| vec![message])?;
+    let mut driver =
+        Driver { node: Arc::clone(node), machine, robot, settings, timeout, clock: Instant::now(), begun };
+    driver.meet(&sender, &inputs, stop).map_err(|message| vec![message])?;
+    driver.drive(&inputs, stop).map_err(|message| vec![message])
+}
+
+/// Declares the parameters; the timeout of calls, which can be set while the node runs, in milliseconds.
+fn parameters(node: &Arc<Node>) -> Result<Arc<std::sync::atomic::AtomicU64>, Vec<Message>> {
+    let timeout = Arc::new(std::sync::atomic::AtomicU64::new(5000));
+    let set = Arc::clone(&timeout);
+    let store = move |value: &ParameterValue| {
+        if let ParameterValue::Double(seconds) = value
+            && let Ok(duration) = Duration::try_from_secs_f64(*seconds)
+        {
+            set.store(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
+        }
+    };
+    let declared = Declared {
+        name: "call_timeout",
+        description: "How long a function may take to change its mode before it is asked once more, in seconds.",
+        value: ParameterValue::Double(5.0),
+        is_dynamic: true,
+    };
+    let hear = store.clone();
+    let warnings = node.declare(vec![declared], move |name, value| {
+        if name == "call_timeout" {
+            hear(value);
+        }
+    })?;
+    for warning in warnings {
+        node.log(Severity::Warn, warning.text().trim_end());
+    }
+    node.parameter("call_timeout").iter().for_each(store);
+    Ok(timeout)
+}
+
+fn journal(node: &Node, options: &Options, control: &mut Loop) -> Result<Option<Journal>, Message> {
+    let Some(directory) = &options.journal else { return Ok(None) };
+    let (journal, recovery) = Journal::open(directory, Policy::default(), control)?;
+    for warning in &recovery.warnings {
+        node.log(Severity::Warn, warning.text().trim_end());
+    }
+    if recovery.replayed.is_some() {
+        let text = format!("goes on from the journal after {} lines", control.beliefs().lines());
+        node.log(Severity::Info, &text);
+    }
+    Ok(Some(journal))
+}
+
+struct Driver {
+    node: Arc<Node>,
+    machine: Machine,
+    robot: Robot,
+    settings: Settings,
+    timeout: Arc<std::sync::atomic::AtomicU64>,
+    clock: Instant,
+    /// The time of the last line in the journal.
+    begun: Duration,
+}
+
+impl Driver {
+    /// Waits for the functions, and says from time to time what is missing. Requests are refused meanwhile.
+    fn meet(
+        &mut self,
+        sender: &Sender<Input>,
+        inputs: &Receiver<Input>,
+        stop: &AtomicBool,
+    ) -> Result<(), Message> {
+        let mut kept = Vec::new();
+        loop {
+            let missing = smol::block_on(self.robot.wait(GRAPH));
+            // A writer of diagnostics may come later: nothing is changed before it speaks.
+            let functions: Vec<&String> =
+                missing.iter().filter(|text| !text.contains("/diagnostics")).collect();
+            while let Ok(input) = inputs.try_recv() {
+                match input {
+                    Input::Request(..) | Input::Cancel(..) => self.handle(input)?,
+                    other => kept.push(other),
+                }
+            }
+            if functions.is_empty() {
+                break;
+            }
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let text = format!("waits for the robot: {}", missing.join("; "));
+            self.robot.event(&json!({"answer": "waiting", "missing": missing}));
+            self.node.log(Severity::Warn, &text);
+        }
+        self.fits()?;
+        let modes = smol::block_on(self.robot.modes());
+        for (function, mode) in &modes {
+            self.node.log(Severity::Debug, &format!("{function} has the mode {mode:?}"));
+        }
+        self.node.log(Severity::Info, "every function answers");
+        self.handle(Input::Ready(modes))?;
+        for input in kept {
+            // What was heard before is still so.
+            let _ = sender.send(input);
+        }
+        Ok(())
+    }
+
+    /// Every design is a mode of its function.
+    fn fits(&self) -> Result<(), Message> {
+        let mut missing = Vec::new();
+        for (function, available) in smol::block_on(self.robot.available(&self.settings)) {
+            let absent =
+                self.machine.modes_of(&function).into_iter().filter(|mode| !available.contains(mode));
+            missing.extend(absent.map(|mode| {
+                let meant = did_you_mean(&mode, available.iter().map(String::as_str));
+                format!("{function} has no mode `{mode}`{meant}")
+            }));
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let text = format!(
+            "designs of the mission are no modes of the robot; `[functions.F.modes]` of the settings names them: {}",
+            missing.join("; ")
+        );
+        Err(Message::error("N132", text))
+    }
+
+    fn drive(&mut self, inputs: &Receiver<Input>, stop: &AtomicBool) -> Result<(), Message> {
+        let mut next = Instant::now();
+        while !stop.load(Ordering::Relaxed) {
+            let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
+            match inputs.recv_timeout(wait) {
+                Ok(input) => self.handle(input)?,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+            }
+            if Instant::now() >= next {
+                next = Instant::now() + PERIOD;
+                self.handle(Input::Tick)?;
+                self.diagnose();
+            }
+        }
+        Ok(())
+    }
+
+    fn handle(&mut self, input: Input) -> Result<(), Message> {
+        let now = self.begun + self.clock.elapsed();
+        for output in self.machine.handle(input, now)? {
+            match output {
+                Output::Change(change) => {
+                    let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
+                    self.robot.change(change, timeout);
+                }
+                Output::Look(function) => self.robot.look(&function),
+                Output::Probe(function, after) => self.robot.probe(&function, after),
+                Output::Reply(number, success) => self.robot.reply(number, success),
+                Output::Perform(number, call) => self.robot.perform(number, call),
+                Output::Stop(number) => self.robot.stop(number),
+                Output::Plan(plan) => self.robot.plan(&plan),
+                Output::Event(event) => self.robot.event(&event),
+                Output::Warn(text) => self.robot.warn(text),
+            }
+        }
+        Ok(())
+    }
+
+    fn diagnose(&self) {
+        let state = self.machine.state();
+        let level = match state {
+            State::Degraded => DiagnosticStatus::WARN,
+            State::WaitGraph => DiagnosticStatus::STALE,
+            State::Idle | State::Reconfigure | State::Execute => DiagnosticStatus::OK,
+        };
+        let beliefs = self.machine.control().beliefs();
+        let mut values = vec![
+            ("state", state.to_string()),
+            ("task", self.machine.task().unwrap_or_default().to_owned()),
+            ("lines", beliefs.lines().to_string()),
+        ];
+        if let Some((_, step)) = beliefs.running() {
+            values.push(("action", step.summary()));
+        }
+        self.robot.diagnose(level, &state.to_string(), values);
+    }
+}

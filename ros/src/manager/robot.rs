@@ -1,0 +1,345 @@
+//! The robot as the manager sees it: topics and services to inputs of the machine, and its outputs to calls.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::Sender;
+use std::time::Duration;
+
+use metaplan::message::Message;
+use serde_json::Value;
+use smol::{Task, Timer};
+
+use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::interfaces::lifecycle_msgs::msg::TransitionEvent;
+use crate::interfaces::mavros_msgs;
+use crate::interfaces::rcl_interfaces::msg::ParameterEvent;
+use crate::interfaces::std_msgs;
+use crate::interfaces::suave_msgs::srv::{Task as TaskService, TaskResponse};
+use crate::interfaces::system_modes_msgs::msg::ModeEvent;
+use crate::interfaces::system_modes_msgs::srv::{
+    ChangeMode, ChangeModeRequest, GetAvailableModes, GetAvailableModesRequest, GetMode, GetModeRequest,
+};
+use crate::manager::machine::{Change, Ended, Input, Outcome};
+use crate::manager::settings::Settings;
+use crate::node::{CallError, Caller, Node, Publisher, Responder, Severity, depth, keep_all, latched};
+use crate::perform::{Call, End, Perform, Progress, Running};
+
+/// So long a function may take to say which mode it has.
+const LOOK: Duration = Duration::from_secs(2);
+
+/// The messages by which diagnostics say what concerns us, in the spelling of MROS.
+const CONCERN: [&str; 2] = ["QA status", "Component status"];
+
+/// So many things that were wrong are remembered, so as to say each once.
+const SAID: usize = 1000;
+
+/// The services of one function.
+struct Function {
+    change: Arc<Caller<ChangeMode>>,
+    look: Arc<Caller<GetMode>>,
+    /// The call that is under way; another one takes its place.
+    calling: Option<Task<()>>,
+    looking: Option<Task<()>>,
+}
+
+/// Everything that the manager hears from and asks of others.
+pub(super) struct Robot {
+    node: Arc<Node>,
+    inputs: Sender<Input>,
+    functions: BTreeMap<String, Function>,
+    performers: BTreeMap<String, Box<dyn Perform>>,
+    performing: HashMap<u64, (Running, Task<()>)>,
+    replies: Arc<std::sync::Mutex<HashMap<u64, Responder<TaskService>>>>,
+    plans: Publisher<std_msgs::msg::String>,
+    events: Publisher<std_msgs::msg::String>,
+    diagnostics: Publisher<DiagnosticArray>,
+    said: std::collections::HashSet<String>,
+}
+
+impl Robot {
+    /// Connects with the topics and services that are there from the beginning.
+    pub(super) fn connect(
+        node: &Arc<Node>,
+        settings: &Settings,
+        functions: &[String],
+        performers: BTreeMap<String, Box<dyn Perform>>,
+        inputs: Sender<Input>,
+    ) -> Result<Self, Message> {
+        hear_diagnostics(node, inputs.clone())?;
+        let mut own = BTreeMap::new();
+        for function in functions {
+            hear_function(node, settings, function, &inputs)?;
+            let system = settings.functions.system(function);
+            let service = |name: &str| format!("/{system}/{name}");
+            own.insert(
+                function.clone(),
+                Function {
+                    change: Arc::new(node.caller(&service("change_mode"))),
+                    look: Arc::new(node.caller(&service("get_mode"))),
+                    calling: None,
+                    looking: None,
+                },
+            );
+        }
+        hear_parameters(node, settings, functions, inputs.clone())?;
+        if let Some(autopilot) = &settings.autopilot {
+            let inputs = inputs.clone();
+            node.subscribe::<mavros_msgs::msg::State>(&autopilot.topic, depth(10), move |state| {
+                let _ = inputs.send(Input::Autopilot(state.mode));
+            })?;
+        }
+        let replies = Arc::default();
+        serve_tasks(node, &inputs, &replies)?;
+        Ok(Self {
+            node: Arc::clone(node),
+            inputs,
+            functions: own,
+            performers,
+            performing: HashMap::new(),
+            replies,
+            plans: node.publisher("~/plan", latched(1))?,
+            events: node.publisher("~/events", depth(100))?,
+            diagnostics: node.publisher("/diagnostics", depth(10))?,
+            said: std::collections::HashSet::new(),
+        })
+    }
+
+    /// Waits until every function is served and diagnostics have a writer, or time is up; what is missing then.
+    pub(super) async fn wait(&self, within: Duration) -> Vec<String> {
+        let calls = self.functions.values().map(|function| function.change.ready(within));
+        let answers = futures::future::join_all(calls).await;
+        let mut missing: Vec<String> =
+            answers.into_iter().filter_map(Result::err).map(|error| error.to_string()).collect();
+        if !self.node.is_written("/diagnostics") {
+            missing.push("nobody writes on /diagnostics".to_owned());
+        }
+        missing
+    }
+
+    /// The mode of each function, as far as it says.
+    pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
+        let look = |(name, function): (&String, &Function)| {
+            let (name, look) = (name.clone(), Arc::clone(&function.look));
+            async move {
+                (
+                    name,
+                    look.call(GetModeRequest::default(), LOOK).await.ok().map(|answer| answer.current_mode),
+                )
+            }
+        };
+        futures::future::join_all(self.functions.iter().map(look)).await
+    }
+
+    /// The modes that each function can have, as far as it says.
+    pub(super) async fn available(&self, settings: &Settings) -> Vec<(String, Vec<String>)> {
+        let ask = |name: &String| {
+            let service = format!("/{}/get_available_modes", settings.functions.system(name));
+            let (name, caller) = (name.clone(), self.node.caller::<GetAvailableModes>(&service));
+            async move {
+                let answer = caller.call(GetAvailableModesRequest::default(), LOOK).await.ok();
+                answer.map(|answer| (name, answer.available_modes))
+            }
+        };
+        futures::future::join_all(self.functions.keys().map(ask)).await.into_iter().flatten().collect()
+    }
+
+    /// Calls `change_mode`; a call of that function that is under way is given up.
+    pub(super) fn change(&mut self, change: Change, within: Duration) {
+        let Some(function) = self.functions.get_mut(&change.function) else { return };
+        let (caller, inputs) = (Arc::clone(&function.change), self.inputs.clone());
+        // First the old call ends, which holds the caller.
+        function.calling = None;
+        function.calling = Some(smol::spawn(async move {
+            let answer = caller.call(ChangeModeRequest { mode_name: change.mode.clone() }, within).await;
+            let outcome = match answer {
+                Ok(answer) if answer.success => Outcome::Done,
+                Ok(_) => Outcome::Refused,
+                Err(error) => Outcome::Failed(error.to_string()),
+            };
+            let _ = inputs.send(Input::Changed(change, outcome));
+        }));
+    }
+
+    /// Asks a function for its mode.
+    pub(super) fn look(&mut self, name: &str) {
+        let Some(function) = self.functions.get_mut(name) else { return };
+        let (look, inputs, name) = (Arc::clone(&function.look), self.inputs.clone(), name.to_owned());
+        function.looking = Some(smol::spawn(async move {
+            if let Ok(answer) = look.call(GetModeRequest::default(), LOOK).await {
+                let _ = inputs.send(Input::Mode(name, answer.current_mode));
+            }
+        }));
+    }
+
+    /// Asks a function later whether it answers; who does not say its mode answers as long as it is there.
+    pub(super) fn probe(&mut self, name: &str, after: Duration) {
+        let Some(function) = self.functions.get(name) else { return };
+        let (change, look) = (Arc::clone(&function.change), Arc::clone(&function.look));
+        let (inputs, name) = (self.inputs.clone(), name.to_owned());
+        smol::spawn(async move {
+            Timer::after(after).await;
+            let answers = match look.call(GetModeRequest::default(), LOOK).await {
+                Ok(_) => true,
+                Err(CallError::Absent { .. }) => change.is_served(),
+                Err(_) => false,
+            };
+            let _ = inputs.send(Input::Probed(name, answers));
+        })
+        .detach();
+    }
+
+    /// Answers the request of a task.
+    pub(super) fn reply(&self, number: u64, success: bool) {
+        let mut replies = self.replies.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(responder) = replies.remove(&number) {
+            responder.send(TaskResponse { success });
+        }
+    }
+
+    /// Has an action performed; one that nobody performs is done as soon as it is begun.
+    pub(super) fn perform(&mut self, number: u64, call: Call) {
+        let Some(performer) = self.performers.get(&call.action) else {
+            let _ = self.inputs.send(Input::Performed(number, Ended::Succeeded));
+            return;
+        };
+        let running = performer.start(call);
+        let (heard, inputs) = (running.clone(), self.inputs.clone());
+        let task = smol::spawn(async move {
+            loop {
+                let input = match heard.next().await {
+                    Progress::Feedback { completion: Some(done), .. } => {
+                        Input::Progress(number, f64::from(done))
+                    }
+                    Progress::Feedback { completion: None, .. } => continue,
+                    Progress::Ended(end) => {
+                        let ended = match end {
+                            End::Succeeded => Ended::Succeeded,
+                            End::Canceled => Ended::Cancelled,
+                            End::Failed(reason) => Ended::Failed(reason),
+                        };
+                        let _ = inputs.send(Input::Performed(number, ended));
+                        return;
+                    }
+                };
+                let _ = inputs.send(input);
+            }
+        });
+        // What ended long ago is not kept.
+        self.performing.retain(|_, (_, task)| !task.is_finished());
+        self.performing.insert(number, (running, task));
+    }
+
+    /// Ends an action early.
+    pub(super) fn stop(&self, number: u64) {
+        match self.performing.get(&number) {
+            Some((running, _)) => running.cancel(),
+            None => drop(self.inputs.send(Input::Performed(number, Ended::Cancelled))),
+        }
+    }
+
+    pub(super) fn plan(&self, plan: &Value) {
+        self.plans.publish(std_msgs::msg::String { data: plan.to_string() });
+    }
+
+    pub(super) fn event(&self, event: &Value) {
+        self.events.publish(std_msgs::msg::String { data: event.to_string() });
+    }
+
+    /// Logs what is wrong, each thing once.
+    pub(super) fn warn(&mut self, text: String) {
+        if self.said.len() >= SAID {
+            self.said.clear();
+        }
+        if self.said.insert(text.clone()) {
+            self.node.log(Severity::Warn, &text);
+        }
+    }
+
+    /// Says on `/diagnostics` how the manager itself is.
+    pub(super) fn diagnose(&self, level: u8, message: &str, values: Vec<(&str, String)>) {
+        let values = values.into_iter().map(|(key, value)| KeyValue { key: key.to_owned(), value }).collect();
+        let status = DiagnosticStatus {
+            level,
+            name: format!("{}: manager", self.node.full_name().trim_start_matches('/')),
+            message: message.to_owned(),
+            hardware_id: String::new(),
+            values,
+        };
+        let mut array = DiagnosticArray { status: vec![status], ..DiagnosticArray::default() };
+        array.header.stamp = crate::node::now();
+        self.diagnostics.publish(array);
+    }
+}
+
+/// Diagnostics that concern components and attributes become lines; what says the same as before does not.
+fn hear_diagnostics(node: &Arc<Node>, inputs: Sender<Input>) -> Result<(), Message> {
+    let mut last: HashMap<String, Vec<KeyValue>> = HashMap::new();
+    node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |mut array| {
+        array.status.retain(|status| {
+            let is_ours = CONCERN.contains(&status.message.as_str());
+            let key = || {
+                let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
+                format!("{}\u{0}{}", status.message, keys.join("\u{0}"))
+            };
+            is_ours && last.insert(key(), status.values.clone()).as_ref() != Some(&status.values)
+        });
+        if !array.status.is_empty() {
+            let line = serde_json::to_string(&array).unwrap_or_default();
+            let _ = inputs.send(Input::Line(line));
+        }
+    })
+}
+
+/// What `system_modes` tells of a function, and its node of its states.
+fn hear_function(
+    node: &Arc<Node>,
+    settings: &Settings,
+    function: &str,
+    inputs: &Sender<Input>,
+) -> Result<(), Message> {
+    let system = settings.functions.system(function);
+    let (name, sender) = (function.to_owned(), inputs.clone());
+    node.subscribe::<ModeEvent>(&format!("/{system}/mode_request_info"), depth(10), move |event| {
+        let _ = sender.send(Input::Mode(name.clone(), event.goal_mode.label));
+    })?;
+    let (name, sender) = (function.to_owned(), inputs.clone());
+    let topic = format!("/{}/transition_event", settings.functions.node(function));
+    node.subscribe::<TransitionEvent>(&topic, depth(10), move |_| {
+        let _ = sender.send(Input::Touched(name.clone()));
+    })
+}
+
+/// Parameters of a function's node that somebody has set.
+fn hear_parameters(
+    node: &Arc<Node>,
+    settings: &Settings,
+    functions: &[String],
+    inputs: Sender<Input>,
+) -> Result<(), Message> {
+    let nodes: HashMap<String, String> =
+        functions.iter().map(|function| (settings.functions.node(function), function.clone())).collect();
+    node.subscribe::<ParameterEvent>("/parameter_events", keep_all(), move |event| {
+        if let Some(function) = nodes.get(event.node.trim_start_matches('/')) {
+            let _ = inputs.send(Input::Touched(function.clone()));
+        }
+    })
+}
+
+type Replies = Arc<std::sync::Mutex<HashMap<u64, Responder<TaskService>>>>;
+
+/// Serves the requests of tasks and their ends.
+fn serve_tasks(node: &Arc<Node>, inputs: &Sender<Input>, replies: &Replies) -> Result<(), Message> {
+    let count = Arc::new(AtomicU64::new(0));
+    let kinds: [(&str, fn(u64, String) -> Input); 2] =
+        [("/task/request", Input::Request), ("/task/cancel", Input::Cancel)];
+    for (service, input) in kinds {
+        let (inputs, replies, count) = (inputs.clone(), Arc::clone(replies), Arc::clone(&count));
+        node.serve::<TaskService>(service, move |request, responder| {
+            let number = count.fetch_add(1, Ordering::Relaxed);
+            replies.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(number, responder);
+            let _ = inputs.send(input(number, request.task_name));
+        })?;
+    }
+    Ok(())
+}
