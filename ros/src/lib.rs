@@ -3,3 +3,5 @@
 pub mod interfaces;
 pub mod node;
 pub mod perform;
+pub mod planner;
+pub mod popf;
