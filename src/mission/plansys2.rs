@@ -113,7 +113,8 @@ mod tests {
 
     /// Lines of steps `(name, start, duration)`, in thousandths, for a problem with this in `:init`.
     fn lines(init: &str, concurrent: bool, steps: &[(&str, i64, i64)]) -> String {
-        let domain = "(define (domain d) (:predicates (p) (q))
+        let domain = "(define (domain d) (:predicates (p) (q) (r))
+            (:durative-action aside :parameters () :duration (= ?duration 5) :condition () :effect (at end (r)))
             (:durative-action long :parameters () :duration (= ?duration 5) :condition () :effect (at end (p)))
             (:durative-action short :parameters () :duration (= ?duration 2) :condition (over all (p)) :effect (at end (q)))
             (:action now :parameters () :precondition () :effect (q)))";
@@ -146,8 +147,8 @@ mod tests {
         let spaced =
             "0.000: (long)  [5.000]\n5.001: (now)  [0.001]\n5.003: (short)  [2.000]\n9.000: (now)  [0.001]\n";
         check("", false, &sequence, spaced);
-        let overlapping = [("long", 0, 5000), ("long", 1000, 5000), ("short", 5000, 2000)];
-        let spaced = "0.000: (long)  [5.000]\n1.000: (long)  [5.000]\n5.001: (short)  [2.000]\n";
+        let overlapping = [("long", 0, 5000), ("aside", 1000, 5000), ("short", 5000, 2000)];
+        let spaced = "0.000: (long)  [5.000]\n1.000: (aside)  [5.000]\n5.001: (short)  [2.000]\n";
         check("", true, &overlapping, spaced);
     }
 
