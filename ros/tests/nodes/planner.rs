@@ -42,9 +42,11 @@ fn hopeless() -> (String, String) {
         :effect (and (not (out ?p)) (not (free ?h)) (in ?p ?h) (home ?p)))
       (:action leave :parameters (?p - pigeon ?h - hole) :precondition (in ?p ?h)
         :effect (and (out ?p) (free ?h) (not (in ?p ?h)) (not (home ?p)))))";
-    let names = |name: &str, count: usize| (0..count).map(|i| format!("{name}{i} ")).collect::<String>();
-    let facts =
-        |before: &str, count: usize| (0..count).map(|i| format!("({before}{i}) ")).collect::<String>();
+    let names =
+        |name: &str, count: usize| (0..count).map(|i| format!("{name}{i} ")).collect::<Vec<_>>().concat();
+    let facts = |before: &str, count: usize| {
+        (0..count).map(|i| format!("({before}{i}) ")).collect::<Vec<_>>().concat()
+    };
     let problem = format!(
         "(define (problem p) (:domain holes) (:objects {}- pigeon {}- hole) (:init {}{}) (:goal (and {})))",
         names("p", 20),
