@@ -159,6 +159,9 @@ class Node:
             elif answer is not None:
                 send(key, answer)
 
+        # The serialiser compiles itself at its first use; no caller should wait for that.
+        codec.decode(f"{type_name}_Request", codec.encode(f"{type_name}_Request", {}))
+        codec.encode(f"{type_name}_Response", {})
         replier = self.transport.replier(name, type_name, take)
         return replier
 
