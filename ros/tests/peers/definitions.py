@@ -95,6 +95,17 @@ SERVICES: dict[str, str] = {
     "plansys2_msgs/srv/AffectNode": "plansys2_msgs/Node node\n---\nbool success\nstring error_info",
 }
 
+_NAVIGATE = """geometry_msgs/PoseStamped pose
+string behavior_tree
+---
+{result}
+---
+geometry_msgs/PoseStamped current_pose
+builtin_interfaces/Duration navigation_time
+builtin_interfaces/Duration estimated_time_remaining
+int16 number_of_recoveries
+float32 distance_remaining{more}"""
+
 ACTIONS: dict[str, str] = {
     "mros2_msgs/action/ControlQos": "mros2_msgs/QoS qos_expected\n---\n---\nmros2_msgs/QoS qos_status",
     "mros2_msgs/action/NavigateToPoseQos": """geometry_msgs/PoseStamped pose
@@ -116,14 +127,42 @@ mros2_msgs/QoS qos_status""",
     "plansys2_msgs/action/ExecutePlan": "plansys2_msgs/Plan plan\n---\nbool success\n"
     "plansys2_msgs/ActionExecutionInfo[] action_execution_status\n---\n"
     "plansys2_msgs/ActionExecutionInfo[] action_execution_status",
-    "nav2_msgs/action/NavigateToPose": """geometry_msgs/PoseStamped pose
-string behavior_tree
+    "nav2_msgs/action/NavigateToPose": _NAVIGATE.format(result="uint16 error_code\nstring error_msg", more=""),
+}
+
+# What `rosbags` has otherwise than Jazzy: the definition says char[16], and ROS reads char as uint8.
+CORRECTED: dict[str, str] = {
+    "service_msgs/msg/ServiceEventInfo": """uint8 event_type
+builtin_interfaces/Time stamp
+uint8[16] client_gid
+int64 sequence_number"""
+}
+
+# Where a distribution, or an older release, differs.
+VARIANTS: dict[str, dict[str, str]] = {
+    "humble": {"nav2_msgs/action/NavigateToPose": _NAVIGATE.format(result="std_msgs/Empty result", more="")},
+    "iron": {"nav2_msgs/action/NavigateToPose": _NAVIGATE.format(result="uint16 error_code", more="")},
+    "rolling": {
+        "nav2_msgs/action/NavigateToPose": _NAVIGATE.format(
+            result="uint16 error_code\nstring error_msg",
+            more="\nfloat32 position_tracking_error\nfloat32 heading_tracking_error",
+        )
+    },
+    "lyrical": {
+        "lifecycle_msgs/msg/TransitionEvent": """builtin_interfaces/Time stamp
+lifecycle_msgs/Transition transition
+lifecycle_msgs/State start_state
+lifecycle_msgs/State goal_state"""
+    },
+    "plansys2_1": {
+        "plansys2_msgs/action/ExecutePlan": """std_msgs/Empty request
 ---
-std_msgs/Empty result
+bool success
+string error_info
 ---
-geometry_msgs/PoseStamped current_pose
-builtin_interfaces/Duration navigation_time
-builtin_interfaces/Duration estimated_time_remaining
-int16 number_of_recoveries
-float32 distance_remaining""",
+int32 seq_action
+int32 total_actions
+string current_action
+float32 progress_current_action"""
+    },
 }
