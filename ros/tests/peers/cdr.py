@@ -23,12 +23,14 @@ import codec
 VALUES = 24
 _INTEGERS = {f"int{n}": (-(2 ** (n - 1)), 2 ** (n - 1) - 1) for n in (8, 16, 32, 64)}
 _INTEGERS |= {f"uint{n}": (0, 2**n - 1) for n in (8, 16, 32, 64)} | {"char": (0, 255)}
-_INTEGERS |= {"byte": (0, 127)}  # a single byte is signed for rosbags, and unsigned for others: what is the same in both
+_INTEGERS |= {
+    "byte": (0, 127)
+}  # a single byte is signed for rosbags, and unsigned for others: what is the same in both
 _FLOATS = {
     "float32": (0.0, -0.0, 1.0, -1.5, 2.0**-149, 3.4028234663852886e38, float(numpy.float32(0.1))),
     "float64": (0.0, -0.0, 0.1, 5e-324, -1.7976931348623157e308, 1 / 3),
 }
-_STRINGS = ("", "a", "ab", "abc", "abcd", "tiefe Gewässer", "水の視界", "line\nbreak \"quoted\"", "x" * 70_001)
+_STRINGS = ("", "a", "ab", "abc", "abcd", "tiefe Gewässer", "水の視界", 'line\nbreak "quoted"', "x" * 70_001)
 
 
 class Rust:
@@ -101,7 +103,7 @@ def rubbish(rust: Rust, name: str, variant: str | None, types: Any) -> list[str]
 
 def of_pyterfaces(name: str) -> str | None:
     """The hash by `ros2-pyterfaces`, if it knows the type."""
-    package, kind, short = name.split("/")
+    _, kind, short = name.split("/")
     module = all_msgs if kind == "msg" else all_srvs
     schema = getattr(module, short, None)
     if schema is None or schema.get("__typename") != name:

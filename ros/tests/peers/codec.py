@@ -15,7 +15,14 @@ from definitions import ACTIONS, CORRECTED, MESSAGES, SERVICES, VARIANTS
 
 PADDING = "structure_needs_at_least_one_member"
 BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4
-_NUMPY = {"bool": "bool", "float32": "float32", "float64": "float64", "byte": "uint8", "octet": "uint8", "char": "uint8"}
+_NUMPY = {
+    "bool": "bool",
+    "float32": "float32",
+    "float64": "float64",
+    "byte": "uint8",
+    "octet": "uint8",
+    "char": "uint8",
+}
 _NUMPY |= {f"{sign}int{width}": f"{sign}int{width}" for sign in ("", "u") for width in (8, 16, 32, 64)}
 
 

@@ -20,17 +20,16 @@ os.environ.setdefault(
     "<AllowMulticast>true</AllowMulticast></General></Domain></CycloneDDS>",
 )
 
-from cyclonedds.core import Policy, ReadCondition, WaitSet  # noqa: E402
-from cyclonedds.core import InstanceState, SampleState, ViewState  # noqa: E402
-from cyclonedds.core import Qos as DdsQos  # noqa: E402
-from cyclonedds.domain import DomainParticipant  # noqa: E402
-from cyclonedds.idl import make_idl_struct, types  # noqa: E402
-from cyclonedds.pub import DataWriter  # noqa: E402
-from cyclonedds.sub import DataReader  # noqa: E402
-from cyclonedds.topic import Topic  # noqa: E402
-from cyclonedds.util import duration  # noqa: E402
+from cyclonedds.core import InstanceState, Policy, ReadCondition, SampleState, ViewState, WaitSet
+from cyclonedds.core import Qos as DdsQos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import make_idl_struct, types
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
 
-from transport import OnKeyed, OnSample, Qos, VOLATILE, service_names  # noqa: E402
+from transport import VOLATILE, OnKeyed, OnSample, Qos, service_names
 
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 _HEADER = struct.Struct("<Qq")

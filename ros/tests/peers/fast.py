@@ -8,10 +8,11 @@ import select
 import subprocess
 import time
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any
 
-from transport import OnKeyed, OnSample, Qos, VOLATILE, service_names
+from transport import VOLATILE, OnKeyed, OnSample, Qos, service_names
 
 BRIDGE = Path(__file__).resolve().parents[3] / "target" / "ros" / "bridge"
 

@@ -1,4 +1,4 @@
-"""system_modes' mode manager, with the ways in which it can fail.
+"""system_modes' mode manager, with the ways in which it can fail; alone, it is a program that can be killed.
 
 Serves `/<function>/change_mode`, `get_mode`, `get_available_modes` and the lifecycle of the nodes below; tells what
 it does on `mode_request_info`, `mode_event`, `transition_event` and `/parameter_events`.
@@ -6,12 +6,19 @@ it does on `mode_request_info`, `mode_event`, `transition_event` and `/parameter
 
 from __future__ import annotations
 
+import argparse
+import json
+import os
+import select
+import subprocess
+import sys
 import time
 from dataclasses import dataclass, field
 from typing import Any
 
 from oracle import FOLLOW, MOTION, PATH, RECHARGE, UNGROUND, Oracle
 from ros2 import Later, Node, now
+from transport import connect
 
 # function -> mode -> (whether its node is active, spiral_altitude); as in suave_modes.yaml
 MODES: dict[str, dict[str, tuple[bool, float | None]]] = {
@@ -102,13 +109,13 @@ class System:
 class ModeManager:
     """All functions; the requests go through the oracle."""
 
-    def __init__(self, node: Node, oracle: Oracle) -> None:
+    def __init__(self, node: Node, oracle: Oracle, functions: list[str]) -> None:
         self.node, self.oracle, self.faults = node, oracle, Faults()
         self.requests: list[tuple[float, str, str]] = []
         self._under_way = 0
         self._configuration: Any = None
         self._parameters = node.publisher("/parameter_events", "rcl_interfaces/msg/ParameterEvent")
-        self.systems = {name: System(node, name, self) for name in MODES}
+        self.systems = {name: System(node, name, self) for name in functions}
 
     def current(self, function: str) -> str:
         """The mode in which a function is."""
@@ -171,3 +178,58 @@ class ModeManager:
         """Somebody else switches: the same events, but nobody has asked."""
         self.systems[function].enter(mode)
         self.oracle.running[function] = mode
+
+
+class Remote:
+    """A mode manager in a process of its own."""
+
+    def __init__(self, vendor: str, domain: int, modes: dict[str, str] | None = None) -> None:
+        command = [sys.executable, __file__, "--vendor", vendor, "--domain", str(domain)]
+        command += ["--modes", json.dumps(modes or {})]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
+        os.set_blocking(self._process.stdout.fileno(), False)
+        self._rest = b""
+        self.requests: list[tuple[str, str]] = []
+
+    def poll(self) -> None:
+        """Reads what was asked for since the last time."""
+        chunk = self._process.stdout.read(1 << 16) or b""
+        *lines, self._rest = (self._rest + chunk).split(b"\n")
+        self.requests += [tuple(json.loads(line)) for line in lines if line]
+
+    def kill(self) -> None:
+        """Gone without a word."""
+        self.poll()
+        self._process.kill()
+        self._process.wait()
+
+    def leave(self) -> None:
+        """Gone, with leave taken."""
+        self._process.stdin.close()
+        self._process.wait(10)
+        self.poll()
+
+
+def main() -> None:
+    """Serves until its input ends; a request is a line of output."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--vendor", default="cyclonedds")
+    parser.add_argument("--domain", type=int, default=0)
+    parser.add_argument("--modes", type=json.loads, default={}, help="modes at the start, as JSON")
+    arguments = parser.parse_args()
+    node = Node(connect(arguments.vendor, arguments.domain), "modes")
+    manager = ModeManager(node, Oracle(), list(MODES))
+    for function, mode in arguments.modes.items():
+        manager.systems[function].mode = mode
+        manager.systems[function].active = MODES[function][mode][0]
+    told = 0
+    while not select.select([sys.stdin], [], [], 0)[0]:
+        node.spin(0.02)
+        for _, function, mode in manager.requests[told:]:
+            print(json.dumps([function, mode]), flush=True)
+        told = len(manager.requests)
+    node.close()
+
+
+if __name__ == "__main__":
+    main()

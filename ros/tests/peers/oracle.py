@@ -34,11 +34,12 @@ class World:
     visibility: float | None = None
     battery: float = 1.0
     failed: set[int] = field(default_factory=set)
+    refused: set[str] = field(default_factory=set)  # designs that the mode manager does not grant
 
     def spiral(self) -> str | None:
         """The best spiral that the water allows; the best one of all before anything was measured."""
         seen = float("inf") if self.visibility is None else self.visibility
-        return next((mode for least, mode in SPIRALS if seen >= least), None)
+        return next((mode for least, mode in SPIRALS if seen >= least and mode not in self.refused), None)
 
     def right(self) -> dict[str, str | None]:
         """For each function its one right mode; `None` where nothing can be right."""

@@ -6,8 +6,9 @@ import heapq
 import itertools
 import time
 import uuid
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Callable
+from typing import Any
 
 import codec
 from transport import LATCHED, VOLATILE, Qos, Transport

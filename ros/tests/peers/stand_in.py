@@ -27,7 +27,9 @@ class StandIn:
         node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", self.hear)
         if role == "manager":
             kind = "system_modes_msgs/srv/ChangeMode"
-            self.clients = {f: node.client(f"/{f}/change_mode", kind) for f in (MOTION, PATH, FOLLOW, "generate_recharge_path")}
+            self.clients = {
+                f: node.client(f"/{f}/change_mode", kind) for f in (MOTION, PATH, FOLLOW, "generate_recharge_path")
+            }
             node.serve("/task/request", "suave_msgs/srv/Task", self.task)
             node.serve("/task/cancel", "suave_msgs/srv/Task", self.end)
         else:

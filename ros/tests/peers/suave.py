@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from modes import ModeManager
+from modes import MODES, ModeManager
 from oracle import FOLLOW, INSPECT, MOTION, PATH, SEARCH, Oracle
 from ros2 import ActionClient, Client, Goal, Node, Publisher, now
 from streams import Stimulus, Stream
@@ -79,6 +79,7 @@ class Options:
     domain: int = 0
     found_at: float = FOUND_AT
     reaction_limit: float = REACTION_LIMIT
+    own_modes: bool = True  # whether the mode manager is played here, and not in a process of its own
 
 
 @dataclass
@@ -108,7 +109,7 @@ class Robot:
         self.options = options
         self.oracle = Oracle()
         self.node = Node(connect(options.vendor, options.domain), "mission_node")
-        self.modes = ModeManager(self.node, self.oracle)
+        self.modes = ModeManager(self.node, self.oracle, list(MODES) if options.own_modes else [])
         self.monitors = Monitors(self.node)
         self.detected = self._bool("/pipeline/detected")
         self.inspected = self._bool("/pipeline/inspected")
@@ -139,6 +140,11 @@ class Robot:
             return asked and self.monitors.topic.matched() > 0
 
         return self.node.spin_until(there, timeout)
+
+    def show(self, metres: float) -> None:
+        """The water visibility is measured, and nothing judged."""
+        self.oracle.world.visibility = metres
+        self.monitors.visibility(metres, now())
 
     def guided(self) -> None:
         """The autopilot reports GUIDED: the mission begins."""
@@ -204,7 +210,9 @@ class Robot:
             world.failed.discard(int(stimulus.value))
         # The decision what is right is not part of the reaction: the stamp is taken after it.
         stamp = now()
-        self.oracle.stimulus(f"{stimulus.kind} {stimulus.value:g} at {stimulus.second:g} s", seconds(stamp), diagnostic=True)
+        self.oracle.stimulus(
+            f"{stimulus.kind} {stimulus.value:g} at {stimulus.second:g} s", seconds(stamp), diagnostic=True
+        )
         if stimulus.kind == "visibility":
             self.monitors.visibility(stimulus.value, stamp)
         elif stimulus.kind == "battery":
@@ -263,4 +271,3 @@ class Robot:
     def close(self) -> None:
         """Leaves the domain."""
         self.node.close()
-

@@ -5,8 +5,9 @@ Octets always carry the encapsulation header. `key` identifies a request; only i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Callable, Protocol
+from typing import Any, Protocol
 
 from codec import dds_name
 
