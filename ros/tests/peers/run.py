@@ -42,7 +42,7 @@ def enter_namespace() -> None:
 
 def play_one(name: str, program: str, vendor: str, domain: int) -> int:
     """Plays one scenario in this process; its report is a line of JSON."""
-    from scenarios import SCENARIOS, Setting
+    from catalogue import SCENARIOS, Setting
 
     setting = Setting(program, vendor, domain)
     report: dict[str, object] = {"scenario": name, "vendor": vendor, "passed": False}
@@ -80,14 +80,14 @@ def play(name: str, arguments: argparse.Namespace, vendor: str, domain: int) -> 
     report["seconds"] = round(time.monotonic() - started, 1)
     mark = "ok    " if report["passed"] else "FAILED"
     print(f"{mark} {name:<20} {vendor:<10} {report['seconds']:>6} s  {report['said']}", flush=True)
-    if report.get("output"):
+    if report.get("output") and not arguments.program.startswith(STAND_IN):
         print(report["output"], flush=True)
     return report
 
 
 def chosen(arguments: argparse.Namespace) -> list[tuple[str, str]]:
     """Scenarios with vendors, in order."""
-    from scenarios import QUICK, SCENARIOS
+    from catalogue import QUICK, SCENARIOS
 
     unknown = sorted(set(arguments.scenario) - set(SCENARIOS))
     if unknown:
@@ -107,6 +107,25 @@ def chosen(arguments: argparse.Namespace) -> list[tuple[str, str]]:
     return pairs
 
 
+def self_test(arguments: argparse.Namespace) -> int:
+    """Whether the scenarios pass with a right stand-in and fail with each of its faults."""
+    fooled = []
+    for fault, name, expected in (
+        ("", "mission-manager", True),
+        ("", "mission-reasoner", True),
+        ("wrong", "mission-reasoner", False),
+        ("miss", "mission-reasoner", False),
+        ("twice", "mission-reasoner", False),
+        ("slow", "mission-reasoner", False),
+    ):
+        arguments.program = f"{STAND_IN}:{fault}"
+        print(f"stand-in {fault or 'without a fault'}, has to {'pass' if expected else 'fail'}:", flush=True)
+        if play(name, arguments, arguments.vendor or "cyclonedds", 90)["passed"] != expected:
+            fooled.append(fault or "none")
+    print(f"the scenarios are fooled by: {', '.join(fooled) or 'none of the stand-ins'}")
+    return 1 if fooled else 0
+
+
 def main() -> int:
     """Plays what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -116,12 +135,15 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="only what takes less than three minutes")
     parser.add_argument("--vendor", choices=("cyclonedds", "fastrtps"))
     parser.add_argument("--report", type=Path, help="writes all results there, as JSON")
+    parser.add_argument("--self-test", action="store_true", help="plays against stand-ins with and without faults")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     parser.add_argument("--domain", type=int, default=0, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     enter_namespace()
     if arguments.one:
         return play_one(arguments.one, arguments.program, arguments.vendor, arguments.domain)
+    if arguments.self_test:
+        return self_test(arguments)
     if not arguments.program.startswith(STAND_IN):
         for needed in (Path(arguments.program), MISSION):
             if not needed.exists():

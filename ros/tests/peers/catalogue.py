@@ -1,0 +1,9 @@
+"""All scenarios: importing a module registers those that are in it."""
+
+import citizen
+import faults
+import planning
+from scenarios import QUICK, SCENARIOS, Setting
+
+MODULES = (citizen, faults, planning)
+__all__ = ["MODULES", "QUICK", "SCENARIOS", "Setting"]
