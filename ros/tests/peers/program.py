@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-MISSION = ROOT / "ros" / "examples" / "suave" / "suave.toml"
+MISSION = Path(os.environ.get("METAPLAN_ROS_MISSION", ROOT / "ros" / "examples" / "suave" / "suave.toml"))
 STAND_IN = "stand-in"
 
 
