@@ -26,6 +26,9 @@ def battery(setting: Setting) -> str:
         no_fault(robot)
         robot.play(Stimulus(0, "battery", 0.24))
         no_fault(robot)
+        # Whichever is heard of first, the end of the recharging or the new level, may be what it goes on with.
+        robot.oracle.world.battery = 1.0
+        robot.oracle.stimulus("end of the recharging", time.time())
         robot.recharged.send({"data": True})
         robot.play(Stimulus(0, "battery", 1.0))
         no_fault(robot)

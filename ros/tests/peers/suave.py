@@ -226,6 +226,11 @@ class Robot:
         for thruster in sorted(self.oracle.world.failed):
             self.play(Stimulus(second, "recovered", thruster))
 
+    def done(self, what: str) -> None:
+        """The task has reached its aim: its functions may be ungrounded now, and have to be when it is cancelled."""
+        self.oracle.world.task = None
+        self.oracle.stimulus(what, time.time())
+
     def mission(self, stream: Stream) -> dict[str, Any]:
         """One whole mission with an oracle of its own: search, detection, inspection; the stimuli of the stream all along."""
         started, tasks, current = time.monotonic(), [], SEARCH
@@ -238,6 +243,7 @@ class Robot:
                 self.recover(recovered_at)
                 recovered_at = None
             if current == SEARCH and stimulus.second >= self.options.found_at:
+                self.done("detection")
                 self.detected.send({"data": True})
                 tasks += [self.cancel(SEARCH), self.request(INSPECT)]
                 current = INSPECT
@@ -245,6 +251,7 @@ class Robot:
             if stimulus.kind == "failure" and self.modes.current(MOTION) == "fd_recover_thrusters":
                 recovered_at = stimulus.second + RECOVERY
         self.recover(streams_end(stream))
+        self.done("end of the inspection")
         self.inspected.send({"data": True})
         tasks.append(self.cancel(current))
         return self.summary(stream.name, tasks, time.monotonic() - started)
