@@ -2,8 +2,9 @@
 
 import citizen
 import faults
+import performers
 import planning
 from scenarios import QUICK, SCENARIOS, Setting
 
-MODULES = (citizen, faults, planning)
+MODULES = (citizen, faults, performers, planning)
 __all__ = ["MODULES", "QUICK", "SCENARIOS", "Setting"]

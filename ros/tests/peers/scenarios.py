@@ -47,11 +47,16 @@ def scenario(quick: bool = True) -> Callable[[Scenario], Scenario]:
 
 @contextmanager
 def play(
-    setting: Setting, role: str = "manager", own_wait: bool = True, **more: Any
+    setting: Setting,
+    role: str = "manager",
+    own_wait: bool = True,
+    prepare: Callable[[Program], list[str]] = lambda _: [],
+    **more: Any,
 ) -> Iterator[tuple[Robot, Program]]:
     """A robot and the program, discovered by each other unless the caller looks after that."""
     program = Program(setting.program, role, setting.vendor, setting.domain, **more)
     setting.programs.append(program)
+    program.more += prepare(program)
     robot = Robot(Options(role=role, vendor=setting.vendor, domain=setting.domain))
     program.start()
     try:
