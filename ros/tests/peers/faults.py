@@ -281,3 +281,52 @@ def wrong_mapping(setting: Setting) -> str:
     finally:
         robot.close()
         program.stop()
+
+
+@scenario()
+def rubbish_requests(setting: Setting) -> str:
+    """Services of the program get octets that are no request, and nobody waits for the answers: others are still served."""
+    rubbish = [
+        b"\x00\x01\x00\x00" + body for body in (b"", b"\xff" * 8, b"\xff\xff\xff\x7f", bytes(range(64)), b"\x01" * 3)
+    ]
+    with play(setting) as (robot, _):
+        see(robot, CLEAR)
+        services = {
+            "/task/request": "suave_msgs/srv/Task",
+            "/task/cancel": "suave_msgs/srv/Task",
+            "/metaplan/change_state": "lifecycle_msgs/srv/ChangeState",
+            "/metaplan/set_parameters": "rcl_interfaces/srv/SetParameters",
+            "/metaplan/get_parameters": "rcl_interfaces/srv/GetParameters",
+        }
+        for name, kind in services.items():
+            client = robot.node.client(name, kind)
+            check(robot.node.spin_until(client.ready, 5.0), f"{name} was not discovered within 5 s")
+            robot.node.spin(0.2)
+            for octets in rubbish:
+                client.raw(octets)
+                robot.node.spin(0.02)
+        robot.node.spin(0.5)
+        check(robot.request(SEARCH), "the task was not granted")
+        see(robot, DARK)
+        no_fault(robot)
+        return f"{len(rubbish) * len(services)} rubbish requests"
+
+
+@scenario()
+def flood(setting: Setting) -> str:
+    """Diagnostics come faster than anything can be switched: what was said last counts, and soon."""
+    with play(setting) as (robot, _):
+        see(robot, CLEAR)
+        check(robot.request(SEARCH), "the task was not granted")
+        count = 3000
+        for number in range(count):
+            robot.show((CLEAR, MURKY, DARK)[number % 3])
+            robot.node.spin_once(0.0)
+        robot.show(DARK)
+        began = time.monotonic()
+        robot.node.spin_until(lambda: robot.modes.current(PATH) == "fd_spiral_low" and robot.modes.idle(), 5.0)
+        took = time.monotonic() - began
+        robot.node.spin(1.0)
+        check(robot.modes.current(PATH) == "fd_spiral_low", f"a second later {robot.modes.current(PATH)} runs")
+        check(took < 2.0, f"right after {took:.1f} s")
+        return f"{count} samples, {len(robot.modes.requests)} requests, right {took * 1e3:.0f} ms after the last one"
