@@ -7,7 +7,7 @@
 
 pub use ::mission::{file, knowledge, message, visible};
 pub use ::verify::measure;
-pub use {encodings, ontology, rules};
+pub use {encodings, ontology, pddl, rules};
 
 pub mod answers;
 pub mod certificate;

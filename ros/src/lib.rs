@@ -4,3 +4,5 @@ pub mod interfaces;
 pub mod manager;
 pub mod node;
 pub mod perform;
+pub mod planner;
+pub mod popf;

@@ -12,7 +12,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::answers::{PlanAnswer, Preparation};
 use metaplan::certificate::{self, Ground};
 use metaplan::message::Message;
-use metaplan::mission::{Blocking, Mission, Planning as _, Reading, blocking, blocking_text, verdict};
+use metaplan::mission::{
+    Blocking, Mission, Planning as _, Reading, blocking, blocking_text, spaced, verdict,
+};
 use pddl::ast::Problem;
 
 use crate::cli::alternatives;
@@ -168,8 +170,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         progress.finish_and_clear();
         let ground = started.elapsed().saturating_sub(read + point.solution.statistics.search);
         let preparation = Preparation { read, ground };
-        objectives.confirm(&mission, &problem, &point, &Reading::concurrent(separation))?;
-        return finish(point, &Beside::default(), &mission, &objectives, &preparation, (arguments, common));
+        let reading = Reading::concurrent(separation);
+        objectives.confirm(&mission, &problem, &point, &reading)?;
+        let subject = (&mission, &problem, &reading);
+        return finish(point, &Beside::default(), subject, &objectives, &preparation, (arguments, common));
     }
     let config = configuration(arguments, limits);
     let failed = |messages| {
@@ -191,7 +195,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             let subject = (&mission, &problem, Ground::Exact(&task));
             let certified = certify(arguments, subject, &objectives, &point.solution, &config.limits);
             let beside = Beside::default();
-            let exit = finish(point, &beside, &mission, &objectives, &preparation, (arguments, common))?;
+            let subject = (&mission, &problem, &reading);
+            let exit = finish(point, &beside, subject, &objectives, &preparation, (arguments, common))?;
             return Ok(certified_or(certified, exit));
         }
         Err(messages) => return Err(failed(messages)),
@@ -212,7 +217,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(reason) = &point.solution.statistics.contradiction {
         return Err(fault(reason));
     }
-    objectives.confirm(&mission, &problem, &point, &Reading::sequential(task.is_timed()))?;
+    let reading = Reading::sequential(task.is_timed());
+    objectives.confirm(&mission, &problem, &point, &reading)?;
     let subject = (&mission, &problem, Ground::Integers(&task));
     let certified = certify(arguments, subject, &objectives, &point.solution, &config.limits);
     if let Some(reason) = &point.solution.statistics.failure {
@@ -228,7 +234,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         _ => None,
     };
     let beside = Beside { others, blocking };
-    let exit = finish(point, &beside, &mission, &objectives, &preparation, (arguments, common))?;
+    let subject = (&mission, &problem, &reading);
+    let exit = finish(point, &beside, subject, &objectives, &preparation, (arguments, common))?;
     Ok(certified_or(certified, exit))
 }
 
@@ -247,17 +254,23 @@ fn certified_or(certified: Result<(), Message>, exit: Exit) -> Exit {
 fn finish(
     mut point: Point,
     beside: &Beside,
-    mission: &Mission,
+    (mission, problem, reading): (&Mission, &Problem, &Reading),
     objectives: &Objectives,
     preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
+    if arguments.plan_format == Some(PlanFormat::Plansys2) {
+        point.solution.plan = point.solution.plan.take().map(|plan| spaced(mission, problem, plan, reading));
+    }
     // What `validate` executes has the designs, what the user's own domain has no place for them has not.
     if arguments.plan_format != Some(PlanFormat::Ipc) {
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let status = point.solution.status;
-    match (show(&point, beside, mission, objectives, preparation, (arguments, common)), &arguments.output) {
+    match (
+        show(&point, beside, &mission.name, objectives, preparation, (arguments, common)),
+        &arguments.output,
+    ) {
         (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
             output::note(&verdict(&point.solution));
@@ -280,12 +293,12 @@ struct Beside {
 fn show(
     point: &Point,
     beside: &Beside,
-    mission: &Mission,
+    name: &str,
     objectives: &Objectives,
     preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Option<String> {
-    let (solution, name) = (&point.solution, mission.name.as_str());
+    let solution = &point.solution;
     match (arguments.plan_format, common.format) {
         (Some(PlanFormat::Json), _) | (None, Format::Json) => {
             let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
@@ -304,7 +317,7 @@ fn show(
             let makespan = concurrent::makespan_text(overlaps);
             Some(plan + &objectives.values_text(point) + &makespan + &others.or(blocking).unwrap_or_default())
         }
-        (Some(format), _) => solution.plan.as_ref().map(|plan| plan_text(mission, plan, format)),
+        (Some(format), _) => solution.plan.as_ref().map(|plan| plan_text(plan, format)),
     }
 }
 
@@ -317,8 +330,7 @@ fn certify(
     limits: &Limits,
 ) -> Result<(), Message> {
     let Some(directory) = &arguments.certificate else { return Ok(()) };
-    let plan =
-        solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(mission, plan, PlanFormat::Ipc));
+    let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(plan, PlanFormat::Ipc));
     let mut problem = problem.clone();
     if let [metric] = &objectives.metrics[..] {
         problem.metric = Some(metric.clone());

@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use std::fmt::Write as _;
 
 use encodings::{Plan, Step};
-use metaplan::mission::{Mission, decimal, plan_lines, popf_text};
+use metaplan::mission::{decimal, plan_lines, popf_text};
 
 use crate::cli::output;
 
@@ -19,9 +19,9 @@ pub(super) enum PlanFormat {
 }
 
 /// The plan in the formats of the planning competitions and of `PlanSys2`.
-pub(super) fn plan_text(mission: &Mission, plan: &Plan, format: PlanFormat) -> String {
+pub(super) fn plan_text(plan: &Plan, format: PlanFormat) -> String {
     if format == PlanFormat::Plansys2 {
-        return popf_text(&plan_lines(mission, plan));
+        return popf_text(&plan_lines(plan));
     }
     let timed = |step: &Step| !step.duration.is_zero() || !step.start.is_zero();
     let temporal = plan.steps.iter().any(timed);

@@ -5,7 +5,7 @@ use ::verify::measure::measure;
 use encodings::Plan;
 use num_rational::BigRational;
 use pddl::ast::{Name, Problem};
-use pddl::validate::{Options, PlanStep, PlanText, validate};
+use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
 
 /// How the validator is to read a plan.
 #[derive(Debug, Clone)]
@@ -27,11 +27,8 @@ impl Reading {
     }
 }
 
-/// Has the independent validator execute a plan for a problem that [`Mission::filled`] has made.
-///
-/// # Errors
-/// Why the plan is none, or that it costs something else: a fault of the planner.
-pub fn confirm(mission: &Mission, problem: &Problem, plan: &Plan, reading: &Reading) -> Result<(), String> {
+/// What the independent validator says of a plan.
+pub(super) fn verdict_of(mission: &Mission, problem: &Problem, plan: &Plan, reading: &Reading) -> Verdict {
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
         arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
@@ -39,7 +36,15 @@ pub fn confirm(mission: &Mission, problem: &Problem, plan: &Plan, reading: &Read
         duration: (!step.duration.is_zero()).then(|| step.duration.to_rational()),
         line: 0,
     });
-    let verdict = validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &reading.options);
+    validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &reading.options)
+}
+
+/// Has the independent validator execute a plan for a problem that [`Mission::filled`] has made.
+///
+/// # Errors
+/// Why the plan is none, or that it costs something else: a fault of the planner.
+pub fn confirm(mission: &Mission, problem: &Problem, plan: &Plan, reading: &Reading) -> Result<(), String> {
+    let verdict = verdict_of(mission, problem, plan, reading);
     match (&verdict.violation, measure(problem, &verdict, plan.steps.len(), reading.timed)) {
         (Some(violation), _) => {
             Err(format!("the validator refuses the plan that was found: {}", violation.message))

@@ -14,6 +14,6 @@ pub use blocking::{Blocking, blocking};
 pub use confirm::{Reading, confirm};
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
-pub use plansys2::{PlanLine, decimal, plan_lines, popf_text};
+pub use plansys2::{PlanLine, decimal, instant, plan_lines, popf_text, spaced};
 pub use sections::{BindingsSection, KnowledgeSection, PlanningSection, Scenario};
 pub use verdict::{blocking_text, verdict};

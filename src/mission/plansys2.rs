@@ -8,8 +8,9 @@ use std::fmt::Write as _;
 use ::mission::Mission;
 use encodings::{Exact, Plan, Step};
 use num_rational::BigRational;
-use num_traits::Zero as _;
-use pddl::ast::InitialElement;
+use pddl::ast::Problem;
+
+use crate::mission::confirm::{Reading, verdict_of};
 
 /// An action of a plan for PlanSys2.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,29 +23,44 @@ pub struct PlanLine {
     pub duration: Exact,
 }
 
-/// The lines of a plan, whose arguments are as the domain's file writes them.
-///
-/// The times of a plan whose actions overlap, and of one that has to meet timed initial literals, stay as they are.
-pub fn plan_lines(mission: &Mission, plan: &Plan) -> Vec<PlanLine> {
-    let instant = BigRational::new(1.into(), 1000.into());
-    let end = |step: &Step| step.start.to_rational() + step.duration.to_rational();
-    let is_sequence =
-        plan.steps.windows(2).all(|pair| pair.iter().map(end).next() <= Some(pair[1].start.to_rational()));
-    let is_timed = mission.problem().init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
-    let mut free = BigRational::zero();
-    let mut lines = Vec::new();
-    for step in &plan.steps {
-        let (mut start, mut duration) = (step.start.to_rational(), step.duration.to_rational());
-        if duration.is_zero() {
-            duration.clone_from(&instant);
-        }
-        if is_sequence && !is_timed {
-            start = start.max(free);
-        }
-        free = &start + &duration + &instant;
-        lines.push(PlanLine { start: start.into(), action: call(step), duration: duration.into() });
+/// The plan with a thousandth between the end of an action and whatever begins then, where that is still a plan; otherwise as it is.
+#[must_use]
+pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Reading) -> Plan {
+    let mut later = plan.clone();
+    for next in 1..plan.steps.len() {
+        let start = plan.steps[next].start.to_rational();
+        let after = plan.steps[..next].iter().zip(&later.steps).map(|(before, moved)| {
+            let (own, moved) = (before.start.to_rational(), moved.start.to_rational());
+            // What overlaps keeps its distance.
+            if own.clone() + before.duration.to_rational() <= start {
+                moved + lasting(before) + instant()
+            } else {
+                moved + &start - own
+            }
+        });
+        later.steps[next].start = after.fold(start.clone(), BigRational::max).into();
     }
-    lines
+    if verdict_of(mission, problem, &later, reading).violation.is_none() { later } else { plan }
+}
+
+/// The lines of a plan, whose arguments are as the domain's file writes them.
+pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
+    let line = |step: &Step| PlanLine {
+        start: step.start.clone(),
+        action: call(step),
+        duration: lasting(step).into(),
+    };
+    plan.steps.iter().map(line).collect()
+}
+
+/// How long PlanSys2 takes an action to last.
+fn lasting(step: &Step) -> BigRational {
+    if step.duration.is_zero() { instant() } else { step.duration.to_rational() }
+}
+
+/// What stands for "at once", and for "as soon as that has ended": a thousandth.
+pub fn instant() -> BigRational {
+    BigRational::new(1.into(), 1000.into())
 }
 
 fn call(step: &Step) -> String {
@@ -96,14 +112,20 @@ mod tests {
     }
 
     /// Lines of steps `(name, start, duration)`, in thousandths, for a problem with this in `:init`.
-    fn lines(init: &str, steps: &[(&str, i64, i64)]) -> String {
-        let domain = pddl::Source::new("d", "(define (domain d) (:predicates (p)))".to_owned());
-        let problem = format!("(define (problem p) (:domain d) (:init {init}) (:goal (and)))");
+    fn lines(init: &str, concurrent: bool, steps: &[(&str, i64, i64)]) -> String {
+        let domain = "(define (domain d) (:predicates (p) (q) (r))
+            (:durative-action aside :parameters () :duration (= ?duration 5) :condition () :effect (at end (r)))
+            (:durative-action long :parameters () :duration (= ?duration 5) :condition () :effect (at end (p)))
+            (:durative-action short :parameters () :duration (= ?duration 2) :condition (over all (p)) :effect (at end (q)))
+            (:action now :parameters () :precondition () :effect (q)))";
+        let domain = pddl::Source::new("d", domain);
+        let problem = format!("(define (problem p) (:domain d) (:init {init}) (:goal (q)))");
         let problem = pddl::Source::new("p", problem);
         let mission = Mission::new("", None, ::mission::Bindings::default(), Ok(domain), Ok(problem));
+        let mission = mission.expect("a mission");
         let steps = steps.iter().map(|&(name, start, duration)| Step {
             action: name.to_owned(),
-            arguments: vec!["x".to_owned()],
+            arguments: Vec::new(),
             configuration: Vec::new(),
             reconfigured: Vec::new(),
             start: exact(start, 1000),
@@ -111,26 +133,30 @@ mod tests {
             cost: exact(0, 1),
         });
         let plan = Plan { steps: steps.collect(), cost: exact(0, 1) };
-        popf_text(&plan_lines(&mission.expect("a mission"), &plan))
+        let reading = if concurrent { Reading::concurrent(&instant()) } else { Reading::sequential(true) };
+        popf_text(&plan_lines(&spaced(&mission, mission.problem(), plan, &reading)))
+    }
+
+    fn check(init: &str, concurrent: bool, steps: &[(&str, i64, i64)], expected: &str) {
+        assert_eq!(lines(init, concurrent, steps), format!("Solution Found\n{expected}"));
     }
 
     #[test]
-    fn actions_of_a_sequence_do_not_touch() {
-        assert_eq!(
-            lines("", &[("a", 0, 5000), ("b", 5000, 0), ("c", 5000, 2000), ("d", 9000, 0)]),
-            "Solution Found\n0.000: (a x)  [5.000]\n5.001: (b x)  [0.001]\n5.003: (c x)  [2.000]\n\
-             9.000: (d x)  [0.001]\n"
-        );
+    fn what_follows_begins_a_thousandth_later() {
+        let sequence = [("long", 0, 5000), ("now", 5000, 0), ("short", 5000, 2000), ("now", 9000, 0)];
+        let spaced =
+            "0.000: (long)  [5.000]\n5.001: (now)  [0.001]\n5.003: (short)  [2.000]\n9.000: (now)  [0.001]\n";
+        check("", false, &sequence, spaced);
+        let overlapping = [("long", 0, 5000), ("aside", 1000, 5000), ("short", 5000, 2000)];
+        let spaced = "0.000: (long)  [5.000]\n1.000: (aside)  [5.000]\n5.001: (short)  [2.000]\n";
+        check("", true, &overlapping, spaced);
     }
 
+    /// Something that holds from 5 to 7 leaves no time.
     #[test]
-    fn times_that_matter_stay() {
-        let overlapping = [("a", 0, 5000), ("b", 1000, 1000), ("c", 2000, 1000)];
-        assert_eq!(
-            lines("", &overlapping),
-            "Solution Found\n0.000: (a x)  [5.000]\n1.000: (b x)  [1.000]\n2.000: (c x)  [1.000]\n"
-        );
-        let timed = lines("(at 7 (p))", &[("a", 0, 5000), ("b", 5000, 2000)]);
-        assert_eq!(timed, "Solution Found\n0.000: (a x)  [5.000]\n5.000: (b x)  [2.000]\n");
+    fn times_that_must_be_stay() {
+        let steps = [("now", 5000, 0), ("short", 5000, 2000)];
+        let kept = "5.000: (now)  [0.001]\n5.000: (short)  [2.000]\n";
+        check("(at 5 (p)) (at 7 (not (p)))", false, &steps, kept);
     }
 }

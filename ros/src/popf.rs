@@ -1,0 +1,168 @@
+//! In the place of POPF, for PlanSys2's plugin: `popf [ARGUMENTS] DOMAIN PROBLEM > plan`, with exit status 0 whatever comes of it.
+//!
+//! The plugin looks for a line with `Solution Found`, and reads each line behind it that does not begin with `;` as an action. Whether a
+//! domain is valid it asks with a problem that has neither an initial state nor a goal, and that names some other domain: the answer is
+//! `Solution Found` without any action.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use metaplan::file;
+use metaplan::message::Message;
+use metaplan::mission::popf_text;
+use metaplan::pddl::Source;
+use metaplan::setup::Setup;
+
+use crate::planner::{self, DOMAIN, Manner, NoPlan, PROBLEM, Request};
+
+/// PlanSys2 waits 15 s.
+const TIME_LIMIT: Duration = Duration::from_secs(10);
+
+/// What a run says.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Said {
+    /// What the plugin reads.
+    pub out: String,
+    /// For people.
+    pub error: String,
+}
+
+impl Said {
+    /// Says why there is no plan, where the plugin does not see it, and people do.
+    fn reason(text: &str) -> Self {
+        let comment = text.lines().fold(String::new(), |all, line| all + "; " + line + "\n");
+        Self { out: comment, error: text.to_owned() + "\n" }
+    }
+}
+
+/// What is asked for.
+#[derive(Debug)]
+struct Asked {
+    domain: PathBuf,
+    problem: PathBuf,
+    mission: Option<PathBuf>,
+    manner: Manner,
+    /// Arguments that POPF may know.
+    ignored: Vec<String>,
+}
+
+/// Does what the arguments say. The environment has defaults: `METAPLAN_METRIC`, `METAPLAN_MISSION`, `METAPLAN_TIME_LIMIT`,
+/// `METAPLAN_OVERLAP`.
+pub fn run(
+    arguments: impl IntoIterator<Item = String>,
+    environment: impl Fn(&str) -> Option<String>,
+) -> Said {
+    let asked = match asked(arguments, environment) {
+        Ok(asked) => asked,
+        Err(text) => return Said::reason(&text),
+    };
+    let mut said = match solve(&asked) {
+        Ok(out) => Said { out, error: String::new() },
+        Err(text) => Said::reason(&text),
+    };
+    if !asked.ignored.is_empty() {
+        let _ = writeln!(said.error, "arguments of POPF that mean nothing here: {}", asked.ignored.join(" "));
+    }
+    said
+}
+
+const USAGE: &str = "usage: popf [--metric EXPRESSION] [--mission MANIFEST] [--time-limit SECONDS] [--overlap yes|no] DOMAIN PROBLEM";
+
+fn asked(
+    arguments: impl IntoIterator<Item = String>,
+    environment: impl Fn(&str) -> Option<String>,
+) -> Result<Asked, String> {
+    let mut metric = environment("METAPLAN_METRIC");
+    let mut mission = environment("METAPLAN_MISSION");
+    let mut time_limit = environment("METAPLAN_TIME_LIMIT");
+    let mut overlap = environment("METAPLAN_OVERLAP");
+    let (mut files, mut ignored) = (Vec::new(), Vec::new());
+    let mut arguments = arguments.into_iter();
+    while let Some(argument) = arguments.next() {
+        let (option, value) = argument.split_once('=').unwrap_or((&argument, ""));
+        let own = match option {
+            "--metric" => &mut metric,
+            "--mission" => &mut mission,
+            "--time-limit" => &mut time_limit,
+            "--overlap" => &mut overlap,
+            _ if argument.starts_with('-') => {
+                ignored.push(argument);
+                continue;
+            }
+            _ => {
+                files.push(PathBuf::from(argument));
+                continue;
+            }
+        };
+        let value = if argument.contains('=') { Some(value.to_owned()) } else { arguments.next() };
+        *own = Some(value.ok_or_else(|| format!("`{option}` lacks its value\n{USAGE}"))?);
+    }
+    let given = |value: Option<String>| value.filter(|value| !value.is_empty());
+    let overlap = match given(overlap).as_deref() {
+        None | Some("auto") => None,
+        Some("yes" | "1" | "true") => Some(true),
+        Some("no" | "0" | "false") => Some(false),
+        Some(other) => return Err(format!("`--overlap {other}` is neither `yes` nor `no`")),
+    };
+    let time_limit = given(time_limit).map_or(Ok(TIME_LIMIT), |text| seconds(&text))?;
+    let manner = Manner { metric: given(metric), time_limit, overlap, alternatives: 0 };
+    let mission = given(mission).map(PathBuf::from);
+    // Values of POPF's own arguments stand before the files.
+    match files.len().checked_sub(2).map(|first| files.split_off(first)).as_deref() {
+        Some([domain, problem]) => {
+            ignored.extend(files.iter().map(|file| file.display().to_string()));
+            Ok(Asked { domain: domain.clone(), problem: problem.clone(), mission, manner, ignored })
+        }
+        _ => Err(USAGE.to_owned()),
+    }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let wrong = || format!("`{text}` is not a time in seconds such as 10 or 0.5");
+    let value: f64 = text.parse().map_err(|_| wrong())?;
+    Duration::try_from_secs_f64(value).ok().filter(|time| !time.is_zero()).ok_or_else(wrong)
+}
+
+/// The text for the plugin, or why there is none.
+fn solve(asked: &Asked) -> Result<String, String> {
+    let domain = read(&asked.domain, DOMAIN)?;
+    let problem = read(&asked.problem, PROBLEM)?;
+    if is_void(problem.text()) {
+        let wrong = |messages: Vec<Message>| NoPlan::Input(messages).text();
+        return planner::check_domain(&domain).map(|()| popf_text(&[])).map_err(wrong);
+    }
+    let setup = asked.mission.as_deref().map(Setup::read).transpose().map_err(|messages| all(&messages))?;
+    let joint = setup.as_ref().map(|setup| &setup.mission);
+    let request = Request { domain, problem, joint };
+    let found = planner::solve(request, &asked.manner).map_err(|none| none.text())?;
+    let mut text = format!("; cost {}\n; {}\n", found.cost, found.verdict.replace('\n', "\n; "));
+    let best = found.plans.first().map(Vec::as_slice).unwrap_or_default();
+    if best.is_empty() {
+        // The plugin takes a plan without actions for none, as it does POPF's.
+        text += "; nothing has to be done: the goal holds already\n";
+    }
+    for (line, configuration) in best.iter().zip(&found.configuration) {
+        let designs: Vec<_> = configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
+        if !designs.is_empty() {
+            let _ = writeln!(text, "; {} with {}", line.action, designs.join(", "));
+        }
+    }
+    Ok(text + &popf_text(best))
+}
+
+fn read(path: &Path, name: &str) -> Result<Source, String> {
+    let source = file::source(path).map_err(|message| all(&[message]))?;
+    Ok(Source::new(name, source.text()))
+}
+
+fn all(messages: &[Message]) -> String {
+    messages.iter().map(Message::text).collect::<Vec<_>>().join("\n")
+}
+
+/// Whether a problem asks for nothing but a look at the domain.
+fn is_void(problem: &str) -> bool {
+    let code: String = problem.lines().map(|line| line.split(';').next().unwrap_or_default()).collect();
+    let code = code.to_ascii_lowercase();
+    !code.contains(":init") && !code.contains(":goal") && code.contains("void")
+}

@@ -1,0 +1,153 @@
+"""What is played against the program under test, by name. A scenario raises `AssertionError` when something is wrong."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import streams
+from program import Program
+from streams import Stimulus
+from suave import Options, Robot
+
+CLEAR, MURKY, DARK = 3.5, 2.5, 1.5  # m: high, medium and low spiral
+
+
+@dataclass
+class Setting:
+    """With what a scenario is played; `results` goes into the report."""
+
+    program: str
+    vendor: str
+    domain: int
+    results: list[dict[str, Any]] = field(default_factory=list)
+    programs: list[Program] = field(default_factory=list)
+
+
+Scenario = Callable[[Setting], str]
+SCENARIOS: dict[str, Scenario] = {}
+QUICK: list[str] = []
+
+
+def scenario(quick: bool = True) -> Callable[[Scenario], Scenario]:
+    """Registers a scenario under its function's name."""
+
+    def register(function: Scenario) -> Scenario:
+        name = function.__name__.replace("_", "-")
+        SCENARIOS[name] = function
+        if quick:
+            QUICK.append(name)
+        return function
+
+    return register
+
+
+@contextmanager
+def play(
+    setting: Setting,
+    role: str = "manager",
+    own_wait: bool = True,
+    prepare: Callable[[Program], list[str]] = lambda _: [],
+    **more: Any,
+) -> Iterator[tuple[Robot, Program]]:
+    """A robot and the program, discovered by each other unless the caller looks after that."""
+    program = Program(setting.program, role, setting.vendor, setting.domain, **more)
+    setting.programs.append(program)
+    program.more += prepare(program)
+    robot = Robot(Options(role=role, vendor=setting.vendor, domain=setting.domain))
+    program.start()
+    try:
+        if own_wait:
+            check(robot.wait(), "the program was not discovered within 20 s")
+        robot.node.spin(0.5)  # the other side may discover a little later
+        yield robot, program
+        check(program.running(), f"the program ended with {program.status()}")
+        if not setting.program.startswith("stand-in"):
+            status = program.stop()
+            check(status == 0, f"after SIGINT the program ended with {status}, within 5 s")
+    finally:
+        robot.close()
+        if program.running():
+            program.kill()
+
+
+def check(condition: bool, message: str) -> None:
+    """An assertion that python -O does not remove."""
+    if not condition:
+        raise AssertionError(message)
+
+
+def faultless(result: dict[str, Any]) -> None:
+    """Nothing wrong, missed or asked for twice, and every task granted."""
+    for what in ("wrong", "missed", "twice"):
+        check(not result[what], f"{result['stream']}: {what}: {result[what][:5]}")
+    tasks = result["tasks"]
+    check(tasks["asked"] == tasks["granted"], f"{result['stream']}: {tasks}")
+    check(len(result["answered_ms"]) > 0, f"{result['stream']}: nothing to react to")
+
+
+def reactions(results: list[dict[str, Any]]) -> str:
+    """The reaction times of several streams in one line."""
+    answered = [ms for result in results for ms in result["answered_ms"]]
+    stimuli, switches = sum(r["stimuli"] for r in results), sum(r["switches"] for r in results)
+    return (
+        f"{stimuli} stimuli, {switches} switches, {len(answered)} reactions: mean {statistics.mean(answered):.2f},"
+        f" median {statistics.median(answered):.2f}, max {max(answered):.2f} ms"
+    )
+
+
+def _missions(setting: Setting, role: str, chosen: list[streams.Stream]) -> str:
+    done = []
+    for stream in chosen:
+        with play(setting, role) as (robot, _):
+            result = robot.mission(stream)
+        setting.results.append(result)
+        faultless(result)
+        done.append(result)
+    median = statistics.median(ms for result in done for ms in result["answered_ms"])
+    check(median < 20.0, f"the median reaction is {median:.1f} ms")
+    return reactions(done)
+
+
+@scenario()
+def mission_manager(setting: Setting) -> str:
+    """Two of the published streams, as the manager of tasks."""
+    return _missions(setting, "manager", [streams.stream(3, 1), streams.stream(3, 6)])
+
+
+@scenario()
+def mission_reasoner(setting: Setting) -> str:
+    """One of the published streams, in the place of MROS's reasoner."""
+    return _missions(setting, "reasoner", [streams.stream(3, 6)])
+
+
+@scenario(quick=False)
+def published_manager(setting: Setting) -> str:
+    """All eighteen published streams, as the manager of tasks."""
+    return _missions(setting, "manager", streams.published())
+
+
+@scenario(quick=False)
+def published_reasoner(setting: Setting) -> str:
+    """All eighteen published streams, in the place of MROS's reasoner."""
+    return _missions(setting, "reasoner", streams.published())
+
+
+def see(robot: Robot, metres: float) -> bool:
+    """The water visibility is measured; whether the robot settled."""
+    return robot.play(Stimulus(0, "visibility", metres))
+
+
+def no_fault(robot: Robot) -> None:
+    """Nothing wrong, missed or asked for twice so far."""
+    oracle = robot.oracle
+    for what, found in (("wrong", oracle.wrong), ("missed", oracle.missed), ("twice", oracle.twice)):
+        check(not found, f"{what}: {found[:5]}")
+
+
+def asked(robot: Robot, function: str) -> list[str]:
+    """The modes asked for of a function, in order."""
+    return [mode for _, of, mode in robot.modes.requests if of == function]

@@ -1,0 +1,280 @@
+"""Simulated SUAVE: the mission node, system_modes' mode manager, the monitors and, for a reasoner, MROS's bridges.
+
+Plays a stream of stimuli at full speed: the next one is sent when the robot has settled after the last one. With
+`--role manager` the system under test owns `/task/request` and calls `/<function>/change_mode`; with `--role reasoner`
+it serves `/mros/objective` and calls `/mros/request_configuration`. Prints a summary as JSON at the end.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from modes import MODES, ModeManager
+from oracle import FOLLOW, INSPECT, MOTION, PATH, SEARCH, Oracle
+from ros2 import ActionClient, Client, Goal, Node, Publisher, now
+from streams import Stimulus, Stream
+from transport import connect
+
+OK, WARN, ERROR = 0, 1, 2
+TASK_TIMEOUT = 5.0  # s, of SUAVE's mission node
+REACTION_LIMIT = 2.0  # s, after which a stimulus counts as missed
+QUIET = 0.004  # s without a request after which the robot has settled
+FOUND_AT = 200.0  # s of the stream, when the pipeline is detected; the rest of the stream is inspection
+RECOVERY = 5.0  # s of the stream that the recovery of the thrusters takes
+FUNCTIONS = {SEARCH: (MOTION, PATH), INSPECT: (MOTION, FOLLOW)}
+
+
+class Monitors:
+    """The water visibility observer, the battery monitor and the thruster monitor on `/diagnostics`."""
+
+    def __init__(self, node: Node) -> None:
+        self.topic = node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+        # The serialiser compiles itself at its first use; this is not part of any reaction.
+        self._send([], now())
+        self._send([self._status(OK, "warm", "up", [("a", "b")])], now())
+
+    @staticmethod
+    def _status(level: int, name: str, message: str, values: list[tuple[str, str]]) -> dict[str, Any]:
+        pairs = [{"key": key, "value": value} for key, value in values]
+        return {"level": level, "name": name, "message": message, "hardware_id": "", "values": pairs}
+
+    def _send(self, status: list[dict[str, Any]], stamp: dict[str, int]) -> None:
+        self.topic.send({"header": {"stamp": stamp, "frame_id": ""}, "status": status})
+
+    def visibility(self, metres: float, stamp: dict[str, int]) -> None:
+        """As water_visibility_observer says it."""
+        name = "water_visibility_observer: Water visibility measurement"
+        self._send([self._status(OK, name, "QA status", [("water_visibility", str(metres))])], stamp)
+
+    def battery(self, share: float, stamp: dict[str, int]) -> None:
+        """As battery_monitor says it."""
+        name = "battery_monitor: Battery level"
+        self._send([self._status(OK, name, "QA status", [("battery_level", str(share))])], stamp)
+
+    def thruster(self, number: int, works: bool, stamp: dict[str, int]) -> None:
+        """As thruster_monitor says it: Metacontrol's word and PLANTA's word under the same key."""
+        level, words = (OK, ("RECOVERED", "OK")) if works else (ERROR, ("FALSE", "ERROR"))
+        values = [(f"c_thruster_{number}", word) for word in words]
+        self._send([self._status(level, "thruster_monitor: Thruster status", "Component status", values)], stamp)
+
+
+def seconds(stamp: dict[str, int]) -> float:
+    """A stamp as seconds since the epoch."""
+    return stamp["sec"] + stamp["nanosec"] / 1e9
+
+
+def streams_end(stream: Stream) -> float:
+    """The second after the last stimulus."""
+    return stream.stimuli[-1].second + 1
+
+
+@dataclass
+class Options:
+    """How a robot is played."""
+
+    role: str = "manager"
+    vendor: str = "cyclonedds"
+    domain: int = 0
+    found_at: float = FOUND_AT
+    reaction_limit: float = REACTION_LIMIT
+    own_modes: bool = True  # whether the mode manager is played here, and not in a process of its own
+
+
+@dataclass
+class Objectives:
+    """MROS's task bridge: one ControlQos goal for each function of the task."""
+
+    client: ActionClient
+    goals: dict[str, Goal] = field(default_factory=dict)
+    count: int = 0
+
+    def send(self, function: str) -> Goal:
+        """Asks for a function, as SUAVE's task_bridge_metacontrol does."""
+        self.count += 1
+        wanted = {
+            "objective_id": f"obj_{function}_{self.count}",
+            "objective_type": function,
+            "always_improve": function == PATH,
+        }
+        self.goals[function] = self.client.send({"qos_expected": wanted})
+        return self.goals[function]
+
+
+class Robot:
+    """The simulated robot with its oracle."""
+
+    def __init__(self, options: Options) -> None:
+        self.options = options
+        self.oracle = Oracle()
+        self.node = Node(connect(options.vendor, options.domain), "mission_node")
+        self.modes = ModeManager(self.node, self.oracle, list(MODES) if options.own_modes else [])
+        self.monitors = Monitors(self.node)
+        self.detected = self._bool("/pipeline/detected")
+        self.inspected = self._bool("/pipeline/inspected")
+        self.recharged = self._bool("/battery_monitor/recharge/complete")
+        self.state = self.node.publisher("/mavros/state", "mavros_msgs/msg/State")
+        self.events: list[str] = []
+        self.node.subscribe("/metaplan/events", "std_msgs/msg/String", lambda m: self.events.append(m.data))
+        self.task_request: Client | None = None
+        self.objectives: Objectives | None = None
+        if options.role == "manager":
+            self.task_request = self.node.client("/task/request", "suave_msgs/srv/Task")
+            self.task_cancel = self.node.client("/task/cancel", "suave_msgs/srv/Task")
+        else:
+            self.objectives = Objectives(ActionClient(self.node, "/mros/objective", "mros2_msgs/action/ControlQos"))
+            self.modes.serve_configuration()
+
+    def _bool(self, name: str) -> Publisher:
+        return self.node.publisher(name, "std_msgs/msg/Bool")
+
+    def wait(self, timeout: float = 20.0) -> bool:
+        """Whether the system under test has been discovered in time."""
+
+        def there() -> bool:
+            if self.objectives is not None:
+                asked = self.objectives.client.ready() and self.modes.configuration_ready()
+            else:
+                asked = self.task_request.ready() and self.task_cancel.ready() and self.modes.ready()
+            return asked and self.monitors.topic.matched() > 0
+
+        return self.node.spin_until(there, timeout)
+
+    def show(self, metres: float) -> None:
+        """The water visibility is measured, and nothing judged."""
+        self.oracle.world.visibility = metres
+        self.monitors.visibility(metres, now())
+
+    def guided(self) -> None:
+        """The autopilot reports GUIDED: the mission begins."""
+        header = {"stamp": now(), "frame_id": ""}
+        fields = {"connected": True, "armed": True, "guided": True, "mode": "GUIDED", "system_status": 4}
+        self.state.send({"header": header, **fields})
+
+    def settle(self) -> bool:
+        """Spins until all that is due has been asked for and answered, and a moment longer."""
+        done = self.node.spin_until(
+            lambda: not self.oracle.awaited() and self.modes.idle(), self.options.reaction_limit
+        )
+        if not done:
+            self.oracle.give_up()
+        self.node.spin(QUIET)
+        return done
+
+    def request(self, task: str) -> bool:
+        """The mission node asks for a task; whether it was granted within five seconds."""
+        self.oracle.world.task = task
+        self.oracle.stimulus(f"request of {task}", time.time())
+        if self.objectives is not None:
+            goals = [self.objectives.send(function) for function in FUNCTIONS[task]]
+            granted = all([self.objectives.client.wait_accepted(goal, TASK_TIMEOUT) for goal in goals])
+        else:
+            call = self.task_request.call({"task_name": task})
+            self.node.spin_until(lambda: call.done, TASK_TIMEOUT)
+            granted = call.value is not None and bool(call.value.success)
+        self.settle()
+        return granted
+
+    def cancel(self, task: str) -> bool:
+        """The mission node ends a task; whether this was confirmed within five seconds."""
+        self.oracle.world.task = None
+        self.oracle.stimulus(f"cancellation of {task}", time.time())
+        if self.objectives is not None:
+            confirmed = all([self._cancel_goal(function) for function in FUNCTIONS[task]])
+        else:
+            call = self.task_cancel.call({"task_name": task})
+            self.node.spin_until(lambda: call.done, TASK_TIMEOUT)
+            confirmed = call.value is not None and bool(call.value.success)
+        self.settle()
+        return confirmed
+
+    def _cancel_goal(self, function: str) -> bool:
+        goal = self.objectives.goals.pop(function)
+        call = self.objectives.client.cancel(goal)
+        self.node.spin_until(lambda: call.done, TASK_TIMEOUT)
+        if call.value is None or call.value.return_code != 0 or not len(call.value.goals_canceling):
+            return False
+        return self.objectives.client.wait_result(goal, TASK_TIMEOUT) and goal.status == 5
+
+    def play(self, stimulus: Stimulus) -> bool:
+        """Sends one stimulus; whether the robot settled."""
+        world = self.oracle.world
+        if stimulus.kind == "visibility":
+            world.visibility = stimulus.value
+        elif stimulus.kind == "battery":
+            world.battery = stimulus.value
+        elif stimulus.kind == "failure":
+            world.failed.add(int(stimulus.value))
+        else:
+            world.failed.discard(int(stimulus.value))
+        # The decision what is right is not part of the reaction: the stamp is taken after it.
+        stamp = now()
+        self.oracle.stimulus(
+            f"{stimulus.kind} {stimulus.value:g} at {stimulus.second:g} s", seconds(stamp), diagnostic=True
+        )
+        if stimulus.kind == "visibility":
+            self.monitors.visibility(stimulus.value, stamp)
+        elif stimulus.kind == "battery":
+            self.monitors.battery(stimulus.value, stamp)
+        else:
+            self.monitors.thruster(int(stimulus.value), stimulus.kind == "recovered", stamp)
+        return self.settle()
+
+    def recover(self, second: float) -> None:
+        """The recovery has done its work: the thrusters report it, one after the other."""
+        for thruster in sorted(self.oracle.world.failed):
+            self.play(Stimulus(second, "recovered", thruster))
+
+    def done(self, what: str) -> None:
+        """The task has reached its aim: its functions may be ungrounded now, and have to be when it is cancelled."""
+        self.oracle.world.task = None
+        self.oracle.stimulus(what, time.time())
+
+    def mission(self, stream: Stream) -> dict[str, Any]:
+        """One whole mission with an oracle of its own: search, detection, inspection; the stimuli of the stream all along."""
+        started, tasks, current = time.monotonic(), [], SEARCH
+        self.oracle = self.modes.oracle = self.oracle.next_run()
+        self.guided()
+        tasks.append(self.request(SEARCH))
+        recovered_at: float | None = None
+        for stimulus in stream.stimuli:
+            if recovered_at is not None and stimulus.second >= recovered_at:
+                self.recover(recovered_at)
+                recovered_at = None
+            if current == SEARCH and stimulus.second >= self.options.found_at:
+                self.done("detection")
+                self.detected.send({"data": True})
+                tasks += [self.cancel(SEARCH), self.request(INSPECT)]
+                current = INSPECT
+            self.play(stimulus)
+            if stimulus.kind == "failure" and self.modes.current(MOTION) == "fd_recover_thrusters":
+                recovered_at = stimulus.second + RECOVERY
+        self.recover(streams_end(stream))
+        self.done("end of the inspection")
+        self.inspected.send({"data": True})
+        tasks.append(self.cancel(current))
+        return self.summary(stream.name, tasks, time.monotonic() - started)
+
+    def summary(self, name: str, tasks: list[bool], took: float) -> dict[str, Any]:
+        """What the oracle has seen."""
+        oracle = self.oracle
+        diagnostic = [r for r in oracle.reactions if r.diagnostic and r.answered is not None]
+        return {
+            "stream": name,
+            "role": self.options.role,
+            "vendor": self.options.vendor,
+            "stimuli": oracle.stimuli,
+            "switches": len(oracle.reactions),
+            "wrong": oracle.wrong,
+            "missed": oracle.missed,
+            "twice": oracle.twice,
+            "tasks": {"asked": len(tasks), "granted": sum(tasks)},
+            "requested_ms": [round(r.requested * 1e3, 3) for r in diagnostic],
+            "answered_ms": [round(r.answered * 1e3, 3) for r in diagnostic],
+            "seconds": round(took, 2),
+        }
+
+    def close(self) -> None:
+        """Leaves the domain."""
+        self.node.close()
