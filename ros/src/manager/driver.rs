@@ -18,11 +18,14 @@ use crate::interfaces::diagnostic_msgs::msg::DiagnosticStatus;
 use crate::manager::machine::{Input, Machine, Output, State};
 use crate::manager::robot::Robot;
 use crate::manager::settings::Settings;
-use crate::node::{Declared, Node, Severity};
+use crate::node::{Declared, Lifecycle, Node, Phase, Severity};
 use crate::perform::{Perform, performers};
 
 /// Time is told the machine so often, and how it is on `/diagnostics`.
 const PERIOD: Duration = Duration::from_secs(1);
+
+/// So much of what is heard waits while the manager is not active.
+const KEPT: usize = 100_000;
 
 /// What is missing of the graph is said so often.
 const GRAPH: Duration = Duration::from_secs(5);
@@ -60,8 +63,26 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     let (sender, inputs) = mpsc::channel();
     let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())
         .map_err(|message| vec![message])?;
-    let mut driver =
-        Driver { node: Arc::clone(node), machine, robot, settings, timeout, clock: Instant::now(), begun };
+    // It has read its mission, and works as soon as it is there; others may bid it rest.
+    let active = Arc::new(AtomicBool::new(true));
+    let hear = Arc::clone(&active);
+    let lifecycle = Lifecycle::serve(node, move |phase| {
+        hear.store(phase == Phase::Active, Ordering::Relaxed);
+        true
+    })
+    .map_err(|message| vec![message])?;
+    lifecycle.go(Phase::Inactive);
+    lifecycle.go(Phase::Active);
+    let mut driver = Driver {
+        node: Arc::clone(node),
+        machine,
+        robot,
+        settings,
+        active,
+        timeout,
+        clock: Instant::now(),
+        begun,
+    };
     driver.meet(&sender, &inputs, stop).map_err(|message| vec![message])?;
     driver.drive(&inputs, stop).map_err(|message| vec![message])
 }
@@ -114,6 +135,8 @@ struct Driver {
     machine: Machine,
     robot: Robot,
     settings: Settings,
+    /// Whether it does its work, as its lifecycle says; what it hears meanwhile waits.
+    active: Arc<AtomicBool>,
     timeout: Arc<std::sync::atomic::AtomicU64>,
     clock: Instant,
     /// The time of the last line in the journal.
@@ -189,6 +212,10 @@ impl Driver {
         let mut next = Instant::now();
         while !stop.load(Ordering::Relaxed) {
             let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
+            if !self.active.load(Ordering::Relaxed) {
+                self.rest(inputs)?;
+                continue;
+            }
             match inputs.recv_timeout(wait) {
                 Ok(input) => self.handle(input)?,
                 Err(RecvTimeoutError::Timeout) => {}
@@ -203,8 +230,29 @@ impl Driver {
         Ok(())
     }
 
+    /// While it is not active, tasks are refused, and what else is heard waits.
+    fn rest(&mut self, inputs: &Receiver<Input>) -> Result<(), Message> {
+        let mut kept = Vec::new();
+        while !self.active.load(Ordering::Relaxed) && kept.len() < KEPT {
+            match inputs.recv_timeout(Duration::from_millis(50)) {
+                Ok(Input::Request(number, _) | Input::Cancel(number, _)) => self.robot.reply(number, false),
+                Ok(input) => kept.push(input),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        kept.into_iter().try_for_each(|input| self.handle(input))
+    }
+
     fn handle(&mut self, input: Input) -> Result<(), Message> {
+        let input = match input {
+            Input::Diagnosed => Input::Line(self.robot.diagnosed()),
+            other => other,
+        };
         let now = self.begun + self.clock.elapsed();
+        if !matches!(input, Input::Tick) {
+            self.node.log(Severity::Debug, &format!("hears {input:?}"));
+        }
         for output in self.machine.handle(input, now)? {
             match output {
                 Output::Change(change) => {

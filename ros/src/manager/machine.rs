@@ -27,6 +27,9 @@ const PROBE: Duration = Duration::from_secs(1);
 /// The longest one.
 const LONGEST_PROBE: Duration = Duration::from_secs(60);
 
+/// After a restart so long diagnostics are waited for, before what was found is judged by what was known before.
+const AGAIN: Duration = Duration::from_secs(3);
+
 /// After a refusal, the design is tried again so much later.
 const REFUSED: Duration = Duration::from_secs(60);
 
@@ -35,6 +38,8 @@ const REFUSED: Duration = Duration::from_secs(60);
 pub(super) enum Input {
     /// The functions answer; the mode that each has, as far as it says.
     Ready(Vec<(String, Option<String>)>),
+    /// Something was diagnosed that waits to be handled: the driver makes a line of it.
+    Diagnosed,
     /// A line of events, as the loop reads them.
     Line(String),
     /// A task is requested; whether it is granted is answered under this number.
@@ -155,6 +160,17 @@ struct Trouble {
     silences: u32,
 }
 
+/// What is done after a restart as soon as it is known how the robot is.
+#[derive(Debug)]
+struct Deferred {
+    /// What the loop asks for again.
+    answers: Vec<Answer>,
+    /// The modes that the functions were found with.
+    modes: BTreeMap<String, String>,
+    /// Diagnostics are waited for until then.
+    until: Duration,
+}
+
 /// The state machine.
 #[derive(Debug)]
 pub(super) struct Machine {
@@ -176,6 +192,7 @@ pub(super) struct Machine {
     /// Whether the last plan was none.
     without_plan: bool,
     obeyed: bool,
+    deferred: Option<Deferred>,
     /// Whether the loop waits for time to pass before it looks for a better plan.
     ticks: bool,
     outputs: Vec<Output>,
@@ -206,6 +223,7 @@ impl Machine {
             trouble: BTreeMap::new(),
             without_plan: false,
             obeyed: false,
+            deferred: None,
             ticks,
             outputs: Vec::new(),
             lines: VecDeque::new(),
@@ -242,6 +260,12 @@ impl Machine {
     /// The journal cannot be written: nothing may be done any more.
     pub(super) fn handle(&mut self, input: Input, now: Duration) -> Result<Vec<Output>, Message> {
         self.now = now;
+        let is_over = self.deferred.as_ref().is_some_and(|own| own.until <= now);
+        if is_over || matches!(input, Input::Request(..) | Input::Cancel(..)) {
+            self.catch_up();
+            self.settle()?;
+        }
+        let is_news = matches!(input, Input::Line(_));
         let because = match input {
             Input::Ready(modes) => self.ready(modes)?,
             Input::Line(line) => self.told(line),
@@ -259,9 +283,13 @@ impl Machine {
             Input::Progress(number, fraction) => self.progress(number, fraction),
             Input::Probed(function, answers) => self.probed(&function, answers),
             Input::Autopilot(mode) => self.autopilot(&mode),
-            Input::Tick => self.tick(),
+            Input::Tick | Input::Diagnosed => self.tick(),
         };
         self.settle()?;
+        if is_news {
+            self.catch_up();
+            self.settle()?;
+        }
         self.begin();
         self.settle()?;
         self.enter(&because)?;
@@ -370,28 +398,46 @@ impl Machine {
             }
         }
         self.restore_action();
-        let known: Vec<(String, String)> = self.modes.clone().into_iter().collect();
-        let (done, rest): (Vec<Answer>, Vec<Answer>) = answers.into_iter().partition(|answer| {
-            matches!(answer.effect().map(|effect| &effect.command), Some(Command::Reconfigure { function, to, .. })
-                if self.modes.get(function).map(String::as_str) == Some(self.settings.functions.mode(function, to)))
-        });
-        for effect in done.iter().filter_map(Answer::effect) {
-            self.say(&Event::Acknowledged { effect: effect.number });
+        let until = if self.control.beliefs().lines() == 0 { self.now } else { self.now + AGAIN };
+        self.deferred = Some(Deferred { answers, modes: self.modes.clone(), until });
+        if until == self.now {
+            self.catch_up();
         }
-        let asked: BTreeSet<String> = rest
-            .iter()
-            .filter_map(|answer| match answer.effect().map(|effect| &effect.command) {
-                Some(Command::Reconfigure { function, .. }) => Some(function.clone()),
-                _ => None,
-            })
-            .collect();
+        Ok("every function answers".to_owned())
+    }
+
+    /// Asks again for what was asked for before a restart and has not been done, and adopts what has changed meanwhile.
+    fn catch_up(&mut self) {
+        let Some(Deferred { answers, modes, .. }) = self.deferred.take() else { return };
+        let outstanding: BTreeSet<u64> =
+            self.control.beliefs().outstanding().map(|effect| effect.number).collect();
+        let mut asked = BTreeSet::new();
+        let mut rest = Vec::new();
+        for answer in answers {
+            let Some(effect) = answer.effect() else {
+                rest.push(answer);
+                continue;
+            };
+            if !outstanding.contains(&effect.number) {
+                // Something else was asked for since.
+                continue;
+            }
+            if let Command::Reconfigure { function, to, .. } = &effect.command {
+                let mode = self.settings.functions.mode(function, to);
+                if self.modes.get(function).is_some_and(|own| own == mode) {
+                    self.say(&Event::Acknowledged { effect: effect.number });
+                    continue;
+                }
+                asked.insert(function.clone());
+            }
+            rest.push(answer);
+        }
         self.take(rest);
-        for (function, mode) in known {
-            if !asked.contains(&function) {
+        for (function, mode) in modes {
+            if !asked.contains(&function) && !self.pending.contains_key(&function) {
                 self.observe(&function, &mode);
             }
         }
-        Ok("every function answers".to_owned())
     }
 
     /// An action that was under way when the program ended is under way still.
@@ -527,6 +573,11 @@ impl Machine {
         match effect.command {
             Command::Reconfigure { function, to, .. } => {
                 let mode = self.settings.functions.mode(&function, &to).to_owned();
+                // It was just seen to have it: somebody has given it while this program was not there.
+                if self.deferred.is_some() && self.modes.get(&function) == Some(&mode) {
+                    self.acknowledge(effect.number);
+                    return;
+                }
                 self.change(Change { function, mode, effect: Some(effect.number), attempt: 1 });
             }
             Command::Request { step } => {

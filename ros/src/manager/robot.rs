@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use metaplan::message::Message;
@@ -50,7 +51,8 @@ pub(super) struct Robot {
     functions: BTreeMap<String, Function>,
     performers: BTreeMap<String, Box<dyn Perform>>,
     performing: HashMap<u64, (Running, Task<()>)>,
-    replies: Arc<std::sync::Mutex<HashMap<u64, Responder<TaskService>>>>,
+    diagnosed: Diagnosed,
+    replies: Arc<Mutex<HashMap<u64, Responder<TaskService>>>>,
     plans: Publisher<std_msgs::msg::String>,
     events: Publisher<std_msgs::msg::String>,
     diagnostics: Publisher<DiagnosticArray>,
@@ -66,7 +68,8 @@ impl Robot {
         performers: BTreeMap<String, Box<dyn Perform>>,
         inputs: Sender<Input>,
     ) -> Result<Self, Message> {
-        hear_diagnostics(node, inputs.clone())?;
+        let diagnosed = Diagnosed::default();
+        hear_diagnostics(node, inputs.clone(), Arc::clone(&diagnosed))?;
         let mut own = BTreeMap::new();
         for function in functions {
             hear_function(node, settings, function, &inputs)?;
@@ -97,6 +100,7 @@ impl Robot {
             functions: own,
             performers,
             performing: HashMap::new(),
+            diagnosed,
             replies,
             plans: node.publisher("~/plan", latched(1))?,
             events: node.publisher("~/events", depth(100))?,
@@ -189,9 +193,17 @@ impl Robot {
         .detach();
     }
 
+    /// What was diagnosed since it was asked last, as a line of events.
+    pub(super) fn diagnosed(&self) -> String {
+        let waiting = std::mem::take(&mut *self.diagnosed.lock().unwrap_or_else(PoisonError::into_inner));
+        let status = waiting.into_iter().map(|(_, status)| status).collect();
+        // Texts and numbers are always data.
+        serde_json::to_string(&DiagnosticArray { status, ..DiagnosticArray::default() }).unwrap_or_default()
+    }
+
     /// Answers the request of a task.
     pub(super) fn reply(&self, number: u64, success: bool) {
-        let mut replies = self.replies.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut replies = self.replies.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(responder) = replies.remove(&number) {
             responder.send(TaskResponse { success });
         }
@@ -272,21 +284,29 @@ impl Robot {
     }
 }
 
-/// Diagnostics that concern components and attributes become lines; what says the same as before does not.
-fn hear_diagnostics(node: &Arc<Node>, inputs: Sender<Input>) -> Result<(), Message> {
+/// What was diagnosed and not yet handled: of each thing the last that was said of it, so that nobody falls behind who is told faster than
+/// he can follow.
+type Diagnosed = Arc<Mutex<Vec<(String, DiagnosticStatus)>>>;
+
+/// Diagnostics that concern components and attributes wait to be handled; what says the same as before does not.
+fn hear_diagnostics(node: &Arc<Node>, inputs: Sender<Input>, diagnosed: Diagnosed) -> Result<(), Message> {
     let mut last: HashMap<String, Vec<KeyValue>> = HashMap::new();
-    node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |mut array| {
-        array.status.retain(|status| {
-            let is_ours = CONCERN.contains(&status.message.as_str());
-            let key = || {
-                let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
-                format!("{}\u{0}{}", status.message, keys.join("\u{0}"))
-            };
-            is_ours && last.insert(key(), status.values.clone()).as_ref() != Some(&status.values)
-        });
-        if !array.status.is_empty() {
-            let line = serde_json::to_string(&array).unwrap_or_default();
-            let _ = inputs.send(Input::Line(line));
+    node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |array| {
+        let mut waiting = diagnosed.lock().unwrap_or_else(PoisonError::into_inner);
+        let nobody_waits = waiting.is_empty();
+        for status in array.status {
+            if !CONCERN.contains(&status.message.as_str()) {
+                continue;
+            }
+            let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
+            let key = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
+            if last.insert(key.clone(), status.values.clone()).as_ref() != Some(&status.values) {
+                waiting.retain(|(known, _)| *known != key);
+                waiting.push((key, status));
+            }
+        }
+        if nobody_waits && !waiting.is_empty() {
+            let _ = inputs.send(Input::Diagnosed);
         }
     })
 }
@@ -326,7 +346,7 @@ fn hear_parameters(
     })
 }
 
-type Replies = Arc<std::sync::Mutex<HashMap<u64, Responder<TaskService>>>>;
+type Replies = Arc<Mutex<HashMap<u64, Responder<TaskService>>>>;
 
 /// Serves the requests of tasks and their ends.
 fn serve_tasks(node: &Arc<Node>, inputs: &Sender<Input>, replies: &Replies) -> Result<(), Message> {
@@ -337,7 +357,7 @@ fn serve_tasks(node: &Arc<Node>, inputs: &Sender<Input>, replies: &Replies) -> R
         let (inputs, replies, count) = (inputs.clone(), Arc::clone(replies), Arc::clone(&count));
         node.serve::<TaskService>(service, move |request, responder| {
             let number = count.fetch_add(1, Ordering::Relaxed);
-            replies.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(number, responder);
+            replies.lock().unwrap_or_else(PoisonError::into_inner).insert(number, responder);
             let _ = inputs.send(input(number, request.task_name));
         })?;
     }

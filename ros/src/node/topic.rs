@@ -1,11 +1,13 @@
 //! Topics.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use futures::StreamExt as _;
 use metaplan::message::Message;
 use ros2_client::MessageTypeName;
-use ros2_client::qos::QosProfile;
+use ros2_client::message_info::MessageInfo;
+use ros2_client::qos::{Durability, QosProfile};
 use smol::Timer;
 
 use crate::interfaces::Msg;
@@ -14,6 +16,24 @@ use crate::node::{Node, Severity, client_name, dds_type, not_made};
 
 /// So often is said that samples of a topic are no messages of its type.
 const RUBBISH: u64 = 1000;
+
+/// So long after its beginning a subscription looks at the age of what it hears.
+const OLD: Duration = Duration::from_secs(5);
+
+/// What was said before somebody listened. Writers keep what a reader that was killed has not acknowledged, and hand it to the next one,
+/// though nobody has asked for it.
+struct Old {
+    since: SystemTime,
+    is_wanted: bool,
+}
+
+impl Old {
+    fn is_old(&self, info: &MessageInfo) -> bool {
+        let stamp = info.source_timestamp().and_then(|stamp| u64::try_from(stamp.to_nanos()).ok());
+        let said = stamp.map(|nanoseconds| UNIX_EPOCH + Duration::from_nanos(nanoseconds));
+        !self.is_wanted && said.is_some_and(|said| said < self.since)
+    }
+}
 
 /// Writes messages on a topic.
 pub struct Publisher<M: Msg> {
@@ -64,6 +84,7 @@ impl Node {
     ) -> Result<(), Message> {
         let full = self.resolve(name);
         let topic_name = client_name(&full)?;
+        let qos_wants_old = qos.durability == Durability::TransientLocal;
         let mut node = self.inner();
         let made = node
             .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
@@ -71,7 +92,8 @@ impl Node {
         drop(node);
         let subscription = made.map_err(|error| not_made(&full, &error))?;
         self.expect_message::<M>(&full);
-        let weak = Arc::downgrade(self);
+        let (weak, begun) = (Arc::downgrade(self), Instant::now());
+        let old = Old { since: SystemTime::now(), is_wanted: qos_wants_old };
         self.spawn(async move {
             let mut samples = Box::pin(subscription.async_stream());
             let mut wrong = 0;
@@ -79,6 +101,7 @@ impl Node {
                 let Some(node) = weak.upgrade() else { return };
                 match sample {
                     Ok((_, info)) if node.graph.is_unfit(info.publisher_gid()) => {}
+                    Ok((_, info)) if begun.elapsed() < OLD && old.is_old(&info) => {}
                     Ok((message, _)) => take(message),
                     Err(error) => {
                         if wrong % RUBBISH == 0 {
@@ -88,7 +111,7 @@ impl Node {
                         wrong += 1;
                         drop(node);
                         // An error that repeats itself must not take all of the time.
-                        Timer::after(std::time::Duration::from_millis(1)).await;
+                        Timer::after(Duration::from_millis(1)).await;
                     }
                 }
             }
