@@ -2,4 +2,5 @@
 
 mod common;
 mod graph;
+mod performers;
 mod planner;
