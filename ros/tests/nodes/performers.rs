@@ -51,7 +51,7 @@ fn call(text: &str) -> Call {
 }
 
 /// All that is heard of an action.
-fn hear(running: &Running) -> (Vec<Progress>, End) {
+pub fn hear(running: &Running) -> (Vec<Progress>, End) {
     let mut heard = Vec::new();
     loop {
         match block_on(running.next()) {
@@ -69,7 +69,7 @@ fn cast(domain: u16, settings: &str) -> (Arc<Node>, Cast) {
 }
 
 /// A server that accepts goals, says something once, and ends them as wanted; goals that are to be cancelled are.
-fn serve<A: Action + 'static>(
+pub fn serve<A: Action + 'static>(
     node: &Arc<Node>,
     name: &str,
     feedback: A::Feedback,
