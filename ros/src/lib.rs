@@ -4,5 +4,6 @@ pub mod interfaces;
 pub mod manager;
 pub mod node;
 pub mod perform;
+pub mod performer;
 pub mod planner;
 pub mod popf;

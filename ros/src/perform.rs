@@ -118,13 +118,18 @@ pub struct Performance {
 impl Performance {
     /// Says how it goes.
     pub fn feedback(&self, completion: Option<f32>, text: impl Into<String>) {
+        self.tell(Progress::Feedback { completion, text: text.into() });
+    }
+
+    /// Hands on what is heard.
+    pub(crate) fn tell(&self, progress: Progress) {
         // Nobody may listen.
-        let _ = self.progress.try_send(Progress::Feedback { completion, text: text.into() });
+        let _ = self.progress.try_send(progress);
     }
 
     /// Says how it has ended.
     pub fn end(self, end: End) {
-        let _ = self.progress.try_send(Progress::Ended(end));
+        self.tell(Progress::Ended(end));
     }
 
     /// Returns when an early end is asked for, and otherwise never.

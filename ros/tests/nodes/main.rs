@@ -2,4 +2,6 @@
 
 mod common;
 mod graph;
+mod nav2;
+mod performers;
 mod planner;

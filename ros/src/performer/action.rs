@@ -1,0 +1,184 @@
+//! An action of ROS in the place of an action of the plan.
+
+use std::marker::PhantomData;
+use std::sync::Arc;
+use std::time::Duration;
+
+use futures::FutureExt as _;
+
+use crate::interfaces::Action;
+use crate::interfaces::suave_msgs::action::{
+    FollowPipeline, FollowPipelineFeedback, FollowPipelineGoal, FollowPipelineResult, RechargeBattery,
+    RechargeBatteryFeedback, RechargeBatteryGoal, RechargeBatteryResult, RecoverThrusters,
+    RecoverThrustersFeedback, RecoverThrustersGoal, RecoverThrustersResult, SpiralSearch,
+    SpiralSearchFeedback, SpiralSearchGoal, SpiralSearchResult,
+};
+use crate::node::{Accepted, ActionCaller, GoalEnd, Node, Pursued};
+use crate::perform::{Call, End, Perform, Performance, Progress, Running};
+use crate::performer::{feedback, part};
+
+/// So long a server is waited for, and its answer to a goal.
+pub(super) const PATIENCE: Duration = Duration::from_secs(10);
+
+/// What an action of ROS means to an action of a plan.
+pub(super) trait Meaning: Action + Sized + 'static {
+    /// What the call needs beside its arguments.
+    type Settings: Clone + Send + Sync + 'static;
+
+    /// The goal for a call, or why there is none.
+    fn goal(settings: &Self::Settings, call: &Call) -> Result<Self::Goal, String>;
+
+    /// How it goes.
+    fn progress(call: &Call, heard: &Self::Feedback) -> Progress;
+
+    /// Why a goal that was reached, as its server says, has not done what it should.
+    fn shortfall(result: &Self::Result) -> Option<String>;
+}
+
+/// A client of such an action.
+pub(super) struct Client<A: Meaning> {
+    caller: Arc<ActionCaller<A>>,
+    settings: A::Settings,
+    action: PhantomData<fn() -> A>,
+}
+
+impl<A: Meaning<Settings = ()>> Client<A> {
+    pub(super) fn new(node: &Arc<Node>, server: &str) -> Self {
+        Self::with(node, server, ())
+    }
+}
+
+impl<A: Meaning> Client<A> {
+    pub(super) fn with(node: &Arc<Node>, server: &str, settings: A::Settings) -> Self {
+        Self { caller: Arc::new(node.action_caller::<A>(server)), settings, action: PhantomData }
+    }
+}
+
+impl<A: Meaning> Perform for Client<A> {
+    fn start(&self, call: Call) -> Running {
+        let (running, performance) = Running::pair();
+        match A::goal(&self.settings, &call) {
+            Ok(goal) => {
+                let caller = Arc::clone(&self.caller);
+                smol::spawn(async move {
+                    let end = follow(&caller, goal, &call, &performance).await;
+                    performance.end(end);
+                })
+                .detach();
+            }
+            Err(because) => performance.end(End::Failed(format!("{}: {because}", call.text()))),
+        }
+        running
+    }
+}
+
+/// Pursues a goal to its end.
+async fn follow<A: Meaning>(
+    caller: &ActionCaller<A>,
+    goal: A::Goal,
+    call: &Call,
+    performance: &Performance,
+) -> End {
+    let pursued = match caller.pursue(goal, PATIENCE).await {
+        Ok(pursued) => pursued,
+        Err(error) => return End::Failed(error.to_string()),
+    };
+    pursue_on(&pursued, performance, |heard| A::progress(call, heard), A::shortfall).await
+}
+
+/// Hears of a goal until it ends, and has it cancelled when that is asked for.
+pub(super) async fn pursue_on<A: Action>(
+    pursued: &Pursued<A>,
+    performance: &Performance,
+    progress: impl Fn(&A::Feedback) -> Progress,
+    shortfall: impl Fn(&A::Result) -> Option<String>,
+) -> End {
+    loop {
+        let mut event = Box::pin(pursued.events.recv()).fuse();
+        let mut canceled = Box::pin(performance.canceled()).fuse();
+        futures::select! {
+            event = event => match event {
+                Ok(Accepted::Feedback(heard)) => performance.tell(progress(&heard)),
+                Ok(Accepted::Ended(GoalEnd::Succeeded, result)) => {
+                    return shortfall(&result).map_or(End::Succeeded, End::Failed);
+                }
+                Ok(Accepted::Ended(GoalEnd::Canceled, _)) => return End::Canceled,
+                Ok(Accepted::Ended(GoalEnd::Aborted, result)) => {
+                    let because = shortfall(&result).unwrap_or_else(|| "its server gave up".to_owned());
+                    return End::Failed(because);
+                }
+                Ok(Accepted::Lost(because)) => return End::Failed(because),
+                Err(_) => return End::Failed("nothing more is heard of it".to_owned()),
+            },
+            () = canceled => pursued.cancel(),
+        }
+    }
+}
+
+impl Meaning for SpiralSearch {
+    type Settings = ();
+
+    fn goal((): &(), _: &Call) -> Result<SpiralSearchGoal, String> {
+        Ok(SpiralSearchGoal::default())
+    }
+
+    fn progress(call: &Call, heard: &SpiralSearchFeedback) -> Progress {
+        let text = format!("{:.1} s searched", heard.elapsed_time);
+        feedback(part(heard.elapsed_time, call.duration as f32), text)
+    }
+
+    fn shortfall(result: &SpiralSearchResult) -> Option<String> {
+        let text = || format!("no pipeline was found in {:.1} s", result.time_spent);
+        (!result.pipeline_found).then(text)
+    }
+}
+
+impl Meaning for FollowPipeline {
+    type Settings = ();
+
+    /// Whoever plans decides when it has been enough; so there is no time-out.
+    fn goal((): &(), _: &Call) -> Result<FollowPipelineGoal, String> {
+        Ok(FollowPipelineGoal { timeout: 0.0 })
+    }
+
+    fn progress(_: &Call, heard: &FollowPipelineFeedback) -> Progress {
+        feedback(None, format!("{:.2} m inspected", heard.distance_inspected))
+    }
+
+    fn shortfall(result: &FollowPipelineResult) -> Option<String> {
+        let because = if result.timed_out { "its time was over" } else { "the pipeline was not followed" };
+        (!result.success).then(|| format!("{because} after {:.2} m", result.distance_inspected))
+    }
+}
+
+impl Meaning for RecoverThrusters {
+    type Settings = ();
+
+    fn goal((): &(), _: &Call) -> Result<RecoverThrustersGoal, String> {
+        Ok(RecoverThrustersGoal::default())
+    }
+
+    fn progress(_: &Call, _: &RecoverThrustersFeedback) -> Progress {
+        feedback(None, "recovering")
+    }
+
+    fn shortfall(result: &RecoverThrustersResult) -> Option<String> {
+        (!result.success).then(|| "the thrusters did not recover".to_owned())
+    }
+}
+
+impl Meaning for RechargeBattery {
+    type Settings = ();
+
+    fn goal((): &(), _: &Call) -> Result<RechargeBatteryGoal, String> {
+        Ok(RechargeBatteryGoal::default())
+    }
+
+    fn progress(_: &Call, _: &RechargeBatteryFeedback) -> Progress {
+        feedback(None, "charging")
+    }
+
+    fn shortfall(result: &RechargeBatteryResult) -> Option<String> {
+        (!result.success).then(|| "the battery was not charged".to_owned())
+    }
+}

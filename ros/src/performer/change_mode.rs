@@ -1,0 +1,50 @@
+//! An action of the plan that gives a function a design: `/<function>/change_mode` of `system_modes`.
+
+use std::sync::Arc;
+
+use crate::interfaces::system_modes_msgs::srv::{ChangeMode as Service, ChangeModeRequest};
+use crate::node::Node;
+use crate::perform::{Call, End, Perform, Running};
+use crate::performer::action::PATIENCE;
+use crate::performer::settings::argument;
+
+/// Which arguments are the function and the design.
+#[derive(Debug)]
+pub(super) struct ChangeMode {
+    node: Arc<Node>,
+    function: Option<usize>,
+    design: Option<usize>,
+}
+
+impl ChangeMode {
+    pub(super) fn new(node: &Arc<Node>, function: Option<usize>, design: Option<usize>) -> Self {
+        Self { node: Arc::clone(node), function, design }
+    }
+}
+
+impl Perform for ChangeMode {
+    fn start(&self, call: Call) -> Running {
+        let (running, performance) = Running::pair();
+        let function = argument(&call.arguments, self.function, 1);
+        let design = argument(&call.arguments, self.design, 0);
+        match (function, design) {
+            (Ok(function), Ok(design)) => {
+                let caller = self.node.caller::<Service>(&format!("/{function}/change_mode"));
+                let request = ChangeModeRequest { mode_name: design.to_owned() };
+                smol::spawn(async move {
+                    let end = match caller.call(request, PATIENCE).await {
+                        Ok(answer) if answer.success => End::Succeeded,
+                        Ok(_) => End::Failed(format!("{} has refused it", caller.service())),
+                        Err(error) => End::Failed(error.to_string()),
+                    };
+                    performance.end(end);
+                })
+                .detach();
+            }
+            (Err(because), _) | (_, Err(because)) => {
+                performance.end(End::Failed(format!("{}: {because}", call.text())));
+            }
+        }
+        running
+    }
+}

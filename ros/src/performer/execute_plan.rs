@@ -1,0 +1,143 @@
+//! PlanSys2's executor carries out a whole plan: its action `execute_plan`, in the types of its versions.
+
+use std::sync::Arc;
+
+use serde::Deserialize;
+
+use crate::interfaces::plansys2_1::plansys2_msgs::action as older;
+use crate::interfaces::plansys2_msgs::action as newer;
+use crate::interfaces::plansys2_msgs::msg::{ActionExecutionInfo, Plan};
+use crate::node::{ActionCaller, Node};
+use crate::perform::{End, Progress, Running};
+use crate::performer::action::{PATIENCE, pursue_on};
+use crate::performer::{feedback, part};
+
+/// Versions of PlanSys2 whose executors differ.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PlanVersion {
+    /// The executor asks PlanSys2's planner for the plan: what [`planner`](crate::planner) serves.
+    Older,
+    /// The plan is part of the goal.
+    #[default]
+    Newer,
+}
+
+/// Has plans executed.
+#[derive(Debug)]
+pub struct ExecutePlans {
+    caller: Caller,
+}
+
+#[derive(Debug)]
+enum Caller {
+    Older(Arc<ActionCaller<older::ExecutePlan>>),
+    Newer(Arc<ActionCaller<newer::ExecutePlan>>),
+}
+
+impl ExecutePlans {
+    /// To call PlanSys2's executor; `server` is `/execute_plan` unless that is remapped.
+    pub fn new(node: &Arc<Node>, server: &str, version: PlanVersion) -> Self {
+        let caller = match version {
+            PlanVersion::Older => Caller::Older(Arc::new(node.action_caller(server))),
+            PlanVersion::Newer => Caller::Newer(Arc::new(node.action_caller(server))),
+        };
+        Self { caller }
+    }
+
+    /// Has a plan executed. How far it is is told as a part of its actions.
+    pub fn start(&self, plan: Plan) -> Running {
+        let (running, performance) = Running::pair();
+        match &self.caller {
+            Caller::Older(caller) => {
+                let caller = Arc::clone(caller);
+                smol::spawn(async move {
+                    let end = match caller.pursue(older::ExecutePlanGoal::default(), PATIENCE).await {
+                        Ok(pursued) => {
+                            pursue_on(&pursued, &performance, told_older, |result| {
+                                let because = || format!("PlanSys2 has failed: {}", result.error_info);
+                                (!result.success).then(because)
+                            })
+                            .await
+                        }
+                        Err(error) => End::Failed(error.to_string()),
+                    };
+                    performance.end(end);
+                })
+                .detach();
+            }
+            Caller::Newer(caller) => {
+                let caller = Arc::clone(caller);
+                smol::spawn(async move {
+                    let end = match caller.pursue(newer::ExecutePlanGoal { plan }, PATIENCE).await {
+                        Ok(pursued) => {
+                            pursue_on(
+                                &pursued,
+                                &performance,
+                                |heard| told(&heard.action_execution_status),
+                                |result| {
+                                    let because = || failed(&result.action_execution_status);
+                                    (!result.success).then(because)
+                                },
+                            )
+                            .await
+                        }
+                        Err(error) => End::Failed(error.to_string()),
+                    };
+                    performance.end(end);
+                })
+                .detach();
+            }
+        }
+        running
+    }
+}
+
+fn told_older(heard: &older::ExecutePlanFeedback) -> Progress {
+    let done = heard.seq_action as f32 + heard.progress_current_action;
+    feedback(part(done, heard.total_actions as f32), heard.current_action.clone())
+}
+
+/// What is done counts whole, what is being done in part.
+fn told(actions: &[ActionExecutionInfo]) -> Progress {
+    let done = |action: &ActionExecutionInfo| match action.status {
+        ActionExecutionInfo::SUCCEEDED => 1.0,
+        ActionExecutionInfo::EXECUTING => action.completion.clamp(0.0, 1.0),
+        _ => 0.0,
+    };
+    let executing = actions.iter().filter(|action| action.status == ActionExecutionInfo::EXECUTING);
+    let texts: Vec<&str> = executing.map(|action| action.action_full_name.as_str()).collect();
+    feedback(part(actions.iter().map(done).sum(), actions.len() as f32), texts.join(", "))
+}
+
+fn failed(actions: &[ActionExecutionInfo]) -> String {
+    let failed = actions.iter().filter(|action| action.status == ActionExecutionInfo::FAILED);
+    let texts: Vec<String> =
+        failed.map(|action| format!("{}: {}", action.action_full_name, action.message_status)).collect();
+    if texts.is_empty() { "PlanSys2 has failed".to_owned() } else { texts.join("; ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_is_as_far_as_its_actions() {
+        let info = |status, completion, name: &str| ActionExecutionInfo {
+            status,
+            completion,
+            action_full_name: name.to_owned(),
+            message_status: "stuck".to_owned(),
+            ..ActionExecutionInfo::default()
+        };
+        let actions = [
+            info(ActionExecutionInfo::SUCCEEDED, 1.0, "(a)"),
+            info(ActionExecutionInfo::EXECUTING, 0.5, "(b)"),
+            info(ActionExecutionInfo::FAILED, 0.5, "(c)"),
+            info(ActionExecutionInfo::NOT_EXECUTED, 0.0, "(d)"),
+        ];
+        assert_eq!(told(&actions), feedback(Some(0.375), "(b)"));
+        assert_eq!(told(&[]), feedback(None, ""));
+        assert_eq!((failed(&actions), failed(&[])), ("(c): stuck".into(), "PlanSys2 has failed".into()));
+    }
+}

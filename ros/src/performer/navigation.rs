@@ -1,0 +1,95 @@
+//! Nav2: an action of the plan is a goal for `navigate_to_pose`, with the pose of one of its arguments.
+
+use std::sync::Arc;
+
+use crate::interfaces::{geometry_msgs, humble, iron, nav2_msgs, rolling};
+use crate::node::Node;
+use crate::perform::{Call, Perform, Progress};
+use crate::performer::action::{Client, Meaning};
+use crate::performer::settings::argument;
+use crate::performer::{Distribution, Poses, feedback, part};
+
+/// What goals are made of.
+#[derive(Debug, Clone)]
+pub(super) struct Navigation {
+    poses: Poses,
+    pose: Option<usize>,
+    behavior_tree: String,
+}
+
+/// A client with the types of a distribution.
+pub(super) fn performer(
+    node: &Arc<Node>,
+    server: &str,
+    (poses, pose): (&Poses, Option<usize>),
+    types: Distribution,
+    behavior_tree: &str,
+) -> Box<dyn Perform> {
+    let settings = Navigation { poses: poses.clone(), pose, behavior_tree: behavior_tree.to_owned() };
+    match types {
+        Distribution::Humble => {
+            Box::new(Client::<humble::nav2_msgs::action::NavigateToPose>::with(node, server, settings))
+        }
+        Distribution::Iron => {
+            Box::new(Client::<iron::nav2_msgs::action::NavigateToPose>::with(node, server, settings))
+        }
+        Distribution::Jazzy => {
+            Box::new(Client::<nav2_msgs::action::NavigateToPose>::with(node, server, settings))
+        }
+        Distribution::Rolling => {
+            Box::new(Client::<rolling::nav2_msgs::action::NavigateToPose>::with(node, server, settings))
+        }
+    }
+}
+
+impl Navigation {
+    fn pose(&self, call: &Call) -> Result<geometry_msgs::msg::PoseStamped, String> {
+        let object = argument(&call.arguments, self.pose, 0)?;
+        self.poses.find(object).ok_or_else(|| self.poses.lacking(object))
+    }
+}
+
+/// What was travelled of the way, as far as that can be told from the time.
+fn told(gone: i32, left: i32, distance: f32, recoveries: i16) -> Progress {
+    let (gone, left) = (gone as f32, left as f32);
+    let recovered = if recoveries > 0 { format!(", {recoveries} recoveries") } else { String::new() };
+    let text = format!("{distance:.2} m left{recovered}");
+    // Nav2 says that no time is left before it knows.
+    feedback(if left > 0.0 { part(gone, gone + left) } else { None }, text)
+}
+
+fn error(code: u16, text: &str) -> Option<String> {
+    let because = if text.is_empty() { String::new() } else { format!(": {text}") };
+    (code != 0).then(|| format!("Nav2 says error {code}{because}"))
+}
+
+/// The types of the distributions have the same fields, and some have more.
+macro_rules! meaning {
+    ($($path:ident)::+, |$result:ident| $shortfall:expr) => {
+        impl Meaning for $($path)::+::action::NavigateToPose {
+            type Settings = Navigation;
+
+            fn goal(
+                settings: &Navigation,
+                call: &Call,
+            ) -> Result<$($path)::+::action::NavigateToPoseGoal, String> {
+                let behavior_tree = settings.behavior_tree.clone();
+                Ok($($path)::+::action::NavigateToPoseGoal { pose: settings.pose(call)?, behavior_tree })
+            }
+
+            fn progress(_: &Call, heard: &$($path)::+::action::NavigateToPoseFeedback) -> Progress {
+                let (gone, left) = (heard.navigation_time.sec, heard.estimated_time_remaining.sec);
+                told(gone, left, heard.distance_remaining, heard.number_of_recoveries)
+            }
+
+            fn shortfall($result: &$($path)::+::action::NavigateToPoseResult) -> Option<String> {
+                $shortfall
+            }
+        }
+    };
+}
+
+meaning!(humble::nav2_msgs, |_result| None);
+meaning!(iron::nav2_msgs, |result| error(result.error_code, ""));
+meaning!(nav2_msgs, |result| error(result.error_code, &result.error_msg));
+meaning!(rolling::nav2_msgs, |result| error(result.error_code, &result.error_msg));

@@ -1,0 +1,179 @@
+//! A performer for PlanSys2: what its executor asks for on `actions_hub` is done by whoever is configured for it here.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use metaplan::message::Message;
+use smol::Timer;
+
+use crate::interfaces::builtin_interfaces::msg::Time;
+use crate::interfaces::plansys2_msgs::msg::{ActionExecution, ActionPerformerStatus};
+use crate::node::{Node, Publisher, Severity, depth};
+use crate::perform::{Call, End, Perform, Progress, Running};
+use crate::performer::hub::{DEPTH, Hub};
+
+/// So often the others hear that we are there.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+
+/// An executor that is silent after our answer has somebody else.
+const SILENCE: Duration = Duration::from_secs(5);
+
+/// Where a performer is.
+enum Stage {
+    Idle,
+    /// It has answered a request with these arguments.
+    Committed(Vec<String>, Instant),
+    Running(Vec<String>, Running),
+}
+
+/// A performer of one action.
+struct Offer {
+    hub: Arc<Hub>,
+    action: String,
+    /// What arguments have to be; an empty one may be anything.
+    specialized: Vec<String>,
+    performer: Arc<dyn Perform>,
+    stage: Mutex<Stage>,
+    status: Publisher<ActionPerformerStatus>,
+}
+
+/// Does an action for PlanSys2's executor, as long as the node is there. `specialized` are the arguments that it is for: an empty one, or
+/// one that is not there, may be anything.
+///
+/// # Errors
+/// A topic cannot be made.
+pub fn offer(
+    node: &Arc<Node>,
+    action: &str,
+    specialized: Vec<String>,
+    performer: Arc<dyn Perform>,
+) -> Result<(), Message> {
+    let hub = Hub::new(node)?;
+    let status = node.publisher("performers_status", depth(DEPTH))?;
+    let heard = hub.listen();
+    let stage = Mutex::new(Stage::Idle);
+    let offer = Arc::new(Offer { hub, action: action.to_owned(), specialized, performer, stage, status });
+    let beating = Arc::downgrade(&offer);
+    smol::spawn(async move {
+        while let Some(offer) = beating.upgrade() {
+            offer.beat();
+            drop(offer);
+            Timer::after(HEARTBEAT).await;
+        }
+    })
+    .detach();
+    let weak = Arc::downgrade(node);
+    smol::spawn(async move {
+        while let Ok(message) = heard.recv().await {
+            let Some(node) = weak.upgrade() else { return };
+            offer.hear(&message, &node);
+        }
+    })
+    .detach();
+    Ok(())
+}
+
+impl Offer {
+    fn stage(&self) -> MutexGuard<'_, Stage> {
+        self.stage.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn beat(&self) {
+        let state = match *self.stage() {
+            Stage::Running(..) => ActionPerformerStatus::RUNNING,
+            Stage::Idle | Stage::Committed(..) => ActionPerformerStatus::READY,
+        };
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        self.status.publish(ActionPerformerStatus {
+            status_stamp: Time { sec: since.as_secs() as i32, nanosec: since.subsec_nanos() },
+            state,
+            action: self.action.clone(),
+            specialized_arguments: self.specialized.clone(),
+            node_name: self.hub.name().to_owned(),
+        });
+    }
+
+    fn message(&self, r#type: i16, arguments: &[String]) -> ActionExecution {
+        ActionExecution {
+            r#type,
+            node_id: self.hub.name().to_owned(),
+            action: self.action.clone(),
+            arguments: arguments.to_vec(),
+            ..ActionExecution::default()
+        }
+    }
+
+    fn is_ours(&self, message: &ActionExecution) -> bool {
+        let fits = |(wanted, given): (&String, &String)| wanted.is_empty() || wanted == given;
+        message.action == self.action && self.specialized.iter().zip(&message.arguments).all(fits)
+    }
+
+    fn hear(self: &Arc<Self>, message: &ActionExecution, node: &Node) {
+        let mut stage = self.stage();
+        let is_for_us = message.node_id == self.hub.name();
+        match (message.r#type, &*stage) {
+            (ActionExecution::REQUEST, Stage::Running(..)) => {}
+            (ActionExecution::REQUEST, Stage::Committed(other, since))
+                if *other != message.arguments && since.elapsed() < SILENCE => {}
+            (ActionExecution::REQUEST, _) if self.is_ours(message) => {
+                *stage = Stage::Committed(message.arguments.clone(), Instant::now());
+                self.hub.say(self.message(ActionExecution::RESPONSE, &message.arguments));
+            }
+            (ActionExecution::CONFIRM, Stage::Committed(arguments, _))
+                if is_for_us && *arguments == message.arguments =>
+            {
+                let call = Call {
+                    action: self.action.clone(),
+                    arguments: message.arguments.clone(),
+                    configuration: std::collections::BTreeMap::new(),
+                    duration: 0.0,
+                };
+                node.log(Severity::Info, &format!("{} is begun for PlanSys2", call.text()));
+                let running = self.performer.start(call);
+                *stage = Stage::Running(message.arguments.clone(), running.clone());
+                let offer = Arc::clone(self);
+                smol::spawn(async move { offer.tell(&running).await }).detach();
+            }
+            (ActionExecution::REJECT, Stage::Committed(arguments, _))
+                if is_for_us && *arguments == message.arguments =>
+            {
+                *stage = Stage::Idle;
+            }
+            (ActionExecution::CANCEL, Stage::Running(arguments, running))
+                if is_for_us && *arguments == message.arguments =>
+            {
+                node.log(Severity::Info, &format!("{} is cancelled by PlanSys2", self.action));
+                running.cancel();
+            }
+            _ => {}
+        }
+    }
+
+    /// Tells the executor how it goes, up to the end.
+    async fn tell(&self, running: &Running) {
+        loop {
+            let progress = running.next().await;
+            let mut stage = self.stage();
+            let Stage::Running(arguments, _) = &*stage else { return };
+            let (completion, status, success) = match progress {
+                Progress::Feedback { completion, text } => {
+                    let (completion, status) = (completion.unwrap_or_default(), text);
+                    let message = self.message(ActionExecution::FEEDBACK, arguments);
+                    self.hub.say(ActionExecution { completion, status, ..message });
+                    continue;
+                }
+                Progress::Ended(End::Succeeded) => (1.0, "done".to_owned(), true),
+                Progress::Ended(End::Failed(because)) => (0.0, because, false),
+                Progress::Ended(End::Canceled) => {
+                    // Who has cancelled it waits for nothing.
+                    *stage = Stage::Idle;
+                    return;
+                }
+            };
+            let message = self.message(ActionExecution::FINISH, arguments);
+            self.hub.say(ActionExecution { success, completion, status, ..message });
+            *stage = Stage::Idle;
+            return;
+        }
+    }
+}

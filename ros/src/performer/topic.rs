@@ -1,0 +1,57 @@
+//! An action that the world does: it is done when a `std_msgs/Bool` on a topic is true.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use metaplan::message::Message;
+
+use crate::interfaces::std_msgs::msg::Bool;
+use crate::node::{Node, depth};
+use crate::perform::{Call, End, Perform, Running};
+
+/// Who waits for a topic.
+#[derive(Debug)]
+pub(super) struct Awaited {
+    waiting: Arc<Mutex<Vec<smol::channel::Sender<()>>>>,
+}
+
+impl Awaited {
+    pub(super) fn new(node: &Arc<Node>, topic: &str) -> Result<Self, Message> {
+        let waiting = Arc::new(Mutex::new(Vec::<smol::channel::Sender<()>>::new()));
+        let listeners = Arc::clone(&waiting);
+        // Who publishes for those who come later, and who does not, are both heard.
+        node.subscribe::<Bool>(topic, depth(10), move |heard| {
+            if heard.data {
+                for listener in listeners.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+                    let _ = listener.try_send(());
+                }
+            }
+        })?;
+        Ok(Self { waiting })
+    }
+}
+
+impl Perform for Awaited {
+    fn start(&self, _: Call) -> Running {
+        let (running, performance) = Running::pair();
+        let (sender, heard) = smol::channel::bounded(1);
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).push(sender);
+        smol::spawn(async move {
+            let end = {
+                let heard = async {
+                    match heard.recv().await {
+                        Ok(()) => End::Succeeded,
+                        Err(_) => End::Failed("the topic is heard no more".to_owned()),
+                    }
+                };
+                let canceled = async {
+                    performance.canceled().await;
+                    End::Canceled
+                };
+                smol::future::or(heard, canceled).await
+            };
+            performance.end(end);
+        })
+        .detach();
+        running
+    }
+}

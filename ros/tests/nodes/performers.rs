@@ -1,0 +1,322 @@
+//! Those who carry out actions, against servers of our own.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use metaplan_ros::interfaces::plansys2_1::plansys2_msgs::action as older;
+use metaplan_ros::interfaces::plansys2_msgs::action::{
+    ExecutePlan, ExecutePlanFeedback, ExecutePlanGoal, ExecutePlanResult,
+};
+use metaplan_ros::interfaces::plansys2_msgs::msg::{
+    ActionExecution, ActionExecutionInfo, ActionPerformerStatus, Plan, PlanItem,
+};
+use metaplan_ros::interfaces::system_modes_msgs::srv::{ChangeMode, ChangeModeResponse};
+use metaplan_ros::interfaces::{Action, humble, nav2_msgs, std_msgs};
+use metaplan_ros::node::{GoalEnd, GoalEvent, Node, depth};
+use metaplan_ros::perform::{Call, End, Perform, Progress, Running};
+use metaplan_ros::performer::{Cast, ExecutePlans, Performers, PlanVersion, offer};
+use smol::block_on;
+
+use crate::common::{domain, node, until};
+
+const SETTINGS: &str = r#"
+[actions.move]
+by = "navigate_to_pose"
+
+[actions.drive]
+by = "navigate_to_pose"
+server = "/humble"
+types = "humble"
+pose = 2
+
+[actions.look]
+by = "topic"
+topic = "/detected"
+
+[actions.reconfigure]
+by = "change_mode"
+
+[actions.search]
+by = "actions_hub"
+
+[poses]
+hall = { x = 1.0, y = -2.5, yaw = 3.141592653589793 }
+"#;
+
+fn call(text: &str) -> Call {
+    let mut words = text.trim_matches(['(', ')']).split(' ').map(str::to_owned);
+    let action = words.next().expect("a name");
+    Call { action, arguments: words.collect(), configuration: BTreeMap::new(), duration: 0.0 }
+}
+
+/// All that is heard of an action.
+pub fn hear(running: &Running) -> (Vec<Progress>, End) {
+    let mut heard = Vec::new();
+    loop {
+        match block_on(running.next()) {
+            Progress::Ended(end) => return (heard, end),
+            feedback @ Progress::Feedback { .. } => heard.push(feedback),
+        }
+    }
+}
+
+fn cast(domain: u16, settings: &str) -> (Arc<Node>, Cast) {
+    let manager = node(domain, "metaplan", "");
+    let settings = Performers::parse("ros.toml", settings).expect("settings");
+    let cast = Cast::new(&manager, &settings).expect("performers");
+    (manager, cast)
+}
+
+/// A server that accepts goals, says something once, and ends them as wanted; goals that are to be cancelled are.
+pub fn serve<A: Action + 'static>(
+    node: &Arc<Node>,
+    name: &str,
+    feedback: A::Feedback,
+    end: impl Fn(&A::Goal) -> Option<(GoalEnd, A::Result)> + Send + 'static,
+) -> Arc<Mutex<Vec<A::Goal>>>
+where
+    A::Feedback: Sync,
+{
+    let goals = Arc::new(Mutex::new(Vec::new()));
+    let seen = Arc::clone(&goals);
+    let server = Arc::new(Mutex::new(None::<Arc<metaplan_ros::node::Goals<A>>>));
+    let own = Arc::clone(&server);
+    let made = node.serve_action::<A>(name, move |event| {
+        let server = own.lock().expect("no panic").clone().expect("it is there");
+        match event {
+            GoalEvent::Wanted(wanted, goal) => {
+                let id = server.accept(wanted);
+                server.feedback(id, feedback.clone());
+                if let Some((end, result)) = end(&goal) {
+                    server.finish(id, end, result);
+                }
+                seen.lock().expect("no panic").push(goal);
+            }
+            GoalEvent::Cancel(id, request) => {
+                server.canceling(request, true);
+                server.finish(id, GoalEnd::Canceled, A::Result::default());
+            }
+        }
+    });
+    *server.lock().expect("no panic") = Some(made.expect("a server"));
+    goals
+}
+
+#[test]
+fn nav2_moves_the_robot() {
+    use nav2_msgs::action::{NavigateToPose, NavigateToPoseFeedback, NavigateToPoseResult};
+
+    let domain = domain();
+    let robot = node(domain, "robot", "");
+    let told = NavigateToPoseFeedback { distance_remaining: 1.25, ..Default::default() };
+    let goals = serve::<NavigateToPose>(&robot, "/navigate_to_pose", told, |goal| {
+        let is_ahead = goal.pose.pose.position.x > 0.0;
+        is_ahead.then(|| (GoalEnd::Succeeded, NavigateToPoseResult::default()))
+    });
+    let aborted = humble::nav2_msgs::action::NavigateToPoseResult::default();
+    let others = serve::<humble::nav2_msgs::action::NavigateToPose>(
+        &robot,
+        "/humble",
+        humble::nav2_msgs::action::NavigateToPoseFeedback::default(),
+        move |_| Some((GoalEnd::Aborted, aborted.clone())),
+    );
+    let (_manager, cast) = cast(domain, &(SETTINGS.to_owned() + "hell = { x = -1.0, y = 0.0 }\n"));
+    let (_, end) = hear(&cast.start(call("(move r1 kitchen HALL)")));
+    assert_eq!(end, End::Succeeded);
+    let goal = goals.lock().expect("no panic")[0].clone();
+    let (position, way) = (&goal.pose.pose.position, &goal.pose.pose.orientation);
+    assert_eq!((goal.pose.header.frame_id.as_str(), position.x, position.y), ("map", 1.0, -2.5));
+    // Half a turn.
+    assert!((way.z - 1.0).abs() < 1e-9 && way.w.abs() < 1e-9 && way.x == 0.0 && way.y == 0.0, "{way:?}");
+    // A goal that takes long is cancelled.
+    let running = cast.start(call("(move r1 hall hell)"));
+    until("a second goal", || goals.lock().expect("no panic").len() == 2);
+    running.cancel();
+    let (_, end) = hear(&running);
+    assert_eq!(end, End::Canceled);
+    // Another distribution, another argument, and no success.
+    let (_, end) = hear(&cast.start(call("(drive r1 hall)")));
+    assert!(matches!(&end, End::Failed(because) if because.contains("gave up")), "{end:?}");
+    assert_eq!(others.lock().expect("no panic").len(), 1);
+    // What has no pose goes nowhere.
+    let (_, end) = hear(&cast.start(call("(move r1 hall hal)")));
+    assert!(matches!(&end, End::Failed(because) if because.contains("did you mean `hall`")), "{end:?}");
+}
+
+#[test]
+fn the_world_and_the_modes_of_functions_do_their_part() {
+    let domain = domain();
+    let robot = node(domain, "robot", "");
+    let modes = Arc::new(Mutex::new(Vec::new()));
+    let asked = Arc::clone(&modes);
+    robot
+        .serve::<ChangeMode>("/f_search/change_mode", move |request, answer| {
+            let success = request.mode_name == "fd_high";
+            asked.lock().expect("no panic").push(request.mode_name);
+            answer.send(ChangeModeResponse { success });
+        })
+        .expect("a service");
+    let detected = robot.publisher::<std_msgs::msg::Bool>("/detected", depth(10)).expect("a topic");
+    let (_manager, cast) = cast(domain, SETTINGS);
+    assert_eq!(hear(&cast.start(call("(reconfigure f_search fd_high)"))).1, End::Succeeded);
+    let end = hear(&cast.start(call("(reconfigure f_search fd_low)"))).1;
+    assert!(matches!(&end, End::Failed(because) if because.contains("refused")), "{end:?}");
+    assert_eq!(*modes.lock().expect("no panic"), ["fd_high", "fd_low"]);
+    let running = cast.start(call("(look)"));
+    let looks = running.clone();
+    let end = std::thread::spawn(move || hear(&looks).1);
+    detected.publish(std_msgs::msg::Bool { data: false });
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(!end.is_finished());
+    until("the end", || {
+        detected.publish(std_msgs::msg::Bool { data: true });
+        end.is_finished()
+    });
+    assert_eq!(end.join().expect("no panic"), End::Succeeded);
+    // What nobody is configured for is done at once.
+    assert!(cast.has("LOOK") && !cast.has("wait"));
+    assert_eq!(hear(&cast.start(call("(wait)"))).1, End::Succeeded);
+}
+
+/// Both ends of the topic: one asks as PlanSys2's executor does, the other is a performer as PlanSys2's are.
+#[test]
+fn actions_go_over_the_hub() {
+    let domain = domain();
+    let performer = node(domain, "performer", "");
+    let (manager, cast) = cast(domain, SETTINGS);
+    let begun = Arc::new(Mutex::new(Vec::new()));
+    let own = Own { begun: Arc::clone(&begun) };
+    offer(&performer, "search", vec![String::new(), "here".to_owned()], Arc::new(own)).expect("an offer");
+    let (said, states) = (Arc::new(Mutex::new(Vec::new())), Arc::new(Mutex::new(Vec::new())));
+    let list = Arc::clone(&said);
+    // A node does not hear itself.
+    let observer = node(domain, "observer", "");
+    observer
+        .subscribe::<ActionExecution>("/actions_hub", depth(100), move |message| {
+            list.lock().expect("no panic").push(message.r#type);
+        })
+        .expect("a subscription");
+    let list = Arc::clone(&states);
+    manager
+        .subscribe::<ActionPerformerStatus>("/performers_status", depth(100), move |status| {
+            list.lock().expect("no panic").push((status.node_name, status.action, status.state));
+        })
+        .expect("a subscription");
+    let idle = ("performer".to_owned(), "search".to_owned(), ActionPerformerStatus::READY);
+    until("a heartbeat", || states.lock().expect("no panic").contains(&idle));
+    let (heard, end) = hear(&cast.start(call("(search r1 here)")));
+    assert_eq!(heard, [Progress::Feedback { completion: Some(0.5), text: "half".to_owned() }]);
+    assert_eq!(end, End::Succeeded);
+    let (_, end) = hear(&cast.start(call("(search r2 here)")));
+    assert_eq!(end, End::Failed("performer has failed: lost".to_owned()));
+    // It goes on until it is cancelled.
+    let running = cast.start(call("(search r3 here)"));
+    until("the third", || begun.lock().expect("no panic").len() == 3);
+    running.cancel();
+    assert_eq!(hear(&running).1, End::Canceled);
+    let (_, end) = hear(&cast.start(call("(search r1 here)")));
+    assert_eq!(end, End::Succeeded);
+    // It is for one place only.
+    let running = cast.start(call("(search r1 there)"));
+    std::thread::sleep(Duration::from_millis(1500));
+    running.cancel();
+    assert_eq!(hear(&running).1, End::Canceled);
+    assert_eq!(begun.lock().expect("no panic").len(), 4);
+    until("the last word", || said.lock().expect("no panic").last() == Some(&ActionExecution::CANCEL));
+    let said = said.lock().expect("no panic");
+    let whole = [
+        ActionExecution::REQUEST,
+        ActionExecution::RESPONSE,
+        ActionExecution::CONFIRM,
+        ActionExecution::FEEDBACK,
+        ActionExecution::FINISH,
+    ];
+    let seen: Vec<i16> = said.iter().copied().filter(|kind| whole.contains(kind)).take(5).collect();
+    assert_eq!(seen, whole);
+}
+
+/// Does what the name of the robot says.
+struct Own {
+    begun: Arc<Mutex<Vec<Call>>>,
+}
+
+impl Perform for Own {
+    fn start(&self, call: Call) -> Running {
+        let (running, performance) = Running::pair();
+        self.begun.lock().expect("no panic").push(call.clone());
+        smol::spawn(async move {
+            performance.feedback(Some(0.5), "half");
+            match call.arguments[0].as_str() {
+                "r1" => performance.end(End::Succeeded),
+                "r2" => performance.end(End::Failed("lost".to_owned())),
+                _ => {
+                    performance.canceled().await;
+                    performance.end(End::Canceled);
+                }
+            }
+        })
+        .detach();
+        running
+    }
+}
+
+#[test]
+fn plansys2_executes_a_whole_plan() {
+    let domain = domain();
+    let (robot, manager) = (node(domain, "executor", ""), node(domain, "metaplan", ""));
+    let info = |status: i8, completion: f32| ActionExecutionInfo {
+        status,
+        completion,
+        action_full_name: "(go)".to_owned(),
+        message_status: "stuck".to_owned(),
+        ..ActionExecutionInfo::default()
+    };
+    let executing = info(ActionExecutionInfo::EXECUTING, 0.25);
+    let told = ExecutePlanFeedback { action_execution_status: vec![executing] };
+    let failed = info(ActionExecutionInfo::FAILED, 0.5);
+    let goals = serve::<ExecutePlan>(&robot, "/execute_plan", told, move |goal: &ExecutePlanGoal| {
+        let success = goal.plan.items.len() == 1;
+        Some((
+            GoalEnd::Succeeded,
+            ExecutePlanResult { success, action_execution_status: vec![failed.clone()] },
+        ))
+    });
+    let told = older::ExecutePlanFeedback {
+        seq_action: 1,
+        total_actions: 4,
+        current_action: "(go)".to_owned(),
+        progress_current_action: 0.5,
+    };
+    serve::<older::ExecutePlan>(&robot, "/execute_older", told, |_| {
+        let error_info = "no plan".to_owned();
+        Some((GoalEnd::Aborted, older::ExecutePlanResult { success: false, error_info }))
+    });
+    let newer = ExecutePlans::new(&manager, "/execute_plan", PlanVersion::Newer);
+    let item = PlanItem { time: 0.0, action: "(go)".to_owned(), duration: 1.0 };
+    let plan = Plan { items: vec![item.clone()] };
+    assert_eq!(hear(&newer.start(plan.clone())).1, End::Succeeded);
+    assert_eq!(goals.lock().expect("no panic")[0].plan, plan);
+    let two = Plan { items: vec![item.clone(), item] };
+    assert_eq!(hear(&newer.start(two)).1, End::Failed("(go): stuck".to_owned()));
+    let older = ExecutePlans::new(&manager, "/execute_older", PlanVersion::Older);
+    assert_eq!(hear(&older.start(plan)).1, End::Failed("PlanSys2 has failed: no plan".to_owned()));
+}
+
+#[test]
+fn settings_that_are_wrong_say_where() {
+    for (text, place, expected) in [
+        ("[actions.a]\nby = \"nav\"\n", Some(1), "unknown variant `nav`"),
+        ("[actions.a]\nby = \"topic\"\n", Some(1), "missing field `topic`"),
+        ("[actions.a]\nby = \"actions_hub\"\nx = 1\n[action]\n", Some(1), "unknown field `action`"),
+        ("[poses]\nhall = { x = 1 }\n", None, "missing field `y`"),
+    ] {
+        let error = Performers::parse("ros.toml", text).expect_err("a mistake");
+        assert!(error.message.contains(expected), "{}", error.message);
+        assert!(place.is_none() || error.line.is_some(), "{error:?}");
+    }
+    let settings = Performers::parse("ros.toml", "[actions.a]\nby = \"navigate_to_pose\"\npose = 0\n");
+    let manager = node(domain(), "metaplan", "");
+    let errors = Cast::new(&manager, &settings.expect("settings")).expect_err("a mistake");
+    assert!(errors[0].message.contains("the first is 1"), "{}", errors[0].message);
+}
