@@ -1,5 +1,6 @@
 //! Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 
+mod diagnosed;
 pub mod interfaces;
 pub mod manager;
 pub mod node;
@@ -7,3 +8,4 @@ pub mod perform;
 pub mod performer;
 pub mod planner;
 pub mod popf;
+pub mod reasoner;

@@ -8,11 +8,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 use metaplan::message::Message;
-use metaplan_ros::manager;
+use metaplan::setup::Setup;
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
+use metaplan_ros::{manager, planner, reasoner};
 
 /// Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 ///
@@ -21,9 +23,9 @@ use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
-    /// A mission's manifest.
-    #[arg(long, value_name = "FILE")]
-    mission: PathBuf,
+    /// A mission's manifest; a planner can do without, and takes domains as they are then.
+    #[arg(long, value_name = "FILE", required_if_eq_any = [("role", "manager"), ("role", "reasoner")])]
+    mission: Option<PathBuf>,
     /// Whose place to take.
     #[arg(long = "as", value_enum, default_value_t = Role::Manager)]
     role: Role,
@@ -42,6 +44,10 @@ struct Arguments {
 enum Role {
     /// Of the manager of tasks: SUAVE's task bridge, MROS's reasoner and the planner in one.
     Manager,
+    /// Of MROS's reasoner: the action `/mros/objective`.
+    Reasoner,
+    /// Of PlanSys2's planner: `planner/get_plan` and its lifecycle.
+    Planner,
 }
 
 fn main() -> ExitCode {
@@ -61,7 +67,9 @@ fn start() -> Result<(), Vec<Message>> {
     let arguments = Arguments::parse_from(words);
     let (network, warnings) =
         Network::from_environment(|name| std::env::var(name).ok()).map_err(|message| vec![message])?;
-    let opening = Opening { name: "metaplan".to_owned(), arguments: ros, network, rmw: arguments.rmw };
+    // PlanSys2 looks for its planner by its name.
+    let name = if arguments.role == Role::Planner { "planner" } else { "metaplan" };
+    let opening = Opening { name: name.to_owned(), arguments: ros, network, rmw: arguments.rmw };
     let node = Node::open(opening).map_err(|message| vec![message])?;
     for warning in warnings {
         node.log(Severity::Warn, warning.text().trim_end());
@@ -76,8 +84,22 @@ fn start() -> Result<(), Vec<Message>> {
     };
     ctrlc::set_handler(handler)
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
-    let Arguments { mission, settings, journal, .. } = arguments;
-    match arguments.role {
-        Role::Manager => manager::run(&node, &manager::Options { mission, settings, journal }, &stop),
+    let Arguments { role, mission, settings, journal, .. } = arguments;
+    match (role, mission) {
+        (Role::Planner, mission) => {
+            let setup = mission.map(|mission| Setup::read(&mission)).transpose()?;
+            let _lifecycle = planner::serve(&node, setup)?;
+            while !stop.load(Ordering::Relaxed) {
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            Ok(())
+        }
+        (Role::Manager, Some(mission)) => {
+            manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
+        }
+        (Role::Reasoner, Some(mission)) => {
+            reasoner::run(&node, &reasoner::Options { mission, settings }, &stop)
+        }
+        (_, None) => Err(vec![Message::error("N100", "`--mission` is missing")]),
     }
 }

@@ -6,6 +6,8 @@ use std::path::Path;
 use metaplan::message::Message;
 use serde::Deserialize;
 
+use crate::performer::{By, Performers, Poses};
+
 /// The mode of a function that nobody needs.
 const UNGROUND: &str = "fd_unground";
 
@@ -23,10 +25,10 @@ pub struct Settings {
     pub autopilot: Option<Autopilot>,
     /// Who carries out an action, by its name; the rest are done as soon as they are begun.
     #[serde(default)]
-    pub actions: BTreeMap<String, toml::Table>,
+    pub actions: BTreeMap<String, By>,
     /// Where things are, for actions that move.
     #[serde(default)]
-    pub poses: toml::Table,
+    pub poses: Poses,
 }
 
 /// A task.
@@ -96,6 +98,13 @@ fn position(text: &str, at: usize) -> (usize, usize) {
     let before = text.get(..at).unwrap_or(text);
     let line = before.rsplit('\n').next().unwrap_or_default();
     (before.matches('\n').count() + 1, line.chars().count() + 1)
+}
+
+impl Settings {
+    /// Who carries out actions.
+    pub(super) fn performers(&self) -> Performers {
+        Performers { actions: self.actions.clone(), poses: self.poses.clone() }
+    }
 }
 
 impl Functions {
