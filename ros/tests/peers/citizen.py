@@ -8,6 +8,7 @@ from typing import Any
 from oracle import SEARCH
 from ros2 import Call, Client, Node
 from scenarios import CLEAR, DARK, Setting, check, play, scenario, see
+from transport import Qos
 
 STRING, INTEGER_PARAMETER = "std_msgs/msg/String", 2
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = 1, 2, 3, 4
@@ -29,7 +30,7 @@ def graph(setting: Setting) -> str:
     with play(setting) as (robot, _):
         node, plans, logs, about = robot.node, [], [], []
         node.subscribe("/metaplan/plan", STRING, lambda message: plans.append(message.data))
-        node.subscribe("/rosout", "rcl_interfaces/msg/Log", logs.append)
+        node.subscribe("/rosout", "rcl_interfaces/msg/Log", logs.append, Qos(1000, transient_local=True))
         node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", about.append)
         node.spin(1.0)
         check("/metaplan" in node.nodes, f"`ros2 node list` shows {sorted(node.nodes)}")
