@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, ValueEnum};
 use metaplan::message::Message;
-use metaplan_ros::manager;
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
+use metaplan_ros::{manager, planner};
 
 /// Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 ///
@@ -21,9 +21,9 @@ use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
-    /// A mission's manifest.
-    #[arg(long, value_name = "FILE")]
-    mission: PathBuf,
+    /// A mission's manifest; a planner needs none.
+    #[arg(long, value_name = "FILE", required_if_eq("role", "manager"))]
+    mission: Option<PathBuf>,
     /// Whose place to take.
     #[arg(long = "as", value_enum, default_value_t = Role::Manager)]
     role: Role,
@@ -42,6 +42,18 @@ struct Arguments {
 enum Role {
     /// Of the manager of tasks: SUAVE's task bridge, MROS's reasoner and the planner in one.
     Manager,
+    /// Of PlanSys2's planner; with a mission, its knowledge base joins in.
+    Planner,
+}
+
+impl Role {
+    /// What the node is called, unless it is said otherwise.
+    fn node(self) -> &'static str {
+        match self {
+            Self::Manager => "metaplan",
+            Self::Planner => "planner",
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -61,7 +73,8 @@ fn start() -> Result<(), Vec<Message>> {
     let arguments = Arguments::parse_from(words);
     let (network, warnings) =
         Network::from_environment(|name| std::env::var(name).ok()).map_err(|message| vec![message])?;
-    let opening = Opening { name: "metaplan".to_owned(), arguments: ros, network, rmw: arguments.rmw };
+    let opening =
+        Opening { name: arguments.role.node().to_owned(), arguments: ros, network, rmw: arguments.rmw };
     let node = Node::open(opening).map_err(|message| vec![message])?;
     for warning in warnings {
         node.log(Severity::Warn, warning.text().trim_end());
@@ -78,6 +91,10 @@ fn start() -> Result<(), Vec<Message>> {
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
     let Arguments { mission, settings, journal, .. } = arguments;
     match arguments.role {
-        Role::Manager => manager::run(&node, &manager::Options { mission, settings, journal }, &stop),
+        Role::Manager => {
+            let mission = mission.unwrap_or_default();
+            manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
+        }
+        Role::Planner => planner::run(&node, &planner::Options { mission, settings }, &stop),
     }
 }

@@ -9,6 +9,7 @@
 //! server = "/navigate_to_pose"      # … here (the default)
 //! pose = 3                          # … with the pose of its third argument (the last, if not given)
 //! types = "jazzy"                   # humble, iron, jazzy or rolling: they differ
+//! behavior_tree = ""                # as Nav2 takes it
 //!
 //! [actions.inspect]                 # a performer of PlanSys2 does it
 //! by = "actions_hub"
@@ -17,21 +18,28 @@
 //! by = "topic"
 //! topic = "/pipeline/detected"
 //!
+//! [actions.reconfigure]             # (reconfigure f_search fd_high): /f_search/change_mode of system_modes
+//! by = "change_mode"
+//! function = 1                      # its first argument (the last but one, if not given)
+//! design = 2                        # its second argument (the last, if not given)
+//!
+//! [actions.recharge]                # an action of SUAVE: also spiral_search, follow_pipeline, recover_thrusters
+//! by = "recharge_battery"
+//! server = "/recharge_battery"
+//!
 //! [poses]                           # where things are
 //! frame = "map"
 //! hall = { x = 1.0, y = -2.5, yaw = 1.57 }
+//!
+//! [offers.reconfigure]              # with `--as planner`: what PlanSys2's executor asks for is done here
+//! by = "change_mode"
 //! ```
 //!
 //! An action without a table is done as soon as it is begun: its effects are not in the world, but in the plan.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
 
-use metaplan::message::Message;
 use smol::channel;
-
-use crate::interfaces::std_msgs::msg::Bool;
-use crate::node::{Node, depth};
 
 /// An action that is to be carried out.
 #[derive(Debug, Clone, PartialEq)]
@@ -144,69 +152,6 @@ impl Performance {
 pub trait Perform: Send + Sync {
     /// Begins an action. Whatever goes wrong is heard as its end.
     fn start(&self, call: Call) -> Running;
-}
-
-/// Who carries out which action, from the tables of the settings.
-///
-/// # Errors
-/// A table says what is not known.
-pub fn performers(
-    node: &Arc<Node>,
-    actions: &BTreeMap<String, toml::Table>,
-    _poses: &toml::Table,
-) -> Result<BTreeMap<String, Box<dyn Perform>>, Message> {
-    let mut performers = BTreeMap::new();
-    for (action, table) in actions {
-        let word = |key: &str| table.get(key).and_then(toml::Value::as_str);
-        let performer: Box<dyn Perform> = match (word("by"), word("topic")) {
-            (Some("topic"), Some(topic)) => Box::new(Told::new(node, topic)?),
-            (by, _) => {
-                let text = format!("the action {action} is done by {by:?}, which is not known");
-                return Err(Message::error("N131", text));
-            }
-        };
-        performers.insert(action.clone(), performer);
-    }
-    Ok(performers)
-}
-
-/// Nodes that do their work by the mode that they have: a topic tells when it is done.
-#[derive(Debug)]
-struct Told {
-    running: Arc<Mutex<Option<Performance>>>,
-}
-
-impl Told {
-    fn new(node: &Arc<Node>, topic: &str) -> Result<Self, Message> {
-        let running: Arc<Mutex<Option<Performance>>> = Arc::default();
-        let hear = Arc::clone(&running);
-        node.subscribe::<Bool>(topic, depth(10), move |told| {
-            let waiting = hear.lock().unwrap_or_else(PoisonError::into_inner).take_if(|_| told.data);
-            if let Some(performance) = waiting {
-                performance.end(End::Succeeded);
-            }
-        })?;
-        Ok(Self { running })
-    }
-}
-
-impl Perform for Told {
-    fn start(&self, _: Call) -> Running {
-        let (running, performance) = Running::pair();
-        let canceled = performance.canceled.clone();
-        *self.running.lock().unwrap_or_else(PoisonError::into_inner) = Some(performance);
-        let own = Arc::clone(&self.running);
-        smol::spawn(async move {
-            // Nodes stop when their functions lose their modes; nothing is to be waited for.
-            if canceled.recv().await.is_ok()
-                && let Some(performance) = own.lock().unwrap_or_else(PoisonError::into_inner).take()
-            {
-                performance.end(End::Canceled);
-            }
-        })
-        .detach();
-        running
-    }
 }
 
 #[cfg(test)]

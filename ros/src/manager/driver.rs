@@ -19,7 +19,8 @@ use crate::manager::machine::{Input, Machine, Output, State};
 use crate::manager::robot::Robot;
 use crate::manager::settings::Settings;
 use crate::node::{Declared, Lifecycle, Node, Phase, Severity};
-use crate::perform::{Perform, performers};
+use crate::perform::Perform;
+use crate::performer::performers;
 
 /// Time is told the machine so often, and how it is on `/diagnostics`.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -58,7 +59,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     let journal = journal(node, options, &mut control).map_err(|message| vec![message])?;
     let begun = control.beliefs().now();
     let performers: BTreeMap<String, Box<dyn Perform>> =
-        performers(node, &settings.actions, &settings.poses).map_err(|message| vec![message])?;
+        performers(node, &settings.actions, &settings.poses)?;
     let machine = Machine::new(control, journal, settings.clone(), ticks);
     let (sender, inputs) = mpsc::channel();
     let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())

@@ -6,6 +6,8 @@ use std::path::Path;
 use metaplan::message::Message;
 use serde::Deserialize;
 
+use crate::performer::{By, Offered, Poses};
+
 /// The mode of a function that nobody needs.
 const UNGROUND: &str = "fd_unground";
 
@@ -23,10 +25,13 @@ pub struct Settings {
     pub autopilot: Option<Autopilot>,
     /// Who carries out an action, by its name; the rest are done as soon as they are begun.
     #[serde(default)]
-    pub actions: BTreeMap<String, toml::Table>,
+    pub actions: BTreeMap<String, By>,
     /// Where things are, for actions that move.
     #[serde(default)]
-    pub poses: toml::Table,
+    pub poses: Poses,
+    /// Who carries out an action for PlanSys2's executor, by its name.
+    #[serde(default)]
+    pub offers: BTreeMap<String, Offered>,
 }
 
 /// A task.

@@ -4,6 +4,8 @@
 //! Each request is planned on a thread of its own, so that the node answers all others meanwhile. With a mission, its knowledge base joins
 //! in, and hears `/diagnostics`.
 
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -20,7 +22,9 @@ use crate::interfaces::plansys2_msgs::msg::{Plan, PlanArray, PlanItem};
 use crate::interfaces::plansys2_msgs::srv::{
     GetPlan, GetPlanArray, GetPlanArrayResponse, GetPlanResponse, ValidateDomain, ValidateDomainResponse,
 };
+use crate::manager::Settings;
 use crate::node::{Declared, Lifecycle, Node, Phase, Severity, keep_all};
+use crate::performer;
 use crate::planner::solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};
 
 /// In seconds; what PlanSys2 has.
@@ -68,6 +72,42 @@ pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, V
             .map_err(one)?;
     }
     Ok(lifecycle)
+}
+
+/// What the planner is told.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The manifest of a mission whose knowledge base joins in.
+    pub mission: Option<PathBuf>,
+    /// How the mission meets the robot: who carries out actions for PlanSys2's executor.
+    pub settings: Option<PathBuf>,
+}
+
+/// So often is looked whether to stop.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Serves as PlanSys2's planner until told to stop, and does the actions that the settings offer.
+///
+/// # Errors
+/// The mission, the settings or a parameter of the command line is wrong.
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
+    let setup = options.mission.as_deref().map(Setup::read).transpose()?;
+    for warning in setup.iter().flat_map(|setup| setup.mission.warnings()) {
+        node.log(Severity::Warn, warning.text().trim_end());
+    }
+    let settings = match (&options.settings, &options.mission) {
+        (None, None) => Settings::default(),
+        (file, mission) => {
+            let beside = mission.clone().unwrap_or_default();
+            Settings::read(file.as_deref(), &beside).map_err(|message| vec![message])?
+        }
+    };
+    serve(node, setup)?;
+    performer::offers(node, &settings.offers, &settings.poses)?;
+    while !stop.load(Ordering::Relaxed) {
+        std::thread::sleep(LOOK);
+    }
+    Ok(())
 }
 
 /// Further plans in the answer of `get_plan_array`.
