@@ -5,7 +5,7 @@
 //! in, and hears `/diagnostics`.
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -36,9 +36,14 @@ const SHARE: f64 = 0.9;
 /// Plans may nest deeply.
 const STACK: usize = 64 << 20;
 
+/// So many requests are planned at a time; who asks for more is told so.
+const MOST: usize = 8;
+
 /// The planner behind the services.
 struct Planner {
     node: Arc<Node>,
+    /// Requests that are being planned.
+    busy: AtomicUsize,
     /// The mission whose knowledge base joins in, as the diagnostics have it.
     joint: Option<Mutex<Mission>>,
     manner: Mutex<Manner>,
@@ -52,7 +57,12 @@ pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, V
     let manner =
         Manner { metric: None, time_limit: Duration::ZERO, overlap: None, alternatives: ALTERNATIVES };
     let joint = setup.map(|setup| Mutex::new(setup.mission));
-    let planner = Arc::new(Planner { node: Arc::clone(node), joint, manner: Mutex::new(manner) });
+    let planner = Arc::new(Planner {
+        node: Arc::clone(node),
+        busy: AtomicUsize::new(0),
+        joint,
+        manner: Mutex::new(manner),
+    });
     let listener = Arc::clone(&planner);
     let warnings = node.declare(declared(), move |name, value| listener.set(name, value))?;
     for warning in warnings {
@@ -227,6 +237,16 @@ impl Planner {
         if !is_ready {
             return Err(NoPlan::None(UNCONFIGURED.to_owned()));
         }
+        if self.busy.fetch_add(1, Ordering::Relaxed) >= MOST {
+            self.busy.fetch_sub(1, Ordering::Relaxed);
+            return Err(NoPlan::None(format!("{MOST} other plans are being looked for")));
+        }
+        let found = self.plan_now(domain, problem, alternatives);
+        self.busy.fetch_sub(1, Ordering::Relaxed);
+        found
+    }
+
+    fn plan_now(&self, domain: String, problem: String, alternatives: usize) -> Result<Found, NoPlan> {
         let manner = Manner { alternatives, ..self.manner().clone() };
         let joint = self.joint.as_ref().map(|joint| lock(joint).clone());
         let request = Request {

@@ -17,7 +17,7 @@ use metaplan_ros::interfaces::{Action, humble, nav2_msgs, std_msgs};
 use metaplan_ros::manager::Settings;
 use metaplan_ros::node::{GoalEnd, GoalEvent, Node, depth};
 use metaplan_ros::perform::{Call, End, Perform, Progress, Running};
-use metaplan_ros::performer::{ExecutePlans, PlanVersion, offer, performers};
+use metaplan_ros::performer::{ExecutePlans, PlanVersion, offer, offers, performers};
 use smol::block_on;
 
 use crate::common::{domain, node, until};
@@ -249,6 +249,30 @@ fn actions_go_over_the_hub() {
     ];
     let seen: Vec<i16> = said.iter().copied().filter(|kind| whole.contains(kind)).take(5).collect();
     assert_eq!(seen, whole);
+}
+
+/// PlanSys2's executor asks for an action of the settings, which changes a mode.
+#[test]
+fn what_the_settings_offer_is_done_for_plansys2() {
+    let domain = domain();
+    let (robot, own, executor) =
+        (node(domain, "robot", ""), node(domain, "planner", ""), node(domain, "executor", ""));
+    robot
+        .serve::<ChangeMode>("/f_search/change_mode", |request, answer| {
+            answer.send(ChangeModeResponse { success: request.mode_name == "fd_high" });
+        })
+        .expect("a service");
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("ros.toml");
+    let text = "[offers.reconfigure]\nby = \"change_mode\"\nspecialized_arguments = [\"f_search\"]\n\
+                [actions.reconfigure]\nby = \"actions_hub\"\n";
+    std::fs::write(&file, text).expect("a file");
+    let settings = Settings::read(Some(&file), Path::new("mission.toml")).expect("settings");
+    offers(&own, &settings.offers, &settings.poses).expect("offers");
+    let cast = Cast::new(&executor, &file);
+    assert_eq!(hear(&cast.start(call("(reconfigure f_search fd_high)"))).1, End::Succeeded);
+    let end = hear(&cast.start(call("(reconfigure f_search fd_low)"))).1;
+    assert!(matches!(&end, End::Failed(because) if because.contains("refused")), "{end:?}");
 }
 
 /// Does what the name of the robot says.
