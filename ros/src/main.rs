@@ -12,7 +12,6 @@ use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 use metaplan::message::Message;
-use metaplan::setup::Setup;
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
 use metaplan_ros::{manager, planner, reasoner};
 
@@ -46,8 +45,18 @@ enum Role {
     Manager,
     /// Of MROS's reasoner: the action `/mros/objective`.
     Reasoner,
-    /// Of PlanSys2's planner: `planner/get_plan` and its lifecycle.
+    /// Of PlanSys2's planner; with a mission, its knowledge base joins in.
     Planner,
+}
+
+impl Role {
+    /// What the node is called, unless it is said otherwise. PlanSys2 looks for its planner by its name.
+    fn node(self) -> &'static str {
+        match self {
+            Self::Manager | Self::Reasoner => "metaplan",
+            Self::Planner => "planner",
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -67,9 +76,8 @@ fn start() -> Result<(), Vec<Message>> {
     let arguments = Arguments::parse_from(words);
     let (network, warnings) =
         Network::from_environment(|name| std::env::var(name).ok()).map_err(|message| vec![message])?;
-    // PlanSys2 looks for its planner by its name.
-    let name = if arguments.role == Role::Planner { "planner" } else { "metaplan" };
-    let opening = Opening { name: name.to_owned(), arguments: ros, network, rmw: arguments.rmw };
+    let opening =
+        Opening { name: arguments.role.node().to_owned(), arguments: ros, network, rmw: arguments.rmw };
     let node = Node::open(opening).map_err(|message| vec![message])?;
     for warning in warnings {
         node.log(Severity::Warn, warning.text().trim_end());
@@ -86,14 +94,7 @@ fn start() -> Result<(), Vec<Message>> {
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
     let Arguments { role, mission, settings, journal, .. } = arguments;
     match (role, mission) {
-        (Role::Planner, mission) => {
-            let setup = mission.map(|mission| Setup::read(&mission)).transpose()?;
-            let _lifecycle = planner::serve(&node, setup)?;
-            while !stop.load(Ordering::Relaxed) {
-                std::thread::sleep(Duration::from_millis(50));
-            }
-            Ok(())
-        }
+        (Role::Planner, mission) => planner::run(&node, &planner::Options { mission, settings }, &stop),
         (Role::Manager, Some(mission)) => {
             manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
         }

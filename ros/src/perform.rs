@@ -9,6 +9,7 @@
 //! server = "/navigate_to_pose"      # … here (the default)
 //! pose = 3                          # … with the pose of its third argument (the last, if not given)
 //! types = "jazzy"                   # humble, iron, jazzy or rolling: they differ
+//! behavior_tree = ""                # as Nav2 takes it
 //!
 //! [actions.inspect]                 # a performer of PlanSys2 does it
 //! by = "actions_hub"
@@ -17,9 +18,21 @@
 //! by = "topic"
 //! topic = "/pipeline/detected"
 //!
+//! [actions.reconfigure]             # (reconfigure f_search fd_high): /f_search/change_mode of system_modes
+//! by = "change_mode"
+//! function = 1                      # its first argument (the last but one, if not given)
+//! design = 2                        # its second argument (the last, if not given)
+//!
+//! [actions.recharge]                # an action of SUAVE: also spiral_search, follow_pipeline, recover_thrusters
+//! by = "recharge_battery"
+//! server = "/recharge_battery"
+//!
 //! [poses]                           # where things are
 //! frame = "map"
 //! hall = { x = 1.0, y = -2.5, yaw = 1.57 }
+//!
+//! [offers.reconfigure]              # with `--as planner`: what PlanSys2's executor asks for is done here
+//! by = "change_mode"
 //! ```
 //!
 //! An action without a table is done as soon as it is begun: its effects are not in the world, but in the plan.

@@ -6,7 +6,7 @@ use std::path::Path;
 use metaplan::message::Message;
 use serde::Deserialize;
 
-use crate::performer::{By, Performers, Poses};
+use crate::performer::{By, Offered, Poses};
 
 /// The mode of a function that nobody needs.
 const UNGROUND: &str = "fd_unground";
@@ -29,6 +29,9 @@ pub struct Settings {
     /// Where things are, for actions that move.
     #[serde(default)]
     pub poses: Poses,
+    /// Who carries out an action for PlanSys2's executor, by its name.
+    #[serde(default)]
+    pub offers: BTreeMap<String, Offered>,
 }
 
 /// A task.
@@ -98,13 +101,6 @@ fn position(text: &str, at: usize) -> (usize, usize) {
     let before = text.get(..at).unwrap_or(text);
     let line = before.rsplit('\n').next().unwrap_or_default();
     (before.matches('\n').count() + 1, line.chars().count() + 1)
-}
-
-impl Settings {
-    /// Who carries out actions.
-    pub(super) fn performers(&self) -> Performers {
-        Performers { actions: self.actions.clone(), poses: self.poses.clone() }
-    }
 }
 
 impl Functions {

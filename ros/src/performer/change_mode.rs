@@ -1,5 +1,6 @@
 //! An action of the plan that gives a function a design: `/<function>/change_mode` of `system_modes`.
 
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use crate::interfaces::system_modes_msgs::srv::{ChangeMode as Service, ChangeModeRequest};
@@ -12,12 +13,16 @@ use crate::performer::settings::argument;
 #[derive(Debug)]
 pub(super) struct ChangeMode {
     node: Arc<Node>,
-    function: Option<usize>,
-    design: Option<usize>,
+    function: Option<NonZeroUsize>,
+    design: Option<NonZeroUsize>,
 }
 
 impl ChangeMode {
-    pub(super) fn new(node: &Arc<Node>, function: Option<usize>, design: Option<usize>) -> Self {
+    pub(super) fn new(
+        node: &Arc<Node>,
+        function: Option<NonZeroUsize>,
+        design: Option<NonZeroUsize>,
+    ) -> Self {
         Self { node: Arc::clone(node), function, design }
     }
 }

@@ -18,7 +18,7 @@ use crate::interfaces::suave_msgs::action::{
     FollowPipeline, RechargeBattery, RecoverThrusters, SpiralSearch,
 };
 use crate::node::Node;
-use crate::perform::{Call, End, Perform, Progress, Running};
+use crate::perform::{Perform, Progress};
 
 use action::Client;
 use change_mode::ChangeMode;
@@ -26,42 +26,27 @@ use hub::Hub;
 use topic::Awaited;
 
 pub use execute_plan::{ExecutePlans, PlanVersion};
-pub use offer::offer;
-pub use settings::{By, Distribution, Performers, Pose, Poses};
+pub use offer::{offer, offers};
+pub use settings::{By, Distribution, Offered, Pose, Poses};
 
-/// All performers of the settings, as one.
-pub struct Cast {
-    performers: BTreeMap<String, Box<dyn Perform>>,
-}
-
-impl std::fmt::Debug for Cast {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.debug_set().entries(self.performers.keys()).finish()
-    }
-}
-
-impl Cast {
-    /// Makes ready to call all that the settings name.
-    ///
-    /// # Errors
-    /// What is wrong with the names, all of it.
-    pub fn new(node: &Arc<Node>, settings: &Performers) -> Result<Self, Vec<Message>> {
-        let (mut performers, mut errors) = (BTreeMap::new(), settings.mistakes());
-        let hub = OnceLock::new();
-        for (action, by) in &settings.actions {
-            match performer(node, by, &settings.poses, &hub) {
-                // PDDL knows no cases.
-                Ok(performer) => drop(performers.insert(action.to_lowercase(), performer)),
-                Err(error) => errors.push(error),
-            }
+/// Whoever is to carry out actions, by the names of these.
+///
+/// # Errors
+/// What is wrong with the names of topics, all of it.
+pub fn performers(
+    node: &Arc<Node>,
+    actions: &BTreeMap<String, By>,
+    poses: &Poses,
+) -> Result<BTreeMap<String, Box<dyn Perform>>, Vec<Message>> {
+    let (mut performers, mut errors) = (BTreeMap::new(), Vec::new());
+    let hub = OnceLock::new();
+    for (action, by) in actions {
+        match performer(node, by, poses, &hub) {
+            Ok(performer) => drop(performers.insert(action.clone(), performer)),
+            Err(error) => errors.push(error),
         }
-        if errors.is_empty() { Ok(Self { performers }) } else { Err(errors) }
     }
-
-    /// Whether somebody is there for an action.
-    pub fn has(&self, action: &str) -> bool {
-        self.performers.contains_key(&action.to_lowercase())
-    }
+    if errors.is_empty() { Ok(performers) } else { Err(errors) }
 }
 
 fn performer(
@@ -90,17 +75,6 @@ fn performer(
         By::RecoverThrusters { server } => Box::new(Client::<RecoverThrusters>::new(node, server)),
         By::RechargeBattery { server } => Box::new(Client::<RechargeBattery>::new(node, server)),
     })
-}
-
-impl Perform for Cast {
-    fn start(&self, call: Call) -> Running {
-        if let Some(performer) = self.performers.get(&call.action.to_lowercase()) {
-            return performer.start(call);
-        }
-        let (running, performance) = Running::pair();
-        performance.end(End::Succeeded);
-        running
-    }
 }
 
 /// How far along something is, of which the whole is known.

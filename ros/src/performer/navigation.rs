@@ -1,5 +1,6 @@
 //! Nav2: an action of the plan is a goal for `navigate_to_pose`, with the pose of one of its arguments.
 
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use crate::interfaces::{geometry_msgs, humble, iron, nav2_msgs, rolling};
@@ -13,7 +14,7 @@ use crate::performer::{Distribution, Poses, feedback, part};
 #[derive(Debug, Clone)]
 pub(super) struct Navigation {
     poses: Poses,
-    pose: Option<usize>,
+    pose: Option<NonZeroUsize>,
     behavior_tree: String,
 }
 
@@ -21,7 +22,7 @@ pub(super) struct Navigation {
 pub(super) fn performer(
     node: &Arc<Node>,
     server: &str,
-    (poses, pose): (&Poses, Option<usize>),
+    (poses, pose): (&Poses, Option<NonZeroUsize>),
     types: Distribution,
     behavior_tree: &str,
 ) -> Box<dyn Perform> {

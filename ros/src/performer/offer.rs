@@ -1,5 +1,6 @@
 //! A performer for PlanSys2: what its executor asks for on `actions_hub` is done by whoever is configured for it here.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -11,6 +12,7 @@ use crate::interfaces::plansys2_msgs::msg::{ActionExecution, ActionPerformerStat
 use crate::node::{Node, Publisher, Severity, depth};
 use crate::perform::{Call, End, Perform, Progress, Running};
 use crate::performer::hub::{DEPTH, Hub};
+use crate::performer::{Offered, Poses, performers};
 
 /// So often the others hear that we are there.
 const HEARTBEAT: Duration = Duration::from_secs(1);
@@ -73,6 +75,23 @@ pub fn offer(
     Ok(())
 }
 
+/// Does actions for PlanSys2's executor, by the settings.
+///
+/// # Errors
+/// What is wrong with the names of topics, all of it.
+pub fn offers(
+    node: &Arc<Node>,
+    offered: &BTreeMap<String, Offered>,
+    poses: &Poses,
+) -> Result<(), Vec<Message>> {
+    let by = offered.iter().map(|(action, offered)| (action.clone(), offered.by.clone())).collect();
+    for (action, performer) in performers(node, &by, poses)? {
+        let specialized = offered[&action].specialized_arguments.clone();
+        offer(node, &action, specialized, Arc::from(performer)).map_err(|message| vec![message])?;
+    }
+    Ok(())
+}
+
 impl Offer {
     fn stage(&self) -> MutexGuard<'_, Stage> {
         self.stage.lock().unwrap_or_else(PoisonError::into_inner)
@@ -125,7 +144,7 @@ impl Offer {
                 let call = Call {
                     action: self.action.clone(),
                     arguments: message.arguments.clone(),
-                    configuration: std::collections::BTreeMap::new(),
+                    configuration: BTreeMap::new(),
                     duration: 0.0,
                 };
                 node.log(Severity::Info, &format!("{} is begun for PlanSys2", call.text()));

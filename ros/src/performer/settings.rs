@@ -1,26 +1,15 @@
 //! The settings of performers, and what can be wrong with them.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 
-use metaplan::message::{Message, did_you_mean};
+use metaplan::message::did_you_mean;
 use serde::Deserialize;
 
 use crate::interfaces::builtin_interfaces::msg::Time;
 use crate::interfaces::geometry_msgs::msg::Pose as PoseMessage;
 use crate::interfaces::geometry_msgs::msg::{Point, PoseStamped, Quaternion};
 use crate::interfaces::std_msgs::msg::Header;
-
-/// Who carries out which action.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Performers {
-    /// By the names of actions.
-    #[serde(default)]
-    pub actions: BTreeMap<String, By>,
-    /// Where things are.
-    #[serde(default)]
-    pub poses: Poses,
-}
 
 /// Who carries out an action.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -32,7 +21,7 @@ pub enum By {
         #[serde(default = "navigate_to_pose")]
         server: String,
         /// Which argument, from 1; if not given, the last.
-        pose: Option<usize>,
+        pose: Option<NonZeroUsize>,
         /// Whose types.
         #[serde(default)]
         types: Distribution,
@@ -50,9 +39,9 @@ pub enum By {
     /// `system_modes`: one argument is a function, another one the design that it is to have.
     ChangeMode {
         /// Which argument is the function, from 1; if not given, the last but one.
-        function: Option<usize>,
+        function: Option<NonZeroUsize>,
         /// Which argument is the design, from 1; if not given, the last.
-        design: Option<usize>,
+        design: Option<NonZeroUsize>,
     },
     /// SUAVE's search.
     SpiralSearch {
@@ -78,6 +67,17 @@ pub enum By {
         #[serde(default = "recharge_battery")]
         server: String,
     },
+}
+
+/// An action that is done for PlanSys2's executor.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Offered {
+    /// What its arguments have to be; an empty one, or one that is not there, may be anything.
+    #[serde(default)]
+    pub specialized_arguments: Vec<String>,
+    /// Who does it.
+    #[serde(flatten)]
+    pub by: By,
 }
 
 fn navigate_to_pose() -> String {
@@ -175,45 +175,14 @@ impl Poses {
     }
 }
 
-impl Performers {
-    /// Reads settings that say nothing else.
-    ///
-    /// # Errors
-    /// What is wrong with them, and where.
-    pub fn parse(file: &str, text: &str) -> Result<Self, Message> {
-        toml::from_str(text).map_err(|error| {
-            let place = error.span().map(|span| {
-                let before = text.get(..span.start).unwrap_or(text);
-                let column = before.rsplit('\n').next().map_or(0, |last| last.chars().count()) + 1;
-                (before.matches('\n').count() + 1, column)
-            });
-            Message::at("N140", file, place, error.message().to_owned())
-        })
-    }
-
-    /// Numbers of arguments begin at 1.
-    pub(super) fn mistakes(&self) -> Vec<Message> {
-        let mut mistakes = Vec::new();
-        for (action, by) in &self.actions {
-            let numbers = match by {
-                By::NavigateToPose { pose, .. } => vec![("pose", pose)],
-                By::ChangeMode { function, design } => vec![("function", function), ("design", design)],
-                _ => Vec::new(),
-            };
-            for (key, _) in numbers.into_iter().filter(|(_, number)| **number == Some(0)) {
-                let text =
-                    format!("`[actions.{action}]`: `{key}` is the number of an argument; the first is 1");
-                mistakes.push(Message::error("N141", text));
-            }
-        }
-        mistakes
-    }
-}
-
 /// An argument by its number from 1, or from the end: 0 is the last.
-pub(super) fn argument(arguments: &[String], number: Option<usize>, from_end: usize) -> Result<&str, String> {
+pub(super) fn argument(
+    arguments: &[String],
+    number: Option<NonZeroUsize>,
+    from_end: usize,
+) -> Result<&str, String> {
     let index = match number {
-        Some(number) => number.checked_sub(1),
+        Some(number) => Some(number.get() - 1),
         None => arguments.len().checked_sub(from_end + 1),
     };
     let found = index.and_then(|index| arguments.get(index)).map(String::as_str);

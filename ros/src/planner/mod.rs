@@ -3,5 +3,5 @@
 mod node;
 mod solve;
 
-pub use node::serve;
+pub use node::{Options, run, serve};
 pub use solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};

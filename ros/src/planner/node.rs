@@ -4,6 +4,8 @@
 //! Each request is planned on a thread of its own, so that the node answers all others meanwhile. With a mission, its knowledge base joins
 //! in, and hears `/diagnostics`.
 
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -20,7 +22,9 @@ use crate::interfaces::plansys2_msgs::msg::{Plan, PlanArray, PlanItem};
 use crate::interfaces::plansys2_msgs::srv::{
     GetPlan, GetPlanArray, GetPlanArrayResponse, GetPlanResponse, ValidateDomain, ValidateDomainResponse,
 };
+use crate::manager::Settings;
 use crate::node::{Declared, Lifecycle, Node, Phase, Severity, keep_all};
+use crate::performer;
 use crate::planner::solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};
 
 /// In seconds; what PlanSys2 has.
@@ -32,9 +36,14 @@ const SHARE: f64 = 0.9;
 /// Plans may nest deeply.
 const STACK: usize = 64 << 20;
 
+/// So many requests are planned at a time; who asks for more is told so.
+const MOST: usize = 8;
+
 /// The planner behind the services.
 struct Planner {
     node: Arc<Node>,
+    /// Requests that are being planned.
+    busy: AtomicUsize,
     /// The mission whose knowledge base joins in, as the diagnostics have it.
     joint: Option<Mutex<Mission>>,
     manner: Mutex<Manner>,
@@ -48,7 +57,12 @@ pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, V
     let manner =
         Manner { metric: None, time_limit: Duration::ZERO, overlap: None, alternatives: ALTERNATIVES };
     let joint = setup.map(|setup| Mutex::new(setup.mission));
-    let planner = Arc::new(Planner { node: Arc::clone(node), joint, manner: Mutex::new(manner) });
+    let planner = Arc::new(Planner {
+        node: Arc::clone(node),
+        busy: AtomicUsize::new(0),
+        joint,
+        manner: Mutex::new(manner),
+    });
     let listener = Arc::clone(&planner);
     let warnings = node.declare(declared(), move |name, value| listener.set(name, value))?;
     for warning in warnings {
@@ -68,6 +82,42 @@ pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, V
             .map_err(one)?;
     }
     Ok(lifecycle)
+}
+
+/// What the planner is told.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The manifest of a mission whose knowledge base joins in.
+    pub mission: Option<PathBuf>,
+    /// How the mission meets the robot: who carries out actions for PlanSys2's executor.
+    pub settings: Option<PathBuf>,
+}
+
+/// So often is looked whether to stop.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Serves as PlanSys2's planner until told to stop, and does the actions that the settings offer.
+///
+/// # Errors
+/// The mission, the settings or a parameter of the command line is wrong.
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
+    let setup = options.mission.as_deref().map(Setup::read).transpose()?;
+    for warning in setup.iter().flat_map(|setup| setup.mission.warnings()) {
+        node.log(Severity::Warn, warning.text().trim_end());
+    }
+    let settings = match (&options.settings, &options.mission) {
+        (None, None) => Settings::default(),
+        (file, mission) => {
+            let beside = mission.clone().unwrap_or_default();
+            Settings::read(file.as_deref(), &beside).map_err(|message| vec![message])?
+        }
+    };
+    serve(node, setup)?;
+    performer::offers(node, &settings.offers, &settings.poses)?;
+    while !stop.load(Ordering::Relaxed) {
+        std::thread::sleep(LOOK);
+    }
+    Ok(())
 }
 
 /// Further plans in the answer of `get_plan_array`.
@@ -187,6 +237,16 @@ impl Planner {
         if !is_ready {
             return Err(NoPlan::None(UNCONFIGURED.to_owned()));
         }
+        if self.busy.fetch_add(1, Ordering::Relaxed) >= MOST {
+            self.busy.fetch_sub(1, Ordering::Relaxed);
+            return Err(NoPlan::None(format!("{MOST} other plans are being looked for")));
+        }
+        let found = self.plan_now(domain, problem, alternatives);
+        self.busy.fetch_sub(1, Ordering::Relaxed);
+        found
+    }
+
+    fn plan_now(&self, domain: String, problem: String, alternatives: usize) -> Result<Found, NoPlan> {
         let manner = Manner { alternatives, ..self.manner().clone() };
         let joint = self.joint.as_ref().map(|joint| lock(joint).clone());
         let request = Request {

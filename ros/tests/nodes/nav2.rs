@@ -11,12 +11,11 @@ use metaplan_ros::interfaces::nav2_msgs::action::{
 };
 use metaplan_ros::interfaces::std_msgs::msg::Bool;
 use metaplan_ros::node::{GoalEnd, depth};
-use metaplan_ros::perform::{Call, End, Perform};
-use metaplan_ros::performer::{Cast, Performers};
+use metaplan_ros::perform::{Call, End};
 use metaplan_ros::planner::{self, Found, Manner, NoPlan, Request};
 
 use crate::common::{domain, node, until};
-use crate::performers::{hear, serve};
+use crate::performers::{Cast, hear, serve};
 
 fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/nav2").join(name)
@@ -47,9 +46,7 @@ fn the_round_is_driven() {
             Some((GoalEnd::Succeeded, NavigateToPoseResult::default()))
         });
     let inspected = robot.publisher::<Bool>("/shelf/inspected", depth(10)).expect("a topic");
-    let settings = std::fs::read_to_string(file("ros.toml")).expect("settings");
-    let settings = Performers::parse("ros.toml", &settings).expect("settings");
-    let cast = Cast::new(&manager, &settings).expect("performers");
+    let cast = Cast::new(&manager, &file("ros.toml"));
     for (line, configuration) in found.plans[0].iter().zip(&found.configuration) {
         let mut words = words(&line.action).into_iter();
         let call = Call {

@@ -1,6 +1,7 @@
 //! Those who carry out actions, against servers of our own.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -13,9 +14,10 @@ use metaplan_ros::interfaces::plansys2_msgs::msg::{
 };
 use metaplan_ros::interfaces::system_modes_msgs::srv::{ChangeMode, ChangeModeResponse};
 use metaplan_ros::interfaces::{Action, humble, nav2_msgs, std_msgs};
+use metaplan_ros::manager::Settings;
 use metaplan_ros::node::{GoalEnd, GoalEvent, Node, depth};
 use metaplan_ros::perform::{Call, End, Perform, Progress, Running};
-use metaplan_ros::performer::{Cast, ExecutePlans, Performers, PlanVersion, offer};
+use metaplan_ros::performer::{ExecutePlans, PlanVersion, offer, offers, performers};
 use smol::block_on;
 
 use crate::common::{domain, node, until};
@@ -61,10 +63,26 @@ pub fn hear(running: &Running) -> (Vec<Progress>, End) {
     }
 }
 
+/// The performers of settings.
+pub struct Cast(BTreeMap<String, Box<dyn Perform>>);
+
+impl Cast {
+    pub fn new(node: &Arc<Node>, file: &Path) -> Self {
+        let settings = Settings::read(Some(file), Path::new("mission.toml")).expect("settings");
+        Self(performers(node, &settings.actions, &settings.poses).expect("performers"))
+    }
+
+    pub fn start(&self, call: Call) -> Running {
+        self.0[&call.action].start(call)
+    }
+}
+
 fn cast(domain: u16, settings: &str) -> (Arc<Node>, Cast) {
     let manager = node(domain, "metaplan", "");
-    let settings = Performers::parse("ros.toml", settings).expect("settings");
-    let cast = Cast::new(&manager, &settings).expect("performers");
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("ros.toml");
+    std::fs::write(&file, settings).expect("a file");
+    let cast = Cast::new(&manager, &file);
     (manager, cast)
 }
 
@@ -174,9 +192,6 @@ fn the_world_and_the_modes_of_functions_do_their_part() {
         end.is_finished()
     });
     assert_eq!(end.join().expect("no panic"), End::Succeeded);
-    // What nobody is configured for is done at once.
-    assert!(cast.has("LOOK") && !cast.has("wait"));
-    assert_eq!(hear(&cast.start(call("(wait)"))).1, End::Succeeded);
 }
 
 /// Both ends of the topic: one asks as PlanSys2's executor does, the other is a performer as PlanSys2's are.
@@ -234,6 +249,30 @@ fn actions_go_over_the_hub() {
     ];
     let seen: Vec<i16> = said.iter().copied().filter(|kind| whole.contains(kind)).take(5).collect();
     assert_eq!(seen, whole);
+}
+
+/// PlanSys2's executor asks for an action of the settings, which changes a mode.
+#[test]
+fn what_the_settings_offer_is_done_for_plansys2() {
+    let domain = domain();
+    let (robot, own, executor) =
+        (node(domain, "robot", ""), node(domain, "planner", ""), node(domain, "executor", ""));
+    robot
+        .serve::<ChangeMode>("/f_search/change_mode", |request, answer| {
+            answer.send(ChangeModeResponse { success: request.mode_name == "fd_high" });
+        })
+        .expect("a service");
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("ros.toml");
+    let text = "[offers.reconfigure]\nby = \"change_mode\"\nspecialized_arguments = [\"f_search\"]\n\
+                [actions.reconfigure]\nby = \"actions_hub\"\n";
+    std::fs::write(&file, text).expect("a file");
+    let settings = Settings::read(Some(&file), Path::new("mission.toml")).expect("settings");
+    offers(&own, &settings.offers, &settings.poses).expect("offers");
+    let cast = Cast::new(&executor, &file);
+    assert_eq!(hear(&cast.start(call("(reconfigure f_search fd_high)"))).1, End::Succeeded);
+    let end = hear(&cast.start(call("(reconfigure f_search fd_low)"))).1;
+    assert!(matches!(&end, End::Failed(because) if because.contains("refused")), "{end:?}");
 }
 
 /// Does what the name of the robot says.
@@ -305,18 +344,19 @@ fn plansys2_executes_a_whole_plan() {
 
 #[test]
 fn settings_that_are_wrong_say_where() {
-    for (text, place, expected) in [
-        ("[actions.a]\nby = \"nav\"\n", Some(1), "unknown variant `nav`"),
-        ("[actions.a]\nby = \"topic\"\n", Some(1), "missing field `topic`"),
-        ("[actions.a]\nby = \"actions_hub\"\nx = 1\n[action]\n", Some(1), "unknown field `action`"),
-        ("[poses]\nhall = { x = 1 }\n", None, "missing field `y`"),
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("ros.toml");
+    for (text, expected) in [
+        ("[actions.a]\nby = \"nav\"\n", "unknown variant `nav`"),
+        ("[actions.a]\nby = \"topic\"\n", "missing field `topic`"),
+        ("[actions.a]\nby = \"navigate_to_pose\"\nposes = 1\n", "unknown field `poses`"),
+        ("[actions.a]\nby = \"navigate_to_pose\"\npose = 0\n", "nonzero"),
+        ("[offers.a]\nby = \"change_mode\"\nmode = 1\n", "unknown field `mode`"),
+        ("[poses]\nhall = { x = 1 }\n", "missing field `y`"),
     ] {
-        let error = Performers::parse("ros.toml", text).expect_err("a mistake");
+        std::fs::write(&file, text).expect("a file");
+        let error = Settings::read(Some(&file), Path::new("mission.toml")).expect_err("a mistake");
         assert!(error.message.contains(expected), "{}", error.message);
-        assert!(place.is_none() || error.line.is_some(), "{error:?}");
+        assert!(error.line.is_some(), "{error:?}");
     }
-    let settings = Performers::parse("ros.toml", "[actions.a]\nby = \"navigate_to_pose\"\npose = 0\n");
-    let manager = node(domain(), "metaplan", "");
-    let errors = Cast::new(&manager, &settings.expect("settings")).expect_err("a mistake");
-    assert!(errors[0].message.contains("the first is 1"), "{}", errors[0].message);
 }
