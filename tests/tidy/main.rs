@@ -50,7 +50,7 @@ fn files() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut found = Vec::new();
     let folders = ["src", "ontology", "rules", "pddl", "mission", "certificate", "verify", "encodings"];
-    for folder in folders.into_iter().chain(["probabilistic", "tests", "benches"]) {
+    for folder in folders.into_iter().chain(["probabilistic", "ros", "tests", "benches"]) {
         rust_files(&root.join(folder), &mut found);
     }
     let relative =

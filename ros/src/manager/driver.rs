@@ -267,7 +267,7 @@ impl Driver {
                 Output::Stop(number) => self.robot.stop(number),
                 Output::Plan(plan) => self.robot.plan(&plan),
                 Output::Event(event) => self.robot.event(&event),
-                Output::Warn(text) => self.robot.warn(text),
+                Output::Warn(text) => self.robot.warn(&text),
             }
         }
         Ok(())

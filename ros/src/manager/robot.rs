@@ -256,12 +256,12 @@ impl Robot {
     }
 
     /// Logs what is wrong, each thing once.
-    pub(super) fn warn(&mut self, text: String) {
+    pub(super) fn warn(&mut self, text: &str) {
         if self.said.len() >= SAID {
             self.said.clear();
         }
-        if self.said.insert(text.clone()) {
-            self.node.log(Severity::Warn, &text);
+        if self.said.insert(text.to_owned()) {
+            self.node.log(Severity::Warn, text);
         }
     }
 
@@ -321,13 +321,12 @@ type Replies = Arc<Mutex<HashMap<u64, Responder<TaskService>>>>;
 /// Serves the requests of tasks and their ends.
 fn serve_tasks(node: &Arc<Node>, inputs: &Sender<Input>, replies: &Replies) -> Result<(), Message> {
     let count = Arc::new(AtomicU64::new(0));
-    let kinds: [(&str, fn(u64, String) -> Input); 2] =
-        [("/task/request", Input::Request), ("/task/cancel", Input::Cancel)];
-    for (service, input) in kinds {
+    for (service, is_request) in [("/task/request", true), ("/task/cancel", false)] {
         let (inputs, replies, count) = (inputs.clone(), Arc::clone(replies), Arc::clone(&count));
         node.serve::<TaskService>(service, move |request, responder| {
             let number = count.fetch_add(1, Ordering::Relaxed);
             replies.lock().unwrap_or_else(PoisonError::into_inner).insert(number, responder);
+            let input = if is_request { Input::Request } else { Input::Cancel };
             let _ = inputs.send(input(number, request.task_name));
         })?;
     }

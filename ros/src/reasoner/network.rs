@@ -122,16 +122,15 @@ impl Network {
 
     fn handle(&mut self, input: Input, now: Duration) {
         match input {
-            Input::Wanted(offer, wanted) => match self.keeping.refused(&wanted) {
-                Some(because) => {
+            Input::Wanted(offer, wanted) => {
+                if let Some(because) = self.keeping.refused(&wanted) {
                     self.node.log(Severity::Warn, &format!("a goal is rejected: {because}"));
                     self.goals.reject(offer);
-                }
-                None => {
+                } else {
                     let goal = self.goals.accept(offer);
                     self.keeping.pursue(goal, &wanted);
                 }
-            },
+            }
             Input::Cancel(goal, request) => {
                 self.cancels.insert(goal, request);
                 self.keeping.cancel(goal);
@@ -149,7 +148,7 @@ impl Network {
             match output {
                 Output::Configure(wanted) => self.configure(wanted),
                 Output::Feedback(goal, qos_status) => {
-                    self.goals.feedback(goal, ControlQosFeedback { qos_status })
+                    self.goals.feedback(goal, ControlQosFeedback { qos_status });
                 }
                 Output::Cancelled(goal, is_so) => {
                     if let Some(request) = self.cancels.remove(&goal) {
@@ -160,7 +159,7 @@ impl Network {
                     }
                 }
                 Output::Event(event) => {
-                    self.events.publish(std_msgs::msg::String { data: event.to_string() })
+                    self.events.publish(std_msgs::msg::String { data: event.to_string() });
                 }
                 Output::Warn(text) => {
                     if self.said.len() >= SAID {

@@ -1,0 +1,51 @@
+//! Actions: begun once their functions have their designs, and ended by whoever performs them.
+
+use metaplan::mapek::Event;
+use serde_json::json;
+
+use crate::manager::machine::Machine;
+use crate::manager::machine::io::{Ended, Output};
+
+impl Machine {
+    /// Begins the action that was requested, once every function that it needs has its design.
+    pub(super) fn begin(&mut self) {
+        let beliefs = self.control.beliefs();
+        let has = |(function, design): &(String, String)| {
+            beliefs.configuration().get(function).is_some_and(|own| own == design)
+        };
+        let is_ready = beliefs.running().is_some_and(|(_, step)| step.configuration.iter().all(has))
+            && !beliefs.suspended()
+            && !beliefs.cancelling();
+        if !self.pending.is_empty() || !is_ready {
+            return;
+        }
+        let Some(action) = self.action.as_mut().filter(|action| !action.begun) else { return };
+        action.begun = true;
+        let (number, effect, call) = (action.number, action.effect, action.call.clone());
+        self.outputs.push(Output::Perform(number, call));
+        self.lines.push_back(Event::Acknowledged { effect }.to_json().to_string());
+        self.lines.push_back(Event::Started { action: number }.to_json().to_string());
+    }
+
+    pub(super) fn performed(&mut self, number: u64, ended: &Ended) -> String {
+        if self.control.beliefs().running().is_none_or(|(running, _)| running != number) {
+            return format!("action {number} has ended before");
+        }
+        self.action = None;
+        match ended {
+            Ended::Succeeded => self.say(&Event::Succeeded { action: number }),
+            Ended::Cancelled => self.say(&Event::Cancelled { action: number }),
+            Ended::Failed(reason) => self.say(&Event::Failed { action: number, reason: reason.clone() }),
+        }
+        format!("action {number} has ended")
+    }
+
+    pub(super) fn progress(&mut self, number: u64, fraction: f64) -> String {
+        let is_running = self.control.beliefs().running().is_some_and(|(running, _)| running == number);
+        if is_running && (0.0..=1.0).contains(&fraction) {
+            let line = json!({"event": "action_progress", "action": number, "fraction": (fraction * 100.0).round() / 100.0});
+            self.lines.push_back(line.to_string());
+        }
+        format!("action {number} goes on")
+    }
+}

@@ -1,0 +1,184 @@
+//! Functions: the modes that are asked for, what comes of it, and what was seen without being asked for.
+
+use std::time::Duration;
+
+use metaplan::mapek::{Command, Event};
+use serde_json::json;
+
+use crate::manager::machine::Machine;
+use crate::manager::machine::io::{Change, Outcome, Output, State};
+
+/// A call is made again once where there was no answer.
+const TRIES: u32 = 2;
+
+/// The first wait before a function that did not answer is asked again; it doubles with each failure.
+const PROBE: Duration = Duration::from_secs(1);
+
+/// The longest one.
+const LONGEST_PROBE: Duration = Duration::from_secs(60);
+
+/// A function that still does not answer is asked again at least so often.
+const AGAIN: Duration = Duration::from_secs(2);
+
+/// After a refusal, the design is tried again so much later.
+const REFUSED: Duration = Duration::from_secs(60);
+
+impl Machine {
+    /// A function that nobody needs gets the mode for that.
+    pub(super) fn unground(&mut self, function: &str) {
+        let mode = self.settings.functions.unground(function).to_owned();
+        let asked = self.pending.get(function).map(|change| &change.mode);
+        let has = asked.or_else(|| self.modes.get(function));
+        // A function that was never heard of has no mode that could be taken away.
+        if has.is_some_and(|has| *has != mode) {
+            self.change(Change { function: function.to_owned(), mode, effect: None, attempt: 1 });
+        }
+    }
+
+    pub(super) fn change(&mut self, change: Change) {
+        self.pending.insert(change.function.clone(), change.clone());
+        self.outputs.push(Output::Change(change));
+    }
+
+    /// A function has answered, or has not.
+    pub(super) fn changed(&mut self, change: Change, outcome: Outcome) -> String {
+        let Change { function, mode, effect, attempt } = change.clone();
+        if self.pending.get(&function) != Some(&change) {
+            // It was asked for something else since; what it did meanwhile is overwritten by that.
+            return format!("{function} has answered late");
+        }
+        match outcome {
+            Outcome::Done => {
+                self.pending.remove(&function);
+                self.modes.insert(function.clone(), mode.clone());
+                self.trouble.entry(function.clone()).or_default().silences = 0;
+                match effect {
+                    Some(effect) => self.acknowledge(effect),
+                    None => self.say(&Event::Observed { function: function.clone(), design: None }),
+                }
+                format!("{function} has the mode {mode}")
+            }
+            Outcome::Failed(because) if attempt < TRIES => {
+                self.complain(&function, &mode, &because);
+                self.change(Change { attempt: attempt + 1, ..change });
+                because
+            }
+            Outcome::Failed(because) => {
+                self.complain(&function, &mode, &because);
+                let trouble = self.trouble.entry(function.clone()).or_default();
+                trouble.silences = trouble.silences.saturating_add(1);
+                let wait = PROBE.saturating_mul(1 << trouble.silences.min(6)).min(LONGEST_PROBE);
+                self.outputs.push(Output::Probe(function.clone(), wait));
+                self.failed(&function, effect, None);
+                because
+            }
+            Outcome::Refused => {
+                let because = format!("{function} has refused the mode {mode}");
+                self.complain(&function, &mode, &because);
+                self.failed(&function, effect, Some(self.now + REFUSED));
+                because
+            }
+        }
+    }
+
+    pub(super) fn complain(&mut self, function: &str, mode: &str, because: &str) {
+        let system = self.settings.functions.system(function).to_owned();
+        self.outputs.push(Output::Warn(format!("/{system}/change_mode {mode}: {because}")));
+        self.outputs.push(Output::Event(json!({
+            "answer": "call_failed", "service": format!("/{system}/change_mode"), "mode": mode, "because": because,
+        })));
+    }
+
+    /// A design could not be had; it is tried again from some time on, or when the function answers.
+    pub(super) fn failed(&mut self, function: &str, effect: Option<u64>, again: Option<Duration>) {
+        self.pending.remove(function);
+        let Some(effect) = effect else { return };
+        let asked = self.control.beliefs().outstanding().find(|own| own.number == effect);
+        if let Some(Command::Reconfigure { to, .. }) = asked.map(|own| own.command.clone()) {
+            self.trouble.entry(function.to_owned()).or_default().designs.insert(to, again);
+            self.say(&Event::ReconfigurationFailed { effect });
+        }
+        self.outputs.push(Output::Look(function.to_owned()));
+    }
+
+    /// A function was seen with a mode.
+    pub(super) fn mode(&mut self, function: &str, mode: &str) -> String {
+        let because = format!("{function} was seen with the mode {mode}");
+        if let Some(change) = self.pending.get(function).cloned() {
+            if change.mode == mode && change.attempt >= TRIES {
+                // Its answer was lost; that it has the mode is answer enough.
+                return self.changed(change, Outcome::Done);
+            }
+            // It is on its way from one mode to another, on our demand.
+            return because;
+        }
+        if self.modes.get(function).map(String::as_str) == Some(mode) {
+            return because;
+        }
+        self.modes.insert(function.to_owned(), mode.to_owned());
+        self.came_late(function, mode);
+        self.observe(function, mode);
+        because
+    }
+
+    /// A mode that was asked for, and that nobody has answered for in time, is there after all.
+    pub(super) fn came_late(&mut self, function: &str, mode: &str) {
+        let designs = self.control.beliefs().mission().designs_of(function);
+        let Some(design) = self.settings.functions.design(function, mode, &designs) else { return };
+        let trouble = self.trouble.get_mut(function).and_then(|own| own.designs.remove(&design));
+        if trouble.is_some() {
+            self.say(&Event::Design { design, realisable: true });
+        }
+    }
+
+    /// Tells the loop of a mode that it has not asked for.
+    pub(super) fn observe(&mut self, function: &str, mode: &str) {
+        let designs = self.control.beliefs().mission().designs_of(function);
+        let design = self.settings.functions.design(function, mode, &designs);
+        let believed = self.control.beliefs().configuration().get(function);
+        if believed != design.as_ref() {
+            self.say(&Event::Observed { function: function.to_owned(), design });
+        }
+    }
+
+    pub(super) fn probed(&mut self, function: &str, answers: bool) -> String {
+        let trouble = self.trouble.entry(function.to_owned()).or_default();
+        if !answers {
+            let wait = PROBE.saturating_mul(1 << trouble.silences.min(6)).min(LONGEST_PROBE);
+            self.outputs.push(Output::Probe(function.to_owned(), wait.min(AGAIN)));
+            return format!("{function} does not answer");
+        }
+        let back: Vec<String> = trouble
+            .designs
+            .iter()
+            .filter(|(_, again)| again.is_none())
+            .map(|(design, _)| design.clone())
+            .collect();
+        trouble.designs.retain(|_, again| again.is_some());
+        for design in back {
+            self.say(&Event::Design { design, realisable: true });
+        }
+        self.outputs.push(Output::Look(function.to_owned()));
+        format!("{function} answers again")
+    }
+
+    /// Designs that were refused long ago are tried again, and hopes that had to settle have.
+    pub(super) fn tick(&mut self) -> String {
+        let now = self.now;
+        let mut back = Vec::new();
+        for trouble in self.trouble.values_mut() {
+            let due = |again: &Option<Duration>| again.is_some_and(|again| again <= now);
+            back.extend(
+                trouble.designs.iter().filter(|(_, again)| due(again)).map(|(design, _)| design.clone()),
+            );
+            trouble.designs.retain(|_, again| !due(again));
+        }
+        for design in back {
+            self.say(&Event::Design { design, realisable: true });
+        }
+        if self.ticks && self.state == State::Execute {
+            self.say(&Event::Tick);
+        }
+        "time has passed".to_owned()
+    }
+}

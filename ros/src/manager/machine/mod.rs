@@ -1,0 +1,319 @@
+//! What is heard to what is asked for: the state machine between the robot and the adaptation loop.
+//!
+//! It knows no clock and no network: inputs come with a time, and outputs are carried out by [`super::driver`]. A line that the loop hears is
+//! written to the journal before it is handled, and what the loop decides before any of it leaves.
+
+mod actions;
+mod functions;
+mod io;
+mod restart;
+mod tasks;
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use metaplan::journal::Journal;
+use metaplan::mapek::{Answer, Command, Effect, Event, Loop, Observation, PlannedStep};
+use metaplan::message::Message;
+use serde_json::json;
+
+use crate::manager::settings::Settings;
+use crate::perform::Call;
+
+pub(super) use io::{Change, Ended, Input, Outcome, Output, State};
+
+/// The goal of nobody.
+const NOTHING: &str = "(and)";
+
+/// An action that was requested by the loop.
+#[derive(Debug, Clone)]
+struct Action {
+    number: u64,
+    call: Call,
+    effect: u64,
+    /// Whether somebody performs it already.
+    begun: bool,
+}
+
+/// Why a function is not asked.
+#[derive(Debug, Clone, Default)]
+struct Trouble {
+    /// Designs that it did not take, with the time from which each is tried again; none while it does not answer.
+    designs: BTreeMap<String, Option<Duration>>,
+    /// How often in a row it did not answer.
+    silences: u32,
+}
+
+/// What is done after a restart as soon as it is known how the robot is.
+#[derive(Debug)]
+struct Deferred {
+    /// What the loop asks for again.
+    answers: Vec<Answer>,
+    /// The modes that the functions were found with.
+    modes: BTreeMap<String, String>,
+    /// Diagnostics are waited for until then.
+    until: Duration,
+}
+
+/// The state machine.
+#[derive(Debug)]
+pub(super) struct Machine {
+    control: Loop,
+    journal: Option<Journal>,
+    settings: Settings,
+    functions: Vec<String>,
+    state: State,
+    task: Option<String>,
+    /// Calls that have no answer yet, by function.
+    pending: BTreeMap<String, Change>,
+    /// The mode that each function was last heard to have.
+    modes: BTreeMap<String, String>,
+    action: Option<Action>,
+    /// Who waits for the answer to the request of a task, and to the end of one.
+    waiting: Vec<u64>,
+    ending: Vec<u64>,
+    trouble: BTreeMap<String, Trouble>,
+    /// Whether the last plan was none.
+    without_plan: bool,
+    obeyed: bool,
+    deferred: Option<Deferred>,
+    /// Whether the loop waits for time to pass before it looks for a better plan.
+    ticks: bool,
+    outputs: Vec<Output>,
+    lines: VecDeque<String>,
+    now: Duration,
+}
+
+impl Machine {
+    /// For a loop that has not begun, with the journal that it was brought back from, if there is one.
+    pub(super) fn new(control: Loop, journal: Option<Journal>, settings: Settings, ticks: bool) -> Self {
+        let mission = control.beliefs().mission();
+        let functions = mission.functions();
+        let task = control.beliefs().goal().filter(|goal| *goal != NOTHING).and_then(|goal| {
+            settings.tasks.iter().find(|(_, own)| own.goal == goal).map(|(name, _)| name.clone())
+        });
+        Self {
+            control,
+            journal,
+            settings,
+            functions,
+            state: State::WaitGraph,
+            task,
+            pending: BTreeMap::new(),
+            modes: BTreeMap::new(),
+            action: None,
+            waiting: Vec::new(),
+            ending: Vec::new(),
+            trouble: BTreeMap::new(),
+            without_plan: false,
+            obeyed: false,
+            deferred: None,
+            ticks,
+            outputs: Vec::new(),
+            lines: VecDeque::new(),
+            now: Duration::ZERO,
+        }
+    }
+
+    pub(super) fn control(&self) -> &Loop {
+        &self.control
+    }
+
+    pub(super) fn state(&self) -> State {
+        self.state
+    }
+
+    pub(super) fn task(&self) -> Option<&str> {
+        self.task.as_deref()
+    }
+
+    /// The functions that have designs.
+    pub(super) fn functions(&self) -> &[String] {
+        &self.functions
+    }
+
+    /// All modes that designs and their absence stand for, of a function.
+    pub(super) fn modes_of(&self, function: &str) -> Vec<String> {
+        let designs = self.control.beliefs().mission().designs_of(function);
+        designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
+    }
+
+    /// Takes something that was heard, at a time since the start, and says what is to be done.
+    ///
+    /// # Errors
+    /// The journal cannot be written: nothing may be done any more.
+    pub(super) fn handle(&mut self, input: Input, now: Duration) -> Result<Vec<Output>, Message> {
+        self.now = now;
+        let is_over = self.deferred.as_ref().is_some_and(|own| own.until <= now);
+        if is_over || matches!(input, Input::Request(..) | Input::Cancel(..)) {
+            self.catch_up();
+            self.settle()?;
+        }
+        let is_news = matches!(input, Input::Line(_));
+        let because = match input {
+            Input::Ready(modes) => self.ready(modes)?,
+            Input::Line(line) => self.told(line),
+            Input::Request(number, task) => self.request(number, &task),
+            Input::Cancel(number, task) => self.cancel(Some(number), &task),
+            Input::Changed(change, outcome) => self.changed(change, outcome),
+            Input::Mode(function, mode) => self.mode(&function, &mode),
+            Input::Touched(function) => {
+                if !self.pending.contains_key(&function) {
+                    self.outputs.push(Output::Look(function.clone()));
+                }
+                format!("{function} has changed something")
+            }
+            Input::Performed(number, ended) => self.performed(number, &ended),
+            Input::Progress(number, fraction) => self.progress(number, fraction),
+            Input::Probed(function, answers) => self.probed(&function, answers),
+            Input::Autopilot(mode) => self.autopilot(&mode),
+            Input::Tick | Input::Diagnosed => self.tick(),
+        };
+        self.settle()?;
+        if is_news {
+            self.catch_up();
+            self.settle()?;
+        }
+        self.begin();
+        self.settle()?;
+        self.enter(&because)?;
+        Ok(std::mem::take(&mut self.outputs))
+    }
+
+    /// Hands the loop all lines that wait.
+    fn settle(&mut self) -> Result<(), Message> {
+        if self.state == State::WaitGraph {
+            return Ok(());
+        }
+        while let Some(line) = self.lines.pop_front() {
+            let answers = self.hand(&line)?;
+            self.take(answers);
+        }
+        Ok(())
+    }
+
+    fn hand(&mut self, line: &str) -> Result<Vec<Answer>, Message> {
+        match &mut self.journal {
+            None => Ok(self.control.handle(&Observation::parse(line), self.now)),
+            Some(journal) => {
+                journal.handle(&mut self.control, line, self.now).map_err(|error| unwritten(&error))
+            }
+        }
+    }
+
+    fn say(&mut self, event: &Event) {
+        self.lines.push_back(event.to_json().to_string());
+    }
+
+    /// The state that follows from what is under way; each change is a note in the journal.
+    fn enter(&mut self, because: &str) -> Result<(), Message> {
+        if self.state == State::WaitGraph {
+            return Ok(());
+        }
+        let next = if !self.pending.is_empty() {
+            State::Reconfigure
+        } else if self.task.is_none() {
+            State::Idle
+        } else if self.without_plan {
+            State::Degraded
+        } else {
+            State::Execute
+        };
+        self.reply();
+        if next != self.state {
+            let text = format!("{} -> {next}: {because}", self.state);
+            self.state = next;
+            let answers = self.hand(&Event::Note { text: text.clone() }.to_json().to_string())?;
+            self.take(answers);
+            self.outputs.push(Output::Event(
+                json!({"answer": "state", "state": next.to_string(), "because": because, "task": self.task}),
+            ));
+        }
+        Ok(())
+    }
+
+    fn told(&mut self, line: String) -> String {
+        let because = "what is known has changed".to_owned();
+        self.lines.push_back(line);
+        because
+    }
+
+    /// Takes what the loop says.
+    fn take(&mut self, answers: Vec<Answer>) {
+        for answer in answers {
+            self.outputs.push(Output::Event(answer.to_json()));
+            match answer {
+                Answer::PlanFound { .. } => {
+                    self.without_plan = false;
+                    self.outputs.push(Output::Plan(answer.to_json()));
+                }
+                Answer::PlanKept { .. } => self.without_plan = false,
+                Answer::PlanNone { because, .. } => {
+                    self.without_plan = self.task.is_some();
+                    self.outputs.push(Output::Warn(format!("there is no plan: {because}")));
+                }
+                Answer::GoalReached => self.reached(),
+                Answer::Error { code, message } => {
+                    self.outputs.push(Output::Warn(format!("{code}: {message}")));
+                }
+                Answer::Effect(effect) => self.effect(effect),
+                _ => {}
+            }
+        }
+    }
+
+    fn effect(&mut self, effect: Effect) {
+        match effect.command {
+            Command::Reconfigure { function, to, .. } => {
+                let mode = self.settings.functions.mode(&function, &to).to_owned();
+                // It was just seen to have it: somebody has given it while this program was not there.
+                if self.deferred.is_some() && self.modes.get(&function) == Some(&mode) {
+                    self.acknowledge(effect.number);
+                    return;
+                }
+                self.change(Change { function, mode, effect: Some(effect.number), attempt: 1 });
+            }
+            Command::Request { step } => {
+                let call = call(&step);
+                let needed: BTreeSet<&String> =
+                    step.configuration.iter().map(|(function, _)| function).collect();
+                let idle: Vec<String> =
+                    self.functions.iter().filter(|function| !needed.contains(function)).cloned().collect();
+                for function in &idle {
+                    self.unground(function);
+                }
+                self.action =
+                    Some(Action { number: effect.action, call, effect: effect.number, begun: false });
+            }
+            Command::Cancel { .. } => {
+                self.acknowledge(effect.number);
+                match &self.action {
+                    // Who performs it says when it has ended.
+                    Some(action) if action.begun => self.outputs.push(Output::Stop(action.number)),
+                    _ => self.say(&Event::Cancelled { action: effect.action }),
+                }
+            }
+            // Functions keep their modes, and so do their nodes what they have done.
+            _ => self.acknowledge(effect.number),
+        }
+    }
+
+    fn acknowledge(&mut self, effect: u64) {
+        self.say(&Event::Acknowledged { effect });
+    }
+}
+
+/// An action as whoever performs it hears of it.
+fn call(step: &PlannedStep) -> Call {
+    let written = step.arguments.get(..step.written).unwrap_or(&step.arguments);
+    Call {
+        action: step.action.clone(),
+        arguments: written.to_vec(),
+        configuration: step.configuration.iter().cloned().collect(),
+        duration: step.duration_rounded(),
+    }
+}
+
+fn unwritten(error: &std::io::Error) -> Message {
+    Message::error("M321", format!("the journal cannot be written: {error}"))
+}

@@ -1,0 +1,87 @@
+//! After a restart: what was asked for before and has not been done, and what has changed meanwhile.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use metaplan::mapek::{Command, Effect, Event};
+use metaplan::message::Message;
+
+use crate::manager::machine::io::{Output, State};
+use crate::manager::machine::{Action, Deferred, Machine, call, unwritten};
+
+/// So long diagnostics are waited for, before what was found is judged by what was known before.
+const AGAIN: Duration = Duration::from_secs(3);
+
+impl Machine {
+    /// The robot is there: what the loop has to say, and what has changed meanwhile.
+    pub(super) fn ready(&mut self, modes: Vec<(String, Option<String>)>) -> Result<String, Message> {
+        self.state = State::Idle;
+        let answers = match &mut self.journal {
+            None => self.control.start(),
+            Some(journal) => journal.begin(&mut self.control).map_err(|error| unwritten(&error))?,
+        };
+        // What was asked for before and has been done meanwhile is not asked for again.
+        for (function, mode) in modes {
+            if let Some(mode) = mode {
+                self.modes.insert(function, mode);
+            }
+        }
+        self.restore_action();
+        let until = if self.control.beliefs().lines() == 0 { self.now } else { self.now + AGAIN };
+        self.deferred = Some(Deferred { answers, modes: self.modes.clone(), until });
+        if until == self.now {
+            self.catch_up();
+        }
+        Ok("every function answers".to_owned())
+    }
+
+    /// Asks again for what was asked for before a restart and has not been done, and adopts what has changed meanwhile.
+    pub(super) fn catch_up(&mut self) {
+        let Some(Deferred { answers, modes, .. }) = self.deferred.take() else { return };
+        let outstanding: BTreeSet<u64> =
+            self.control.beliefs().outstanding().map(|effect| effect.number).collect();
+        let mut asked = BTreeSet::new();
+        let mut rest = Vec::new();
+        for answer in answers {
+            let Some(effect) = answer.effect() else {
+                rest.push(answer);
+                continue;
+            };
+            if !outstanding.contains(&effect.number) {
+                // Something else was asked for since.
+                continue;
+            }
+            if let Command::Reconfigure { function, to, .. } = &effect.command {
+                let mode = self.settings.functions.mode(function, to);
+                if self.modes.get(function).is_some_and(|own| own == mode) {
+                    self.say(&Event::Acknowledged { effect: effect.number });
+                    continue;
+                }
+                asked.insert(function.clone());
+            }
+            rest.push(answer);
+        }
+        self.take(rest);
+        for (function, mode) in modes {
+            if !asked.contains(&function) && !self.pending.contains_key(&function) {
+                self.observe(&function, &mode);
+            }
+        }
+    }
+
+    /// An action that was under way when the program ended is under way still.
+    pub(super) fn restore_action(&mut self) {
+        let Some((number, step)) = self.control.beliefs().running() else { return };
+        let call = call(step);
+        let is_waiting = |effect: &&Effect| matches!(effect.command, Command::Request { .. });
+        let effect = self.control.beliefs().outstanding().find(is_waiting).map(|effect| effect.number);
+        // Who performs it may not know of it any more: it is begun again, which is right for what tells by a topic that it is done.
+        self.action =
+            Some(Action { number, call, effect: effect.unwrap_or_default(), begun: effect.is_none() });
+        if effect.is_none()
+            && let Some(action) = &self.action
+        {
+            self.outputs.push(Output::Perform(number, action.call.clone()));
+        }
+    }
+}

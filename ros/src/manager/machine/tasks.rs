@@ -1,0 +1,118 @@
+//! Tasks: requested, granted, ended by who asked for them, by their goals, or by the autopilot.
+
+use metaplan::mapek::Event;
+use metaplan::message::did_you_mean;
+use serde_json::json;
+
+use crate::manager::machine::io::{Output, State};
+use crate::manager::machine::{Machine, NOTHING};
+
+impl Machine {
+    /// Answers those who wait, where it is known what has come of it.
+    pub(super) fn reply(&mut self) {
+        if !self.pending.is_empty() {
+            return;
+        }
+        let granted = self.task.is_some() && !self.without_plan;
+        for number in std::mem::take(&mut self.waiting) {
+            self.outputs.push(Output::Reply(number, granted));
+        }
+        for number in std::mem::take(&mut self.ending) {
+            let left =
+                self.modes.iter().any(|(function, mode)| self.settings.functions.unground(function) != mode);
+            self.outputs.push(Output::Reply(number, self.task.is_none() && !left));
+        }
+    }
+
+    pub(super) fn request(&mut self, number: u64, task: &str) -> String {
+        let Some(settings) = self.settings.tasks.get(task).cloned() else {
+            let meant = did_you_mean(task, self.settings.tasks.keys().map(String::as_str));
+            let because = format!("there is no task `{task}`{meant}");
+            self.outputs.push(Output::Reply(number, false));
+            self.refuse(&because);
+            return because;
+        };
+        if self.state == State::WaitGraph {
+            self.outputs.push(Output::Reply(number, false));
+            let because = format!("the task {task} is requested, and functions are missing");
+            self.refuse(&because);
+            return because;
+        }
+        self.waiting.push(number);
+        if self.task.as_deref() != Some(task) {
+            self.task = Some(task.to_owned());
+            for (name, value) in &settings.facts {
+                let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                self.say(&Event::Fact { name: name.clone(), value });
+            }
+            self.say(&Event::Goal { goal: settings.goal });
+        }
+        format!("the task {task} is requested")
+    }
+
+    pub(super) fn refuse(&mut self, because: &str) {
+        self.outputs.push(Output::Event(json!({"answer": "refused", "because": because})));
+        self.outputs.push(Output::Warn(because.to_owned()));
+    }
+
+    pub(super) fn cancel(&mut self, number: Option<u64>, task: &str) -> String {
+        if !self.settings.tasks.contains_key(task) {
+            let because = format!("there is no task `{task}`");
+            self.outputs.extend(number.map(|number| Output::Reply(number, false)));
+            self.refuse(&because);
+            return because;
+        }
+        if self.task.as_deref().is_some_and(|own| own != task) {
+            // Another task is under way: what is asked for is so already.
+            self.outputs.extend(number.map(|number| Output::Reply(number, true)));
+            return format!("the task {task} is not under way");
+        }
+        self.ending.extend(number);
+        self.without_plan = false;
+        for waiting in std::mem::take(&mut self.waiting) {
+            self.outputs.push(Output::Reply(waiting, false));
+        }
+        if self.task.take().is_some() {
+            self.say(&Event::Goal { goal: NOTHING.to_owned() });
+        }
+        if let Some(action) = self.action.take() {
+            self.outputs.push(Output::Stop(action.number));
+        }
+        if let Some((action, _)) = self.control.beliefs().running() {
+            self.say(&Event::Cancelled { action });
+        }
+        for function in self.functions.clone() {
+            self.unground(&function);
+        }
+        format!("the task {task} ends")
+    }
+
+    /// The task is done: nobody needs a function any more.
+    pub(super) fn reached(&mut self) {
+        self.without_plan = false;
+        self.action = None;
+        if self.task.take().is_none() {
+            return;
+        }
+        for number in std::mem::take(&mut self.waiting) {
+            self.outputs.push(Output::Reply(number, true));
+        }
+        self.say(&Event::Goal { goal: NOTHING.to_owned() });
+        for function in self.functions.clone() {
+            self.unground(&function);
+        }
+    }
+
+    pub(super) fn autopilot(&mut self, mode: &str) -> String {
+        let obeys = self.settings.autopilot.as_ref().is_some_and(|own| own.mode == mode);
+        let was = std::mem::replace(&mut self.obeyed, obeys);
+        let because = format!("the autopilot is in the mode {mode}");
+        match self.task.clone() {
+            Some(task) if was && !obeys => {
+                self.cancel(None, &task);
+                because
+            }
+            _ => because,
+        }
+    }
+}

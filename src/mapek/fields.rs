@@ -1,0 +1,111 @@
+//! The fields of a line: what is missing, what is wrong, and what is there twice.
+
+use std::time::Duration;
+
+use num_rational::BigRational;
+use serde_json::{Map, Value};
+
+use crate::number;
+
+/// Why a line, or a part of it, is no event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// A stable code.
+    pub code: &'static str,
+    /// One sentence.
+    pub message: String,
+}
+
+impl Refusal {
+    pub(crate) fn new(code: &'static str, message: impl Into<String>) -> Self {
+        Self { code, message: message.into() }
+    }
+}
+
+/// A field that an object has twice; of objects within it nothing is said.
+pub(super) fn doubled_key(text: &str) -> Option<String> {
+    let Keys(keys) = serde_json::from_str(text).ok()?;
+    let doubled = keys.iter().enumerate().find(|(index, key)| keys[..*index].contains(key));
+    doubled.map(|(_, key)| key.clone())
+}
+
+/// The keys of an object, in their order.
+struct Keys(Vec<String>);
+
+impl<'de> serde::Deserialize<'de> for Keys {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> serde::de::Visitor<'de> for Visitor {
+            type Value = Keys;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("an object")
+            }
+
+            fn visit_map<M: serde::de::MapAccess<'de>>(self, mut map: M) -> Result<Keys, M::Error> {
+                let mut keys = Vec::new();
+                while let Some((key, _)) = map.next_entry::<String, serde::de::IgnoredAny>()? {
+                    keys.push(key);
+                }
+                Ok(Keys(keys))
+            }
+        }
+        deserializer.deserialize_map(Visitor)
+    }
+}
+
+pub(super) fn seconds(value: &Value) -> Option<Duration> {
+    number::from_json(value).and_then(|value| Duration::try_from_secs_f64(number::to_f64(&value)).ok())
+}
+
+/// Takes an optional field away.
+pub(super) fn take<T>(
+    fields: &mut Map<String, Value>,
+    name: &str,
+    wanted: &str,
+    read: impl Fn(&Value) -> Option<T>,
+) -> Result<Option<T>, Refusal> {
+    match fields.remove(name) {
+        None => Ok(None),
+        Some(value) => match read(&value) {
+            Some(read) => Ok(Some(read)),
+            None => Err(Refusal::new("M302", format!("`{name}` is {value}, but should be {wanted}"))),
+        },
+    }
+}
+
+pub(super) fn need<T>(
+    fields: &mut Map<String, Value>,
+    name: &str,
+    wanted: &str,
+    read: impl Fn(&Value) -> Option<T>,
+) -> Result<T, Refusal> {
+    let missing = || Refusal::new("M302", format!("the field `{name}` is missing; it should be {wanted}"));
+    take(fields, name, wanted, read)?.ok_or_else(missing)
+}
+
+pub(super) fn text(value: &Value) -> Option<String> {
+    value.as_str().map(str::trim).filter(|text| !text.is_empty()).map(ToOwned::to_owned)
+}
+
+pub(super) fn fraction(value: &Value) -> Option<BigRational> {
+    let (zero, one) = (BigRational::from_integer(0.into()), BigRational::from_integer(1.into()));
+    let percent = BigRational::from_integer(100.into());
+    let fraction = number::from_json(value).filter(|fraction| (zero..=one).contains(fraction))?;
+    Some((fraction * &percent).round() / percent)
+}
+
+/// Names with exact numbers.
+pub(super) fn numbers(value: &Value) -> Option<Vec<(String, BigRational)>> {
+    let fields = value.as_object()?.iter();
+    fields.map(|(name, value)| Some((name.clone(), number::from_json(value)?))).collect()
+}
+
+/// The value of a fact: a word, a number or a truth value.
+pub(super) fn word(value: &Value) -> Option<String> {
+    match value {
+        Value::Bool(truth) => Some(truth.to_string()),
+        Value::Number(number) => Some(number.to_string()),
+        other => text(other),
+    }
+}
