@@ -53,6 +53,15 @@ pub(crate) struct Expected {
     pub(crate) hash: &'static str,
 }
 
+/// Whoever serves a service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Server {
+    /// How it maps services.
+    pub(crate) mapping: Mapping,
+    /// What reads its requests.
+    pub(crate) reader: [u8; 16],
+}
+
 /// A reader or a writer of another participant.
 #[derive(Debug, Clone)]
 struct Endpoint {
@@ -161,8 +170,8 @@ impl Graph {
         self.seen().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
     }
 
-    /// The mapping of whoever serves a service, if somebody does who reads what we send, by the topics of requests and replies.
-    pub(crate) fn server(&self, requests: &str, replies: &str) -> Option<Result<Mapping, String>> {
+    /// Whoever serves a service, if somebody does, by the topics of requests and replies.
+    pub(crate) fn server(&self, requests: &str, replies: &str) -> Option<Result<Server, String>> {
         let seen = self.seen();
         let of = |topic: &str, is_reader: bool| {
             let is_it = |own: &(&[u8; 16], &Endpoint)| own.1.is_reader == is_reader && own.1.topic == topic;
@@ -177,7 +186,7 @@ impl Graph {
         }
         let vendor = Vendor::new([guid[0], guid[1]]);
         let mapping = self.rmw.fixed().or_else(|| vendor.mapping()).or(seen.mapping);
-        Some(Ok(mapping.unwrap_or(Mapping::Enhanced)))
+        Some(Ok(Server { mapping: mapping.unwrap_or(Mapping::Enhanced), reader: *guid }))
     }
 
     /// The mapping of our own services: that of the first participant that has only one.

@@ -1,6 +1,6 @@
 //! A managed node (ROS 2 design article "Managed nodes"): its primary states, and the services by which others move it between them.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use metaplan::message::Message;
@@ -101,7 +101,8 @@ impl Way {
 
 /// The states of a managed node.
 pub struct Lifecycle {
-    node: Arc<Node>,
+    /// The node holds what is served, and that this.
+    node: Weak<Node>,
     phase: Mutex<Phase>,
     events: Publisher<TransitionEvent>,
     /// Does what a change needs; without success the node stays where it is.
@@ -125,7 +126,7 @@ impl Lifecycle {
     ) -> Result<Arc<Self>, Message> {
         let events = node.publisher("~/transition_event", depth(1))?;
         let own = Arc::new(Self {
-            node: Arc::clone(node),
+            node: Arc::downgrade(node),
             phase: Mutex::new(Phase::Unconfigured),
             events,
             change: Box::new(change),
@@ -180,7 +181,9 @@ impl Lifecycle {
         };
         let Some(way) = WAYS.iter().find(is_it) else {
             let text = format!("no transition {} ({}) from {}", wanted.id, wanted.label, from.state().label);
-            self.node.log(Severity::Warn, &text);
+            if let Some(node) = self.node.upgrade() {
+                node.log(Severity::Warn, &text);
+            }
             return false;
         };
         self.walk(way)

@@ -13,7 +13,7 @@ use ros2_client::request_id::RmwRequestId;
 use smol::{Timer, channel};
 
 use crate::interfaces::Service;
-use crate::node::graph::Expected;
+use crate::node::graph::{Expected, Server};
 use crate::node::qos;
 use crate::node::rmw::Mapping;
 use crate::node::{Node, Severity, client_name, dds_type, not_made};
@@ -84,7 +84,7 @@ pub enum CallError {
     },
 }
 
-type Connection<S> = (Mapping, Client<<S as Service>::Request, <S as Service>::Response>);
+type Connection<S> = (Server, Client<<S as Service>::Request, <S as Service>::Response>);
 
 /// Calls a service, one request at a time.
 pub struct Caller<S: Service> {
@@ -126,7 +126,7 @@ impl<S: Service> Caller<S> {
     pub async fn call(&self, request: S::Request, within: Duration) -> Result<S::Response, CallError> {
         let begun = Instant::now();
         let mut connection = self.connection.lock().await;
-        let (mapping, client) = self.connect(&mut connection, within).await?;
+        let (Server { mapping, .. }, client) = self.connect(&mut connection, within).await?;
         let left = within.saturating_sub(begun.elapsed());
         let broken = |because: String| CallError::Broken { service: self.full.clone(), because };
         let id = client.async_send_request(request).await.map_err(|error| broken(error.to_string()))?;
@@ -154,18 +154,23 @@ impl<S: Service> Caller<S> {
         let (requests, replies) = (self.requests(), self.replies());
         let absent = || CallError::Absent { service: self.full.clone(), waited: seconds(within) };
         let found = self.node.graph.wait(within, |graph| graph.server(&requests, &replies)).await;
-        let mapping = found
+        let server = found
             .ok_or_else(absent)?
             .map_err(|complaint| CallError::Unfit { service: self.full.clone(), complaint })?;
-        if connection.as_ref().is_some_and(|(own, _)| *own == mapping) {
-            return connection.as_ref().ok_or_else(absent);
+        let before = connection.take();
+        let is_new = before.as_ref().is_none_or(|(own, _)| *own != server);
+        let client = match before.filter(|(own, _)| own.mapping == server.mapping) {
+            Some((_, client)) => client,
+            None => self.client(server.mapping).map_err(|message| CallError::Broken {
+                service: self.full.clone(),
+                because: message.message.clone(),
+            })?,
+        };
+        let connected = connection.insert((server, client));
+        if is_new {
+            Timer::after(MATCHING.min(within)).await;
         }
-        let made = self.client(mapping).map_err(|message| CallError::Broken {
-            service: self.full.clone(),
-            because: message.message.clone(),
-        })?;
-        Timer::after(MATCHING.min(within)).await;
-        Ok(connection.insert((mapping, made)))
+        Ok(connected)
     }
 
     fn client(&self, mapping: Mapping) -> Result<Client<S::Request, S::Response>, Message> {

@@ -5,3 +5,4 @@ mod graph;
 mod nav2;
 mod performers;
 mod planner;
+mod roles;

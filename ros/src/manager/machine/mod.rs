@@ -317,3 +317,6 @@ fn call(step: &PlannedStep) -> Call {
 fn unwritten(error: &std::io::Error) -> Message {
     Message::error("M321", format!("the journal cannot be written: {error}"))
 }
+
+#[cfg(test)]
+mod tests;

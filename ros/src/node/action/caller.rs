@@ -13,7 +13,7 @@ use smol::{Timer, channel};
 
 use crate::interfaces::Action;
 use crate::node::action::{GoalEnd, POLL, expect_action};
-use crate::node::graph::Graph;
+use crate::node::graph::{Graph, Server};
 use crate::node::rmw::Mapping;
 use crate::node::{Node, client_name, latched, not_made, qos};
 
@@ -62,7 +62,7 @@ pub struct ActionCaller<A: Action> {
 /// A client with the goals that are under way. The client library gives what is heard to whoever asks first, whichever goal it is
 /// about; so one task asks for all goals.
 struct Connection<A: Action> {
-    mapping: Mapping,
+    server: Server,
     client: Client<A>,
     goals: Mutex<BTreeMap<GoalId, Followed<A>>>,
 }
@@ -113,7 +113,7 @@ impl<A: Action + 'static> ActionCaller<A> {
         // Held until there is an answer: two who wait would take each other's.
         let mut connection = self.connection.lock().await;
         let connection = self.connect(&mut connection, within).await.map_err(unreachable)?;
-        let (client, mapping) = (&connection.client, connection.mapping);
+        let (client, mapping) = (&connection.client, connection.server.mapping);
         let left = within.saturating_sub(begun.elapsed());
         let mut timer = futures::FutureExt::fuse(Timer::after(left));
         let mut sent = Box::pin(client.async_send_goal(goal)).fuse();
@@ -150,13 +150,13 @@ impl<A: Action + 'static> ActionCaller<A> {
     ) -> Result<&'c Arc<Connection<A>>, String> {
         let (requests, replies) = goal_topics(&self.full);
         let found = self.node.graph.wait(within, |graph| graph.server(&requests, &replies)).await;
-        let mapping =
+        let server =
             found.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
-        if connection.as_ref().is_none_or(|own| own.mapping != mapping) {
-            let client = self.client(mapping).map_err(|message| message.message.clone())?;
+        if connection.as_ref().is_none_or(|own| own.server != server) {
+            let client = self.client(server.mapping).map_err(|message| message.message.clone())?;
             // What is answered before the server has discovered us is lost.
             Timer::after(MATCHING.min(within)).await;
-            *connection = Some(Arc::new(Connection { mapping, client, goals: Mutex::default() }));
+            *connection = Some(Arc::new(Connection { server, client, goals: Mutex::default() }));
         }
         connection.as_ref().ok_or_else(String::new)
     }

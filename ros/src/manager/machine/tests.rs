@@ -1,0 +1,313 @@
+//! The machine without a robot: what is asked for after what was heard.
+
+use std::path::Path;
+use std::time::Duration;
+
+use metaplan::journal::{Journal, JournalReport, Policy};
+use metaplan::mapek::Loop;
+use metaplan::setup::Setup;
+
+use crate::manager::machine::{Change, Ended, Input, Machine, Outcome, Output, State};
+use crate::manager::settings::Settings;
+
+const PATH: &str = "f_generate_search_path";
+const MOTION: &str = "f_maintain_motion";
+const RECHARGE: &str = "generate_recharge_path";
+
+/// A machine with a clock that goes on a little with each input.
+struct Robot {
+    machine: Machine,
+    now: Duration,
+}
+
+fn control() -> (Loop, Settings) {
+    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
+    let setup = Setup::read(&mission).expect("the mission is read");
+    let settings = Settings::read(None, &mission).expect("settings");
+    (Loop::new(setup.mission, setup.settings).expect("it can be planned for"), settings)
+}
+
+impl Robot {
+    /// All functions answer, and have no design.
+    fn new(journal: Option<&Path>) -> Self {
+        Self::found(journal, |_| "fd_unground")
+    }
+
+    /// All functions answer with these modes.
+    fn found(journal: Option<&Path>, mode: impl Fn(&str) -> &'static str) -> Self {
+        let (mut control, settings) = control();
+        let journal =
+            journal.map(|path| Journal::open(path, Policy::default(), &mut control).expect("a journal").0);
+        let machine = Machine::new(control, journal, settings, false);
+        let modes =
+            machine.functions().iter().map(|name| (name.clone(), Some(mode(name).to_owned()))).collect();
+        let mut robot = Self { machine, now: Duration::ZERO };
+        assert_eq!(robot.machine.state(), State::WaitGraph);
+        robot.hear(Input::Ready(modes));
+        robot
+    }
+
+    /// What is to be done; events and plans apart.
+    fn hear(&mut self, input: Input) -> Vec<Output> {
+        self.now += Duration::from_millis(10);
+        let outputs = self.machine.handle(input, self.now).expect("a journal that can be written");
+        outputs.into_iter().filter(|own| !matches!(own, Output::Event(_) | Output::Plan(_))).collect()
+    }
+
+    /// A change is answered.
+    fn answer(&mut self, output: &Output, outcome: Outcome) -> Vec<Output> {
+        let Output::Change(change) = output else { panic!("{output:?} is no change") };
+        self.hear(Input::Changed(change.clone(), outcome))
+    }
+
+    /// All changes are answered with success, and those that follow from that.
+    fn obey(&mut self, outputs: Vec<Output>) -> Vec<Output> {
+        let mut open = outputs;
+        while let Some(at) = open.iter().position(|own| matches!(own, Output::Change(_))) {
+            let change = open.remove(at);
+            open.extend(self.answer(&change, Outcome::Done));
+        }
+        open
+    }
+
+    fn request(&mut self, task: &str) -> Vec<Output> {
+        self.hear(Input::Request(7, task.to_owned()))
+    }
+
+    fn measure(&mut self, attribute: &str, value: &str) -> Vec<Output> {
+        self.hear(Input::Line(format!(r#"{{"event":"measured","attribute":"{attribute}","value":{value}}}"#)))
+    }
+}
+
+/// Function and mode of the changes among outputs, in alphabetical order.
+fn changes(outputs: &[Output]) -> Vec<(&str, &str)> {
+    let mut changes = Vec::new();
+    for output in outputs {
+        if let Output::Change(Change { function, mode, .. }) = output {
+            changes.push((function.as_str(), mode.as_str()));
+        }
+    }
+    changes.sort_unstable();
+    changes
+}
+
+fn performed(outputs: &[Output]) -> Vec<&str> {
+    let mut actions = Vec::new();
+    for output in outputs {
+        if let Output::Perform(_, call) = output {
+            actions.push(call.action.as_str());
+        }
+    }
+    actions
+}
+
+#[test]
+fn a_task_is_granted_when_its_functions_have_their_designs() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high"), (MOTION, "fd_all_thrusters")]);
+    assert_eq!(robot.machine.state(), State::Reconfigure);
+    let first = robot.answer(&outputs[0], Outcome::Done);
+    assert_eq!(first, [], "one of two has answered");
+    let last = robot.answer(&outputs[1], Outcome::Done);
+    assert_eq!(performed(&last), ["search_pipeline"]);
+    assert!(last.contains(&Output::Reply(7, true)), "{last:?}");
+    assert_eq!(robot.machine.state(), State::Execute);
+    // The end of the task takes all designs away; who has asked for it hears when that is done.
+    let outputs = robot.hear(Input::Cancel(8, "search_pipeline".to_owned()));
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    let outputs = robot.obey(outputs);
+    assert!(outputs.contains(&Output::Reply(8, true)), "{outputs:?}");
+    assert_eq!(robot.machine.state(), State::Idle);
+}
+
+#[test]
+fn an_unknown_task_is_refused() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipline");
+    assert!(
+        matches!(&outputs[..], [Output::Reply(7, false), Output::Warn(text)] if text.contains("did you mean `search_pipeline`"))
+    );
+    assert_eq!(robot.machine.state(), State::Idle);
+}
+
+#[test]
+fn a_stimulus_changes_the_mode_that_it_concerns() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.measure("water_visibility", "2.3");
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")]);
+    // Before there is an answer it becomes darker: only the last mode counts.
+    let darker = robot.measure("water_visibility", "1.3");
+    assert_eq!(changes(&darker), [(PATH, "fd_spiral_low")]);
+    assert_eq!(robot.answer(&outputs[0], Outcome::Done), [], "it is late");
+    assert_eq!(robot.machine.state(), State::Reconfigure);
+    robot.obey(darker);
+    assert_eq!(robot.machine.state(), State::Execute);
+    // Too dark for any: nothing is changed, and it is said.
+    let outputs = robot.measure("water_visibility", "1");
+    assert_eq!(changes(&outputs), []);
+    assert_eq!(robot.machine.state(), State::Degraded);
+    let outputs = robot.measure("water_visibility", "4");
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high")]);
+}
+
+#[test]
+fn a_design_that_is_refused_is_replaced_and_tried_again_a_minute_later() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    let path = outputs
+        .iter()
+        .position(|own| matches!(own, Output::Change(own) if own.function == PATH))
+        .expect("a change");
+    let next = robot.answer(&outputs[path], Outcome::Refused);
+    assert_eq!(changes(&next), [(PATH, "fd_spiral_medium")]);
+    assert!(next.contains(&Output::Look(PATH.to_owned())), "{next:?}");
+    let mut rest: Vec<Output> =
+        outputs.into_iter().enumerate().filter(|(at, _)| *at != path).map(|(_, own)| own).collect();
+    rest.extend(next);
+    let outputs = robot.obey(rest);
+    assert!(outputs.contains(&Output::Reply(7, true)), "{outputs:?}");
+    robot.now += Duration::from_secs(59);
+    assert_eq!(changes(&robot.hear(Input::Tick)), []);
+    robot.now += Duration::from_secs(2);
+    assert_eq!(changes(&robot.hear(Input::Tick)), [(PATH, "fd_spiral_high")]);
+}
+
+#[test]
+fn a_function_that_is_silent_is_asked_twice_and_then_when_it_answers() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let first = robot.measure("water_visibility", "1.3");
+    let silent = || Outcome::Failed("no answer".to_owned());
+    let second = robot.answer(&first[0], silent());
+    assert_eq!(changes(&second), [(PATH, "fd_spiral_low")]);
+    let again = second.iter().find(|own| matches!(own, Output::Change(_))).expect("once more").clone();
+    let third = robot.answer(&again, silent());
+    assert_eq!(changes(&third), [], "no other spiral can be flown in the dark");
+    let probe = third.iter().find_map(|own| match own {
+        Output::Probe(function, wait) => Some((function.clone(), *wait)),
+        _ => None,
+    });
+    assert_eq!(probe, Some((PATH.to_owned(), Duration::from_secs(2))));
+    assert_eq!(robot.machine.state(), State::Degraded);
+    let outputs = robot.hear(Input::Probed(PATH.to_owned(), false));
+    assert!(matches!(&outputs[..], [Output::Probe(..)]), "{outputs:?}");
+    let outputs = robot.hear(Input::Probed(PATH.to_owned(), true));
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_low")]);
+}
+
+#[test]
+fn a_mode_that_comes_late_counts() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let first = robot.measure("water_visibility", "2.3");
+    let silent = || Outcome::Failed("no answer".to_owned());
+    let second = robot.answer(&first[0], silent());
+    let again = second.iter().find(|own| matches!(own, Output::Change(_))).expect("once more").clone();
+    // The function tells its mode, though it has not answered.
+    let outputs = robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_medium".to_owned()));
+    assert_eq!(changes(&outputs), []);
+    assert_eq!(robot.machine.state(), State::Execute);
+    assert_eq!(robot.answer(&again, Outcome::Done), [], "it is late");
+}
+
+#[test]
+fn what_somebody_else_has_changed_is_adopted_or_taken_back() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    // What we have asked for is no news.
+    assert_eq!(robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_high".to_owned())), []);
+    let outputs = robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_low".to_owned()));
+    assert_eq!(
+        changes(&outputs),
+        [(PATH, "fd_spiral_high")],
+        "it costs more, and nothing is said of a minimum"
+    );
+    robot.obey(outputs);
+    let outputs = robot.hear(Input::Touched(MOTION.to_owned()));
+    assert_eq!(outputs, [Output::Look(MOTION.to_owned())]);
+    let outputs = robot.hear(Input::Mode(MOTION.to_owned(), "fd_unground".to_owned()));
+    assert_eq!(changes(&outputs), [(MOTION, "fd_all_thrusters")], "it is needed");
+    // A mode that no design has is none.
+    let outputs = robot.hear(Input::Mode(RECHARGE.to_owned(), "inactive".to_owned()));
+    assert_eq!(changes(&outputs), []);
+}
+
+#[test]
+fn the_battery_comes_first() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.measure("battery_level", "0.2");
+    let Some(Output::Stop(action)) = outputs.iter().find(|own| matches!(own, Output::Stop(_))) else {
+        panic!("{outputs:?}")
+    };
+    let outputs = robot.hear(Input::Performed(*action, Ended::Cancelled));
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (RECHARGE, "normal")]);
+    let outputs = robot.obey(outputs);
+    assert_eq!(performed(&outputs), ["recharge"]);
+    let outputs = robot.hear(Input::Performed(2, Ended::Succeeded));
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high"), (RECHARGE, "fd_unground")]);
+    let outputs = robot.obey(outputs);
+    assert_eq!(performed(&outputs), ["search_pipeline"]);
+    // The goal is reached: nobody needs a function any more.
+    let outputs = robot.hear(Input::Performed(3, Ended::Succeeded));
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    robot.obey(outputs);
+    assert_eq!((robot.machine.state(), robot.machine.task()), (State::Idle, None));
+}
+
+#[test]
+fn a_task_ends_when_the_autopilot_does_not_obey_any_more() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    assert_eq!(robot.hear(Input::Autopilot("GUIDED".to_owned())), []);
+    let outputs = robot.hear(Input::Autopilot("MANUAL".to_owned()));
+    assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
+    robot.obey(outputs);
+    assert_eq!(robot.machine.state(), State::Idle);
+}
+
+#[test]
+fn a_restart_goes_on_and_asks_for_nothing_twice() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut robot = Robot::new(Some(directory.path()));
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.measure("water_visibility", "2.3");
+    // It ends before there is an answer, and the function has done it all the same.
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")]);
+    drop(robot);
+    let mode = |path: &'static str| {
+        move |function: &str| match function {
+            PATH => path,
+            MOTION => "fd_all_thrusters",
+            _ => "fd_unground",
+        }
+    };
+    let mut robot = Robot::found(Some(directory.path()), mode("fd_spiral_medium"));
+    assert_eq!(robot.machine.task(), Some("search_pipeline"));
+    assert_eq!(changes(&robot.measure("water_visibility", "2.4")), []);
+    assert_eq!(robot.machine.state(), State::Execute);
+    assert_eq!(robot.machine.control().beliefs().outstanding().count(), 0);
+    drop(robot);
+    // Meanwhile somebody has flown lower, which the water does not ask for: after a while without diagnostics that is judged.
+    let mut robot = Robot::found(Some(directory.path()), mode("fd_spiral_low"));
+    assert_eq!(changes(&robot.hear(Input::Tick)), []);
+    robot.now += Duration::from_secs(4);
+    assert_eq!(changes(&robot.hear(Input::Tick)), [(PATH, "fd_spiral_medium")]);
+    drop(robot);
+    // Meanwhile the water has become darker, and somebody has seen to it.
+    let mut robot = Robot::found(Some(directory.path()), mode("fd_spiral_low"));
+    assert_eq!(changes(&robot.measure("water_visibility", "1.3")), []);
+    drop(robot);
+    let report = JournalReport::read(directory.path()).expect("a report");
+    let text = format!("{report:?}");
+    assert!(text.contains("IDLE -> RECONFIGURE: the task search_pipeline is requested"), "arrows are notes");
+}
