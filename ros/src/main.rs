@@ -12,7 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::{Parser, ValueEnum};
 use metaplan::message::Message;
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
-use metaplan_ros::{manager, planner};
+use metaplan_ros::performer::PlanVersion;
+use metaplan_ros::{controller, manager, planner};
 
 /// Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 ///
@@ -22,7 +23,7 @@ use metaplan_ros::{manager, planner};
 #[command(version)]
 struct Arguments {
     /// A mission's manifest; a planner needs none.
-    #[arg(long, value_name = "FILE", required_if_eq("role", "manager"))]
+    #[arg(long, value_name = "FILE", required_if_eq_any([("role", "manager"), ("role", "controller")]))]
     mission: Option<PathBuf>,
     /// Whose place to take.
     #[arg(long = "as", value_enum, default_value_t = Role::Manager)]
@@ -36,6 +37,9 @@ struct Arguments {
     /// How services are mapped: as the discovered participants say, or as this middleware does.
     #[arg(long, value_enum, default_value_t = Rmw::Auto)]
     rmw: Rmw,
+    /// With `--as controller`: whose types PlanSys2's executor has.
+    #[arg(long, value_enum, default_value_t)]
+    executor: PlanVersion,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -44,13 +48,15 @@ enum Role {
     Manager,
     /// Of PlanSys2's planner; with a mission, its knowledge base joins in.
     Planner,
+    /// Of whoever has PlanSys2's executor carry out what its experts want: with a knowledge base, and again when a design is lost.
+    Controller,
 }
 
 impl Role {
     /// What the node is called, unless it is said otherwise.
     fn node(self) -> &'static str {
         match self {
-            Self::Manager => "metaplan",
+            Self::Manager | Self::Controller => "metaplan",
             Self::Planner => "planner",
         }
     }
@@ -89,11 +95,15 @@ fn start() -> Result<(), Vec<Message>> {
     };
     ctrlc::set_handler(handler)
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
-    let Arguments { mission, settings, journal, .. } = arguments;
+    let Arguments { mission, settings, journal, executor, .. } = arguments;
     match arguments.role {
         Role::Manager => {
             let mission = mission.unwrap_or_default();
             manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
+        }
+        Role::Controller => {
+            let options = controller::Options { mission: mission.unwrap_or_default(), version: executor };
+            controller::run(&node, &options, &stop)
         }
         Role::Planner => planner::run(&node, &planner::Options { mission, settings }, &stop),
     }
