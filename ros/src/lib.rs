@@ -1,6 +1,7 @@
 //! Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 
 pub mod controller;
+mod diagnosed;
 pub mod interfaces;
 pub mod manager;
 pub mod node;
@@ -8,3 +9,4 @@ pub mod perform;
 pub mod performer;
 pub mod planner;
 pub mod popf;
+pub mod reasoner;

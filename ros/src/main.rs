@@ -13,7 +13,7 @@ use clap::{Parser, ValueEnum};
 use metaplan::message::Message;
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
 use metaplan_ros::performer::PlanVersion;
-use metaplan_ros::{controller, manager, planner};
+use metaplan_ros::{controller, manager, planner, reasoner};
 
 /// Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 ///
@@ -22,8 +22,8 @@ use metaplan_ros::{controller, manager, planner};
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
-    /// A mission's manifest; a planner needs none.
-    #[arg(long, value_name = "FILE", required_if_eq_any([("role", "manager"), ("role", "controller")]))]
+    /// A mission's manifest; a planner can do without, and takes domains as they are then.
+    #[arg(long, value_name = "FILE", required_if_eq_any = [("role", "manager"), ("role", "reasoner"), ("role", "controller")])]
     mission: Option<PathBuf>,
     /// Whose place to take.
     #[arg(long = "as", value_enum, default_value_t = Role::Manager)]
@@ -46,20 +46,12 @@ struct Arguments {
 enum Role {
     /// Of the manager of tasks: SUAVE's task bridge, MROS's reasoner and the planner in one.
     Manager,
-    /// Of PlanSys2's planner; with a mission, its knowledge base joins in.
+    /// Of MROS's reasoner: the action `/mros/objective`.
+    Reasoner,
+    /// Of PlanSys2's planner: `planner/get_plan` and its lifecycle.
     Planner,
     /// Of whoever has PlanSys2's executor carry out what its experts want: with a knowledge base, and again when a design is lost.
     Controller,
-}
-
-impl Role {
-    /// What the node is called, unless it is said otherwise.
-    fn node(self) -> &'static str {
-        match self {
-            Self::Manager | Self::Controller => "metaplan",
-            Self::Planner => "planner",
-        }
-    }
 }
 
 fn main() -> ExitCode {
@@ -79,8 +71,9 @@ fn start() -> Result<(), Vec<Message>> {
     let arguments = Arguments::parse_from(words);
     let (network, warnings) =
         Network::from_environment(|name| std::env::var(name).ok()).map_err(|message| vec![message])?;
-    let opening =
-        Opening { name: arguments.role.node().to_owned(), arguments: ros, network, rmw: arguments.rmw };
+    // PlanSys2 looks for its planner by its name.
+    let name = if arguments.role == Role::Planner { "planner" } else { "metaplan" };
+    let opening = Opening { name: name.to_owned(), arguments: ros, network, rmw: arguments.rmw };
     let node = Node::open(opening).map_err(|message| vec![message])?;
     for warning in warnings {
         node.log(Severity::Warn, warning.text().trim_end());
@@ -95,16 +88,18 @@ fn start() -> Result<(), Vec<Message>> {
     };
     ctrlc::set_handler(handler)
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
-    let Arguments { mission, settings, journal, executor, .. } = arguments;
-    match arguments.role {
-        Role::Manager => {
-            let mission = mission.unwrap_or_default();
+    let Arguments { role, mission, settings, journal, executor, .. } = arguments;
+    match (role, mission) {
+        (Role::Planner, mission) => planner::run(&node, &planner::Options { mission, settings }, &stop),
+        (Role::Controller, Some(mission)) => {
+            controller::run(&node, &controller::Options { mission, version: executor }, &stop)
+        }
+        (Role::Manager, Some(mission)) => {
             manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
         }
-        Role::Controller => {
-            let options = controller::Options { mission: mission.unwrap_or_default(), version: executor };
-            controller::run(&node, &options, &stop)
+        (Role::Reasoner, Some(mission)) => {
+            reasoner::run(&node, &reasoner::Options { mission, settings }, &stop)
         }
-        Role::Planner => planner::run(&node, &planner::Options { mission, settings }, &stop),
+        (_, None) => Err(vec![Message::error("N100", "`--mission` is missing")]),
     }
 }

@@ -159,6 +159,9 @@ impl Keeper {
                     self.asked.remove(effect).ok_or_else(|| unknown_effect(*effect))?;
                 self.configurator.revert(&objective, from.as_deref()).map_err(refused)?;
             }
+            Event::Design { design, realisable } => {
+                knowledge.take(design, RobotReport::Design(*realisable)).map_err(refused)?;
+            }
             Event::Tick | Event::Note { .. } => {}
             other => {
                 let text = format!("`{}` is about plans, and here there is none", other.kind());

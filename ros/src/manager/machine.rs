@@ -519,9 +519,8 @@ impl Machine {
         if let Some((action, _)) = self.control.beliefs().running() {
             self.say(&Event::Cancelled { action });
         }
-        let functions = self.functions.clone();
-        for function in &functions {
-            self.unground(function);
+        for function in self.functions.clone() {
+            self.unground(&function);
         }
         format!("the task {task} ends")
     }
@@ -556,16 +555,29 @@ impl Machine {
                     self.without_plan = self.task.is_some();
                     self.outputs.push(Output::Warn(format!("there is no plan: {because}")));
                 }
-                Answer::GoalReached => {
-                    self.without_plan = false;
-                    self.action = None;
-                }
+                Answer::GoalReached => self.reached(),
                 Answer::Error { code, message } => {
                     self.outputs.push(Output::Warn(format!("{code}: {message}")))
                 }
                 Answer::Effect(effect) => self.effect(effect),
                 _ => {}
             }
+        }
+    }
+
+    /// The task is done: nobody needs a function any more.
+    fn reached(&mut self) {
+        self.without_plan = false;
+        self.action = None;
+        if self.task.take().is_none() {
+            return;
+        }
+        for number in std::mem::take(&mut self.waiting) {
+            self.outputs.push(Output::Reply(number, true));
+        }
+        self.say(&Event::Goal { goal: NOTHING.to_owned() });
+        for function in self.functions.clone() {
+            self.unground(&function);
         }
     }
 
@@ -787,15 +799,12 @@ impl Machine {
     }
 }
 
-/// An action as whoever performs it hears of it: without what says which design fills which function.
+/// An action as whoever performs it hears of it.
 fn call(step: &PlannedStep) -> Call {
     let written = step.arguments.get(..step.written).unwrap_or(&step.arguments);
-    let is_choice = |word: &&String| {
-        step.configuration.iter().any(|(function, design)| *word == function || *word == design)
-    };
     Call {
         action: step.action.clone(),
-        arguments: written.iter().filter(|word| !is_choice(word)).cloned().collect(),
+        arguments: written.to_vec(),
         configuration: step.configuration.iter().cloned().collect(),
         duration: step.duration_rounded(),
     }

@@ -11,6 +11,7 @@ use metaplan::message::Message;
 use serde_json::Value;
 use smol::{Task, Timer};
 
+use crate::diagnosed::Diagnosed;
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::interfaces::lifecycle_msgs::msg::TransitionEvent;
 use crate::interfaces::mavros_msgs;
@@ -24,13 +25,11 @@ use crate::interfaces::system_modes_msgs::srv::{
 use crate::manager::machine::{Change, Ended, Input, Outcome};
 use crate::manager::settings::Settings;
 use crate::node::{CallError, Caller, Node, Publisher, Responder, Severity, depth, keep_all, latched};
-use crate::perform::{Call, End, Perform, Progress, Running};
+use crate::perform::{Call, End, Perform as _, Progress, Running};
+use crate::performer::Cast;
 
 /// So long a function may take to say which mode it has.
 const LOOK: Duration = Duration::from_secs(2);
-
-/// The messages by which diagnostics say what concerns us, in the spelling of MROS.
-const CONCERN: [&str; 2] = ["QA status", "Component status"];
 
 /// So many things that were wrong are remembered, so as to say each once.
 const SAID: usize = 1000;
@@ -49,7 +48,7 @@ pub(super) struct Robot {
     node: Arc<Node>,
     inputs: Sender<Input>,
     functions: BTreeMap<String, Function>,
-    performers: BTreeMap<String, Box<dyn Perform>>,
+    performers: Cast,
     performing: HashMap<u64, (Running, Task<()>)>,
     diagnosed: Diagnosed,
     replies: Arc<Mutex<HashMap<u64, Responder<TaskService>>>>,
@@ -65,11 +64,11 @@ impl Robot {
         node: &Arc<Node>,
         settings: &Settings,
         functions: &[String],
-        performers: BTreeMap<String, Box<dyn Perform>>,
+        performers: Cast,
         inputs: Sender<Input>,
     ) -> Result<Self, Message> {
-        let diagnosed = Diagnosed::default();
-        hear_diagnostics(node, inputs.clone(), Arc::clone(&diagnosed))?;
+        let heard = inputs.clone();
+        let diagnosed = Diagnosed::hear(node, move || drop(heard.send(Input::Diagnosed)))?;
         let mut own = BTreeMap::new();
         for function in functions {
             hear_function(node, settings, function, &inputs)?;
@@ -195,10 +194,7 @@ impl Robot {
 
     /// What was diagnosed since it was asked last, as a line of events.
     pub(super) fn diagnosed(&self) -> String {
-        let waiting = std::mem::take(&mut *self.diagnosed.lock().unwrap_or_else(PoisonError::into_inner));
-        let status = waiting.into_iter().map(|(_, status)| status).collect();
-        // Texts and numbers are always data.
-        serde_json::to_string(&DiagnosticArray { status, ..DiagnosticArray::default() }).unwrap_or_default()
+        self.diagnosed.line()
     }
 
     /// Answers the request of a task.
@@ -209,13 +205,9 @@ impl Robot {
         }
     }
 
-    /// Has an action performed; one that nobody performs is done as soon as it is begun.
+    /// Has an action performed.
     pub(super) fn perform(&mut self, number: u64, call: Call) {
-        let Some(performer) = self.performers.get(&call.action) else {
-            let _ = self.inputs.send(Input::Performed(number, Ended::Succeeded));
-            return;
-        };
-        let running = performer.start(call);
+        let running = self.performers.start(call);
         let (heard, inputs) = (running.clone(), self.inputs.clone());
         let task = smol::spawn(async move {
             loop {
@@ -282,33 +274,6 @@ impl Robot {
         array.header.stamp = crate::node::now();
         self.diagnostics.publish(array);
     }
-}
-
-/// What was diagnosed and not yet handled: of each thing the last that was said of it, so that nobody falls behind who is told faster than
-/// he can follow.
-type Diagnosed = Arc<Mutex<Vec<(String, DiagnosticStatus)>>>;
-
-/// Diagnostics that concern components and attributes wait to be handled; what says the same as before does not.
-fn hear_diagnostics(node: &Arc<Node>, inputs: Sender<Input>, diagnosed: Diagnosed) -> Result<(), Message> {
-    let mut last: HashMap<String, Vec<KeyValue>> = HashMap::new();
-    node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |array| {
-        let mut waiting = diagnosed.lock().unwrap_or_else(PoisonError::into_inner);
-        let nobody_waits = waiting.is_empty();
-        for status in array.status {
-            if !CONCERN.contains(&status.message.as_str()) {
-                continue;
-            }
-            let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
-            let key = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
-            if last.insert(key.clone(), status.values.clone()).as_ref() != Some(&status.values) {
-                waiting.retain(|(known, _)| *known != key);
-                waiting.push((key, status));
-            }
-        }
-        if nobody_waits && !waiting.is_empty() {
-            let _ = inputs.send(Input::Diagnosed);
-        }
-    })
 }
 
 /// What `system_modes` tells of a function, and its node of its states.

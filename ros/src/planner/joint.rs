@@ -8,13 +8,14 @@ use metaplan::mapek::{Event, Observation};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 
-use crate::interfaces::diagnostic_msgs::msg::DiagnosticArray;
-use crate::node::{Node, keep_all};
+use crate::diagnosed::Diagnosed;
+use crate::node::Node;
 
-/// The mission.
+/// The mission, and what was diagnosed since it was looked at.
 #[derive(Debug)]
 pub(crate) struct Joint {
     mission: Mutex<Mission>,
+    diagnosed: Diagnosed,
 }
 
 impl Joint {
@@ -23,11 +24,8 @@ impl Joint {
     /// # Errors
     /// The topic cannot be made.
     pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Vec<Message>> {
-        let joint = Arc::new(Self { mission: Mutex::new(mission) });
-        let hears = Arc::clone(&joint);
-        node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |array| hears.hear(&array))
-            .map_err(|message| vec![message])?;
-        Ok(joint)
+        let diagnosed = Diagnosed::hear(node, || {}).map_err(|message| vec![message])?;
+        Ok(Arc::new(Self { mission: Mutex::new(mission), diagnosed }))
     }
 
     /// The mission as it is now.
@@ -43,16 +41,11 @@ impl Joint {
         available.map(|design| design.individual.name.to_lowercase()).collect()
     }
 
+    /// The mission, once it has taken over what the diagnostics say of what the knowledge base knows.
     fn lock(&self) -> MutexGuard<'_, Mission> {
-        self.mission.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Takes over what the diagnostics say of what the knowledge base knows.
-    fn hear(&self, array: &DiagnosticArray) {
-        let Ok(text) = serde_json::to_string(array) else { return };
-        let mut mission = self.lock();
+        let mut mission = self.mission.lock().unwrap_or_else(PoisonError::into_inner);
         // What is not understood, or not known, is about something else.
-        for event in Observation::parse(&text).events.into_iter().flatten() {
+        for event in Observation::parse(&self.diagnosed.line()).events.into_iter().flatten() {
             let _ = match event {
                 Event::Measured { attribute, value } => {
                     mission.set(&attribute, &Exact::from(value).to_string())
@@ -63,5 +56,6 @@ impl Joint {
                 _ => Ok(()),
             };
         }
+        mission
     }
 }

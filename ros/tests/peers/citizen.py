@@ -6,10 +6,12 @@ import json
 from typing import Any
 
 from oracle import SEARCH
+from program import Program
 from ros2 import Call, Client, Node
 from scenarios import CLEAR, DARK, Setting, check, play, scenario, see
+from transport import Qos
 
-STRING, INTEGER_PARAMETER = "std_msgs/msg/String", 2
+STRING, INTEGER_PARAMETER, DOUBLE_PARAMETER = "std_msgs/msg/String", 2, 3
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = 1, 2, 3, 4
 
 
@@ -23,14 +25,22 @@ def answer(node: Node, client: Client, value: dict[str, Any] | None = None, time
     return call.value
 
 
+def timeout_of(node: Node, name: str) -> float:
+    """The parameter `call_timeout` of a node."""
+    getter = node.client(f"{name}/get_parameters", "rcl_interfaces/srv/GetParameters")
+    return answer(node, getter, {"names": ["call_timeout"]}).values[0].double_value
+
+
 @scenario()
 def graph(setting: Setting) -> str:
     """`ros2 node list`, `ros2 lifecycle get` and `ros2 param list` show the program; it reports plans and events."""
     with play(setting) as (robot, _):
         node, plans, logs, about = robot.node, [], [], []
         node.subscribe("/metaplan/plan", STRING, lambda message: plans.append(message.data))
-        node.subscribe("/rosout", "rcl_interfaces/msg/Log", logs.append)
+        node.subscribe("/rosout", "rcl_interfaces/msg/Log", logs.append, Qos(1000, transient_local=True))
         node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", about.append)
+        changes: list[Any] = []
+        node.subscribe("/parameter_events", "rcl_interfaces/msg/ParameterEvent", changes.append)
         node.spin(1.0)
         check("/metaplan" in node.nodes, f"`ros2 node list` shows {sorted(node.nodes)}")
         state = answer(node, node.client("/metaplan/get_state", "lifecycle_msgs/srv/GetState"))
@@ -56,10 +66,17 @@ def graph(setting: Setting) -> str:
         )
         check(len(refused.results) == 1 and not refused.results[0].successful, "an unknown parameter was set")
         check(bool(refused.results[0].reason), "a refusal has no reason")
+        known = {"name": "call_timeout", "value": {"type": DOUBLE_PARAMETER, "double_value": 2.5}}
+        setter = node.client("/metaplan/set_parameters", "rcl_interfaces/srv/SetParameters")
+        done = answer(node, setter, {"parameters": [known]})
+        check(bool(done.results[0].successful), f"call_timeout cannot be set: {done.results}")
+        check(timeout_of(node, "/metaplan") == 2.5, "call_timeout is not what it was set to")
         see(robot, CLEAR)
         check(robot.request(SEARCH), "the task was not granted")
         see(robot, DARK)
         node.spin(1.5)
+        changed = [p.name for event in changes if event.node == "/metaplan" for p in event.changed_parameters]
+        check("call_timeout" in changed, f"/parameter_events tell of {changed}")
         check(bool(plans), "nothing on /metaplan/plan")
         check(bool(robot.events), "nothing on /metaplan/events")
         for text in plans + robot.events:
@@ -72,9 +89,15 @@ def graph(setting: Setting) -> str:
 
 @scenario()
 def remapped(setting: Setting) -> str:
-    """Node name, namespace and a topic are given by `--ros-args`."""
-    words = ["--ros-args", "-r", "__node:=boss", "-r", "__ns:=/auv", "-r", "/task/request:=/bridge/request"]
-    with play(setting, own_wait=False, more=words) as (robot, _):
+    """Node name, namespace, the name of a service and parameters are given by `--ros-args`."""
+
+    def words(program: Program) -> list[str]:
+        file = program.directory / "parameters.yaml"
+        file.write_text("/auv/boss:\n  ros__parameters:\n    call_timeout: 1.5\n")
+        names = ["-r", "__node:=boss", "-r", "__ns:=/auv", "-r", "/task/request:=/bridge/request"]
+        return ["--ros-args", *names, "--params-file", str(file), "--"]
+
+    with play(setting, own_wait=False, prepare=words) as (robot, _):
         node = robot.node
         check(node.spin_until(lambda: "/auv/boss" in node.nodes, 20.0), f"nodes are {sorted(node.nodes)}")
         state = answer(node, node.client("/auv/boss/get_state", "lifecycle_msgs/srv/GetState"))
@@ -82,6 +105,7 @@ def remapped(setting: Setting) -> str:
         request = node.client("/bridge/request", "suave_msgs/srv/Task")
         granted = answer(node, request, {"task_name": "no_such_task"})
         check(not granted.success, "an unknown task was granted")
+        check(timeout_of(node, "/auv/boss") == 1.5, "the file of parameters does not count")
         return "/auv/boss"
 
 

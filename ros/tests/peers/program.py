@@ -94,7 +94,8 @@ class Program:
         """Ends it and removes what it left."""
         if self.running():
             self.kill()
-        shutil.rmtree(self.directory, ignore_errors=True)
+        if not os.environ.get("METAPLAN_KEEP"):
+            shutil.rmtree(self.directory, ignore_errors=True)
 
     def wait_output(self, words: str, timeout: float) -> bool:
         """Whether some words were printed in time."""

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import time
+
+from citizen import answer
 from oracle import MOTION, PATH, SEARCH, UNGROUND
+from program import ROOT, Program
+from ros2 import Node
 from scenarios import CLEAR, DARK, Setting, asked, check, no_fault, play, scenario, see
+from transport import connect
 
 
 @scenario()
@@ -41,3 +49,51 @@ def objectives(setting: Setting) -> str:
         check(answered, "no answer to an objective of an unknown function")
         check(robot._cancel_goal(MOTION), "the other objective is not cancelled")
         return f"{len(asked(robot, PATH))} requests for {PATH}"
+
+
+EARLIER = ROOT.parent / "shared" / "tools" / "ros"
+
+
+def _earlier_peer(vendor: str) -> list[str]:
+    """The command of a peer that was written before there was a program to test; it lives for 20 s in domain 0."""
+    if vendor == "cyclonedds":
+        return [sys.executable, str(EARLIER / "peer_cyclone.py"), "20"]
+    built = ROOT / "target" / "ros" / "peer_fastdds"
+    source = EARLIER / "peer_fastdds.cpp"
+    if not built.exists() or built.stat().st_mtime < source.stat().st_mtime:
+        command = ["g++", "-std=c++17", "-O1", str(source), "-lfastrtps", "-lfastcdr", "-o", str(built)]
+        subprocess.run(command, check=True)
+    return [str(built), "20"]
+
+
+@scenario()
+def earlier_peer(setting: Setting) -> str:
+    """The peer of the first trials is a client of /mros/objective: its goal is accepted and it hears feedback."""
+    if not EARLIER.is_dir():
+        return f"NOT PLAYED: {EARLIER.relative_to(ROOT.parent)} is not there"
+    program = Program(setting.program, "reasoner", setting.vendor, 0)
+    setting.programs.append(program)
+    node = Node(connect(setting.vendor, 0), "bridge")
+    node.serve("/mros/request_configuration", "mros2_msgs/srv/MetacontrolFD", lambda _: {"success": True})
+    output = program.directory / "peer"
+    with output.open("wb") as file:
+        peer = subprocess.Popen(_earlier_peer(setting.vendor), stdout=file, stderr=file)
+    program.start()
+    try:
+        node.spin(4.0)
+        # It sends its goal when somebody has changed the state of its node.
+        change = node.client("/f_maintain_motion_node/change_state", "lifecycle_msgs/srv/ChangeState")
+        answer(node, change, {"transition": {"id": 3, "label": "activate"}})
+        end = time.monotonic() + 14
+        accepted = "goal accepted True" if setting.vendor == "cyclonedds" else "goal accepted=1 correlated=1"
+        wanted = [accepted] + (["feedback obj_f_generate_search_path_1 fd_spiral"] * (setting.vendor == "cyclonedds"))
+        while time.monotonic() < end and not all(words in output.read_text() for words in wanted):
+            node.spin(0.2)
+        said = output.read_text()
+        check(all(words in said for words in wanted), f"the peer says {said[-600:]}")
+        return "; ".join(wanted)
+    finally:
+        peer.kill()
+        peer.wait()
+        node.close()
+        program.stop()

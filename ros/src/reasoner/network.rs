@@ -1,0 +1,232 @@
+//! The reasoner on the network: the action that it serves, the diagnostics that it hears, and the services that it calls.
+
+use std::collections::{BTreeMap, HashSet};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::time::{Duration, Instant};
+
+use metaplan::message::Message;
+use ros2_client::ParameterValue;
+use ros2_client::action::GoalId;
+use smol::Task;
+
+use crate::diagnosed::Diagnosed;
+use crate::interfaces::mros2_msgs::action::{ControlQos, ControlQosFeedback, ControlQosResult};
+use crate::interfaces::mros2_msgs::msg::QoS;
+use crate::interfaces::mros2_msgs::srv::{MetacontrolFD, MetacontrolFDRequest};
+use crate::interfaces::std_msgs;
+use crate::interfaces::system_modes_msgs::srv::{ChangeMode, ChangeModeRequest};
+use crate::node::{
+    CallError, Caller, CancelRequest, Declared, GoalEnd, GoalEvent, Goals, Lifecycle, Node, Phase, Publisher,
+    Severity, Wanted as Offer, depth,
+};
+use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
+
+/// How long a function may take to change its mode.
+const TIMEOUT: Duration = Duration::from_secs(5);
+
+/// So many things that were wrong are remembered, so as to say each once.
+const SAID: usize = 1000;
+
+/// What is heard.
+enum Input {
+    Wanted(Offer, QoS),
+    Cancel(GoalId, CancelRequest),
+    Diagnosed,
+    Answered(Wanted, Outcome),
+}
+
+/// Everything that the reasoner hears from and asks of others.
+pub(super) struct Network {
+    node: Arc<Node>,
+    keeping: Keeping,
+    goals: Arc<Goals<ControlQos>>,
+    /// Cancellations that wait for an answer.
+    cancels: BTreeMap<GoalId, CancelRequest>,
+    bridge: Arc<Caller<MetacontrolFD>>,
+    systems: BTreeMap<String, Arc<Caller<ChangeMode>>>,
+    calling: BTreeMap<String, Task<()>>,
+    diagnosed: Diagnosed,
+    events: Publisher<std_msgs::msg::String>,
+    said: HashSet<String>,
+    /// Milliseconds.
+    period: Arc<AtomicU64>,
+    sender: Sender<Input>,
+    inputs: Receiver<Input>,
+}
+
+impl Network {
+    pub(super) fn connect(node: &Arc<Node>, keeping: Keeping) -> Result<Self, Vec<Message>> {
+        let one = |message: Message| vec![message];
+        let period = parameters(node)?;
+        let (sender, inputs) = mpsc::channel();
+        let heard = sender.clone();
+        let diagnosed = Diagnosed::hear(node, move || drop(heard.send(Input::Diagnosed))).map_err(one)?;
+        let heard = sender.clone();
+        let goals = node.serve_action::<ControlQos>("/mros/objective", move |event| {
+            let input = match event {
+                GoalEvent::Wanted(offer, goal) => Input::Wanted(offer, goal.qos_expected),
+                GoalEvent::Cancel(goal, request) => Input::Cancel(goal, request),
+            };
+            let _ = heard.send(input);
+        });
+        let systems = keeping.functions().into_iter().map(|function| {
+            let service = format!("/{}/change_mode", keeping.system(&function));
+            let caller = node.caller(&service);
+            (function, Arc::new(caller))
+        });
+        let systems = systems.collect();
+        let bridge = Arc::new(node.caller::<MetacontrolFD>("/mros/request_configuration"));
+        let client = Arc::clone(&bridge);
+        // So that the first call need not wait for discovery.
+        smol::spawn(async move { while client.ready(TIMEOUT).await.is_err() {} }).detach();
+        let lifecycle = Lifecycle::serve(node, |_| true).map_err(one)?;
+        lifecycle.go(Phase::Inactive);
+        lifecycle.go(Phase::Active);
+        Ok(Self {
+            node: Arc::clone(node),
+            keeping,
+            goals: goals.map_err(one)?,
+            cancels: BTreeMap::new(),
+            bridge,
+            systems,
+            calling: BTreeMap::new(),
+            diagnosed,
+            events: node.publisher("~/events", depth(100)).map_err(one)?,
+            said: HashSet::new(),
+            period,
+            sender,
+            inputs,
+        })
+    }
+
+    /// Serves until told to stop.
+    pub(super) fn run(mut self, stop: &AtomicBool) {
+        let clock = Instant::now();
+        let mut next = clock;
+        while !stop.load(Ordering::Relaxed) {
+            let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
+            match self.inputs.recv_timeout(wait) {
+                Ok(input) => self.handle(input, clock.elapsed()),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            if Instant::now() >= next {
+                next = Instant::now() + Duration::from_millis(self.period.load(Ordering::Relaxed).max(1));
+                self.keeping.tick(clock.elapsed());
+            }
+            self.carry_out();
+        }
+    }
+
+    fn handle(&mut self, input: Input, now: Duration) {
+        match input {
+            Input::Wanted(offer, wanted) => match self.keeping.refused(&wanted) {
+                Some(because) => {
+                    self.node.log(Severity::Warn, &format!("a goal is rejected: {because}"));
+                    self.goals.reject(offer);
+                }
+                None => {
+                    let goal = self.goals.accept(offer);
+                    self.keeping.pursue(goal, &wanted);
+                }
+            },
+            Input::Cancel(goal, request) => {
+                self.cancels.insert(goal, request);
+                self.keeping.cancel(goal);
+            }
+            Input::Diagnosed => {
+                let line = self.diagnosed.line();
+                self.keeping.hear(&line);
+            }
+            Input::Answered(wanted, outcome) => self.keeping.answered(&wanted, outcome, now),
+        }
+    }
+
+    fn carry_out(&mut self) {
+        for output in self.keeping.outputs() {
+            match output {
+                Output::Configure(wanted) => self.configure(wanted),
+                Output::Feedback(goal, qos_status) => {
+                    self.goals.feedback(goal, ControlQosFeedback { qos_status })
+                }
+                Output::Cancelled(goal, is_so) => {
+                    if let Some(request) = self.cancels.remove(&goal) {
+                        self.goals.canceling(request, is_so);
+                    }
+                    if is_so {
+                        self.goals.finish(goal, GoalEnd::Canceled, ControlQosResult::default());
+                    }
+                }
+                Output::Event(event) => {
+                    self.events.publish(std_msgs::msg::String { data: event.to_string() })
+                }
+                Output::Warn(text) => {
+                    if self.said.len() >= SAID {
+                        self.said.clear();
+                    }
+                    if self.said.insert(text.clone()) {
+                        self.node.log(Severity::Warn, &text);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Asks for a mode: MROS's bridge, or the function itself where there is no bridge.
+    fn configure(&mut self, wanted: Wanted) {
+        let bridge = Arc::clone(&self.bridge);
+        let Some(system) = self.systems.get(&wanted.function).map(Arc::clone) else { return };
+        let (sender, name) = (self.sender.clone(), wanted.function.clone());
+        // A call that is under way for the same function is given up first.
+        self.calling.remove(&name);
+        let call = smol::spawn(async move {
+            let (function, mode) = (wanted.function.clone(), wanted.mode.clone());
+            let answer: Result<bool, CallError> = if bridge.is_served() || !system.is_served() {
+                let request =
+                    MetacontrolFDRequest { required_function_name: function, required_fd_name: mode };
+                bridge.call(request, TIMEOUT).await.map(|answer| answer.success)
+            } else {
+                system.call(ChangeModeRequest { mode_name: mode }, TIMEOUT).await.map(|answer| answer.success)
+            };
+            let outcome = match answer {
+                Ok(true) => Outcome::Done,
+                Ok(false) => Outcome::Refused,
+                Err(error) => Outcome::Failed(error.to_string()),
+            };
+            let _ = sender.send(Input::Answered(wanted, outcome));
+        });
+        self.calling.insert(name, call);
+    }
+}
+
+/// Declares the parameters of MROS's reasoner that mean something here; the period of telling, in milliseconds.
+fn parameters(node: &Arc<Node>) -> Result<Arc<AtomicU64>, Vec<Message>> {
+    let period = Arc::new(AtomicU64::new(1500));
+    let set = Arc::clone(&period);
+    let store = move |value: &ParameterValue| {
+        if let ParameterValue::Double(seconds) = value
+            && let Ok(duration) = Duration::try_from_secs_f64(*seconds)
+        {
+            set.store(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
+        }
+    };
+    let declared = Declared {
+        name: "reasoning_period",
+        description: "How often is told how objectives are, in seconds; what changes is told at once.",
+        value: ParameterValue::Double(1.5),
+        is_dynamic: true,
+    };
+    let hear = store.clone();
+    let warnings = node.declare(vec![declared], move |name, value| {
+        if name == "reasoning_period" {
+            hear(value);
+        }
+    })?;
+    for warning in warnings {
+        node.log(Severity::Warn, warning.text().trim_end());
+    }
+    node.parameter("reasoning_period").iter().for_each(store);
+    Ok(period)
+}
