@@ -48,10 +48,20 @@ enum Role {
     Manager,
     /// Of MROS's reasoner: the action `/mros/objective`.
     Reasoner,
-    /// Of PlanSys2's planner: `planner/get_plan` and its lifecycle.
+    /// Of PlanSys2's planner; with a mission, its knowledge base joins in.
     Planner,
     /// Of whoever has PlanSys2's executor carry out what its experts want: with a knowledge base, and again when a design is lost.
     Controller,
+}
+
+impl Role {
+    /// What the node is called, unless it is said otherwise. PlanSys2 looks for its planner by its name.
+    fn node(self) -> &'static str {
+        match self {
+            Self::Manager | Self::Reasoner | Self::Controller => "metaplan",
+            Self::Planner => "planner",
+        }
+    }
 }
 
 fn main() -> ExitCode {
@@ -71,9 +81,8 @@ fn start() -> Result<(), Vec<Message>> {
     let arguments = Arguments::parse_from(words);
     let (network, warnings) =
         Network::from_environment(|name| std::env::var(name).ok()).map_err(|message| vec![message])?;
-    // PlanSys2 looks for its planner by its name.
-    let name = if arguments.role == Role::Planner { "planner" } else { "metaplan" };
-    let opening = Opening { name: name.to_owned(), arguments: ros, network, rmw: arguments.rmw };
+    let opening =
+        Opening { name: arguments.role.node().to_owned(), arguments: ros, network, rmw: arguments.rmw };
     let node = Node::open(opening).map_err(|message| vec![message])?;
     for warning in warnings {
         node.log(Severity::Warn, warning.text().trim_end());

@@ -1,5 +1,6 @@
 //! The thread that has the machine: inputs one by one, and their outputs to the robot.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +19,8 @@ use crate::manager::machine::{Input, Machine, Output, State};
 use crate::manager::robot::Robot;
 use crate::manager::settings::Settings;
 use crate::node::{Declared, Lifecycle, Node, Phase, Severity};
-use crate::performer::Cast;
+use crate::perform::Perform;
+use crate::performer::performers;
 
 /// Time is told the machine so often, and how it is on `/diagnostics`.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -56,7 +58,8 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     let mut control = Loop::new(mission, adaptation)?;
     let journal = journal(node, options, &mut control).map_err(|message| vec![message])?;
     let begun = control.beliefs().now();
-    let performers = Cast::new(node, &settings.actions, &settings.poses)?;
+    let performers: BTreeMap<String, Box<dyn Perform>> =
+        performers(node, &settings.actions, &settings.poses)?;
     let machine = Machine::new(control, journal, settings.clone(), ticks);
     let (sender, inputs) = mpsc::channel();
     let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())

@@ -25,8 +25,7 @@ use crate::interfaces::system_modes_msgs::srv::{
 use crate::manager::machine::{Change, Ended, Input, Outcome};
 use crate::manager::settings::Settings;
 use crate::node::{CallError, Caller, Node, Publisher, Responder, Severity, depth, keep_all, latched};
-use crate::perform::{Call, End, Perform as _, Progress, Running};
-use crate::performer::Cast;
+use crate::perform::{Call, End, Perform, Progress, Running};
 
 /// So long a function may take to say which mode it has.
 const LOOK: Duration = Duration::from_secs(2);
@@ -48,7 +47,7 @@ pub(super) struct Robot {
     node: Arc<Node>,
     inputs: Sender<Input>,
     functions: BTreeMap<String, Function>,
-    performers: Cast,
+    performers: BTreeMap<String, Box<dyn Perform>>,
     performing: HashMap<u64, (Running, Task<()>)>,
     diagnosed: Diagnosed,
     replies: Arc<Mutex<HashMap<u64, Responder<TaskService>>>>,
@@ -64,7 +63,7 @@ impl Robot {
         node: &Arc<Node>,
         settings: &Settings,
         functions: &[String],
-        performers: Cast,
+        performers: BTreeMap<String, Box<dyn Perform>>,
         inputs: Sender<Input>,
     ) -> Result<Self, Message> {
         let heard = inputs.clone();
@@ -205,9 +204,15 @@ impl Robot {
         }
     }
 
-    /// Has an action performed.
+    /// Has an action performed; one that nobody performs is done as soon as it is begun.
     pub(super) fn perform(&mut self, number: u64, call: Call) {
-        let running = self.performers.start(call);
+        // PDDL knows no cases.
+        let performer = self.performers.iter().find(|(action, _)| action.eq_ignore_ascii_case(&call.action));
+        let Some((_, performer)) = performer else {
+            let _ = self.inputs.send(Input::Performed(number, Ended::Succeeded));
+            return;
+        };
+        let running = performer.start(call);
         let (heard, inputs) = (running.clone(), self.inputs.clone());
         let task = smol::spawn(async move {
             loop {

@@ -18,7 +18,7 @@ use crate::interfaces::suave_msgs::action::{
     FollowPipeline, RechargeBattery, RecoverThrusters, SpiralSearch,
 };
 use crate::node::Node;
-use crate::perform::{Call, End, Perform, Progress, Running};
+use crate::perform::{Perform, Progress};
 
 use action::Client;
 use change_mode::ChangeMode;
@@ -30,47 +30,23 @@ pub use offer::{offer, offers};
 pub use settings::{By, Distribution, Offered, Pose, Poses};
 
 /// Whoever is to carry out actions, by the names of these.
-pub struct Cast(BTreeMap<String, Box<dyn Perform>>);
-
-impl std::fmt::Debug for Cast {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.debug_set().entries(self.0.keys()).finish()
-    }
-}
-
-impl Cast {
-    /// Makes ready to call all that the settings name.
-    ///
-    /// # Errors
-    /// What is wrong with the names of topics, all of it.
-    pub fn new(
-        node: &Arc<Node>,
-        actions: &BTreeMap<String, By>,
-        poses: &Poses,
-    ) -> Result<Self, Vec<Message>> {
-        let (mut cast, mut errors) = (BTreeMap::new(), Vec::new());
-        let hub = OnceLock::new();
-        for (action, by) in actions {
-            match performer(node, by, poses, &hub) {
-                // PDDL knows no cases.
-                Ok(performer) => drop(cast.insert(action.to_lowercase(), performer)),
-                Err(error) => errors.push(error),
-            }
+///
+/// # Errors
+/// What is wrong with the names of topics, all of it.
+pub fn performers(
+    node: &Arc<Node>,
+    actions: &BTreeMap<String, By>,
+    poses: &Poses,
+) -> Result<BTreeMap<String, Box<dyn Perform>>, Vec<Message>> {
+    let (mut performers, mut errors) = (BTreeMap::new(), Vec::new());
+    let hub = OnceLock::new();
+    for (action, by) in actions {
+        match performer(node, by, poses, &hub) {
+            Ok(performer) => drop(performers.insert(action.clone(), performer)),
+            Err(error) => errors.push(error),
         }
-        if errors.is_empty() { Ok(Self(cast)) } else { Err(errors) }
     }
-}
-
-impl Perform for Cast {
-    /// What nobody is there for is done as soon as it is begun.
-    fn start(&self, call: Call) -> Running {
-        if let Some(performer) = self.0.get(&call.action.to_lowercase()) {
-            return performer.start(call);
-        }
-        let (running, performance) = Running::pair();
-        performance.end(End::Succeeded);
-        running
-    }
+    if errors.is_empty() { Ok(performers) } else { Err(errors) }
 }
 
 fn performer(

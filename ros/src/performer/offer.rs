@@ -12,7 +12,7 @@ use crate::interfaces::plansys2_msgs::msg::{ActionExecution, ActionPerformerStat
 use crate::node::{Node, Publisher, Severity, depth};
 use crate::perform::{Call, End, Perform, Progress, Running};
 use crate::performer::hub::{DEPTH, Hub};
-use crate::performer::{Cast, Offered, Poses};
+use crate::performer::{Offered, Poses, performers};
 
 /// So often the others hear that we are there.
 const HEARTBEAT: Duration = Duration::from_secs(1);
@@ -85,11 +85,9 @@ pub fn offers(
     poses: &Poses,
 ) -> Result<(), Vec<Message>> {
     let by = offered.iter().map(|(action, offered)| (action.clone(), offered.by.clone())).collect();
-    let cast = Arc::new(Cast::new(node, &by, poses)?);
-    for (action, offered) in offered {
-        let performer: Arc<dyn Perform> = Arc::<Cast>::clone(&cast);
-        offer(node, action, offered.specialized_arguments.clone(), performer)
-            .map_err(|message| vec![message])?;
+    for (action, performer) in performers(node, &by, poses)? {
+        let specialized = offered[&action].specialized_arguments.clone();
+        offer(node, &action, specialized, Arc::from(performer)).map_err(|message| vec![message])?;
     }
     Ok(())
 }

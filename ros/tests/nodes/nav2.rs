@@ -11,11 +11,11 @@ use metaplan_ros::interfaces::nav2_msgs::action::{
 };
 use metaplan_ros::interfaces::std_msgs::msg::Bool;
 use metaplan_ros::node::{GoalEnd, depth};
-use metaplan_ros::perform::{Call, End, Perform as _};
+use metaplan_ros::perform::{Call, End};
 use metaplan_ros::planner::{self, Found, Manner, NoPlan, Request};
 
 use crate::common::{domain, node, until};
-use crate::performers::{cast_of, hear, serve};
+use crate::performers::{Cast, hear, serve};
 
 /// A file of the example.
 pub fn file(name: &str) -> PathBuf {
@@ -47,7 +47,7 @@ fn the_round_is_driven() {
             Some((GoalEnd::Succeeded, NavigateToPoseResult::default()))
         });
     let inspected = robot.publisher::<Bool>("/shelf/inspected", depth(10)).expect("a topic");
-    let cast = cast_of(&manager, &file("ros.toml"));
+    let cast = Cast::new(&manager, &file("ros.toml"));
     for (line, configuration) in found.plans[0].iter().zip(&found.configuration) {
         let mut words = words(&line.action).into_iter();
         let call = Call {
