@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from program import ROOT, Program
 from performers import Executor
+from program import ROOT, Program
 from ros2 import CANCELED, Node
 from scenarios import Setting, check, scenario
 from transport import connect
