@@ -40,8 +40,12 @@ class Patient(Executor):
 def experts(node: Node) -> None:
     """PlanSys2's experts, with the domain and the problem of the example."""
     domain, problem = ((EXAMPLE / name).read_text() for name in ("domain.pddl", "problem.pddl"))
-    node.serve("/domain_expert/get_domain", "plansys2_msgs/srv/GetDomain", lambda _: {"success": True, "domain": domain})
-    node.serve("/problem_expert/get_problem", "plansys2_msgs/srv/GetProblem", lambda _: {"success": True, "problem": problem})
+    node.serve(
+        "/domain_expert/get_domain", "plansys2_msgs/srv/GetDomain", lambda _: {"success": True, "domain": domain}
+    )
+    node.serve(
+        "/problem_expert/get_problem", "plansys2_msgs/srv/GetProblem", lambda _: {"success": True, "problem": problem}
+    )
 
 
 @scenario()
