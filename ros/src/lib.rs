@@ -1,5 +1,6 @@
 //! Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 
+pub mod controller;
 mod diagnosed;
 pub mod interfaces;
 pub mod manager;

@@ -12,7 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::{Parser, ValueEnum};
 use metaplan::message::Message;
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
-use metaplan_ros::{manager, planner, reasoner};
+use metaplan_ros::performer::PlanVersion;
+use metaplan_ros::{controller, manager, planner, reasoner};
 
 /// Metaplan on a ROS 2 robot, over DDS and without a ROS installation.
 ///
@@ -22,7 +23,7 @@ use metaplan_ros::{manager, planner, reasoner};
 #[command(version)]
 struct Arguments {
     /// A mission's manifest; a planner can do without, and takes domains as they are then.
-    #[arg(long, value_name = "FILE", required_if_eq_any = [("role", "manager"), ("role", "reasoner")])]
+    #[arg(long, value_name = "FILE", required_if_eq_any = [("role", "manager"), ("role", "reasoner"), ("role", "controller")])]
     mission: Option<PathBuf>,
     /// Whose place to take.
     #[arg(long = "as", value_enum, default_value_t = Role::Manager)]
@@ -36,6 +37,9 @@ struct Arguments {
     /// How services are mapped: as the discovered participants say, or as this middleware does.
     #[arg(long, value_enum, default_value_t = Rmw::Auto)]
     rmw: Rmw,
+    /// With `--as controller`: whose types PlanSys2's executor has.
+    #[arg(long, value_enum, default_value_t)]
+    executor: PlanVersion,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -46,13 +50,15 @@ enum Role {
     Reasoner,
     /// Of PlanSys2's planner; with a mission, its knowledge base joins in.
     Planner,
+    /// Of whoever has PlanSys2's executor carry out what its experts want: with a knowledge base, and again when a design is lost.
+    Controller,
 }
 
 impl Role {
     /// What the node is called, unless it is said otherwise. PlanSys2 looks for its planner by its name.
     fn node(self) -> &'static str {
         match self {
-            Self::Manager | Self::Reasoner => "metaplan",
+            Self::Manager | Self::Reasoner | Self::Controller => "metaplan",
             Self::Planner => "planner",
         }
     }
@@ -91,9 +97,12 @@ fn start() -> Result<(), Vec<Message>> {
     };
     ctrlc::set_handler(handler)
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
-    let Arguments { role, mission, settings, journal, .. } = arguments;
+    let Arguments { role, mission, settings, journal, executor, .. } = arguments;
     match (role, mission) {
         (Role::Planner, mission) => planner::run(&node, &planner::Options { mission, settings }, &stop),
+        (Role::Controller, Some(mission)) => {
+            controller::run(&node, &controller::Options { mission, version: executor }, &stop)
+        }
         (Role::Manager, Some(mission)) => {
             manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
         }

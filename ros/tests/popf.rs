@@ -191,6 +191,22 @@ fn the_knowledge_base_of_a_mission_joins_in() {
     assert!(text.contains("optimal, proved") && text.contains(" = fd_"), "{text}");
 }
 
+/// `ros2 run PACKAGE PROGRAM` runs `lib/PACKAGE/PROGRAM` of the first prefix of `AMENT_PREFIX_PATH` whose index names the package.
+#[cfg(unix)]
+#[test]
+fn the_overlay_is_where_ros2_run_looks() {
+    let (directory, [domain, problem]) = files(DOMAIN, PROBLEM);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/popf/overlay");
+    let prefix = directory.path().join("prefix");
+    let made =
+        Command::new(&script).arg(env!("CARGO_BIN_EXE_popf")).arg(&prefix).status().expect("the script");
+    assert!(made.success());
+    assert!(prefix.join("share/ament_index/resource_index/packages/popf").is_file());
+    let output = Command::new(prefix.join("lib/popf/popf")).args([&domain, &problem]).output().expect("popf");
+    assert_eq!(read_as_the_plugin(&output).map(|items| items.len()), Some(2));
+    assert!(!Command::new(script).arg("nothing").output().expect("the script").status.success());
+}
+
 /// Domains of PlanSys2's own tests; those that it calls an error are.
 #[test]
 fn domains_of_plansys2_are_valid() {

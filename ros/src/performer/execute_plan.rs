@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use serde::Deserialize;
+use clap::ValueEnum;
 
 use crate::interfaces::plansys2_1::plansys2_msgs::action as older;
 use crate::interfaces::plansys2_msgs::action as newer;
@@ -13,12 +13,11 @@ use crate::performer::action::{PATIENCE, pursue_on};
 use crate::performer::{feedback, part};
 
 /// Versions of PlanSys2 whose executors differ.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum PlanVersion {
-    /// The executor asks PlanSys2's planner for the plan: what [`planner`](crate::planner) serves.
+    /// The executor asks PlanSys2's planner for the plan, and the goal is empty.
     Older,
-    /// The plan is part of the goal.
+    /// The plan is the goal.
     #[default]
     Newer,
 }

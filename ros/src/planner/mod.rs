@@ -1,7 +1,12 @@
 //! In the place of PlanSys2's planner.
 
+mod joint;
+mod manner;
 mod node;
 mod solve;
 
+pub(crate) use joint::Joint;
+pub(crate) use manner::Chosen;
 pub use node::{Options, run, serve};
+pub(crate) use node::{on_a_thread, plan_message};
 pub use solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};

@@ -5,33 +5,25 @@
 //! in, and hears `/diagnostics`.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use metaplan::encodings::Exact;
-use metaplan::mapek::{Event, Observation};
 use metaplan::message::Message;
-use metaplan::mission::{Mission, PlanLine};
+use metaplan::mission::PlanLine;
 use metaplan::pddl::Source;
 use metaplan::setup::Setup;
-use ros2_client::ParameterValue;
 
-use crate::interfaces::diagnostic_msgs::msg::DiagnosticArray;
 use crate::interfaces::plansys2_msgs::msg::{Plan, PlanArray, PlanItem};
 use crate::interfaces::plansys2_msgs::srv::{
     GetPlan, GetPlanArray, GetPlanArrayResponse, GetPlanResponse, ValidateDomain, ValidateDomainResponse,
 };
 use crate::manager::Settings;
-use crate::node::{Declared, Lifecycle, Node, Phase, Severity, keep_all};
+use crate::node::{Lifecycle, Node, Phase, Severity};
 use crate::performer;
+use crate::planner::joint::Joint;
+use crate::planner::manner::Chosen;
 use crate::planner::solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};
-
-/// In seconds; what PlanSys2 has.
-const TIMEOUT: f64 = 15.0;
-
-/// Who has asked gives up at the time-out, so that the answer has to come before.
-const SHARE: f64 = 0.9;
 
 /// Plans may nest deeply.
 const STACK: usize = 64 << 20;
@@ -45,8 +37,8 @@ struct Planner {
     /// Requests that are being planned.
     busy: AtomicUsize,
     /// The mission whose knowledge base joins in, as the diagnostics have it.
-    joint: Option<Mutex<Mission>>,
-    manner: Mutex<Manner>,
+    joint: Option<Arc<Joint>>,
+    manner: Arc<Chosen>,
 }
 
 /// Serves as PlanSys2's planner. The node has no parameters yet; it is not configured, and its lifecycle is returned.
@@ -54,33 +46,12 @@ struct Planner {
 /// # Errors
 /// A parameter of the command line is wrong, or a topic cannot be made.
 pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, Vec<Message>> {
-    let manner =
-        Manner { metric: None, time_limit: Duration::ZERO, overlap: None, alternatives: ALTERNATIVES };
-    let joint = setup.map(|setup| Mutex::new(setup.mission));
-    let planner = Arc::new(Planner {
-        node: Arc::clone(node),
-        busy: AtomicUsize::new(0),
-        joint,
-        manner: Mutex::new(manner),
-    });
-    let listener = Arc::clone(&planner);
-    let warnings = node.declare(declared(), move |name, value| listener.set(name, value))?;
-    for warning in warnings {
-        node.log(Severity::Warn, &warning.message);
-    }
-    for parameter in declared() {
-        if let Some(value) = node.parameter(parameter.name) {
-            planner.set(parameter.name, &value);
-        }
-    }
+    let manner = Chosen::declare(node)?;
+    let joint = setup.map(|setup| Joint::listen(node, setup.mission)).transpose()?;
+    let planner = Arc::new(Planner { node: Arc::clone(node), busy: AtomicUsize::new(0), joint, manner });
     let one = |message: Message| vec![message];
     let lifecycle = Lifecycle::serve(node, |_| true).map_err(one)?;
     planner.answer(&lifecycle).map_err(one)?;
-    if planner.joint.is_some() {
-        let hears = Arc::clone(&planner);
-        node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |array| hears.hear(&array))
-            .map_err(one)?;
-    }
     Ok(lifecycle)
 }
 
@@ -120,76 +91,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     Ok(())
 }
 
-/// Further plans in the answer of `get_plan_array`.
-const ALTERNATIVES: usize = 3;
-
-fn declared() -> Vec<Declared> {
-    let one = |name, description, value| Declared { name, description, value, is_dynamic: true };
-    vec![
-        one(
-            "plan_solver_timeout",
-            "how long whoever asks for a plan waits for it, in seconds",
-            ParameterValue::Double(TIMEOUT),
-        ),
-        one(
-            "plan_solver_plugins",
-            "accepted, as PlanSys2's parameter files have it; there are no plugins here",
-            ParameterValue::StringArray(Vec::new()),
-        ),
-        one(
-            "metric",
-            "what is minimised where the problem has no metric, as PlanSys2's problems have none: `(cost)`, `total-time`",
-            ParameterValue::String(String::new()),
-        ),
-        one(
-            "overlap",
-            "whether durative actions may overlap: `yes`, `no`, or `auto`: unless a knowledge base joins in",
-            ParameterValue::String("auto".to_owned()),
-        ),
-        one(
-            "alternatives",
-            "up to so many further plans that are as good, in the answer of get_plan_array",
-            ParameterValue::Integer(ALTERNATIVES as i64),
-        ),
-    ]
-}
-
 impl Planner {
-    fn manner(&self) -> MutexGuard<'_, Manner> {
-        self.manner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn set(&self, name: &str, value: &ParameterValue) {
-        let mut manner = self.manner();
-        match (name, value) {
-            ("plan_solver_timeout", ParameterValue::Double(seconds)) => {
-                let wanted = Duration::try_from_secs_f64(*seconds).ok().filter(|time| !time.is_zero());
-                if wanted.is_none() {
-                    let text = format!(
-                        "plan_solver_timeout should be above 0, and is {seconds}: {TIMEOUT} s are taken"
-                    );
-                    self.node.log(Severity::Warn, &text);
-                }
-                let timeout = wanted.unwrap_or_else(|| Duration::from_secs_f64(TIMEOUT));
-                manner.time_limit = timeout.mul_f64(SHARE);
-            }
-            ("metric", ParameterValue::String(text)) => {
-                manner.metric = Some(text.trim().to_owned()).filter(|text| !text.is_empty());
-            }
-            ("overlap", ParameterValue::String(text)) => {
-                manner.overlap = match text.as_str() {
-                    "yes" | "true" => Some(true),
-                    "no" | "false" => Some(false),
-                    _ => None,
-                };
-            }
-            ("alternatives", ParameterValue::Integer(count)) => {
-                manner.alternatives = usize::try_from(*count).unwrap_or_default();
-            }
-            _ => {}
-        }
-    }
-
     /// Serves the three services.
     fn answer(self: &Arc<Self>, lifecycle: &Arc<Lifecycle>) -> Result<(), Message> {
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
@@ -203,7 +105,7 @@ impl Planner {
         self.node.serve::<GetPlanArray>("planner/get_plan_array", move |request, answer| {
             let is_ready = is_ready(&phase);
             planner.aside("get_plan_array", move |planner| {
-                let most = planner.manner().alternatives;
+                let most = planner.manner.get().alternatives;
                 let found = planner.plan(is_ready, request.domain, request.problem, most);
                 answer.send(get_plan_array_response(found));
             });
@@ -220,8 +122,7 @@ impl Planner {
     /// Does something on a thread of its own.
     fn aside(self: &Arc<Self>, name: &str, work: impl FnOnce(&Self) + Send + 'static) {
         let planner = Arc::clone(self);
-        let thread = std::thread::Builder::new().name(name.to_owned()).stack_size(STACK);
-        if let Err(error) = thread.spawn(move || work(&planner)) {
+        if let Err(error) = on_a_thread(name, move || work(&planner)) {
             // Who has asked hears nothing, and gives up in time.
             self.node.log(Severity::Error, &format!("{name}: there is no further thread: {error}"));
         }
@@ -247,8 +148,8 @@ impl Planner {
     }
 
     fn plan_now(&self, domain: String, problem: String, alternatives: usize) -> Result<Found, NoPlan> {
-        let manner = Manner { alternatives, ..self.manner().clone() };
-        let joint = self.joint.as_ref().map(|joint| lock(joint).clone());
+        let manner = Manner { alternatives, ..self.manner.get() };
+        let joint = self.joint.as_ref().map(|joint| joint.mission());
         let request = Request {
             domain: Source::new(DOMAIN, domain),
             problem: Source::new(PROBLEM, problem),
@@ -266,28 +167,14 @@ impl Planner {
         }
         found
     }
-
-    /// Takes over what the diagnostics say of what the knowledge base knows.
-    fn hear(&self, array: &DiagnosticArray) {
-        let (Some(joint), Ok(text)) = (&self.joint, serde_json::to_string(array)) else { return };
-        let mut mission = lock(joint);
-        // What is not understood, or not known, is about something else.
-        for event in Observation::parse(&text).events.into_iter().flatten() {
-            let _ = match event {
-                Event::Measured { attribute, value } => {
-                    mission.set(&attribute, &Exact::from(value).to_string())
-                }
-                Event::Component { component, status } => mission
-                    .knowledge_mut()
-                    .map_or(Ok(()), |knowledge| knowledge.report(&component, status).map(|_| ())),
-                _ => Ok(()),
-            };
-        }
-    }
 }
 
-fn lock(joint: &Mutex<Mission>) -> MutexGuard<'_, Mission> {
-    joint.lock().unwrap_or_else(PoisonError::into_inner)
+/// Plans, or whatever takes long, on a thread of its own.
+///
+/// # Errors
+/// There is no further thread.
+pub(crate) fn on_a_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    std::thread::Builder::new().name(name.to_owned()).stack_size(STACK).spawn(work).map(|_| ())
 }
 
 const UNCONFIGURED: &str = "the planner is not configured; `ros2 lifecycle set /planner configure` does it";
@@ -296,7 +183,8 @@ fn is_ready(lifecycle: &Lifecycle) -> bool {
     matches!(lifecycle.phase(), Phase::Inactive | Phase::Active)
 }
 
-fn plan_message(lines: &[PlanLine]) -> Plan {
+/// The plan as PlanSys2 has it; times are in seconds.
+pub(crate) fn plan_message(lines: &[PlanLine]) -> Plan {
     let item = |line: &PlanLine| PlanItem {
         time: line.start.to_f64() as f32,
         action: line.action.clone(),

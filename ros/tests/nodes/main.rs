@@ -1,6 +1,7 @@
 //! Two of our own nodes over loopback.
 
 mod common;
+mod controller;
 mod graph;
 mod nav2;
 mod performers;

@@ -1,11 +1,12 @@
 """All scenarios: importing a module registers those that are in it."""
 
 import citizen
+import controlling
 import faults
 import performers
 import planning
 import reasoning
 from scenarios import QUICK, SCENARIOS, Setting
 
-MODULES = (citizen, faults, performers, planning, reasoning)
+MODULES = (citizen, controlling, faults, performers, planning, reasoning)
 __all__ = ["MODULES", "QUICK", "SCENARIOS", "Setting"]

@@ -1,0 +1,226 @@
+//! The mission of PlanSys2, controlled from here: its experts say what is to be done, the knowledge base says with which designs it can be
+//! done, and PlanSys2's executor does it.
+//!
+//! ```text
+//! ASK --domain_expert/get_domain, problem_expert/get_problem--> PLAN --a plan--> EXECUTE (action execute_plan)
+//! EXECUTE --it succeeds--> end     EXECUTE --it fails--> ASK
+//! EXECUTE --a design of the plan is no longer available--> it is cancelled --> ASK
+//! PLAN --no plan--> said, and asked again when the knowledge base has changed, or after some seconds
+//! ```
+//!
+//! What was done stays done: PlanSys2's problem expert knows it.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use metaplan::message::Message;
+use metaplan::pddl::Source;
+use metaplan::setup::Setup;
+use smol::Timer;
+
+use crate::interfaces::plansys2_msgs::msg::Plan;
+use crate::interfaces::plansys2_msgs::srv::{GetDomain, GetDomainRequest, GetProblem, GetProblemRequest};
+use crate::node::{Node, Severity};
+use crate::perform::{End, Progress};
+use crate::performer::{ExecutePlans, PlanVersion};
+use crate::planner::{
+    Chosen, DOMAIN, Found, Joint, NoPlan, PROBLEM, Request, on_a_thread, plan_message, solve,
+};
+
+/// So long the experts are waited for.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// So long nothing is tried again, unless the knowledge base changes.
+const PAUSE: Duration = Duration::from_secs(5);
+
+/// So long after a failure.
+const BREATH: Duration = Duration::from_secs(1);
+
+/// So often is looked whether something has changed.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// After so many failures on end nothing is tried again.
+const MOST_FAILURES: usize = 5;
+
+/// What is controlled.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// The manifest of the mission whose knowledge base joins in.
+    pub mission: PathBuf,
+    /// The executor's types.
+    pub version: PlanVersion,
+}
+
+/// Has PlanSys2's goal reached; returns when it is, or when told to stop.
+///
+/// # Errors
+/// The mission or a parameter of the command line is wrong, or nothing that was tried has succeeded.
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
+    let setup = Setup::read(&options.mission)?;
+    for warning in setup.mission.warnings() {
+        node.log(Severity::Warn, warning.text().trim_end());
+    }
+    let controller = Controller {
+        node: Arc::clone(node),
+        manner: Chosen::declare(node)?,
+        joint: Joint::listen(node, setup.mission)?,
+        executes: ExecutePlans::new(node, "execute_plan", options.version),
+    };
+    smol::block_on(controller.control(stop)).map_err(|message| vec![message])
+}
+
+struct Controller {
+    node: Arc<Node>,
+    manner: Arc<Chosen>,
+    joint: Arc<Joint>,
+    executes: ExecutePlans,
+}
+
+/// What has come of a plan.
+enum Outcome {
+    Done,
+    Failed(String),
+    /// It was cancelled, for these designs.
+    Lost(Vec<String>),
+    Stopped,
+}
+
+impl Controller {
+    async fn control(&self, stop: &AtomicBool) -> Result<(), Message> {
+        let mut failures = 0;
+        while !stop.load(Ordering::Relaxed) {
+            let stopped = async {
+                while !stop.load(Ordering::Relaxed) {
+                    Timer::after(LOOK).await;
+                }
+                None
+            };
+            let found = match smol::future::or(stopped, async { Some(self.find().await) }).await {
+                Some(Ok(found)) => found,
+                Some(Err(because)) => {
+                    self.node.log(Severity::Warn, &because);
+                    self.pause(PAUSE, stop).await;
+                    continue;
+                }
+                None => return Ok(()),
+            };
+            let plan = found.plans.first().map(|lines| plan_message(lines)).unwrap_or_default();
+            if plan.items.is_empty() {
+                self.node.log(Severity::Info, "the goal holds");
+                return Ok(());
+            }
+            match self.execute(plan, &found, stop).await {
+                Outcome::Done => {
+                    self.node.log(Severity::Info, "the plan is executed");
+                    return Ok(());
+                }
+                Outcome::Stopped => return Ok(()),
+                Outcome::Lost(designs) => {
+                    let text =
+                        format!("the plan is given up: {} lost; another one is made", designs.join(", "));
+                    self.node.log(Severity::Warn, &text);
+                    failures = 0;
+                }
+                Outcome::Failed(because) => {
+                    failures += 1;
+                    self.node.log(Severity::Error, &because);
+                    if failures == MOST_FAILURES {
+                        let text = format!("{failures} plans on end have failed, the last one so: {because}");
+                        return Err(Message::error("N150", text));
+                    }
+                    self.pause(BREATH, stop).await;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The best plan for what PlanSys2 has now, or why there is none.
+    async fn find(&self) -> Result<Found, String> {
+        let (domain, problem) = self.ask().await?;
+        self.plan(domain, problem).await.map_err(|none| none.text())
+    }
+
+    /// The domain and the problem as PlanSys2 has them now.
+    async fn ask(&self) -> Result<(String, String), String> {
+        let domain = self.node.caller::<GetDomain>("domain_expert/get_domain");
+        let domain =
+            domain.call(GetDomainRequest::default(), PATIENCE).await.map_err(|error| error.to_string())?;
+        let problem = self.node.caller::<GetProblem>("problem_expert/get_problem");
+        let problem =
+            problem.call(GetProblemRequest::default(), PATIENCE).await.map_err(|error| error.to_string())?;
+        match (domain.success, problem.success) {
+            (true, true) => Ok((domain.domain, problem.problem)),
+            (false, _) => Err(format!("PlanSys2 has no domain: {}", domain.error_info)),
+            (_, false) => Err(format!("PlanSys2 has no problem: {}", problem.error_info)),
+        }
+    }
+
+    async fn plan(&self, domain: String, problem: String) -> Result<Found, NoPlan> {
+        let (mission, manner) = (self.joint.mission(), self.manner.get());
+        let (sender, found) = smol::channel::bounded(1);
+        let work = move || {
+            let (domain, problem) = (Source::new(DOMAIN, domain), Source::new(PROBLEM, problem));
+            let _ = sender.try_send(solve(Request { domain, problem, joint: Some(&mission) }, &manner));
+        };
+        on_a_thread("plan", work)
+            .map_err(|error| NoPlan::None(format!("there is no further thread: {error}")))?;
+        let found = found.recv().await.map_err(|_| NoPlan::Fault("the planner has ended".to_owned()))??;
+        let actions = found.plans.first().map_or(0, Vec::len);
+        let text = format!("a plan of {actions} actions that costs {}: {}", found.cost, found.verdict);
+        self.node.log(Severity::Info, &text);
+        Ok(found)
+    }
+
+    /// Has a plan executed as long as its designs are available.
+    async fn execute(&self, plan: Plan, found: &Found, stop: &AtomicBool) -> Outcome {
+        let used: BTreeSet<String> =
+            found.configuration.iter().flatten().map(|(_, design)| design.to_lowercase()).collect();
+        let running = self.executes.start(plan);
+        let (mut lost, mut stopped) = (Vec::new(), false);
+        loop {
+            let progress = async { Some(running.next().await) };
+            let look = async {
+                Timer::after(LOOK).await;
+                None
+            };
+            match smol::future::or(progress, look).await {
+                Some(Progress::Feedback { completion, text }) => self.tell(completion, &text),
+                Some(Progress::Ended(_)) if stopped => return Outcome::Stopped,
+                Some(Progress::Ended(End::Succeeded)) => return Outcome::Done,
+                Some(Progress::Ended(_)) if !lost.is_empty() => return Outcome::Lost(lost),
+                Some(Progress::Ended(End::Failed(because))) => return Outcome::Failed(because),
+                Some(Progress::Ended(End::Canceled)) => {
+                    return Outcome::Failed("somebody has cancelled the plan".to_owned());
+                }
+                None if !stopped && stop.load(Ordering::Relaxed) => {
+                    stopped = true;
+                    running.cancel();
+                }
+                None if lost.is_empty() => {
+                    lost = used.difference(&self.joint.available()).cloned().collect();
+                    if !lost.is_empty() {
+                        running.cancel();
+                    }
+                }
+                None => {}
+            }
+        }
+    }
+
+    fn tell(&self, completion: Option<f32>, text: &str) {
+        let done = completion.map(|part| format!("{:.0} %: ", part * 100.0)).unwrap_or_default();
+        self.node.log(Severity::Debug, &(done + text));
+    }
+
+    /// Waits until the knowledge base has changed, or for some seconds.
+    async fn pause(&self, time: Duration, stop: &AtomicBool) {
+        let (begun, available) = (Instant::now(), self.joint.available());
+        while begun.elapsed() < time && !stop.load(Ordering::Relaxed) && self.joint.available() == available {
+            Timer::after(LOOK).await;
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! How plans are made, as the node's parameters say.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use metaplan::message::Message;
+use ros2_client::ParameterValue;
+
+use crate::node::{Declared, Node, Severity};
+use crate::planner::Manner;
+
+/// In seconds; what PlanSys2 has.
+const TIMEOUT: f64 = 15.0;
+
+/// Who has asked gives up at the time-out, so that the answer has to come before.
+const SHARE: f64 = 0.9;
+
+/// Further plans in the answer of `get_plan_array`.
+const ALTERNATIVES: usize = 3;
+
+fn declared() -> Vec<Declared> {
+    let one = |name, description, value| Declared { name, description, value, is_dynamic: true };
+    vec![
+        one(
+            "plan_solver_timeout",
+            "how long whoever asks for a plan waits for it, in seconds",
+            ParameterValue::Double(TIMEOUT),
+        ),
+        one(
+            "plan_solver_plugins",
+            "accepted, as PlanSys2's parameter files have it; there are no plugins here",
+            ParameterValue::StringArray(Vec::new()),
+        ),
+        one(
+            "metric",
+            "what is minimised where the problem has no metric, as PlanSys2's problems have none: `(cost)`, `total-time`",
+            ParameterValue::String(String::new()),
+        ),
+        one(
+            "overlap",
+            "whether durative actions may overlap: `yes`, `no`, or `auto`: unless a knowledge base joins in",
+            ParameterValue::String("auto".to_owned()),
+        ),
+        one(
+            "alternatives",
+            "up to so many further plans that are as good, in the answer of get_plan_array",
+            ParameterValue::Integer(ALTERNATIVES as i64),
+        ),
+    ]
+}
+
+/// The manner that the parameters choose.
+#[derive(Debug)]
+pub(crate) struct Chosen {
+    manner: Mutex<Manner>,
+}
+
+impl Chosen {
+    /// Declares the parameters of a node that has none yet, and follows them.
+    ///
+    /// # Errors
+    /// The command line gives a value of another type.
+    pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Vec<Message>> {
+        let manner =
+            Manner { metric: None, time_limit: Duration::ZERO, overlap: None, alternatives: ALTERNATIVES };
+        let chosen = Arc::new(Self { manner: Mutex::new(manner) });
+        let (listener, weak) = (Arc::clone(&chosen), Arc::downgrade(node));
+        let changed = move |name: &str, value: &ParameterValue| {
+            if let Some(node) = weak.upgrade() {
+                listener.set(&node, name, value);
+            }
+        };
+        for warning in node.declare(declared(), changed)? {
+            node.log(Severity::Warn, &warning.message);
+        }
+        for parameter in declared() {
+            if let Some(value) = node.parameter(parameter.name) {
+                chosen.set(node, parameter.name, &value);
+            }
+        }
+        Ok(chosen)
+    }
+
+    /// The manner as it is now.
+    pub(crate) fn get(&self) -> Manner {
+        self.lock().clone()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Manner> {
+        self.manner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn set(&self, node: &Node, name: &str, value: &ParameterValue) {
+        let mut manner = self.lock();
+        match (name, value) {
+            ("plan_solver_timeout", ParameterValue::Double(seconds)) => {
+                let wanted = Duration::try_from_secs_f64(*seconds).ok().filter(|time| !time.is_zero());
+                if wanted.is_none() {
+                    let text = format!(
+                        "plan_solver_timeout should be above 0, and is {seconds}: {TIMEOUT} s are taken"
+                    );
+                    node.log(Severity::Warn, &text);
+                }
+                let timeout = wanted.unwrap_or_else(|| Duration::from_secs_f64(TIMEOUT));
+                manner.time_limit = timeout.mul_f64(SHARE);
+            }
+            ("metric", ParameterValue::String(text)) => {
+                manner.metric = Some(text.trim().to_owned()).filter(|text| !text.is_empty());
+            }
+            ("overlap", ParameterValue::String(text)) => {
+                manner.overlap = match text.as_str() {
+                    "yes" | "true" => Some(true),
+                    "no" | "false" => Some(false),
+                    _ => None,
+                };
+            }
+            ("alternatives", ParameterValue::Integer(count)) => {
+                manner.alternatives = usize::try_from(*count).unwrap_or_default();
+            }
+            _ => {}
+        }
+    }
+}
