@@ -51,7 +51,7 @@ def objectives(setting: Setting) -> str:
         return f"{len(asked(robot, PATH))} requests for {PATH}"
 
 
-@scenario()
+@scenario(quick=False)
 def killed_reasoner(setting: Setting) -> str:
     """kill -9 while there are objectives: they are kept, nothing is asked for twice, and they can be cancelled."""
     with play(setting, "reasoner") as (robot, program):
