@@ -273,16 +273,19 @@ def vanishes(setting: Setting) -> str:
 
 @scenario()
 def wrong_mapping(setting: Setting) -> str:
-    """The other vendor's mapping of services is forced: the calls time out and the report names the mapping."""
+    """The other vendor's mapping of services is forced: calls time out, and it is said which mapping was used."""
     other = "fastrtps" if setting.vendor == "cyclonedds" else "cyclonedds"
-    program = Program(setting.program, "reasoner", setting.vendor, setting.domain, rmw=other)
+    program = Program(setting.program, "manager", setting.vendor, setting.domain, rmw=other)
     setting.programs.append(program)
     robot = Robot(Options(vendor=setting.vendor, domain=setting.domain))
     try:
         program.start()
-        robot.node.spin(8.0)
+        said = robot.node.spin_until(lambda: f"--rmw {setting.vendor}" in program.output(), 25.0)
         check(program.running(), f"the program ended with {program.status()}")
-        return "alive"
+        check(said, f"within 25 s nothing is said of `--rmw {setting.vendor}`")
+        told = robot.node.spin_until(lambda: any("--rmw" in event for event in robot.events), 5.0)
+        check(told, f"nothing on /metaplan/events: {robot.events[-3:]}")
+        return next(event for event in robot.events if "--rmw" in event)[:160]
     finally:
         robot.close()
         program.stop()
