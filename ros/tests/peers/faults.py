@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from modes import Remote
-from oracle import MOTION, PATH, SEARCH, UNGROUND
+from oracle import MOTION, PATH, SEARCH, UNGROUND, World
 from program import Program
 from ros2 import Node
 from scenarios import CLEAR, DARK, MURKY, Setting, asked, check, no_fault, play, scenario, see
@@ -235,9 +235,8 @@ def _again(robot: Robot) -> bool:
     return False
 
 
-@scenario()
-def vanishes(setting: Setting) -> str:
-    """The mode manager is killed and comes back with everything ungrounded: the mission goes on."""
+def _remote(setting: Setting, part: Callable[[Remote, Robot], None], limit: float) -> str:
+    """The mode manager is a process of its own, which goes and comes back with everything ungrounded: the mission goes on."""
     program = Program(setting.program, "manager", setting.vendor, setting.domain)
     setting.programs.append(program)
     modes = Remote(setting.vendor, setting.domain)
@@ -252,23 +251,45 @@ def vanishes(setting: Setting) -> str:
         robot.node.spin(0.3)
         modes.poll()
         check((PATH, "fd_spiral_high") in modes.requests, f"asked for {modes.requests}")
-        modes.kill()
-        robot.show(DARK)
-        robot.node.spin(12.0)
+        part(modes, robot)
         check(program.running(), f"the program ended with {program.status()}")
-        check(any("fd_spiral" in e or "change_mode" in e for e in robot.events), "nothing on /metaplan/events")
         modes = Remote(setting.vendor, setting.domain)
         began = time.monotonic()
-        while (PATH, "fd_spiral_low") not in modes.requests and time.monotonic() < began + 25:
-            robot.show(DARK)
+        wanted = {(PATH, World(SEARCH, robot.oracle.world.visibility).spiral()), (MOTION, "fd_all_thrusters")}
+        while not wanted <= set(modes.requests) and time.monotonic() < began + limit:
+            robot.show(robot.oracle.world.visibility)
             robot.node.spin(0.5)
             modes.poll()
-        check((PATH, "fd_spiral_low") in modes.requests, f"after its return asked for {modes.requests}")
+        check(wanted <= set(modes.requests), f"{limit:g} s after its return asked for {modes.requests}")
         return f"asked again {time.monotonic() - began:.1f} s after its return"
     finally:
         modes.kill()
         robot.close()
         program.stop()
+
+
+@scenario()
+def vanishes(setting: Setting) -> str:
+    """The mode manager is killed; while it is away the water becomes murky."""
+
+    def part(modes: Remote, robot: Robot) -> None:
+        modes.kill()
+        robot.show(DARK)
+        robot.node.spin(12.0)
+        check(any("fd_spiral" in e or "change_mode" in e for e in robot.events), "nothing on /metaplan/events")
+
+    return _remote(setting, part, 25.0)
+
+
+@scenario()
+def restarts(setting: Setting) -> str:
+    """The mode manager is restarted, and nothing else changes."""
+
+    def part(modes: Remote, robot: Robot) -> None:
+        modes.leave()
+        robot.node.spin(1.0)
+
+    return _remote(setting, part, 15.0)
 
 
 @scenario()
