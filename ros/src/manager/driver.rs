@@ -179,7 +179,12 @@ impl Driver {
         for (function, mode) in &modes {
             self.node.log(Severity::Debug, &format!("{function} has the mode {mode:?}"));
         }
-        self.node.log(Severity::Info, "every function answers");
+        let silent = modes.iter().filter(|(_, mode)| mode.is_none()).count();
+        let text = match silent {
+            0 => "every function answers".to_owned(),
+            _ => format!("{silent} of {} functions do not say which mode they have", modes.len()),
+        };
+        self.node.log(Severity::Info, &text);
         self.handle(Input::Ready(modes))?;
         for input in kept {
             // What was heard before is still so.

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use metaplan::message::Message;
-use serde_json::Value;
+use serde_json::{Value, json};
 use smol::{Task, Timer};
 
 use crate::diagnosed::Diagnosed;
@@ -21,6 +21,7 @@ use crate::interfaces::suave_msgs::srv::{Task as TaskService, TaskResponse};
 use crate::interfaces::system_modes_msgs::msg::ModeEvent;
 use crate::interfaces::system_modes_msgs::srv::{
     ChangeMode, ChangeModeRequest, GetAvailableModes, GetAvailableModesRequest, GetMode, GetModeRequest,
+    GetModeResponse,
 };
 use crate::manager::machine::{Change, Ended, Input, Outcome};
 use crate::manager::settings::Settings;
@@ -119,18 +120,23 @@ impl Robot {
         missing
     }
 
-    /// The mode of each function, as far as it says.
-    pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
+    /// The mode of each function, as far as it says; why one does not is an event, and logged.
+    pub(super) async fn modes(&mut self) -> Vec<(String, Option<String>)> {
         let look = |(name, function): (&String, &Function)| {
             let (name, look) = (name.clone(), Arc::clone(&function.look));
-            async move {
-                (
-                    name,
-                    look.call(GetModeRequest::default(), LOOK).await.ok().map(|answer| answer.current_mode),
-                )
+            async move { (name, look.call(GetModeRequest::default(), LOOK).await) }
+        };
+        let answers = futures::future::join_all(self.functions.iter().map(look)).await;
+        let said = |(name, answer): (String, Result<GetModeResponse, CallError>)| match answer {
+            Ok(answer) => (name, Some(answer.current_mode)),
+            Err(error) => {
+                let because = error.to_string();
+                self.event(&json!({"answer": "silent", "function": name, "because": because}));
+                self.warn(because);
+                (name, None)
             }
         };
-        futures::future::join_all(self.functions.iter().map(look)).await
+        answers.into_iter().map(said).collect()
     }
 
     /// The modes that each function can have, as far as it says.

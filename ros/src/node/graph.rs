@@ -74,7 +74,9 @@ struct Endpoint {
 impl Graph {
     /// Begins to watch, until the task is dropped. Nobody else may listen to the status of the participant.
     pub(crate) fn watch(participant: &DomainParticipant, own: [u8; 12], rmw: Rmw) -> (Arc<Self>, Task<()>) {
-        let graph = Arc::new(Self { rmw, own, seen: Mutex::default() });
+        // A mapping that is given counts before the first participant is met.
+        let seen = Seen { mapping: rmw.fixed(), ..Seen::default() };
+        let graph = Arc::new(Self { rmw, own, seen: Mutex::new(seen) });
         let (listener, watching) = (participant.status_listener(), Arc::clone(&graph));
         let task = smol::spawn(async move {
             let mut events = listener.as_async_status_stream();
@@ -204,7 +206,7 @@ impl Graph {
         if seen.mapping.is_none() {
             let met = seen.participants.values().find_map(|vendor| vendor.mapping());
             let waited = seen.first.is_some_and(|first| first.elapsed() >= PATIENCE);
-            seen.mapping = self.rmw.fixed().or(met).or_else(|| waited.then_some(Mapping::Enhanced));
+            seen.mapping = met.or_else(|| waited.then_some(Mapping::Enhanced));
         }
         seen.mapping
     }

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from modes import Remote
-from oracle import MOTION, PATH, SEARCH, UNGROUND
+from oracle import MOTION, PATH, SEARCH, UNGROUND, World
 from program import Program
 from ros2 import Node
 from scenarios import CLEAR, DARK, MURKY, Setting, asked, check, no_fault, play, scenario, see
@@ -235,9 +235,8 @@ def _again(robot: Robot) -> bool:
     return False
 
 
-@scenario()
-def vanishes(setting: Setting) -> str:
-    """The mode manager is killed and comes back with everything ungrounded: the mission goes on."""
+def _remote(setting: Setting, part: Callable[[Remote, Robot], None], limit: float) -> str:
+    """The mode manager is a process of its own, which goes and comes back with everything ungrounded: the mission goes on."""
     program = Program(setting.program, "manager", setting.vendor, setting.domain)
     setting.programs.append(program)
     modes = Remote(setting.vendor, setting.domain)
@@ -252,18 +251,16 @@ def vanishes(setting: Setting) -> str:
         robot.node.spin(0.3)
         modes.poll()
         check((PATH, "fd_spiral_high") in modes.requests, f"asked for {modes.requests}")
-        modes.kill()
-        robot.show(DARK)
-        robot.node.spin(12.0)
+        part(modes, robot)
         check(program.running(), f"the program ended with {program.status()}")
-        check(any("fd_spiral" in e or "change_mode" in e for e in robot.events), "nothing on /metaplan/events")
         modes = Remote(setting.vendor, setting.domain)
         began = time.monotonic()
-        while (PATH, "fd_spiral_low") not in modes.requests and time.monotonic() < began + 25:
-            robot.show(DARK)
+        wanted = {(PATH, World(SEARCH, robot.oracle.world.visibility).spiral()), (MOTION, "fd_all_thrusters")}
+        while not wanted <= set(modes.requests) and time.monotonic() < began + limit:
+            robot.show(robot.oracle.world.visibility)
             robot.node.spin(0.5)
             modes.poll()
-        check((PATH, "fd_spiral_low") in modes.requests, f"after its return asked for {modes.requests}")
+        check(wanted <= set(modes.requests), f"{limit:g} s after its return asked for {modes.requests}")
         return f"asked again {time.monotonic() - began:.1f} s after its return"
     finally:
         modes.kill()
@@ -272,17 +269,44 @@ def vanishes(setting: Setting) -> str:
 
 
 @scenario()
+def vanishes(setting: Setting) -> str:
+    """The mode manager is killed; while it is away the water becomes murky."""
+
+    def part(modes: Remote, robot: Robot) -> None:
+        modes.kill()
+        robot.show(DARK)
+        robot.node.spin(12.0)
+        check(any("fd_spiral" in e or "change_mode" in e for e in robot.events), "nothing on /metaplan/events")
+
+    return _remote(setting, part, 25.0)
+
+
+@scenario()
+def restarts(setting: Setting) -> str:
+    """The mode manager is restarted, and nothing else changes."""
+
+    def part(modes: Remote, robot: Robot) -> None:
+        modes.leave()
+        robot.node.spin(1.0)
+
+    return _remote(setting, part, 15.0)
+
+
+@scenario()
 def wrong_mapping(setting: Setting) -> str:
-    """The other vendor's mapping of services is forced: the calls time out and the report names the mapping."""
+    """The other vendor's mapping of services is forced: calls time out, and it is said which mapping was used."""
     other = "fastrtps" if setting.vendor == "cyclonedds" else "cyclonedds"
-    program = Program(setting.program, "reasoner", setting.vendor, setting.domain, rmw=other)
+    program = Program(setting.program, "manager", setting.vendor, setting.domain, rmw=other)
     setting.programs.append(program)
     robot = Robot(Options(vendor=setting.vendor, domain=setting.domain))
     try:
         program.start()
-        robot.node.spin(8.0)
+        said = robot.node.spin_until(lambda: f"--rmw {setting.vendor}" in program.output(), 25.0)
         check(program.running(), f"the program ended with {program.status()}")
-        return "alive"
+        check(said, f"within 25 s nothing is said of `--rmw {setting.vendor}`")
+        told = robot.node.spin_until(lambda: any("--rmw" in event for event in robot.events), 5.0)
+        check(told, f"nothing on /metaplan/events: {robot.events[-3:]}")
+        return next(event for event in robot.events if "--rmw" in event)[:160]
     finally:
         robot.close()
         program.stop()

@@ -51,6 +51,40 @@ def objectives(setting: Setting) -> str:
         return f"{len(asked(robot, PATH))} requests for {PATH}"
 
 
+@scenario(quick=False)
+def killed_reasoner(setting: Setting) -> str:
+    """kill -9 while there are objectives: they are kept, nothing is asked for twice, and they can be cancelled."""
+    with play(setting, "reasoner") as (robot, program):
+        see(robot, CLEAR)
+        check(robot.request(SEARCH), "an objective was not accepted")
+        no_fault(robot)
+        before = len(robot.modes.requests)
+        program.kill()
+        robot.node.spin(0.3)
+        program.start()
+        check(program.wait_output("goes on from the journal", 10.0), "it does not go on from the journal")
+        robot.node.spin(3.0)
+        for _ in range(5):
+            see(robot, CLEAR)
+            robot.node.spin(0.1)
+        check(len(robot.modes.requests) == before, f"asked again for {robot.modes.requests[before:]}")
+        see(robot, DARK)
+        no_fault(robot)
+        heard = len(robot.objectives.goals[PATH].feedback)
+        robot.node.spin(2.0)
+        check(len(robot.objectives.goals[PATH].feedback) > heard, "no feedback after the restart")
+        robot.oracle.world.task = None
+        robot.oracle.stimulus("cancellation", 0.0)
+        for function in (PATH, MOTION):
+            call = robot.objectives.client.cancel(robot.objectives.goals[function])
+            robot.node.spin_until(lambda answered=call: answered.done, 5.0)
+            check(call.value is not None and len(call.value.goals_canceling) == 1, f"{function} is not cancelled")
+        robot.settle()
+        check(robot.modes.current(PATH) == UNGROUND, f"{robot.modes.current(PATH)} runs after the cancellation")
+        no_fault(robot)
+        return f"{len(robot.modes.requests)} requests, none twice"
+
+
 EARLIER = ROOT.parent / "shared" / "tools" / "ros"
 
 
@@ -66,6 +100,30 @@ def _earlier_peer(vendor: str) -> list[str]:
     return [str(built), "20"]
 
 
+def _change_state() -> object:
+    """A request of ChangeState with the type that the earlier peer knows: Cyclone DDS compares types among its own.
+
+    What is returned has to be kept: the peer stumbles when a writer leaves.
+    """
+    from cyclonedds.core import Policy, Qos
+    from cyclonedds.domain import DomainParticipant
+    from cyclonedds.idl import make_idl_struct, types
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.topic import Topic
+    from cyclonedds.util import duration
+
+    fields = {"guid": types.uint64, "seq": types.int64, "id": types.uint8, "label": str}
+    kind = make_idl_struct("Request", "lifecycle_msgs::srv::dds_::ChangeState_Request_", fields)
+    participant = DomainParticipant(0)
+    topic = Topic(participant, "rq/f_maintain_motion_node/change_stateRequest", kind)
+    writer = DataWriter(participant, topic, qos=Qos(Policy.Reliability.Reliable(duration(seconds=1))))
+    end = time.monotonic() + 5
+    while not writer.get_matched_subscriptions() and time.monotonic() < end:
+        time.sleep(0.05)
+    writer.write(kind(guid=1, seq=1, id=3, label="activate"))
+    return writer
+
+
 @scenario()
 def earlier_peer(setting: Setting) -> str:
     """The peer of the first trials is a client of /mros/objective: its goal is accepted and it hears feedback."""
@@ -79,14 +137,18 @@ def earlier_peer(setting: Setting) -> str:
     with output.open("wb") as file:
         peer = subprocess.Popen(_earlier_peer(setting.vendor), stdout=file, stderr=file)
     program.start()
+    writer: object = None
     try:
         node.spin(4.0)
         # It sends its goal when somebody has changed the state of its node.
-        change = node.client("/f_maintain_motion_node/change_state", "lifecycle_msgs/srv/ChangeState")
-        answer(node, change, {"transition": {"id": 3, "label": "activate"}})
+        if setting.vendor == "cyclonedds":
+            writer = _change_state()
+        else:
+            change = node.client("/f_maintain_motion_node/change_state", "lifecycle_msgs/srv/ChangeState")
+            answer(node, change, {"transition": {"id": 3, "label": "activate"}})
         end = time.monotonic() + 14
         accepted = "goal accepted True" if setting.vendor == "cyclonedds" else "goal accepted=1 correlated=1"
-        wanted = [accepted] + (["feedback obj_f_generate_search_path_1 fd_spiral"] * (setting.vendor == "cyclonedds"))
+        wanted = [accepted] + (["feedback obj_f_generate_search_path_1"] * (setting.vendor == "cyclonedds"))
         while time.monotonic() < end and not all(words in output.read_text() for words in wanted):
             node.spin(0.2)
         said = output.read_text()
@@ -95,5 +157,6 @@ def earlier_peer(setting: Setting) -> str:
     finally:
         peer.kill()
         peer.wait()
+        del writer
         node.close()
         program.stop()

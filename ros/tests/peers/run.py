@@ -43,11 +43,12 @@ def enter_namespace() -> None:
     os.execvp("unshare", ["unshare", "-rn", "sh", "-c", SETUP, "sh", sys.executable, __file__, *sys.argv[1:]])
 
 
-def play_one(name: str, program: str, vendor: str, domain: int) -> int:
+def play_one(arguments: argparse.Namespace) -> int:
     """Plays one scenario in this process; its report is a line of JSON."""
     from catalogue import SCENARIOS, Setting
 
-    setting = Setting(program, vendor, domain)
+    name, vendor = arguments.one, arguments.vendor
+    setting = Setting(arguments.program, vendor, arguments.domain, arguments.median)
     report: dict[str, object] = {"scenario": name, "vendor": vendor, "passed": False}
     try:
         report["said"] = SCENARIOS[name](setting)
@@ -68,7 +69,7 @@ def play_one(name: str, program: str, vendor: str, domain: int) -> int:
 def play(name: str, arguments: argparse.Namespace, vendor: str, domain: int) -> dict[str, object]:
     """Plays one scenario in a process of its own and returns its report."""
     command = [sys.executable, __file__, "--one", name, "--program", arguments.program]
-    command += ["--vendor", vendor, "--domain", str(domain)]
+    command += ["--vendor", vendor, "--domain", str(domain), "--median", str(arguments.median)]
     started = time.monotonic()
     limit = LONG_TIMEOUT if name.startswith("published") else TIMEOUT
     failed: dict[str, object] = {"scenario": name, "vendor": vendor, "passed": False, "results": []}
@@ -153,6 +154,7 @@ def main() -> int:
     parser.add_argument("--program", default=str(default), help=f"program under test; `{STAND_IN}` is ours")
     parser.add_argument("--quick", action="store_true", help="only what takes less than three minutes")
     parser.add_argument("--vendor", choices=("cyclonedds", "fastrtps"))
+    parser.add_argument("--median", type=float, default=20.0, help="greatest median of the reactions in ms")
     parser.add_argument("--report", type=Path, help="writes all results there, as JSON")
     parser.add_argument("--self-test", action="store_true", help="plays against stand-ins with and without faults")
     parser.add_argument("--one", help=argparse.SUPPRESS)
@@ -160,7 +162,7 @@ def main() -> int:
     arguments = parser.parse_args()
     enter_namespace()
     if arguments.one:
-        return play_one(arguments.one, arguments.program, arguments.vendor, arguments.domain)
+        return play_one(arguments)
     if arguments.self_test:
         return self_test(arguments)
     if not arguments.program.startswith(STAND_IN):
