@@ -16,7 +16,7 @@ from launch_ros.actions import Node
 # Name, default, what it is.
 ARGUMENTS = (
     ("program", "metaplan-ros", "the program: a path, or a name on PATH"),
-    ("role", "manager", "manager, reasoner or planner"),
+    ("role", "manager", "manager, reasoner, planner or controller"),
     ("mission", "", "a mission's manifest; the planner can do without"),
     ("settings", "", "how the mission meets the robot; ros.toml beside the mission if empty"),
     ("journal", "", "a directory for the manager's journal; none if empty"),
