@@ -132,7 +132,7 @@ impl Robot {
             Err(error) => {
                 let because = error.to_string();
                 self.event(&json!({"answer": "silent", "function": name, "because": because}));
-                self.warn(because);
+                self.warn(&because);
                 (name, None)
             }
         };
