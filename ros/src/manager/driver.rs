@@ -230,6 +230,7 @@ impl Driver {
             if Instant::now() >= next {
                 next = Instant::now() + PERIOD;
                 self.handle(Input::Tick)?;
+                self.robot.greet();
                 self.diagnose();
             }
         }

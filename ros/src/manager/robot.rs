@@ -1,6 +1,6 @@
 //! The robot as the manager sees it: topics and services to inputs of the machine, and its outputs to calls.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
@@ -31,6 +31,9 @@ use crate::perform::{Call, End, Perform, Progress, Running};
 /// So long a function may take to say which mode it has.
 const LOOK: Duration = Duration::from_secs(2);
 
+/// A server that is new is asked so often, once in a period: it may not have discovered us at first.
+const GREETINGS: u32 = 3;
+
 /// So many things that were wrong are remembered, so as to say each once.
 const SAID: usize = 1000;
 
@@ -41,6 +44,10 @@ struct Function {
     /// The call that is under way; another one takes its place.
     calling: Option<Task<()>>,
     looking: Option<Task<()>>,
+    /// Who says its mode.
+    servers: BTreeSet<[u8; 16]>,
+    /// So often it is still to be asked for its mode.
+    greetings: u32,
 }
 
 /// Everything that the manager hears from and asks of others.
@@ -81,6 +88,8 @@ impl Robot {
                     look: Arc::new(node.caller(&service("get_mode"))),
                     calling: None,
                     looking: None,
+                    servers: BTreeSet::new(),
+                    greetings: 0,
                 },
             );
         }
@@ -167,6 +176,27 @@ impl Robot {
             };
             let _ = inputs.send(Input::Changed(change, outcome));
         }));
+    }
+
+    /// Asks those functions for their modes whose server is new since the last time: one that was started again has forgotten its mode.
+    pub(super) fn greet(&mut self) {
+        let mut names = Vec::new();
+        for (name, function) in &mut self.functions {
+            let servers = function.look.servers();
+            if !function.servers.is_empty() && !servers.is_subset(&function.servers) {
+                function.greetings = GREETINGS;
+            }
+            if !servers.is_empty() {
+                function.servers = servers;
+            }
+            if function.greetings > 0 {
+                function.greetings -= 1;
+                names.push(name.clone());
+            }
+        }
+        for name in names {
+            self.look(&name);
+        }
     }
 
     /// Asks a function for its mode.

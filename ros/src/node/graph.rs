@@ -191,6 +191,13 @@ impl Graph {
         Some(Ok(Server { mapping: mapping.unwrap_or(Mapping::Enhanced), reader: *guid }))
     }
 
+    /// Who reads on a topic, named as DDS does.
+    pub(crate) fn readers(&self, topic: &str) -> BTreeSet<[u8; 16]> {
+        let seen = self.seen();
+        let is_it = |endpoint: &Endpoint| endpoint.is_reader && endpoint.topic == topic;
+        seen.endpoints.iter().filter(|(_, endpoint)| is_it(endpoint)).map(|(guid, _)| *guid).collect()
+    }
+
     /// The mapping of our own services: that of the first participant that has only one.
     pub(crate) async fn mapping(&self) -> Mapping {
         loop {

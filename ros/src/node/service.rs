@@ -1,5 +1,6 @@
 //! Services: serving them, and calling those of others.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -109,6 +110,11 @@ impl<S: Service> Caller<S> {
     /// Whether somebody serves it now.
     pub fn is_served(&self) -> bool {
         self.node.graph.server(&self.requests(), &self.replies()).is_some()
+    }
+
+    /// Who serves it now, by numbers: one that is started again has another one.
+    pub fn servers(&self) -> BTreeSet<[u8; 16]> {
+        self.node.graph.readers(&self.requests())
     }
 
     /// Makes ready to call, as soon as somebody serves it, so that the first call need not wait for discovery.
