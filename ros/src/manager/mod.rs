@@ -2,7 +2,7 @@
 //!
 //! Diagnostics and tasks become events of the adaptation loop [`metaplan::mapek`]; its effects become calls of
 //! `/<function>/change_mode` of `system_modes`, and actions that somebody performs. What stands between both is a state machine without
-//! clock, thread or network, [`machine`]:
+//! clock, thread or network, `machine`:
 //!
 //! ```text
 //! START --the mission and its settings are read--> WAIT_GRAPH --every function answers--> IDLE

@@ -2,7 +2,7 @@
 //!
 //! Names are expanded and remapped as ROS 2 does. What is heard is handed to closures on a thread of the executor, which must be quick;
 //! samples that are no message of their type, and endpoints whose type is not ours, are reported and left out. Our own services wait for
-//! the first participant that tells how services are mapped, see [`rmw`].
+//! the first participant that tells how services are mapped, see `rmw`.
 
 mod action;
 mod arguments;

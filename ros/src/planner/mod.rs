@@ -9,4 +9,5 @@ pub(crate) use joint::Joint;
 pub(crate) use manner::Chosen;
 pub use node::{Options, run, serve};
 pub(crate) use node::{on_a_thread, plan_message};
-pub use solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};
+pub(crate) use solve::{DOMAIN, PROBLEM, check_domain};
+pub use solve::{Found, Manner, NoPlan, Request, solve};

@@ -98,12 +98,12 @@ impl NoPlan {
 }
 
 /// What domains are called in messages.
-pub const DOMAIN: &str = "domain";
+pub(crate) const DOMAIN: &str = "domain";
 /// What problems are called in messages.
-pub const PROBLEM: &str = "problem";
+pub(crate) const PROBLEM: &str = "problem";
 
 /// Errors with their places, on one line.
-pub fn one_line(messages: &[Message]) -> String {
+fn one_line(messages: &[Message]) -> String {
     let texts = messages.iter().filter(|message| message.is_error()).map(|message| {
         let place = match (&message.file, message.line, message.column) {
             (Some(file), Some(line), Some(column)) => format!("{file}, line {line}, column {column}: "),
@@ -241,7 +241,7 @@ impl Asked<'_> {
 ///
 /// # Errors
 /// All that is wrong with it.
-pub fn check_domain(domain: &Source) -> Result<(), Vec<Message>> {
+pub(crate) fn check_domain(domain: &Source) -> Result<(), Vec<Message>> {
     let (tree, mut found) = pddl::parse_domain(domain);
     if let Some(tree) = &tree {
         found.extend(pddl::check_domain(tree, domain));
