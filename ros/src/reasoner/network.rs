@@ -156,7 +156,7 @@ impl Network {
         else {
             return;
         };
-        let text = format!("goes on with {} objectives from before", memory.goals.len());
+        let text = format!("goes on from the journal with {} objectives", memory.goals.len());
         self.node.log(Severity::Info, &text);
         let goals: Vec<GoalId> = memory.goals.iter().map(|own| self.goals.go_on(own.goal)).collect();
         let look = |own: &Remembered| {
