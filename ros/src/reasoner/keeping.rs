@@ -393,3 +393,6 @@ impl Keeping {
         self.outputs.push(Output::Feedback(goal, told));
     }
 }
+
+#[cfg(test)]
+mod tests;
