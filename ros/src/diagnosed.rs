@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use metaplan::message::Message;
 
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::interfaces::std_msgs::msg::Header;
 use crate::node::{Node, keep_all};
 
 /// The messages by which diagnostics say what concerns us, in the spelling of MROS.
@@ -15,7 +16,14 @@ const CONCERN: [&str; 2] = ["QA status", "Component status"];
 /// he can follow.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Diagnosed {
-    waiting: Arc<Mutex<Vec<(String, DiagnosticStatus)>>>,
+    waiting: Arc<Mutex<Waiting>>,
+}
+
+/// What waits, by what it is about, with the header of the last message.
+#[derive(Debug, Default)]
+struct Waiting {
+    header: Header,
+    statuses: Vec<(String, DiagnosticStatus)>,
 }
 
 impl Diagnosed {
@@ -26,16 +34,17 @@ impl Diagnosed {
         let mut last: HashMap<String, Vec<KeyValue>> = HashMap::new();
         node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |array| {
             let mut waiting = waiting.lock().unwrap_or_else(PoisonError::into_inner);
-            let nobody_waits = waiting.is_empty();
+            let nobody_waits = waiting.statuses.is_empty();
+            waiting.header = array.header;
             for status in array.status.into_iter().filter(|own| CONCERN.contains(&own.message.as_str())) {
                 let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
                 let key = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
                 if last.insert(key.clone(), status.values.clone()).as_ref() != Some(&status.values) {
-                    waiting.retain(|(known, _)| *known != key);
-                    waiting.push((key, status));
+                    waiting.statuses.retain(|(known, _)| *known != key);
+                    waiting.statuses.push((key, status));
                 }
             }
-            if nobody_waits && !waiting.is_empty() {
+            if nobody_waits && !waiting.statuses.is_empty() {
                 waits();
             }
         })?;
@@ -44,9 +53,10 @@ impl Diagnosed {
 
     /// What waits, as a line of events.
     pub(crate) fn line(&self) -> String {
-        let waiting = std::mem::take(&mut *self.waiting.lock().unwrap_or_else(PoisonError::into_inner));
-        let status = waiting.into_iter().map(|(_, status)| status).collect();
+        let Waiting { header, statuses } =
+            std::mem::take(&mut *self.waiting.lock().unwrap_or_else(PoisonError::into_inner));
+        let status = statuses.into_iter().map(|(_, status)| status).collect();
         // Texts and numbers are always data.
-        serde_json::to_string(&DiagnosticArray { status, ..DiagnosticArray::default() }).unwrap_or_default()
+        serde_json::to_string(&DiagnosticArray { header, status }).unwrap_or_default()
     }
 }

@@ -98,6 +98,10 @@ fn start() -> Result<(), Vec<Message>> {
     ctrlc::set_handler(handler)
         .map_err(|error| vec![Message::error("N100", format!("signals cannot be heard: {error}"))])?;
     let Arguments { role, mission, settings, journal, executor, .. } = arguments;
+    if journal.is_some() && matches!(role, Role::Planner | Role::Controller) {
+        let text = "`--journal` is for a manager and a reasoner: nothing of a planner has to be known after a restart";
+        return Err(vec![Message::error("N100", text)]);
+    }
     match (role, mission) {
         (Role::Planner, mission) => planner::run(&node, &planner::Options { mission, settings }, &stop),
         (Role::Controller, Some(mission)) => {
@@ -107,7 +111,7 @@ fn start() -> Result<(), Vec<Message>> {
             manager::run(&node, &manager::Options { mission, settings, journal }, &stop)
         }
         (Role::Reasoner, Some(mission)) => {
-            reasoner::run(&node, &reasoner::Options { mission, settings }, &stop)
+            reasoner::run(&node, &reasoner::Options { mission, settings, journal }, &stop)
         }
         (_, None) => Err(vec![Message::error("N100", "`--mission` is missing")]),
     }

@@ -8,6 +8,7 @@
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
 mod keeping;
+mod memory;
 mod network;
 
 use std::path::PathBuf;
@@ -22,6 +23,7 @@ use crate::manager::Settings;
 use crate::node::{Node, Severity};
 
 use keeping::Keeping;
+use memory::MemoryFile;
 use network::Network;
 
 /// So long a choice may take.
@@ -34,6 +36,8 @@ pub struct Options {
     pub mission: PathBuf,
     /// What functions and designs are called on the robot; a file `ros.toml` beside the mission unless said otherwise.
     pub settings: Option<PathBuf>,
+    /// Where is kept what has to be known after a restart.
+    pub journal: Option<PathBuf>,
 }
 
 /// Serves objectives until told to stop.
@@ -52,6 +56,6 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     }
     let configurator = Configurator::new(knowledge, Wishes::default())?;
     let keeping = Keeping::new(Keeper::new(configurator, Some(LIMIT)), settings.functions);
-    Network::connect(node, keeping)?.run(stop);
-    Ok(())
+    let memory = options.journal.as_deref().map(MemoryFile::open).transpose().map_err(one)?;
+    Network::connect(node, keeping, memory)?.run(stop).map_err(one)
 }

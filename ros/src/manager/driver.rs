@@ -28,6 +28,12 @@ const PERIOD: Duration = Duration::from_secs(1);
 /// So much of what is heard waits while the manager is not active.
 const KEPT: usize = 100_000;
 
+/// The functions are looked for so long at a time.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// A task that is requested while functions are missing is refused after this; SUAVE's mission node waits for five seconds.
+const ASKED: Duration = Duration::from_secs(4);
+
 /// What is missing of the graph is said so often.
 const GRAPH: Duration = Duration::from_secs(5);
 
@@ -152,28 +158,36 @@ impl Driver {
         inputs: &Receiver<Input>,
         stop: &AtomicBool,
     ) -> Result<(), Message> {
-        let mut kept = Vec::new();
+        let (mut kept, mut asked, mut said) = (Vec::new(), Vec::new(), Instant::now());
         loop {
-            let missing = smol::block_on(self.robot.wait(GRAPH));
+            let missing = smol::block_on(self.robot.wait(LOOK));
             // A writer of diagnostics may come later: nothing is changed before it speaks.
-            let functions: Vec<&String> =
-                missing.iter().filter(|text| !text.contains("/diagnostics")).collect();
+            let is_there = missing.iter().all(|text| text.contains("/diagnostics"));
             while let Ok(input) = inputs.try_recv() {
                 match input {
-                    Input::Request(..) | Input::Cancel(..) => self.handle(input)?,
+                    Input::Request(..) | Input::Cancel(..) => asked.push((Instant::now(), input)),
                     other => kept.push(other),
                 }
             }
-            if functions.is_empty() {
+            if is_there {
                 break;
             }
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let text = format!("waits for the robot: {}", missing.join("; "));
-            self.robot.event(&json!({"answer": "waiting", "missing": missing}));
-            self.node.log(Severity::Warn, &text);
+            // Who asks for a task waits a while, and then believes that it is refused.
+            let (late, waiting) = asked.into_iter().partition(|(since, _)| since.elapsed() >= ASKED);
+            asked = waiting;
+            let late: Vec<(Instant, Input)> = late;
+            late.into_iter().try_for_each(|(_, input)| self.handle(input))?;
+            if said.elapsed() >= GRAPH {
+                said = Instant::now();
+                let text = format!("waits for the robot: {}", missing.join("; "));
+                self.robot.event(&json!({"answer": "waiting", "missing": missing}));
+                self.node.log(Severity::Warn, &text);
+            }
         }
+        kept.extend(asked.into_iter().map(|(_, input)| input));
         self.fits()?;
         let modes = smol::block_on(self.robot.modes());
         for (function, mode) in &modes {
@@ -284,7 +298,7 @@ impl Driver {
         let level = match state {
             State::Degraded => DiagnosticStatus::WARN,
             State::WaitGraph => DiagnosticStatus::STALE,
-            State::Idle | State::Reconfigure | State::Execute => DiagnosticStatus::OK,
+            State::Idle | State::Plan | State::Reconfigure | State::Execute => DiagnosticStatus::OK,
         };
         let beliefs = self.machine.control().beliefs();
         let mut values = vec![

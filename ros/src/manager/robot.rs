@@ -14,6 +14,7 @@ use smol::{Task, Timer};
 use crate::diagnosed::Diagnosed;
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::interfaces::lifecycle_msgs::msg::TransitionEvent;
+use crate::interfaces::lyrical::lifecycle_msgs::msg as lyrical;
 use crate::interfaces::mavros_msgs;
 use crate::interfaces::rcl_interfaces::msg::ParameterEvent;
 use crate::interfaces::std_msgs;
@@ -25,7 +26,9 @@ use crate::interfaces::system_modes_msgs::srv::{
 };
 use crate::manager::machine::{Change, Ended, Input, Outcome};
 use crate::manager::settings::Settings;
-use crate::node::{CallError, Caller, Node, Publisher, Responder, Severity, depth, keep_all, latched};
+use crate::node::{
+    CallError, Caller, Node, Publisher, Responder, Severity, depth, is_lyrical, keep_all, latched,
+};
 use crate::perform::{Call, End, Perform, Progress, Running};
 
 /// So long a function may take to say which mode it has.
@@ -331,9 +334,12 @@ fn hear_function(
     })?;
     let (name, sender) = (function.to_owned(), inputs.clone());
     let topic = format!("/{}/transition_event", settings.functions.node(function));
-    node.subscribe::<TransitionEvent>(&topic, depth(10), move |_| {
-        let _ = sender.send(Input::Touched(name.clone()));
-    })
+    let touched = move || drop(sender.send(Input::Touched(name.clone())));
+    if is_lyrical() {
+        node.subscribe::<lyrical::TransitionEvent>(&topic, depth(10), move |_| touched())
+    } else {
+        node.subscribe::<TransitionEvent>(&topic, depth(10), move |_| touched())
+    }
 }
 
 /// Parameters of a function's node that somebody has set.

@@ -115,6 +115,20 @@ impl<A: Action> Goals<A> {
         wanted.goal
     }
 
+    /// A goal that was accepted before this program was started is under way still.
+    pub fn go_on(&self, goal: [u8; 16]) -> GoalId {
+        // The library takes numbers of goals as data only.
+        let id = serde_json::from_value(serde_json::json!({ "uuid": goal })).unwrap_or(GoalId::ZERO);
+        let known = Known {
+            accepted: Time::now(),
+            status: GoalStatusEnum::Executing,
+            result: None,
+            asked: Vec::new(),
+        };
+        self.goals().insert(id, known);
+        id
+    }
+
     /// Does not accept a goal.
     pub fn reject(&self, wanted: Wanted) {
         self.answer(wanted, false, Time::now());

@@ -1,7 +1,6 @@
 //! A managed node (ROS 2 design article "Managed nodes"): its primary states, and the services by which others move it between them.
 
 use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use metaplan::message::Message;
 
@@ -10,7 +9,8 @@ use crate::interfaces::lifecycle_msgs::srv::{
     ChangeState, ChangeStateResponse, GetAvailableStates, GetAvailableStatesResponse,
     GetAvailableTransitions, GetAvailableTransitionsResponse, GetState, GetStateResponse,
 };
-use crate::node::{Node, Publisher, Severity, depth};
+use crate::interfaces::lyrical::lifecycle_msgs::msg as lyrical;
+use crate::node::{Node, Publisher, Severity, depth, is_lyrical, now};
 
 /// A primary state of a managed node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,12 +99,31 @@ impl Way {
     }
 }
 
+/// Where changes are told, in the type of the distribution.
+enum Events {
+    /// Up to Kilted.
+    Nanoseconds(Publisher<TransitionEvent>),
+    /// From Lyrical on.
+    Stamp(Publisher<lyrical::TransitionEvent>),
+}
+
+impl Events {
+    fn new(node: &Node, is_lyrical: bool) -> Result<Self, Message> {
+        let topic = "~/transition_event";
+        Ok(if is_lyrical {
+            Self::Stamp(node.publisher(topic, depth(1))?)
+        } else {
+            Self::Nanoseconds(node.publisher(topic, depth(1))?)
+        })
+    }
+}
+
 /// The states of a managed node.
 pub struct Lifecycle {
     /// The node holds what is served, and that this.
     node: Weak<Node>,
     phase: Mutex<Phase>,
-    events: Publisher<TransitionEvent>,
+    events: Events,
     /// Does what a change needs; without success the node stays where it is.
     change: Box<dyn Fn(Phase) -> bool + Send + Sync>,
 }
@@ -124,7 +143,7 @@ impl Lifecycle {
         node: &Arc<Node>,
         change: impl Fn(Phase) -> bool + Send + Sync + 'static,
     ) -> Result<Arc<Self>, Message> {
-        let events = node.publisher("~/transition_event", depth(1))?;
+        let events = Events::new(node, is_lyrical())?;
         let own = Arc::new(Self {
             node: Arc::downgrade(node),
             phase: Mutex::new(Phase::Unconfigured),
@@ -199,14 +218,17 @@ impl Lifecycle {
     }
 
     fn tell(&self, way: &Way, start_state: State, goal_state: State) {
-        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let timestamp = u64::try_from(since.as_nanos()).unwrap_or_default();
-        self.events.publish(TransitionEvent {
-            timestamp,
-            transition: way.transition(),
-            start_state,
-            goal_state,
-        });
+        let (stamp, transition) = (now(), way.transition());
+        match &self.events {
+            Events::Nanoseconds(events) => {
+                let timestamp =
+                    u64::try_from(stamp.sec).unwrap_or_default() * 1_000_000_000 + u64::from(stamp.nanosec);
+                events.publish(TransitionEvent { timestamp, transition, start_state, goal_state });
+            }
+            Events::Stamp(events) => {
+                events.publish(lyrical::TransitionEvent { stamp, transition, start_state, goal_state });
+            }
+        }
     }
 }
 

@@ -175,6 +175,11 @@ fn not_made(what: &str, error: &dyn std::fmt::Display) -> Message {
     Message::error("N122", format!("{what} could not be made: {error}"))
 }
 
+/// Whether the robot has Lyrical or what follows it, as the environment says: some types differ.
+pub(crate) fn is_lyrical() -> bool {
+    std::env::var("ROS_DISTRO").is_ok_and(|name| ["lyrical", "rolling"].contains(&name.trim()))
+}
+
 /// The time now, for stamps.
 pub(crate) fn now() -> crate::interfaces::builtin_interfaces::msg::Time {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();

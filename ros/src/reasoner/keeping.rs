@@ -11,6 +11,7 @@ use serde_json::Value;
 use crate::interfaces::diagnostic_msgs::msg::KeyValue;
 use crate::interfaces::mros2_msgs::msg::QoS;
 use crate::manager::Functions;
+use crate::reasoner::memory::{Memory, Remembered};
 
 /// A design that was refused is tried again so much later.
 const REFUSED: Duration = Duration::from_secs(60);
@@ -60,6 +61,8 @@ struct Pursued {
     design: Option<String>,
     /// A cancellation waits for its function.
     cancelling: bool,
+    /// What was wanted, for who comes after a restart.
+    wanted: QoS,
 }
 
 /// What the reasoner knows beside the knowledge base.
@@ -74,6 +77,10 @@ pub(super) struct Keeping {
     failed: BTreeMap<String, (Duration, u32)>,
     /// What was measured last.
     measured: BTreeMap<String, String>,
+    /// The last event about each thing.
+    reports: BTreeMap<String, String>,
+    /// Designs that functions have from before a restart.
+    had: BTreeMap<String, String>,
     outputs: Vec<Output>,
     count: u64,
 }
@@ -87,6 +94,8 @@ impl Keeping {
             pending: BTreeMap::new(),
             failed: BTreeMap::new(),
             measured: BTreeMap::new(),
+            reports: BTreeMap::new(),
+            had: BTreeMap::new(),
             outputs: Vec::new(),
             count: 0,
         }
@@ -105,6 +114,36 @@ impl Keeping {
     /// What is to be done since it was asked last.
     pub(super) fn outputs(&mut self) -> Vec<Output> {
         std::mem::take(&mut self.outputs)
+    }
+
+    /// What is to be known after a restart.
+    pub(super) fn memory(&self) -> Memory {
+        let goal = |(goal, own): (&GoalId, &Pursued)| Remembered {
+            goal: goal.uuid.into_bytes(),
+            wanted: QoS { objective_id: own.objective.clone(), ..own.wanted.clone() },
+            design: own.design.clone(),
+        };
+        let goals = self.goals.iter().filter(|(_, own)| !own.cancelling).map(goal).collect();
+        Memory::new(self.reports.clone(), goals)
+    }
+
+    /// Goes on after a restart: functions that have the design that is right are not asked for it again. `modes` are those that they were
+    /// found with, as far as they say.
+    pub(super) fn remember(&mut self, memory: Memory, goals: &[GoalId], modes: &BTreeMap<String, String>) {
+        for line in memory.reports.values() {
+            self.hear(line);
+        }
+        for (Remembered { wanted, design, .. }, goal) in memory.goals.into_iter().zip(goals) {
+            let function = wanted.objective_type.clone();
+            if let Some(design) = design {
+                let mode = self.functions.mode(&function, &design);
+                if modes.get(&function).is_none_or(|found| found == mode) {
+                    self.had.insert(function, design);
+                }
+            }
+            self.pursue(*goal, &wanted);
+        }
+        self.had.clear();
     }
 
     /// A goal is wanted: why it cannot be pursued, if it cannot.
@@ -152,6 +191,7 @@ impl Keeping {
             always_improve: wanted.always_improve,
             design: None,
             cancelling: false,
+            wanted: wanted.clone(),
         };
         self.goals.insert(goal, pursued);
         self.hear(&line);
@@ -184,6 +224,12 @@ impl Keeping {
             {
                 self.measured.insert(attribute.clone(), value.to_string());
             }
+            let about = match event {
+                Event::Measured { attribute, .. } => attribute,
+                Event::Component { component, .. } => component,
+                _ => continue,
+            };
+            self.reports.insert(about.clone(), event.to_json().to_string());
         }
         let answers = self.keeper.handle(&observation);
         self.take(answers);
@@ -200,6 +246,10 @@ impl Keeping {
                     effect,
                     ..
                 }) => {
+                    if self.had.get(&function) == Some(&to) {
+                        self.has(&function, &to, Some(effect));
+                        continue;
+                    }
                     let mode = self.functions.mode(&function, &to).to_owned();
                     self.ask(Wanted { function, mode, effect: Some(effect) }, Some(to));
                 }
@@ -228,18 +278,7 @@ impl Keeping {
             .map(|(goal, _)| *goal)
             .collect();
         match (outcome, design) {
-            (Outcome::Done, Some(design)) => {
-                self.failed.remove(&design);
-                if let Some(effect) = wanted.effect {
-                    self.hear(&Event::Acknowledged { effect }.to_json().to_string());
-                }
-                for goal in goals {
-                    if let Some(own) = self.goals.get_mut(&goal) {
-                        own.design = Some(design.clone());
-                    }
-                    self.tell(goal);
-                }
-            }
+            (Outcome::Done, Some(design)) => self.has(&wanted.function, &design, wanted.effect),
             (Outcome::Done, None) => {
                 for goal in goals {
                     self.end(goal);
@@ -255,6 +294,22 @@ impl Keeping {
                     }
                 }
             }
+        }
+    }
+
+    /// A function has a design.
+    fn has(&mut self, function: &str, design: &str, effect: Option<u64>) {
+        self.failed.remove(design);
+        if let Some(effect) = effect {
+            self.hear(&Event::Acknowledged { effect }.to_json().to_string());
+        }
+        let goals: Vec<GoalId> =
+            self.goals.iter().filter(|(_, own)| own.function == function).map(|(goal, _)| *goal).collect();
+        for goal in goals {
+            if let Some(own) = self.goals.get_mut(&goal) {
+                own.design = Some(design.to_owned());
+            }
+            self.tell(goal);
         }
     }
 
@@ -338,3 +393,6 @@ impl Keeping {
         self.outputs.push(Output::Feedback(goal, told));
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -16,15 +16,19 @@ use crate::interfaces::mros2_msgs::action::{ControlQos, ControlQosFeedback, Cont
 use crate::interfaces::mros2_msgs::msg::QoS;
 use crate::interfaces::mros2_msgs::srv::{MetacontrolFD, MetacontrolFDRequest};
 use crate::interfaces::std_msgs;
-use crate::interfaces::system_modes_msgs::srv::{ChangeMode, ChangeModeRequest};
+use crate::interfaces::system_modes_msgs::srv::{ChangeMode, ChangeModeRequest, GetMode, GetModeRequest};
 use crate::node::{
     CallError, Caller, CancelRequest, Declared, GoalEnd, GoalEvent, Goals, Lifecycle, Node, Phase, Publisher,
     Severity, Wanted as Offer, depth,
 };
 use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
+use crate::reasoner::memory::{MemoryFile, Remembered};
 
 /// How long a function may take to change its mode.
 const TIMEOUT: Duration = Duration::from_secs(5);
+
+/// So long a function may take to say which mode it has.
+const LOOK: Duration = Duration::from_secs(2);
 
 /// So many things that were wrong are remembered, so as to say each once.
 const SAID: usize = 1000;
@@ -52,12 +56,19 @@ pub(super) struct Network {
     said: HashSet<String>,
     /// Milliseconds.
     period: Arc<AtomicU64>,
+    /// Whether it does its work, as its lifecycle says.
+    active: Arc<AtomicBool>,
+    memory: Option<MemoryFile>,
     sender: Sender<Input>,
     inputs: Receiver<Input>,
 }
 
 impl Network {
-    pub(super) fn connect(node: &Arc<Node>, keeping: Keeping) -> Result<Self, Vec<Message>> {
+    pub(super) fn connect(
+        node: &Arc<Node>,
+        keeping: Keeping,
+        memory: Option<MemoryFile>,
+    ) -> Result<Self, Vec<Message>> {
         let one = |message: Message| vec![message];
         let period = parameters(node)?;
         let (sender, inputs) = mpsc::channel();
@@ -81,7 +92,13 @@ impl Network {
         let client = Arc::clone(&bridge);
         // So that the first call need not wait for discovery.
         smol::spawn(async move { while client.ready(TIMEOUT).await.is_err() {} }).detach();
-        let lifecycle = Lifecycle::serve(node, |_| true).map_err(one)?;
+        let active = Arc::new(AtomicBool::new(true));
+        let hear = Arc::clone(&active);
+        let lifecycle = Lifecycle::serve(node, move |phase| {
+            hear.store(phase == Phase::Active, Ordering::Relaxed);
+            true
+        })
+        .map_err(one)?;
         lifecycle.go(Phase::Inactive);
         lifecycle.go(Phase::Active);
         Ok(Self {
@@ -96,13 +113,20 @@ impl Network {
             events: node.publisher("~/events", depth(100)).map_err(one)?,
             said: HashSet::new(),
             period,
+            active,
+            memory,
             sender,
             inputs,
         })
     }
 
     /// Serves until told to stop.
-    pub(super) fn run(mut self, stop: &AtomicBool) {
+    ///
+    /// # Errors
+    /// What has to be known after a restart cannot be written.
+    pub(super) fn run(mut self, stop: &AtomicBool) -> Result<(), Message> {
+        self.go_on();
+        self.node.log(Severity::Info, "serves /mros/objective");
         let clock = Instant::now();
         let mut next = clock;
         while !stop.load(Ordering::Relaxed) {
@@ -110,20 +134,51 @@ impl Network {
             match self.inputs.recv_timeout(wait) {
                 Ok(input) => self.handle(input, clock.elapsed()),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return,
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
             if Instant::now() >= next {
                 next = Instant::now() + Duration::from_millis(self.period.load(Ordering::Relaxed).max(1));
                 self.keeping.tick(clock.elapsed());
             }
+            // What is asked for is known before, if it ends in between.
+            if let Some(memory) = &mut self.memory {
+                memory.write(self.keeping.memory())?;
+            }
             self.carry_out();
         }
+        Ok(())
+    }
+
+    /// Goes on with what was pursued before a restart.
+    fn go_on(&mut self) {
+        let Some(memory) =
+            self.memory.as_ref().map(MemoryFile::read).filter(|memory| !memory.goals.is_empty())
+        else {
+            return;
+        };
+        let text = format!("goes on from the journal with {} objectives", memory.goals.len());
+        self.node.log(Severity::Info, &text);
+        let goals: Vec<GoalId> = memory.goals.iter().map(|own| self.goals.go_on(own.goal)).collect();
+        let look = |own: &Remembered| {
+            let function = own.wanted.objective_type.clone();
+            let service = format!("/{}/get_mode", self.keeping.system(&function));
+            let caller = self.node.caller::<GetMode>(&service);
+            async move {
+                let answer = caller.call(GetModeRequest::default(), LOOK).await.ok()?;
+                Some((function, answer.current_mode))
+            }
+        };
+        let modes = smol::block_on(futures::future::join_all(memory.goals.iter().map(look)));
+        let modes = modes.into_iter().flatten().collect();
+        self.keeping.remember(memory, &goals, &modes);
     }
 
     fn handle(&mut self, input: Input, now: Duration) {
         match input {
             Input::Wanted(offer, wanted) => {
-                if let Some(because) = self.keeping.refused(&wanted) {
+                let rests =
+                    (!self.active.load(Ordering::Relaxed)).then(|| "the node is not active".to_owned());
+                if let Some(because) = rests.or_else(|| self.keeping.refused(&wanted)) {
                     self.node.log(Severity::Warn, &format!("a goal is rejected: {because}"));
                     self.goals.reject(offer);
                 } else {

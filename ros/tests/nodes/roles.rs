@@ -200,7 +200,7 @@ fn a_reasoner_serves_objectives() {
     let domain = domain();
     let robot = Robot::new(domain, None);
     let node = node(domain, "reasoner", "");
-    let options = reasoner::Options { mission: mission(), settings: None };
+    let options = reasoner::Options { mission: mission(), settings: None, journal: None };
     let running = Running::new(move |stop| reasoner::run(&node, &options, stop));
     let caller = robot.node.action_caller::<ControlQos>("/mros/objective");
     let goal = |function: &str| {

@@ -20,6 +20,7 @@ from transport import connect
 OK, WARN, ERROR = 0, 1, 2
 TASK_TIMEOUT = 5.0  # s, of SUAVE's mission node
 REACTION_LIMIT = 2.0  # s, after which a stimulus counts as missed
+HEARTBEAT = 3.2  # s, a little more than Fast DDS waits before it repeats a heartbeat
 QUIET = 0.004  # s without a request after which the robot has settled
 FOUND_AT = 200.0  # s of the stream, when the pipeline is detected; the rest of the stream is inspection
 RECOVERY = 5.0  # s of the stream that the recovery of the thrusters takes
@@ -139,7 +140,12 @@ class Robot:
                 asked = self.task_request.ready() and self.task_cancel.ready() and self.modes.ready()
             return asked and self.monitors.topic.matched() > 0
 
-        return self.node.spin_until(there, timeout)
+        found = self.node.spin_until(there, timeout)
+        if self.options.vendor == "fastrtps":
+            # A reader of RustDDS hands on nothing until it knows where the writer begins. If it met the writer too late for the
+            # first heartbeat of Fast DDS, it knows with the next one: samples are late until then, and in order.
+            self.node.spin(HEARTBEAT)
+        return found
 
     def show(self, metres: float) -> None:
         """The water visibility is measured, and nothing judged."""

@@ -98,6 +98,8 @@ pub(in crate::manager) enum Output {
 pub(in crate::manager) enum State {
     WaitGraph,
     Idle,
+    /// It is passed within one input.
+    Plan,
     Reconfigure,
     Execute,
     Degraded,
@@ -108,6 +110,7 @@ impl fmt::Display for State {
         formatter.write_str(match self {
             Self::WaitGraph => "WAIT_GRAPH",
             Self::Idle => "IDLE",
+            Self::Plan => "PLAN",
             Self::Reconfigure => "RECONFIGURE",
             Self::Execute => "EXECUTE",
             Self::Degraded => "DEGRADED",

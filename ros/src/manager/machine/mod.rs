@@ -79,6 +79,8 @@ pub(super) struct Machine {
     deferred: Option<Deferred>,
     /// Whether the loop waits for time to pass before it looks for a better plan.
     ticks: bool,
+    /// States that were passed since the last one that lasted.
+    through: Vec<State>,
     outputs: Vec<Output>,
     lines: VecDeque<String>,
     now: Duration,
@@ -109,6 +111,7 @@ impl Machine {
             obeyed: false,
             deferred: None,
             ticks,
+            through: Vec::new(),
             outputs: Vec::new(),
             lines: VecDeque::new(),
             now: Duration::ZERO,
@@ -212,23 +215,35 @@ impl Machine {
         }
         let next = if !self.pending.is_empty() {
             State::Reconfigure
-        } else if self.task.is_none() {
-            State::Idle
         } else if self.without_plan {
             State::Degraded
-        } else {
+        } else if self.task.is_some() || self.control.beliefs().running().is_some() {
             State::Execute
+        } else {
+            State::Idle
         };
         self.reply();
+        let through = std::mem::take(&mut self.through);
         if next != self.state {
-            let text = format!("{} -> {next}: {because}", self.state);
+            let way: Vec<String> = [self.state]
+                .into_iter()
+                .chain(through)
+                .chain([next])
+                .map(|state| state.to_string())
+                .collect();
             self.state = next;
-            let answers = self.hand(&Event::Note { text: text.clone() }.to_json().to_string())?;
-            self.take(answers);
-            self.outputs.push(Output::Event(
-                json!({"answer": "state", "state": next.to_string(), "because": because, "task": self.task}),
-            ));
+            self.note(&way, because)?;
         }
+        Ok(())
+    }
+
+    /// A change of state is a line of the journal, and told.
+    fn note(&mut self, way: &[String], because: &str) -> Result<(), Message> {
+        let text = format!("{}: {because}", way.join(" -> "));
+        let answers = self.hand(&Event::Note { text }.to_json().to_string())?;
+        self.take(answers);
+        let event = json!({"answer": "state", "state": way.last(), "way": way, "because": because, "task": self.task});
+        self.outputs.push(Output::Event(event));
         Ok(())
     }
 
@@ -243,13 +258,17 @@ impl Machine {
         for answer in answers {
             self.outputs.push(Output::Event(answer.to_json()));
             match answer {
+                Answer::PlanRequested { .. } => self.through = vec![State::Plan],
                 Answer::PlanFound { .. } => {
                     self.without_plan = false;
-                    self.outputs.push(Output::Plan(answer.to_json()));
+                    // What is left of an action is no plan for a task that has ended.
+                    if self.task.is_some() || self.control.beliefs().goal().is_none() {
+                        self.outputs.push(Output::Plan(answer.to_json()));
+                    }
                 }
                 Answer::PlanKept { .. } => self.without_plan = false,
                 Answer::PlanNone { because, .. } => {
-                    self.without_plan = self.task.is_some();
+                    self.without_plan = self.task.is_some() || self.control.beliefs().goal().is_none();
                     self.outputs.push(Output::Warn(format!("there is no plan: {because}")));
                 }
                 Answer::GoalReached => self.reached(),

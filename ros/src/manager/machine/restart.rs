@@ -16,10 +16,14 @@ impl Machine {
     /// The robot is there: what the loop has to say, and what has changed meanwhile.
     pub(super) fn ready(&mut self, modes: Vec<(String, Option<String>)>) -> Result<String, Message> {
         self.state = State::Idle;
+        let is_first = self.control.beliefs().lines() == 0;
         let answers = match &mut self.journal {
             None => self.control.start(),
             Some(journal) => journal.begin(&mut self.control).map_err(|error| unwritten(&error))?,
         };
+        let way = |from: &str, to: State| [from.to_owned(), to.to_string()];
+        self.note(&way("START", State::WaitGraph), "the mission and its settings are read")?;
+        self.note(&[State::WaitGraph.to_string(), State::Idle.to_string()], "every function answers")?;
         // What was asked for before and has been done meanwhile is not asked for again.
         for (function, mode) in modes {
             if let Some(mode) = mode {
@@ -27,7 +31,7 @@ impl Machine {
             }
         }
         self.restore_action();
-        let until = if self.control.beliefs().lines() == 0 { self.now } else { self.now + AGAIN };
+        let until = if is_first { self.now } else { self.now + AGAIN };
         self.deferred = Some(Deferred { answers, modes: self.modes.clone(), until });
         if until == self.now {
             self.catch_up();

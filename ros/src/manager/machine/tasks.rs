@@ -90,14 +90,16 @@ impl Machine {
     /// The task is done: nobody needs a function any more.
     pub(super) fn reached(&mut self) {
         self.without_plan = false;
-        self.action = None;
-        if self.task.take().is_none() {
+        let was_active = self.action.take().is_some();
+        if self.task.take().is_none() && !was_active {
             return;
         }
         for number in std::mem::take(&mut self.waiting) {
             self.outputs.push(Output::Reply(number, true));
         }
-        self.say(&Event::Goal { goal: NOTHING.to_owned() });
+        if self.control.beliefs().goal().is_some_and(|goal| goal != NOTHING) {
+            self.say(&Event::Goal { goal: NOTHING.to_owned() });
+        }
         for function in self.functions.clone() {
             self.unground(&function);
         }

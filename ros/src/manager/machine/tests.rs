@@ -309,5 +309,6 @@ fn a_restart_goes_on_and_asks_for_nothing_twice() {
     drop(robot);
     let report = JournalReport::read(directory.path()).expect("a report");
     let text = format!("{report:?}");
-    assert!(text.contains("IDLE -> RECONFIGURE: the task search_pipeline is requested"), "arrows are notes");
+    assert!(text.contains("WAIT_GRAPH -> IDLE: every function answers"), "{text}");
+    assert!(text.contains("IDLE -> PLAN -> RECONFIGURE: the task search_pipeline is requested"), "{text}");
 }

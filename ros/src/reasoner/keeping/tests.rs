@@ -1,0 +1,122 @@
+//! The reasoner without a robot: what is asked for after what was heard.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use metaplan::configure::{Configurator, Keeper, Wishes};
+use metaplan::setup::Setup;
+use ros2_client::action::GoalId;
+
+use crate::interfaces::mros2_msgs::msg::QoS;
+use crate::manager::Settings;
+use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
+use crate::reasoner::memory::MemoryFile;
+
+const PATH: &str = "f_generate_search_path";
+
+fn keeping() -> Keeping {
+    let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/suave/suave.toml");
+    let settings = Settings::read(None, &mission).expect("settings");
+    let mission = Setup::read(&mission).expect("the mission is read").mission;
+    let knowledge = mission.knowledge().cloned().expect("a knowledge base");
+    let configurator = Configurator::new(knowledge, Wishes::default()).expect("designs");
+    Keeping::new(Keeper::new(configurator, None), settings.functions)
+}
+
+fn wanted(function: &str) -> QoS {
+    QoS { objective_type: function.to_owned(), always_improve: true, ..QoS::default() }
+}
+
+/// What is asked for; everything else apart.
+fn asked(keeping: &mut Keeping) -> Vec<Wanted> {
+    let mut asked = Vec::new();
+    for output in keeping.outputs() {
+        if let Output::Configure(wanted) = output {
+            asked.push(wanted);
+        }
+    }
+    asked
+}
+
+fn modes(asked: &[Wanted]) -> Vec<&str> {
+    asked.iter().map(|wanted| wanted.mode.as_str()).collect()
+}
+
+fn see(keeping: &mut Keeping, metres: &str) -> Vec<Wanted> {
+    keeping.hear(&format!(r#"{{"event":"measured","attribute":"water_visibility","value":{metres}}}"#));
+    asked(keeping)
+}
+
+const NOW: Duration = Duration::from_secs(100);
+
+#[test]
+fn an_objective_gets_the_best_design_and_loses_it_with_its_end() {
+    let (mut keeping, goal) = (keeping(), GoalId::new_random());
+    assert!(keeping.refused(&wanted("f_fly")).is_some_and(|text| text.contains("`f_fly`")));
+    assert_eq!(keeping.refused(&wanted(PATH)), None);
+    keeping.pursue(goal, &wanted(PATH));
+    let first = asked(&mut keeping);
+    assert_eq!(modes(&first), ["fd_spiral_high"]);
+    keeping.answered(&first[0], Outcome::Done, NOW);
+    let told = keeping.outputs();
+    let is_told = |output: &Output| matches!(output, Output::Feedback(_, told) if told.selected_mode == "fd_spiral_high");
+    assert!(told.iter().any(is_told), "{told:?}");
+    let darker = see(&mut keeping, "2.3");
+    assert_eq!(modes(&darker), ["fd_spiral_medium"]);
+    keeping.answered(&darker[0], Outcome::Done, NOW);
+    keeping.cancel(goal);
+    let end = asked(&mut keeping);
+    assert_eq!(modes(&end), ["fd_unground"]);
+    keeping.answered(&end[0], Outcome::Refused, NOW);
+    assert!(keeping.outputs().contains(&Output::Cancelled(goal, false)), "it keeps its design");
+    keeping.cancel(goal);
+    let end = asked(&mut keeping);
+    keeping.answered(&end[0], Outcome::Done, NOW);
+    assert!(keeping.outputs().contains(&Output::Cancelled(goal, true)));
+    assert_eq!(see(&mut keeping, "4"), [], "nobody asks for the function any more");
+}
+
+#[test]
+fn a_design_that_is_refused_is_replaced_and_tried_again() {
+    let mut keeping = keeping();
+    keeping.pursue(GoalId::new_random(), &wanted(PATH));
+    let first = asked(&mut keeping);
+    keeping.answered(&first[0], Outcome::Refused, NOW);
+    let next = asked(&mut keeping);
+    assert_eq!(modes(&next), ["fd_spiral_medium"]);
+    keeping.answered(&next[0], Outcome::Done, NOW);
+    keeping.tick(NOW + Duration::from_secs(59));
+    assert_eq!(asked(&mut keeping), []);
+    keeping.tick(NOW + Duration::from_secs(61));
+    assert_eq!(modes(&asked(&mut keeping)), ["fd_spiral_high"]);
+}
+
+#[test]
+fn a_restart_asks_for_nothing_twice() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut file = MemoryFile::open(directory.path()).expect("a directory");
+    let (mut before, goal) = (keeping(), GoalId::new_random());
+    see(&mut before, "2.3");
+    before.pursue(goal, &wanted(PATH));
+    let first = asked(&mut before);
+    assert_eq!(modes(&first), ["fd_spiral_medium"]);
+    before.answered(&first[0], Outcome::Done, NOW);
+    file.write(before.memory()).expect("written");
+    let again = |found: &str| {
+        let file = MemoryFile::open(directory.path()).expect("it is read");
+        let modes: BTreeMap<String, String> = [(PATH.to_owned(), found.to_owned())].into();
+        let mut keeping = keeping();
+        keeping.remember(file.read(), &[goal], &modes);
+        keeping
+    };
+    let mut after = again("fd_spiral_medium");
+    assert_eq!(asked(&mut after), []);
+    assert_eq!(modes(&see(&mut after, "4")), ["fd_spiral_high"], "it goes on");
+    // Meanwhile somebody has changed the mode: what is right is asked for.
+    assert_eq!(modes(&asked(&mut again("fd_spiral_low"))), ["fd_spiral_medium"]);
+    // What is damaged is said.
+    std::fs::write(directory.path().join("reasoner.json"), "{").expect("written");
+    let message = MemoryFile::open(directory.path()).expect_err("it is damaged");
+    assert_eq!(message.code, "N141");
+}

@@ -1,0 +1,96 @@
+//! What a reasoner has to know after a restart: the goals that it pursues, the designs that they have, and what was reported last.
+//!
+//! It is one file, written anew beside the old one and put in its place, so that it is whole whenever the program ends.
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use metaplan::message::Message;
+use serde::{Deserialize, Serialize};
+
+use crate::interfaces::mros2_msgs::msg::QoS;
+
+/// The version of the file.
+const FORMAT: &str = "metaplan-reasoner/1";
+
+/// Everything that is kept.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Memory {
+    format: String,
+    /// The last event about each thing, by what it is about.
+    pub(super) reports: BTreeMap<String, String>,
+    pub(super) goals: Vec<Remembered>,
+}
+
+/// A goal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Remembered {
+    /// The number that its client has given it.
+    pub(super) goal: [u8; 16],
+    /// What was wanted, with the name that the objective has.
+    pub(super) wanted: QoS,
+    /// The design that its function has.
+    pub(super) design: Option<String>,
+}
+
+/// Where it is kept.
+#[derive(Debug)]
+pub(super) struct MemoryFile {
+    path: PathBuf,
+    last: Memory,
+}
+
+impl Memory {
+    pub(super) fn new(reports: BTreeMap<String, String>, goals: Vec<Remembered>) -> Self {
+        Self { format: FORMAT.to_owned(), reports, goals }
+    }
+}
+
+impl MemoryFile {
+    /// Opens the file in a directory, which is made if there is none.
+    ///
+    /// # Errors
+    /// The directory cannot be used, or the file is damaged.
+    pub(super) fn open(directory: &Path) -> Result<Self, Message> {
+        let path = directory.join("reasoner.json");
+        let failed = |text: String| Message::at("N141", &path.display().to_string(), None, text);
+        std::fs::create_dir_all(directory).map_err(|error| failed(format!("cannot be made: {error}")))?;
+        let last = match std::fs::read_to_string(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Memory::default(),
+            Err(error) => return Err(failed(format!("cannot be read: {error}"))),
+            Ok(text) => {
+                serde_json::from_str(&text).map_err(|error| failed(format!("is damaged: {error}")))?
+            }
+        };
+        if last != Memory::default() && last.format != FORMAT {
+            return Err(failed(format!("has the format `{}`; this program writes {FORMAT}", last.format)));
+        }
+        Ok(Self { path, last })
+    }
+
+    /// What was kept.
+    pub(super) fn read(&self) -> Memory {
+        self.last.clone()
+    }
+
+    /// Keeps this, if it is something else than before.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(super) fn write(&mut self, memory: Memory) -> Result<(), Message> {
+        if memory == self.last {
+            return Ok(());
+        }
+        let failed = |error: std::io::Error| {
+            Message::at("N141", &self.path.display().to_string(), None, format!("cannot be written: {error}"))
+        };
+        let directory = self.path.parent().unwrap_or_else(|| Path::new("."));
+        let mut file = tempfile::NamedTempFile::new_in(directory).map_err(failed)?;
+        let text = serde_json::to_string(&memory).unwrap_or_default();
+        file.write_all(text.as_bytes()).map_err(failed)?;
+        file.persist(&self.path).map_err(|error| failed(error.error))?;
+        self.last = memory;
+        Ok(())
+    }
+}
