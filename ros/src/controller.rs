@@ -27,7 +27,7 @@ use crate::node::{Node, Severity};
 use crate::perform::{End, Progress};
 use crate::performer::{ExecutePlans, PlanVersion};
 use crate::planner::{
-    Chosen, DOMAIN, Found, Joint, NoPlan, PROBLEM, Request, on_a_thread, plan_message, solve,
+    Chosen, DOMAIN, Found, Joint, NoPlan, PROBLEM, Request, Told, on_a_thread, plan_message, solve,
 };
 
 /// So long the experts are waited for.
@@ -68,6 +68,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         manner: Chosen::declare(node)?,
         joint: Joint::listen(node, setup.mission)?,
         executes: ExecutePlans::new(node, "execute_plan", options.version),
+        told: Told::new(node)?,
     };
     smol::block_on(controller.control(stop)).map_err(|message| vec![message])
 }
@@ -77,6 +78,7 @@ struct Controller {
     manner: Arc<Chosen>,
     joint: Arc<Joint>,
     executes: ExecutePlans,
+    told: Told,
 }
 
 /// What has come of a plan.
@@ -99,9 +101,8 @@ impl Controller {
                 None
             };
             let found = match smol::future::or(stopped, async { Some(self.find().await) }).await {
-                Some(Ok(found)) => found,
-                Some(Err(because)) => {
-                    self.node.log(Severity::Warn, &because);
+                Some(Some(found)) => found,
+                Some(None) => {
                     self.pause(PAUSE, stop).await;
                     continue;
                 }
@@ -138,10 +139,15 @@ impl Controller {
         Ok(())
     }
 
-    /// The best plan for what PlanSys2 has now, or why there is none.
-    async fn find(&self) -> Result<Found, String> {
-        let (domain, problem) = self.ask().await?;
-        self.plan(domain, problem).await.map_err(|none| none.text())
+    /// The best plan for what PlanSys2 has now; why there is none is told.
+    async fn find(&self) -> Option<Found> {
+        match self.ask().await {
+            Ok((domain, problem)) => self.plan(domain, problem).await.ok(),
+            Err(because) => {
+                self.node.log(Severity::Warn, &because);
+                None
+            }
+        }
     }
 
     /// The domain and the problem as PlanSys2 has them now.
@@ -168,11 +174,10 @@ impl Controller {
         };
         on_a_thread("plan", work)
             .map_err(|error| NoPlan::None(format!("there is no further thread: {error}")))?;
-        let found = found.recv().await.map_err(|_| NoPlan::Fault("the planner has ended".to_owned()))??;
-        let actions = found.plans.first().map_or(0, Vec::len);
-        let text = format!("a plan of {actions} actions that costs {}: {}", found.cost, found.verdict);
-        self.node.log(Severity::Info, &text);
-        Ok(found)
+        let found =
+            found.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
+        self.told.tell(&found);
+        found
     }
 
     /// Has a plan executed as long as its designs are available.

@@ -24,6 +24,7 @@ use crate::performer;
 use crate::planner::joint::Joint;
 use crate::planner::manner::Chosen;
 use crate::planner::solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};
+use crate::planner::told::Told;
 
 /// Plans may nest deeply.
 const STACK: usize = 64 << 20;
@@ -39,6 +40,7 @@ struct Planner {
     /// The mission whose knowledge base joins in, as the diagnostics have it.
     joint: Option<Arc<Joint>>,
     manner: Arc<Chosen>,
+    told: Told,
 }
 
 /// Serves as PlanSys2's planner. The node has no parameters yet; it is not configured, and its lifecycle is returned.
@@ -48,7 +50,13 @@ struct Planner {
 pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, Vec<Message>> {
     let manner = Chosen::declare(node)?;
     let joint = setup.map(|setup| Joint::listen(node, setup.mission)).transpose()?;
-    let planner = Arc::new(Planner { node: Arc::clone(node), busy: AtomicUsize::new(0), joint, manner });
+    let planner = Arc::new(Planner {
+        node: Arc::clone(node),
+        busy: AtomicUsize::new(0),
+        joint,
+        manner,
+        told: Told::new(node)?,
+    });
     let one = |message: Message| vec![message];
     let lifecycle = Lifecycle::serve(node, |_| true).map_err(one)?;
     planner.answer(&lifecycle).map_err(one)?;
@@ -156,15 +164,7 @@ impl Planner {
             joint: joint.as_ref(),
         };
         let found = solve(request, &manner);
-        match &found {
-            Ok(found) => {
-                let actions = found.plans.first().map_or(0, Vec::len);
-                let text =
-                    format!("a plan of {actions} actions that costs {}: {}", found.cost, found.verdict);
-                self.node.log(Severity::Info, &text);
-            }
-            Err(none) => self.node.log(Severity::Warn, &none.text()),
-        }
+        self.told.tell(&found);
         found
     }
 }

@@ -4,6 +4,7 @@
 //! makespan counts where there is no metric; if no such plan is found in time, actions follow one another. With a knowledge base
 //! they always do: which design a function has is one choice at a time.
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
@@ -18,6 +19,7 @@ use metaplan::mission::{
 };
 use metaplan::pddl::ast::{ActionBody, Problem};
 use metaplan::pddl::{self, Source};
+use serde_json::{Value, json};
 
 /// What is to be planned.
 #[derive(Debug, Clone)]
@@ -52,10 +54,39 @@ pub struct Found {
     pub configuration: Vec<Vec<(String, String)>>,
     /// Its cost by the metric.
     pub cost: Exact,
+    /// Whether it is proved that nothing is better.
+    pub proved: bool,
     /// What is claimed of it, in a sentence.
     pub verdict: String,
     /// What is questionable about the domain and the problem.
     pub warnings: Vec<Message>,
+}
+
+impl Found {
+    /// The best plan for programs, as the adaptation loop says it, with its times.
+    pub fn to_json(&self) -> Value {
+        let number = |number: &Exact| {
+            let text = number.to_string();
+            serde_json::from_str(&text).unwrap_or(Value::String(text))
+        };
+        let step = |(line, configuration): (&PlanLine, &Vec<(String, String)>)| {
+            let mut words = line.action.trim_matches(['(', ')']).split(' ');
+            json!({
+                "action": words.next(),
+                "arguments": words.collect::<Vec<_>>(),
+                "configuration": configuration.iter().cloned().collect::<BTreeMap<_, _>>(),
+                "start": number(&line.start),
+                "duration": number(&line.duration),
+            })
+        };
+        let best = self.plans.first().into_iter().flatten();
+        json!({
+            "answer": "plan_found",
+            "cost": number(&self.cost),
+            "optimal": self.proved,
+            "steps": best.zip(&self.configuration).map(step).collect::<Vec<_>>(),
+        })
+    }
 }
 
 /// Why there is no plan.
@@ -156,6 +187,7 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
         plans: std::iter::once(plan).chain(&others).map(written).collect(),
         configuration: plan.steps.iter().map(|step: &Step| step.configuration.clone()).collect(),
         cost: plan.cost.clone(),
+        proved: solution.status == Status::Optimal,
         verdict: verdict(&solution).trim_end().to_owned(),
         warnings,
     })

@@ -1,7 +1,7 @@
 //! In the place of PlanSys2's planner: as PlanSys2's own planner client and lifecycle manager call it.
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use metaplan::setup::Setup;
@@ -15,7 +15,8 @@ use metaplan_ros::interfaces::plansys2_msgs::srv::{
     GetPlan, GetPlanArray, GetPlanArrayRequest, GetPlanRequest, GetPlanResponse, ValidateDomain,
     ValidateDomainRequest,
 };
-use metaplan_ros::node::{Caller, Node, depth};
+use metaplan_ros::interfaces::std_msgs;
+use metaplan_ros::node::{Caller, Node, depth, latched};
 use metaplan_ros::planner;
 use smol::block_on;
 
@@ -159,9 +160,19 @@ fn the_knowledge_base_of_a_mission_joins_in() {
     let (domain, problem) = (text("encodings/uuv/plain.pddl"), text("encodings/uuv/problem.pddl"));
     let setup = Setup::read(&root.join("missions/uuv_plain.toml")).expect("a mission");
     let (_planner, client) = planner(Some(setup), "");
+    let told = Arc::new(Mutex::new(String::new()));
+    let own = Arc::clone(&told);
+    let hear = move |message: std_msgs::msg::String| *own.lock().expect("no panic") = message.data;
+    client.subscribe::<std_msgs::msg::String>("/planner/plan", latched(1), hear).expect("a subscription");
     let get_plan = client.caller::<GetPlan>("/planner/get_plan");
     let before = ask(&get_plan, &domain, &problem);
     assert!(before.success, "{}", before.error_info);
+    // What PlanSys2's plans have no place for.
+    until("the plan as JSON", || !told.lock().expect("no panic").is_empty());
+    let plan: serde_json::Value = serde_json::from_str(&told.lock().expect("no panic")).expect("JSON");
+    assert_eq!((&plan["optimal"], &plan["steps"][0]["action"]), (&true.into(), &"search_pipeline".into()));
+    assert_eq!(plan["steps"][0]["arguments"], serde_json::json!(["pl1"]));
+    assert_eq!(plan["steps"][0]["configuration"]["f_generate_search_path"], "fd_search_high");
     let said = client.publisher::<DiagnosticArray>("/diagnostics", depth(10)).expect("a publisher");
     let values = vec![KeyValue { key: "water_visibility".into(), value: "1.5".into() }];
     let status = vec![DiagnosticStatus { message: "QA status".into(), values, ..Default::default() }];

@@ -1,0 +1,42 @@
+//! What is found, told to people and programs: in the log, and as JSON on the topic `~/plan`, with the designs for which PlanSys2's plans
+//! have no place.
+
+use std::sync::Arc;
+
+use metaplan::message::Message;
+
+use crate::interfaces::std_msgs::msg::String as Text;
+use crate::node::{Node, Publisher, Severity, latched};
+use crate::planner::{Found, NoPlan};
+
+/// Tells it.
+#[derive(Debug)]
+pub(crate) struct Told {
+    node: Arc<Node>,
+    plans: Publisher<Text>,
+}
+
+impl Told {
+    /// Makes the topic.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Vec<Message>> {
+        let plans = node.publisher("~/plan", latched(1)).map_err(|message| vec![message])?;
+        Ok(Self { node: Arc::clone(node), plans })
+    }
+
+    /// Tells what was found, or why nothing was.
+    pub(crate) fn tell(&self, found: &Result<Found, NoPlan>) {
+        match found {
+            Ok(found) => {
+                let actions = found.plans.first().map_or(0, Vec::len);
+                let text =
+                    format!("a plan of {actions} actions that costs {}: {}", found.cost, found.verdict);
+                self.node.log(Severity::Info, &text);
+                self.plans.publish(Text { data: found.to_json().to_string() });
+            }
+            Err(none) => self.node.log(Severity::Warn, &none.text()),
+        }
+    }
+}
