@@ -44,6 +44,10 @@ class Monitors:
     def _send(self, status: list[dict[str, Any]], stamp: dict[str, int]) -> None:
         self.topic.send({"header": {"stamp": stamp, "frame_id": ""}, "status": status})
 
+    def nothing(self) -> None:
+        """A message without a status."""
+        self._send([], now())
+
     def visibility(self, metres: float, stamp: dict[str, int]) -> None:
         """As water_visibility_observer says it."""
         name = "water_visibility_observer: Water visibility measurement"
@@ -143,7 +147,9 @@ class Robot:
         found = self.node.spin_until(there, timeout)
         if self.options.vendor == "fastrtps":
             # A reader of RustDDS hands on nothing until it knows where the writer begins. If it met the writer too late for the
-            # first heartbeat of Fast DDS, it knows with the next one: samples are late until then, and in order.
+            # first heartbeat of Fast DDS, it knows with the one that follows a sample: what is said until then is late, and in
+            # order. So something is said that changes nothing, and waited for that heartbeat.
+            self.monitors.nothing()
             self.node.spin(HEARTBEAT)
         return found
 
