@@ -42,7 +42,8 @@ class Program:
             script = str(Path(__file__).with_name("stand_in.py"))
             vendor = ["--vendor", self.vendor, "--domain", str(self.domain), "--fault", fault]
             return [sys.executable, script, "--as", self.role, *vendor]
-        journal = ["--journal", str(self.directory / "journal")]
+        # The others have nothing to remember.
+        journal = ["--journal", str(self.directory / "journal")] if self.role in ("manager", "reasoner") else []
         mission = ["--mission", str(self.mission)]
         return [self.path, *mission, "--as", self.role, "--rmw", self.rmw, *journal, *self.more]
 
