@@ -11,14 +11,13 @@ use metaplan::journal::{Journal, Policy};
 use metaplan::mapek::Loop;
 use metaplan::message::{Message, did_you_mean};
 use metaplan::setup::Setup;
-use ros2_client::ParameterValue;
 use serde_json::json;
 
 use crate::interfaces::diagnostic_msgs::msg::DiagnosticStatus;
 use crate::manager::machine::{Input, Machine, Output, State};
 use crate::manager::robot::Robot;
 use crate::manager::settings::Settings;
-use crate::node::{Declared, Lifecycle, Node, Phase, Severity};
+use crate::node::{Lifecycle, Node, Phase, Severity};
 use crate::perform::Perform;
 use crate::performer::performers;
 
@@ -59,7 +58,11 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     for warning in mission.warnings() {
         node.log(Severity::Warn, warning.text().trim_end());
     }
-    let timeout = parameters(node)?;
+    let timeout = node.declare_seconds(
+        "call_timeout",
+        "How long a function may take to change its mode before it is asked once more, in seconds.",
+        5.0,
+    )?;
     let ticks = !adaptation.settle.is_zero();
     let mut control = Loop::new(mission, adaptation)?;
     let journal = journal(node, options, &mut control).map_err(|message| vec![message])?;
@@ -92,36 +95,6 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     };
     driver.meet(&sender, &inputs, stop).map_err(|message| vec![message])?;
     driver.drive(&inputs, stop).map_err(|message| vec![message])
-}
-
-/// Declares the parameters; the timeout of calls, which can be set while the node runs, in milliseconds.
-fn parameters(node: &Arc<Node>) -> Result<Arc<std::sync::atomic::AtomicU64>, Vec<Message>> {
-    let timeout = Arc::new(std::sync::atomic::AtomicU64::new(5000));
-    let set = Arc::clone(&timeout);
-    let store = move |value: &ParameterValue| {
-        if let ParameterValue::Double(seconds) = value
-            && let Ok(duration) = Duration::try_from_secs_f64(*seconds)
-        {
-            set.store(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
-        }
-    };
-    let declared = Declared {
-        name: "call_timeout",
-        description: "How long a function may take to change its mode before it is asked once more, in seconds.",
-        value: ParameterValue::Double(5.0),
-        is_dynamic: true,
-    };
-    let hear = store.clone();
-    let warnings = node.declare(vec![declared], move |name, value| {
-        if name == "call_timeout" {
-            hear(value);
-        }
-    })?;
-    for warning in warnings {
-        node.log(Severity::Warn, warning.text().trim_end());
-    }
-    node.parameter("call_timeout").iter().for_each(store);
-    Ok(timeout)
 }
 
 fn journal(node: &Node, options: &Options, control: &mut Loop) -> Result<Option<Journal>, Message> {

@@ -1,7 +1,9 @@
 //! Parameters: declared, overridden from the command line, and served to `ros2 param`.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use metaplan::message::{Message, did_you_mean};
 use ros2_client::ParameterValue;
@@ -12,7 +14,7 @@ use crate::interfaces::rcl_interfaces::srv::{
     GetParameters, GetParametersResponse, ListParameters, ListParametersResponse, SetParameters,
     SetParametersAtomically, SetParametersAtomicallyResponse, SetParametersResponse,
 };
-use crate::node::Node;
+use crate::node::{Node, Severity};
 
 /// A parameter of a node.
 #[derive(Debug, Clone)]
@@ -78,6 +80,44 @@ impl Node {
         self.serve_parameters(Arc::new(Mutex::new(table)), Arc::new(changed))
             .map_err(|message| vec![message])?;
         Ok(warnings)
+    }
+
+    /// Declares one parameter, a time in seconds that can be set while the node runs; returns it in milliseconds. What else the command line
+    /// gives is warned of in the log.
+    ///
+    /// # Errors
+    /// As [`Node::declare`].
+    pub(crate) fn declare_seconds(
+        self: &Arc<Self>,
+        name: &'static str,
+        description: &'static str,
+        seconds: f64,
+    ) -> Result<Arc<AtomicU64>, Vec<Message>> {
+        let time = Arc::new(AtomicU64::new(0));
+        let own = Arc::clone(&time);
+        let set = move |value: &ParameterValue| {
+            if let ParameterValue::Double(seconds) = value
+                && let Ok(duration) = Duration::try_from_secs_f64(*seconds)
+            {
+                own.store(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
+            }
+        };
+        let value = ParameterValue::Double(seconds);
+        set(&value);
+        let hear = set.clone();
+        let warnings = self.declare(
+            vec![Declared { name, description, value, is_dynamic: true }],
+            move |set, value| {
+                if set == name {
+                    hear(value);
+                }
+            },
+        )?;
+        for warning in warnings {
+            self.log(Severity::Warn, warning.text().trim_end());
+        }
+        self.parameter(name).iter().for_each(set);
+        Ok(time)
     }
 
     /// The value of a parameter that was declared.

@@ -7,7 +7,6 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
 use metaplan::message::Message;
-use ros2_client::ParameterValue;
 use ros2_client::action::GoalId;
 use smol::Task;
 
@@ -18,8 +17,8 @@ use crate::interfaces::mros2_msgs::srv::{MetacontrolFD, MetacontrolFDRequest};
 use crate::interfaces::std_msgs;
 use crate::interfaces::system_modes_msgs::srv::{ChangeMode, ChangeModeRequest, GetMode, GetModeRequest};
 use crate::node::{
-    CallError, Caller, CancelRequest, Declared, GoalEnd, GoalEvent, Goals, Lifecycle, Node, Phase, Publisher,
-    Severity, Wanted as Offer, depth,
+    CallError, Caller, CancelRequest, GoalEnd, GoalEvent, Goals, Lifecycle, Node, Phase, Publisher, Severity,
+    Wanted as Offer, depth,
 };
 use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
 use crate::reasoner::memory::{MemoryFile, Remembered};
@@ -70,7 +69,11 @@ impl Network {
         memory: Option<MemoryFile>,
     ) -> Result<Self, Vec<Message>> {
         let one = |message: Message| vec![message];
-        let period = parameters(node)?;
+        let period = node.declare_seconds(
+            "reasoning_period",
+            "How often is told how objectives are, in seconds; what changes is told at once.",
+            1.5,
+        )?;
         let (sender, inputs) = mpsc::channel();
         let heard = sender.clone();
         let diagnosed = Diagnosed::hear(node, move || drop(heard.send(Input::Diagnosed))).map_err(one)?;
@@ -253,34 +256,4 @@ impl Network {
         });
         self.calling.insert(name, call);
     }
-}
-
-/// Declares the parameters of MROS's reasoner that mean something here; the period of telling, in milliseconds.
-fn parameters(node: &Arc<Node>) -> Result<Arc<AtomicU64>, Vec<Message>> {
-    let period = Arc::new(AtomicU64::new(1500));
-    let set = Arc::clone(&period);
-    let store = move |value: &ParameterValue| {
-        if let ParameterValue::Double(seconds) = value
-            && let Ok(duration) = Duration::try_from_secs_f64(*seconds)
-        {
-            set.store(u64::try_from(duration.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
-        }
-    };
-    let declared = Declared {
-        name: "reasoning_period",
-        description: "How often is told how objectives are, in seconds; what changes is told at once.",
-        value: ParameterValue::Double(1.5),
-        is_dynamic: true,
-    };
-    let hear = store.clone();
-    let warnings = node.declare(vec![declared], move |name, value| {
-        if name == "reasoning_period" {
-            hear(value);
-        }
-    })?;
-    for warning in warnings {
-        node.log(Severity::Warn, warning.text().trim_end());
-    }
-    node.parameter("reasoning_period").iter().for_each(store);
-    Ok(period)
 }

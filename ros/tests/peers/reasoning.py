@@ -51,7 +51,7 @@ def objectives(setting: Setting) -> str:
         return f"{len(asked(robot, PATH))} requests for {PATH}"
 
 
-@scenario(quick=False)
+@scenario()
 def killed_reasoner(setting: Setting) -> str:
     """kill -9 while there are objectives: they are kept, nothing is asked for twice, and they can be cancelled."""
     with play(setting, "reasoner") as (robot, program):
@@ -62,7 +62,7 @@ def killed_reasoner(setting: Setting) -> str:
         program.kill()
         robot.node.spin(0.3)
         program.start()
-        check(program.wait_output("goes on from the journal", 10.0), "it does not go on from the journal")
+        check(program.wait_output("goes on with 2 objectives", 10.0), "it does not go on from the journal")
         robot.node.spin(3.0)
         for _ in range(5):
             see(robot, CLEAR)
