@@ -19,7 +19,7 @@ EXPERIMENTS = {1: "thrusters", 2: "water visibility", 3: "both"}
 DIFFERENCE = """\
 Theirs: 30 runs of the whole simulation (Gazebo and ArduSub) for each row; each number of the CSV is the mean of
 one run, from the stamp of the diagnostic to the lifecycle event of the thrusters' node or to the parameter event of the
-spiral's altitude, by the clock of the simulation; monitors publish at 1 Hz and managers may run with a period (MROS's
+spiral's altitude; monitors publish at 1 Hz and managers may run with a period (MROS's
 reasoner 1.5 s). Ours: the same stimuli without the simulation, at full speed on loopback, one run for each draw; from the
 stamp to the answer of change_mode (as manager) or of /mros/request_configuration (as reasoner), by the machine's clock;
 also the recovery of the thrusters counts. A lifecycle transition of the node below takes place after this answer. So the
