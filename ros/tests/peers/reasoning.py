@@ -62,7 +62,10 @@ def killed_reasoner(setting: Setting) -> str:
         program.kill()
         robot.node.spin(0.3)
         program.start()
-        check(program.wait_output("goes on with 2 objectives", 10.0), "it does not go on from the journal")
+        check(
+            program.wait_output("goes on from the journal with 2 objectives", 10.0),
+            "it does not go on from the journal",
+        )
         robot.node.spin(3.0)
         for _ in range(5):
             see(robot, CLEAR)
