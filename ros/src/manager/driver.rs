@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ use crate::interfaces::diagnostic_msgs::msg::DiagnosticStatus;
 use crate::manager::machine::{Input, Machine, Output, State};
 use crate::manager::robot::Robot;
 use crate::manager::settings::Settings;
-use crate::node::{Lifecycle, Node, Phase, Severity};
+use crate::node::{Lifecycle, Node, Severity};
 use crate::perform::Perform;
 use crate::performer::performers;
 
@@ -73,16 +73,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     let (sender, inputs) = mpsc::channel();
     let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())
         .map_err(|message| vec![message])?;
-    // It has read its mission, and works as soon as it is there; others may bid it rest.
-    let active = Arc::new(AtomicBool::new(true));
-    let hear = Arc::clone(&active);
-    let lifecycle = Lifecycle::serve(node, move |phase| {
-        hear.store(phase == Phase::Active, Ordering::Relaxed);
-        true
-    })
-    .map_err(|message| vec![message])?;
-    lifecycle.go(Phase::Inactive);
-    lifecycle.go(Phase::Active);
+    let active = Lifecycle::activated(node).map_err(|message| vec![message])?;
     let mut driver = Driver {
         node: Arc::clone(node),
         machine,
@@ -117,14 +108,15 @@ struct Driver {
     settings: Settings,
     /// Whether it does its work, as its lifecycle says; what it hears meanwhile waits.
     active: Arc<AtomicBool>,
-    timeout: Arc<std::sync::atomic::AtomicU64>,
+    /// Of calls, in milliseconds.
+    timeout: Arc<AtomicU64>,
     clock: Instant,
     /// The time of the last line in the journal.
     begun: Duration,
 }
 
 impl Driver {
-    /// Waits for the functions, and says from time to time what is missing. Requests are refused meanwhile.
+    /// Waits for the functions, and says from time to time what is missing. Requests wait a while.
     fn meet(
         &mut self,
         sender: &Sender<Input>,
@@ -244,7 +236,7 @@ impl Driver {
             other => other,
         };
         let now = self.begun + self.clock.elapsed();
-        if !matches!(input, Input::Tick) {
+        if self.node.is_logged(Severity::Debug) && !matches!(input, Input::Tick) {
             self.node.log(Severity::Debug, &format!("hears {input:?}"));
         }
         for output in self.machine.handle(input, now)? {
@@ -260,7 +252,7 @@ impl Driver {
                 Output::Stop(number) => self.robot.stop(number),
                 Output::Plan(plan) => self.robot.plan(&plan),
                 Output::Event(event) => self.robot.event(&event),
-                Output::Warn(text) => self.robot.warn(&text),
+                Output::Warn(text) => self.node.warn_once(&text),
             }
         }
         Ok(())

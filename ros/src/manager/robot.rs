@@ -26,9 +26,7 @@ use crate::interfaces::system_modes_msgs::srv::{
 };
 use crate::manager::machine::{Change, Ended, Input, Outcome};
 use crate::manager::settings::Settings;
-use crate::node::{
-    CallError, Caller, Node, Publisher, Responder, Severity, depth, is_lyrical, keep_all, latched,
-};
+use crate::node::{CallError, Caller, Node, Publisher, Responder, depth, is_lyrical, keep_all, latched};
 use crate::perform::{Call, End, Perform, Progress, Running};
 
 /// So long a function may take to say which mode it has.
@@ -36,9 +34,6 @@ const LOOK: Duration = Duration::from_secs(2);
 
 /// A server that is new is asked so often, once in a period: it may not have discovered us at first.
 const GREETINGS: u32 = 3;
-
-/// So many things that were wrong are remembered, so as to say each once.
-const SAID: usize = 1000;
 
 /// The services of one function.
 struct Function {
@@ -65,7 +60,6 @@ pub(super) struct Robot {
     plans: Publisher<std_msgs::msg::String>,
     events: Publisher<std_msgs::msg::String>,
     diagnostics: Publisher<DiagnosticArray>,
-    said: std::collections::HashSet<String>,
 }
 
 impl Robot {
@@ -116,7 +110,6 @@ impl Robot {
             plans: node.publisher("~/plan", latched(1))?,
             events: node.publisher("~/events", depth(100))?,
             diagnostics: node.publisher("/diagnostics", depth(10))?,
-            said: std::collections::HashSet::new(),
         })
     }
 
@@ -133,7 +126,7 @@ impl Robot {
     }
 
     /// The mode of each function, as far as it says; why one does not is an event, and logged.
-    pub(super) async fn modes(&mut self) -> Vec<(String, Option<String>)> {
+    pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
         let look = |(name, function): (&String, &Function)| {
             let (name, look) = (name.clone(), Arc::clone(&function.look));
             async move { (name, look.call(GetModeRequest::default(), LOOK).await) }
@@ -144,7 +137,7 @@ impl Robot {
             Err(error) => {
                 let because = error.to_string();
                 self.event(&json!({"answer": "silent", "function": name, "because": because}));
-                self.warn(&because);
+                self.node.warn_once(&because);
                 (name, None)
             }
         };
@@ -292,16 +285,6 @@ impl Robot {
 
     pub(super) fn event(&self, event: &Value) {
         self.events.publish(std_msgs::msg::String { data: event.to_string() });
-    }
-
-    /// Logs what is wrong, each thing once.
-    pub(super) fn warn(&mut self, text: &str) {
-        if self.said.len() >= SAID {
-            self.said.clear();
-        }
-        if self.said.insert(text.to_owned()) {
-            self.node.log(Severity::Warn, text);
-        }
     }
 
     /// Says on `/diagnostics` how the manager itself is.

@@ -1,5 +1,6 @@
 //! A managed node (ROS 2 design article "Managed nodes"): its primary states, and the services by which others move it between them.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use metaplan::message::Message;
@@ -135,6 +136,23 @@ impl std::fmt::Debug for Lifecycle {
 }
 
 impl Lifecycle {
+    /// Serves the states of a node that has read its mission, and works as soon as it is there; others may bid it rest. Returns whether it
+    /// is active.
+    ///
+    /// # Errors
+    /// A topic cannot be made.
+    pub(crate) fn activated(node: &Arc<Node>) -> Result<Arc<AtomicBool>, Message> {
+        let active = Arc::new(AtomicBool::new(true));
+        let hear = Arc::clone(&active);
+        let lifecycle = Self::serve(node, move |phase| {
+            hear.store(phase == Phase::Active, Ordering::Relaxed);
+            true
+        })?;
+        lifecycle.go(Phase::Inactive);
+        lifecycle.go(Phase::Active);
+        Ok(active)
+    }
+
     /// Serves the states of a node that is not configured. `change` is asked before each change, with the state that will be.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! The log: what a node says on `/rosout`, and on standard error as `rcutils` writes it.
 
 use std::io::Write as _;
+use std::sync::PoisonError;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use metaplan::visible::visible;
@@ -9,6 +10,9 @@ use ros2_client::ros2::LogLevel;
 use ros2_client::rosout::RosoutRaw as _;
 
 use crate::node::Node;
+
+/// So many warnings are remembered, so as to say each once.
+const WARNED: usize = 1000;
 
 /// How grave it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -61,9 +65,26 @@ impl Severity {
 }
 
 impl Node {
+    /// Whether anybody hears what is so grave.
+    pub(crate) fn is_logged(&self, severity: Severity) -> bool {
+        severity >= self.least
+    }
+
+    /// Warns of something, once of the same.
+    pub(crate) fn warn_once(&self, text: &str) {
+        let mut warned = self.warned.lock().unwrap_or_else(PoisonError::into_inner);
+        if warned.len() >= WARNED {
+            warned.clear();
+        }
+        if warned.insert(text.to_owned()) {
+            drop(warned);
+            self.log(Severity::Warn, text);
+        }
+    }
+
     /// Says something to whoever reads logs.
     pub fn log(&self, severity: Severity, text: &str) {
-        if severity < self.least {
+        if !self.is_logged(severity) {
             return;
         }
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();

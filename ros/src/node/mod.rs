@@ -17,6 +17,7 @@ mod rmw;
 mod service;
 mod topic;
 
+use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -62,6 +63,8 @@ pub struct Node {
     arguments: RosArguments,
     graph: Arc<Graph>,
     least: Severity,
+    /// What was warned of, to be said once.
+    warned: Mutex<HashSet<String>>,
     /// What goes on for as long as the node is there.
     tasks: Mutex<Vec<Task<()>>>,
 }
@@ -110,6 +113,7 @@ impl Node {
             arguments,
             graph,
             least,
+            warned: Mutex::default(),
             tasks: Mutex::new(vec![watching]),
         });
         node.report_complaints();

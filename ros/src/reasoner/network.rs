@@ -1,6 +1,6 @@
 //! The reasoner on the network: the action that it serves, the diagnostics that it hears, and the services that it calls.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
@@ -17,7 +17,7 @@ use crate::interfaces::mros2_msgs::srv::{MetacontrolFD, MetacontrolFDRequest};
 use crate::interfaces::std_msgs;
 use crate::interfaces::system_modes_msgs::srv::{ChangeMode, ChangeModeRequest, GetMode, GetModeRequest};
 use crate::node::{
-    CallError, Caller, CancelRequest, GoalEnd, GoalEvent, Goals, Lifecycle, Node, Phase, Publisher, Severity,
+    CallError, Caller, CancelRequest, GoalEnd, GoalEvent, Goals, Lifecycle, Node, Publisher, Severity,
     Wanted as Offer, depth,
 };
 use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
@@ -28,9 +28,6 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 
 /// So long a function may take to say which mode it has.
 const LOOK: Duration = Duration::from_secs(2);
-
-/// So many things that were wrong are remembered, so as to say each once.
-const SAID: usize = 1000;
 
 /// What is heard.
 enum Input {
@@ -52,7 +49,6 @@ pub(super) struct Network {
     calling: BTreeMap<String, Task<()>>,
     diagnosed: Diagnosed,
     events: Publisher<std_msgs::msg::String>,
-    said: HashSet<String>,
     /// Milliseconds.
     period: Arc<AtomicU64>,
     /// Whether it does its work, as its lifecycle says.
@@ -95,15 +91,7 @@ impl Network {
         let client = Arc::clone(&bridge);
         // So that the first call need not wait for discovery.
         smol::spawn(async move { while client.ready(TIMEOUT).await.is_err() {} }).detach();
-        let active = Arc::new(AtomicBool::new(true));
-        let hear = Arc::clone(&active);
-        let lifecycle = Lifecycle::serve(node, move |phase| {
-            hear.store(phase == Phase::Active, Ordering::Relaxed);
-            true
-        })
-        .map_err(one)?;
-        lifecycle.go(Phase::Inactive);
-        lifecycle.go(Phase::Active);
+        let active = Lifecycle::activated(node).map_err(one)?;
         Ok(Self {
             node: Arc::clone(node),
             keeping,
@@ -114,7 +102,6 @@ impl Network {
             calling: BTreeMap::new(),
             diagnosed,
             events: node.publisher("~/events", depth(100)).map_err(one)?,
-            said: HashSet::new(),
             period,
             active,
             memory,
@@ -219,14 +206,7 @@ impl Network {
                 Output::Event(event) => {
                     self.events.publish(std_msgs::msg::String { data: event.to_string() });
                 }
-                Output::Warn(text) => {
-                    if self.said.len() >= SAID {
-                        self.said.clear();
-                    }
-                    if self.said.insert(text.clone()) {
-                        self.node.log(Severity::Warn, &text);
-                    }
-                }
+                Output::Warn(text) => self.node.warn_once(&text),
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use metaplan::mapek::{Command, Effect, Event};
+use metaplan::mapek::{Command, Effect};
 use metaplan::message::Message;
 
 use crate::manager::machine::io::{Output, State};
@@ -41,33 +41,17 @@ impl Machine {
 
     /// Asks again for what was asked for before a restart and has not been done, and adopts what has changed meanwhile.
     pub(super) fn catch_up(&mut self) {
-        let Some(Deferred { answers, modes, .. }) = self.deferred.take() else { return };
+        let Some(deferred) = &mut self.deferred else { return };
+        let (mut answers, modes) =
+            (std::mem::take(&mut deferred.answers), std::mem::take(&mut deferred.modes));
         let outstanding: BTreeSet<u64> =
             self.control.beliefs().outstanding().map(|effect| effect.number).collect();
-        let mut asked = BTreeSet::new();
-        let mut rest = Vec::new();
-        for answer in answers {
-            let Some(effect) = answer.effect() else {
-                rest.push(answer);
-                continue;
-            };
-            if !outstanding.contains(&effect.number) {
-                // Something else was asked for since.
-                continue;
-            }
-            if let Command::Reconfigure { function, to, .. } = &effect.command {
-                let mode = self.settings.functions.mode(function, to);
-                if self.modes.get(function).is_some_and(|own| own == mode) {
-                    self.say(&Event::Acknowledged { effect: effect.number });
-                    continue;
-                }
-                asked.insert(function.clone());
-            }
-            rest.push(answer);
-        }
-        self.take(rest);
+        // Of the others something else was asked for since.
+        answers.retain(|answer| answer.effect().is_none_or(|effect| outstanding.contains(&effect.number)));
+        self.take(answers);
+        self.deferred = None;
         for (function, mode) in modes {
-            if !asked.contains(&function) && !self.pending.contains_key(&function) {
+            if !self.pending.contains_key(&function) {
                 self.observe(&function, &mode);
             }
         }
