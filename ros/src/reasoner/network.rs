@@ -122,17 +122,19 @@ impl Network {
         while !stop.load(Ordering::Relaxed) {
             let wait = next.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
             match self.inputs.recv_timeout(wait) {
-                Ok(input) => self.handle(input, clock.elapsed()),
+                Ok(input) => {
+                    self.handle(input, clock.elapsed());
+                    // What is asked for is known before, if it ends in between.
+                    if let Some(memory) = &mut self.memory {
+                        memory.write(self.keeping.memory())?;
+                    }
+                }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
             if Instant::now() >= next {
                 next = Instant::now() + Duration::from_millis(self.period.load(Ordering::Relaxed).max(1));
                 self.keeping.tick(clock.elapsed());
-            }
-            // What is asked for is known before, if it ends in between.
-            if let Some(memory) = &mut self.memory {
-                memory.write(self.keeping.memory())?;
             }
             self.carry_out();
         }
@@ -141,13 +143,11 @@ impl Network {
 
     /// Goes on with what was pursued before a restart.
     fn go_on(&mut self) {
-        let Some(memory) =
-            self.memory.as_ref().map(MemoryFile::read).filter(|memory| !memory.goals.is_empty())
-        else {
-            return;
-        };
-        let text = format!("goes on from the journal with {} objectives", memory.goals.len());
-        self.node.log(Severity::Info, &text);
+        let Some(memory) = self.memory.as_ref().map(MemoryFile::read) else { return };
+        if !memory.goals.is_empty() {
+            let text = format!("goes on from the journal with {} objectives", memory.goals.len());
+            self.node.log(Severity::Info, &text);
+        }
         let goals: Vec<GoalId> = memory.goals.iter().map(|own| self.goals.go_on(own.goal)).collect();
         let look = |own: &Remembered| {
             let function = own.wanted.objective_type.clone();

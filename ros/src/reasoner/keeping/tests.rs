@@ -115,6 +115,13 @@ fn a_restart_asks_for_nothing_twice() {
     assert_eq!(modes(&see(&mut after, "4")), ["fd_spiral_high"], "it goes on");
     // Meanwhile somebody has changed the mode: what is right is asked for.
     assert_eq!(modes(&asked(&mut again("fd_spiral_low"))), ["fd_spiral_medium"]);
+    // What was reported is known without any goal, too.
+    let mut alone = keeping();
+    see(&mut alone, "1.3");
+    file.write(alone.memory()).expect("written");
+    let mut after = again("fd_unground");
+    after.pursue(goal, &wanted(PATH));
+    assert_eq!(modes(&asked(&mut after)), ["fd_spiral_low"]);
     // What is damaged is said.
     std::fs::write(directory.path().join("reasoner.json"), "{").expect("written");
     let message = MemoryFile::open(directory.path()).expect_err("it is damaged");
