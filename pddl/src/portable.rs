@@ -3,7 +3,7 @@
 //! Requirements name what is used, what is used is declared, nothing is said twice, the problem names its domain. What
 //! no other form could say (two actions of one name, names that begin with a digit) stays as it is.
 
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{
     ActionBody, Atom, Comparison, Condition, Declaration, Domain, Effect, EffectTime, Expression, Identifier,
@@ -83,6 +83,7 @@ fn move_constants(domain: &mut Domain, problem: &mut Problem) {
         domain.constants.iter().map(|constant| constant.identifier.name.clone()).collect();
     let is_new = |object: &TypedName| !declared.contains(&object.identifier.name);
     domain.constants.extend(Vec::into_iter(moved).filter(is_new));
+    merge_types(&mut domain.constants);
 }
 
 fn constant(term: &Term) -> Option<Name> {
@@ -94,9 +95,10 @@ fn constant(term: &Term) -> Option<Name> {
 
 /// Drops objects that are constants already, repeated facts and values, and what the closed world says anyway.
 fn say_once(domain: &Domain, problem: &mut Problem) {
-    let mut objects: FxHashSet<Name> =
+    let constants: FxHashSet<Name> =
         domain.constants.iter().map(|constant| constant.identifier.name.clone()).collect();
-    problem.objects.retain(|object| objects.insert(object.identifier.name.clone()));
+    problem.objects.retain(|object| !constants.contains(&object.identifier.name));
+    merge_types(&mut problem.objects);
     let mut said: FxHashSet<(bool, Name, Vec<Name>)> = FxHashSet::default();
     problem.init.retain(|element| match element {
         InitialElement::Fact(atom) => said.insert((false, atom.predicate.name.clone(), names(atom))),
@@ -104,6 +106,24 @@ fn say_once(domain: &Domain, problem: &mut Problem) {
         InitialElement::NegatedFact(_) => false,
         InitialElement::Timed(..) => true,
     });
+}
+
+/// Objects that are declared twice are of both types.
+fn merge_types(objects: &mut Vec<TypedName>) {
+    let mut merged: Vec<TypedName> = Vec::with_capacity(objects.len());
+    let mut places: FxHashMap<Name, usize> = FxHashMap::default();
+    for object in objects.drain(..) {
+        let Some(place) = places.get(&object.identifier.name) else {
+            places.insert(object.identifier.name.clone(), merged.len());
+            merged.push(object);
+            continue;
+        };
+        let known = &mut merged[*place].r#type.alternatives;
+        let is_new = |one: &Identifier| known.iter().all(|other| other.name != one.name);
+        let more: Vec<_> = object.r#type.alternatives.into_iter().filter(is_new).collect();
+        known.extend(more);
+    }
+    *objects = merged;
 }
 
 fn names(atom: &Atom) -> Vec<Name> {

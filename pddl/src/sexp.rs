@@ -141,6 +141,9 @@ pub(super) fn read<'s>(text: &'s str, sink: &mut Sink<'_>) -> Option<Tree<'s>> {
     let mut at = 0;
     while let Some((start, end)) = next_token(text, at) {
         let span = Span { start: dense(start), end: dense(end) };
+        if start == at && text[..at].ends_with(in_a_word) && text[at..].starts_with('?') {
+            reader.glued_variable(span, &text[start..end]);
+        }
         match text.as_bytes()[start] {
             b'(' => reader.open(span)?,
             b')' => reader.close(span),
@@ -172,9 +175,18 @@ fn next_token(text: &str, mut at: usize) -> Option<(usize, usize)> {
             },
         }
     }
-    let ends = |(_, character): &(usize, char)| matches!(character, '(' | ')' | ';') || is_space(*character);
+    let ends = |(place, character): &(usize, char)| {
+        // As other planners have it, a variable begins with its question mark, with or without a space before it.
+        !in_a_word(*character)
+            || (*character == '?' && *place > 0 && text[at + place + 1..].starts_with(in_a_word))
+    };
     let length = text[at..].char_indices().find(ends).map_or(text.len() - at, |(length, _)| length);
     Some((at, at + length))
+}
+
+/// Whether a character continues a word.
+fn in_a_word(character: char) -> bool {
+    !matches!(character, '(' | ')' | ';') && !is_space(character)
 }
 
 /// White space in the wide sense: text copied from documents brings no-break spaces and byte order marks.
@@ -216,6 +228,13 @@ impl Reader<'_, '_> {
             }
         }
         self.nodes.push(Node { span, next: dense(self.nodes.len()) + 1, is_list: false });
+    }
+
+    /// A variable behind a word without a space.
+    fn glued_variable(&mut self, span: Span, text: &str) {
+        self.sink
+            .warning("P116", span, format!("`{text}` is read as a word of its own"))
+            .help("put a space before the question mark");
     }
 
     /// A section at top level: the `(define` before it was closed too early, so it goes on.

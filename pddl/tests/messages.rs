@@ -77,6 +77,15 @@ says!(function_as_predicate, "(at a)" => "(at a) (battery)", @r"
       │
       = help: `battery` is a function
 ");
+says!(function_of_another_domain, "(= (battery) 10)" => "(= (fuel) 7)", @r"
+    error[P122]: unknown function `fuel`
+      ┌─ problem.pddl:4:32
+      │
+    4 │   (:init (at a) (link a b) (= (fuel) 7) (= (distance a b) 2))
+      │                                ^^^^
+      │
+      = help: the domain has to declare it in `:functions`, or it has no meaning here
+");
 says!(unknown_object, "(link a b)" => "(link a bb)", @r"
     error[P123]: unknown object `bb`
       ┌─ problem.pddl:4:25

@@ -9,6 +9,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use metaplan_pddl::validate::{Options, PlanText, validate};
 use metaplan_pddl::{Severity, Source, read, render};
 
 const TOOLS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/tools");
@@ -171,4 +172,29 @@ fn generated_missions_are_clean() {
             assert!(warnings.is_empty(), "{name}.{encoding}: {warnings:?}");
         }
     }
+}
+
+#[test]
+fn what_other_planners_read_is_read_as_they_do() {
+    let domain = Source::new(
+        "domain",
+        "(in-package \"PDDL\") (define (domain d) (:types oven kiln - object - board)
+         (:predicates (hot ?x) (next ?x ?y) (used? ?x))
+         (:action heat :parameters (?x - oven) :vars (?y - kiln) :precondition (and (next?x ?y) (not (used? ?x)))
+          :effect (hot?x)))",
+    );
+    let problem = Source::new(
+        "problem",
+        "(define (problem p) (:domain d) (:objects k - oven k - kiln - board) (:init (next k k)) (:goal (hot k)))",
+    );
+    let warnings = accepted(&domain, &problem);
+    assert_eq!(warnings, ["P104", "P107", "P109", "P116", "P116", "P127", "P107"]);
+    let (domain, problem, _) = read(&domain, &problem).expect("it was accepted");
+    let parameters = &domain.actions[0].parameters;
+    assert_eq!(parameters.iter().map(|entry| entry.identifier.name.as_str()).collect::<Vec<_>>(), ["x", "y"]);
+    let plan = PlanText::parse(&Source::new("plan", "(heat k k)")).expect("it is a plan");
+    let verdict = validate(&domain, &problem, &plan, &Options::default());
+    assert!(verdict.valid, "{verdict:?}");
+    let (_, problem) = metaplan_pddl::portable(&domain, &problem);
+    assert!(metaplan_pddl::print_problem(&problem).contains("k - (either oven kiln)"));
 }

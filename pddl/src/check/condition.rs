@@ -123,13 +123,17 @@ impl<'a> Checker<'a> {
         if name.as_str().to_ascii_lowercase().starts_with("inferred-") {
             self.undeclared_inferred.insert(name);
         }
-        let is_other = other.contains_key(name);
+        let (is_other, in_domain) = (other.contains_key(name), self.in_domain);
         let diagnostic = match kind {
             Kind::Predicate => self.undeclared("P121", *span, kind.noun(), name, own.keys().copied()),
             Kind::Function => self.undeclared("P122", *span, kind.noun(), name, own.keys().copied()),
         };
         if is_other {
             diagnostic.help(format!("`{name}` is a {other_noun}"));
+        } else if !in_domain && diagnostic.help.is_none() {
+            let section = if kind == Kind::Predicate { ":predicates" } else { ":functions" };
+            diagnostic
+                .help(format!("the domain has to declare it in `{section}`, or it has no meaning here"));
         }
     }
 

@@ -131,7 +131,11 @@ impl<'a> Checker<'a> {
         } else {
             let source = self.sink.source();
             self.sink
-                .error("P127", *span, format!("the {what} `{name}` is declared with two types"))
+                .warning(
+                    "P127",
+                    *span,
+                    format!("the {what} `{name}` is declared with two types; it is of both"),
+                )
                 .related(source, earlier.identifier.span, "the first declaration is here");
         }
     }

@@ -7,7 +7,7 @@ use crate::sexp::{Item, SECTIONS};
 use super::typed::Entries;
 use super::{Parser, at_start, list_start};
 
-const ACTION_KEYS: [&str; 3] = [":parameters", ":precondition", ":effect"];
+const ACTION_KEYS: [&str; 4] = [":parameters", ":vars", ":precondition", ":effect"];
 const DURATIVE_KEYS: [&str; 4] = [":parameters", ":duration", ":condition", ":effect"];
 
 impl Parser<'_> {
@@ -134,13 +134,22 @@ impl Parser<'_> {
     fn action(&mut self, section: Item<'_>) -> Option<Action> {
         let (identifier, fields) = self.action_fields(section, &ACTION_KEYS)?;
         let (mut parameters, mut precondition, mut effect) = (Vec::new(), None, None);
+        let mut variables = Vec::new();
         for (keyword, value) in fields {
             match keyword {
                 ":parameters" => parameters = self.parameters(value),
+                // PDDL 1.2: variables that the precondition binds, and the effect uses.
+                ":vars" => {
+                    self.sink
+                        .warning("P109", at_start(value), "`:vars` are read as further parameters")
+                        .help("plans name their objects, too, behind those of `:parameters`");
+                    variables = self.parameters(value);
+                }
                 ":precondition" => precondition = self.condition(value),
                 _ => effect = self.effect(value),
             }
         }
+        parameters.append(&mut variables);
         let body = ActionBody::Instantaneous {
             precondition: precondition.unwrap_or(Condition::And(Vec::new())),
             effect: effect.unwrap_or(Effect::And(Vec::new())),
@@ -213,6 +222,10 @@ impl Parser<'_> {
         let help = match (symbol.to_ascii_lowercase().as_str(), nearest(symbol, keys.iter().copied())) {
             (":condition", _) => "instantaneous actions have a `:precondition`".to_owned(),
             (":precondition", _) => "durative actions have a `:condition`".to_owned(),
+            (":observe", _) => {
+                "observations are not supported: every plan here is a sequence that needs to sense nothing"
+                    .to_owned()
+            }
             (":duration", _) => "actions with a duration are `:durative-action`".to_owned(),
             (_, Some(key)) => format!("did you mean `{key}`?"),
             _ => format!("known keywords are {}", keys.join(", ")),

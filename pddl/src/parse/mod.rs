@@ -105,6 +105,10 @@ impl Parser<'_> {
         for item in top {
             match define {
                 None if item.is_headed("define") => define = Some(item),
+                // Files of 1998 were Lisp.
+                None if item.is_headed("in-package") => {
+                    self.sink.warning("P104", at_start(item), "`in-package` is ignored");
+                }
                 _ => {
                     let what = if item.is_list() { "this list" } else { "this word" };
                     self.sink

@@ -28,7 +28,7 @@ impl Parser<'_> {
             if let Some(glued) = symbol.strip_prefix('-') {
                 let r#type = self.type_after_dash(item, glued, &mut items);
                 if untyped_from == list.len() {
-                    self.sink.error(
+                    self.sink.warning(
                         "P107",
                         item.span(),
                         "there is nothing before this `-` that it could type",
