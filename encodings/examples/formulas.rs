@@ -6,7 +6,7 @@
 
 use std::time::{Duration, Instant};
 
-use metaplan_encodings::{Backend, Config, GroundConfig, Limits, Strategy, ground, optimize};
+use metaplan_encodings::{Backend, Config, Engine, GroundConfig, Limits, Strategy, ground, optimize};
 use pddl::{Source, read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let task = ground(&domain, &problem, &GroundConfig::default()).map_err(|faults| format!("{faults:?}"))?;
     let backend: Backend = solver.parse()?;
     let limits = Limits::none().with_time(Duration::from_secs_f64(seconds.parse()?));
-    let config = Config { quick_search: false, strategy, backend, limits, ..Config::default() };
+    let config = Config { engine: Engine::Sat, strategy, backend, limits, ..Config::default() };
     let started = Instant::now();
     let solution = optimize(&task, &config, &mut |_| {});
     let text = |value: Option<_>| {

@@ -61,7 +61,7 @@ pub use error::{Error, File, Place};
 pub use exact::{ExactTask, ground_exact, optimize_exact};
 pub use ground::{Config as GroundConfig, ground};
 pub use limits::Limits;
-pub use optimize::{Config, Front, Point, Strategy, lexicographic, optimize, pareto};
+pub use optimize::{Config, Engine, Front, Point, Strategy, lexicographic, optimize, pareto};
 pub use plan::solution::{Improvement, Proof, Solution, Statistics, Status, Unbounded};
 pub use plan::transitions::{Situation, Transition};
 pub use plan::{Exact, Plan, Step};

@@ -49,7 +49,7 @@ fn is_solvable(
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(task, &limits),
-        Plans { allowed: &window.allowed, cost: Some(cost), semantics },
+        Plans { allowed: &window.allowed, cost: Some(cost), semantics, most: usize::MAX },
         &OnceCell::new(),
     )
     .expect("no limit");
@@ -369,7 +369,7 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(&task, &limits),
-        Plans { allowed: &allowed, cost: None, semantics: Semantics::Sequential },
+        Plans { allowed: &allowed, cost: None, semantics: Semantics::Sequential, most: usize::MAX },
         &OnceCell::new(),
     );
     let counts = encoding.expect("no limit").formula.counts();

@@ -6,28 +6,28 @@ mod random;
 
 use std::fmt::Write as _;
 
-use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, ground, optimize};
+use metaplan_encodings::{Config, Engine, GroundConfig, Limits, Solution, Status, ground, optimize};
 use pddl::{Source, read};
 use random::Random;
 
 /// Solves a task with the quick search, or with the SAT solver alone.
-fn solve(domain: &str, problem: &str, quick_search: bool) -> Solution {
+fn solve(domain: &str, problem: &str, engine: Engine) -> Solution {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
     let task = ground(&domain, &problem, &GroundConfig::default())
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain:?}"));
     let limits = Limits::none();
-    optimize(&task, &Config { horizon: None, quick_search, limits, ..Config::default() }, &mut |_| {})
+    optimize(&task, &Config { horizon: None, engine, limits, ..Config::default() }, &mut |_| {})
 }
 
 /// Both ways find the cost; none stands for "no plan exists".
 fn check(name: &str, domain: &str, problem: &str, expected: Option<&str>) {
-    for quick_search in [true, false] {
-        let solution = solve(domain, problem, quick_search);
+    for engine in [Engine::Auto, Engine::Sat] {
+        let solution = solve(domain, problem, engine);
         let found = solution.plan.map(|plan| plan.cost.to_string());
-        assert_eq!(found.as_deref(), expected, "{name}, quick search {quick_search}");
+        assert_eq!(found.as_deref(), expected, "{name}, {engine:?}");
         let status = if expected.is_some() { Status::Optimal } else { Status::Unsolvable };
-        assert_eq!(solution.status, status, "{name}, quick search {quick_search}");
+        assert_eq!(solution.status, status, "{name}, {engine:?}");
     }
 }
 
@@ -320,11 +320,11 @@ fn agree(seeds: std::ops::Range<u64>) {
             .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}\n{domain}\n{problem}"));
         let task = ground(&parsed, &goal, &GroundConfig::default())
             .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}\n{domain}\n{problem}"));
-        let run = |quick_search| {
-            let config = Config { horizon: Some(HORIZON), quick_search, ..Config::default() };
+        let run = |engine| {
+            let config = Config { horizon: Some(HORIZON), engine, ..Config::default() };
             optimize(&task, &config, &mut |_| {})
         };
-        let (quick, sat) = (run(true), run(false));
+        let (quick, sat) = (run(Engine::Auto), run(Engine::Sat));
         let cost = |solution: &Solution| solution.plan.as_ref().map(|plan| plan.cost.to_string());
         assert_eq!(cost(&quick), cost(&sat), "seed {seed}\n{domain}\n{problem}\n{quick:?}\n{sat:?}");
         solved += usize::from(cost(&quick).is_some());

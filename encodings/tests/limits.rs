@@ -4,7 +4,9 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
-use metaplan_encodings::{Config, Error, GroundConfig, Limits, Status, alternatives, ground, optimize};
+use metaplan_encodings::{
+    Config, Engine, Error, GroundConfig, Limits, Status, alternatives, ground, optimize,
+};
 use pddl::ast::{Domain, Problem};
 use pddl::{Source, read};
 
@@ -55,12 +57,7 @@ fn depot(places: usize, parcels: usize, designs: usize) -> (Domain, Problem) {
 }
 
 /// Grounds and plans; the status, if the task could be ground in time, and the whole time.
-fn run(
-    domain: &Domain,
-    problem: &Problem,
-    limit: Duration,
-    quick_search: bool,
-) -> (Option<Status>, Duration) {
+fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (Option<Status>, Duration) {
     let started = Instant::now();
     let limits = Limits::none().with_time(limit);
     let config = GroundConfig { limits: limits.clone(), ..GroundConfig::default() };
@@ -71,7 +68,7 @@ fn run(
             return (None, started.elapsed());
         }
     };
-    let config = Config { quick_search, limits, ..Config::default() };
+    let config = Config { engine, limits, ..Config::default() };
     let solution = optimize(&task, &config, &mut |_| {});
     if let Some(others) = alternatives(&task, &solution, 2, &config) {
         assert!(others.plans.len() <= 2);
@@ -84,12 +81,12 @@ fn run(
 fn wherever_time_is_up_there_is_no_false_answer() {
     let (domain, problem) = depot(4, 2, 3);
     let mut ended = 0;
-    for quick_search in [true, false] {
+    for engine in [Engine::Auto, Engine::Sat] {
         // Steps of a fifth: from before grounding to after the proof.
         let mut microseconds = 100.0_f64;
         while microseconds < 3e6 {
             let limit = Duration::from_secs_f64(microseconds / 1e6);
-            let (status, _) = run(&domain, &problem, limit, quick_search);
+            let (status, _) = run(&domain, &problem, limit, engine);
             let honest = [None, Some(Status::Unknown), Some(Status::Feasible), Some(Status::Optimal)];
             assert!(honest.contains(&status), "{status:?} after {limit:?}");
             ended += usize::from(status == Some(Status::Optimal));
@@ -104,15 +101,12 @@ fn wherever_time_is_up_there_is_no_false_answer() {
 
 fn check_overrun(name: &str, (domain, problem): &(Domain, Problem)) {
     for seconds in [1, 3, 8] {
-        for quick_search in [true, false] {
+        for engine in [Engine::Auto, Engine::Sat] {
             let limit = Duration::from_secs(seconds);
-            let (status, passed) = run(domain, problem, limit, quick_search);
-            println!("{name}, quick search {quick_search}, limit {seconds} s: {passed:.1?}, {status:?}");
+            let (status, passed) = run(domain, problem, limit, engine);
+            println!("{name}, {engine:?}, limit {seconds} s: {passed:.1?}, {status:?}");
             let most = limit + Duration::from_secs(1);
-            assert!(
-                passed <= most,
-                "{name}, quick search {quick_search}: {passed:?} with a limit of {limit:?}"
-            );
+            assert!(passed <= most, "{name}, {engine:?}: {passed:?} with a limit of {limit:?}");
             assert_ne!(status, Some(Status::Unsolvable), "{name}");
         }
     }

@@ -4,12 +4,12 @@
 mod missions;
 mod random;
 
-use metaplan_encodings::{Backend, Config, GroundConfig, Proof, Status, Strategy, ground, optimize};
+use metaplan_encodings::{Backend, Config, Engine, GroundConfig, Proof, Status, Strategy, ground, optimize};
 use missions::Mission;
 use pddl::{Source, read};
 
 /// How a mission without a plan, and one with a free metric, is answered: the SAT solver alone cannot tell.
-fn check(seed: u64, quick_search: bool, backend: &Backend, strategy: Strategy) {
+fn check(seed: u64, engine: Engine, backend: &Backend, strategy: Strategy) {
     let mission = Mission::random(seed);
     let (domain, problem) = (mission.domain(), mission.problem());
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
@@ -17,26 +17,23 @@ fn check(seed: u64, quick_search: bool, backend: &Backend, strategy: Strategy) {
     let task = ground(&domain, &problem, &GroundConfig::default())
         .unwrap_or_else(|errors| panic!("seed {seed}: {errors:#?}"));
     let costly = mission.weights.0 > 0 && mission.weights.1 > 0;
-    let bounded = quick_search || costly && mission.oracle().is_some();
+    let bounded = engine == Engine::Auto || costly && mission.oracle().is_some();
     let horizon = if bounded { None } else { Some(14) };
-    let config = Config { quick_search, horizon, strategy, backend: backend.clone(), ..Config::default() };
+    let config =
+        Config { engine, confirm: true, horizon, strategy, backend: backend.clone(), ..Config::default() };
     let solution = optimize(&task, &config, &mut |_| {});
-    let context = || {
-        format!(
-            "seed {seed}, quick search {quick_search}, {backend:?}, {strategy:?}: {mission:?}: {solution:?}"
-        )
-    };
+    let context = || format!("seed {seed}, {engine:?}, {backend:?}, {strategy:?}: {mission:?}: {solution:?}");
     let Some(cost) = mission.oracle() else {
         let allowed = [Status::Unsolvable, Status::UnsolvableWithinHorizon];
         assert!(allowed.contains(&solution.status) && solution.plan.is_none(), "{}", context());
-        assert!(!quick_search || solution.status == Status::Unsolvable, "{}", context());
+        assert!(engine == Engine::Sat || solution.status == Status::Unsolvable, "{}", context());
         return;
     };
     let found = solution.plan.as_ref().map(|plan| plan.cost.to_string());
     assert_eq!(found, Some(cost.to_string()), "{}", context());
     let length = solution.plan.as_ref().map_or(0, |plan| plan.steps.len());
     assert_eq!(mission.oracle_by_steps(length).last(), Some(&Some(cost)), "{}", context());
-    if quick_search {
+    if engine == Engine::Auto {
         assert_eq!(solution.status, Status::Optimal, "{}", context());
     }
     if costly {
@@ -53,14 +50,14 @@ const STRATEGIES: [Strategy; 3] = [Strategy::Auto, Strategy::Tighten, Strategy::
 
 #[test]
 fn generated_missions_have_the_optimum_of_the_oracle() {
-    (0..150).for_each(|seed| check(seed, true, &Backend::default(), Strategy::Auto));
+    (0..150).for_each(|seed| check(seed, Engine::Auto, &Backend::default(), Strategy::Auto));
 }
 
 #[test]
 fn the_sat_solvers_alone_find_the_same_optimum() {
     for backend in built_in() {
         for strategy in STRATEGIES {
-            (0..40).for_each(|seed| check(seed, false, &backend, strategy));
+            (0..40).for_each(|seed| check(seed, Engine::Sat, &backend, strategy));
         }
     }
 }
@@ -71,8 +68,8 @@ fn many_generated_missions_have_the_optimum_of_the_oracle() {
     for backend in built_in() {
         for strategy in STRATEGIES {
             for seed in 150..2_200 {
-                check(seed, true, &backend, strategy);
-                check(seed, false, &backend, strategy);
+                check(seed, Engine::Auto, &backend, strategy);
+                check(seed, Engine::Sat, &backend, strategy);
             }
         }
     }

@@ -5,7 +5,7 @@ mod random;
 
 use std::fmt::Write as _;
 
-use metaplan_encodings::{Config, GroundConfig, Limits, Plan, Status, ground, optimize};
+use metaplan_encodings::{Config, Engine, GroundConfig, Limits, Plan, Status, ground, optimize};
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};
@@ -18,14 +18,13 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The cheapest plan; none if it is proved that there is none. `quick_search` is off for the SAT solver alone.
-fn plan(domain: &Domain, problem: &Problem, quick_search: bool) -> Option<Plan> {
+/// The cheapest plan; none if it is proved that there is none. `Engine::Sat` is the SAT solver alone.
+fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
     let limits = Limits::none();
-    let horizon = (!quick_search).then_some(8);
-    let solution =
-        optimize(&task, &Config { horizon, quick_search, limits, ..Config::default() }, &mut |_| {});
+    let horizon = (engine == Engine::Sat).then_some(8);
+    let solution = optimize(&task, &Config { horizon, engine, limits, ..Config::default() }, &mut |_| {});
     match solution.status {
         Status::Optimal | Status::Feasible => solution.plan,
         _ => None,
@@ -54,7 +53,7 @@ fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
 /// The cost, and the times at which the actions start.
 fn check(name: &str, domain: &str, problem: &str, expected: Option<(&str, &[&str])>) {
     let (domain, problem) = parse(domain, problem);
-    let found = plan(&domain, &problem, true);
+    let found = plan(&domain, &problem, Engine::Auto);
     let starts = |plan: &Plan| plan.steps.iter().map(|step| step.start.to_string()).collect::<Vec<_>>();
     let shown = found.as_ref().map(|plan| (plan.cost.to_string(), starts(plan)));
     let expected =
@@ -137,8 +136,8 @@ fn a_wait_is_no_step_of_a_plan() {
       (:action back :parameters () :precondition (at-d) :effect (at-c)))";
     let problem = "(define (problem p) (:domain d) (:init (at 5 (gate))) (:goal (at-c)))";
     let (domain, problem) = parse(domain, problem);
-    for quick_search in [true, false] {
-        let found = plan(&domain, &problem, quick_search).expect("a plan");
+    for engine in [Engine::Auto, Engine::Sat] {
+        let found = plan(&domain, &problem, engine).expect("a plan");
         let starts: Vec<_> = found.steps.iter().map(|step| step.start.to_string()).collect();
         assert_eq!((found.cost.to_string().as_str(), found.steps.len()), ("2", 2), "{starts:?}");
         assert_eq!(
@@ -238,10 +237,9 @@ fn agree(seed: u64) {
     let task = sample(&mut Random(seed));
     let (domain, problem) = parse(&task.domain, &task.problem);
     let expected = brute_force(&task, &domain, &problem);
-    for quick_search in [true, false] {
-        let found = plan(&domain, &problem, quick_search);
-        let context =
-            || format!("seed {seed}, quick search {quick_search}\n{}\n{}", task.domain, task.problem);
+    for engine in [Engine::Auto, Engine::Sat] {
+        let found = plan(&domain, &problem, engine);
+        let context = || format!("seed {seed}, {engine:?}\n{}\n{}", task.domain, task.problem);
         let Some(found) = found else {
             assert_eq!(expected, None, "{}", context());
             continue;

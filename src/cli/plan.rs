@@ -47,6 +47,12 @@ pub struct Arguments {
     /// Stop when the program takes more than this much memory, in megabytes, with the best plan so far.
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     memory_limit: Option<u64>,
+    /// What finds plans, and proves that there is none better: search and then the SAT solver, or one of them alone.
+    #[arg(long, value_enum, default_value_t)]
+    engine: EngineName,
+    /// Have the SAT solver confirm what is proved without it, however long that takes.
+    #[arg(long, conflicts_with = "concurrent")]
+    confirm: bool,
     /// The SAT solver: `varisat`, `batsat`, or a program with its arguments that reads DIMACS on its standard input.
     #[arg(long, value_name = "NAME", default_value = Backend::BUILT_IN[0])]
     solver: Backend,
@@ -103,6 +109,27 @@ enum StrategyName {
     Cores,
 }
 
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum EngineName {
+    /// Search, then the SAT solver.
+    #[default]
+    Auto,
+    /// The SAT solver.
+    Sat,
+    /// Search.
+    Search,
+}
+
+impl From<EngineName> for encodings::Engine {
+    fn from(engine: EngineName) -> Self {
+        match engine {
+            EngineName::Auto => Self::Auto,
+            EngineName::Sat => Self::Sat,
+            EngineName::Search => Self::Search,
+        }
+    }
+}
+
 impl From<StrategyName> for encodings::Strategy {
     fn from(strategy: StrategyName) -> Self {
         match strategy {
@@ -128,7 +155,8 @@ fn configuration(arguments: &Arguments, limits: Limits) -> Config {
     let backend = arguments.solver.clone();
     let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
     let strategy = arguments.strategy.into();
-    Config { horizon, semantics, strategy, limits, backend, ..Config::default() }
+    let (engine, confirm) = (arguments.engine.into(), arguments.confirm);
+    Config { horizon, engine, confirm, semantics, strategy, backend, limits }
 }
 
 impl Arguments {

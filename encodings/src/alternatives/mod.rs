@@ -58,7 +58,8 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
         bounds.window(context, Some(first.cost), Some(first.steps.len())).ok()?.allowed
     };
     let cost = CostLimit { limit: first.cost, bounds: &bounds, counting: Counting::Sum };
-    let plans = Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential };
+    let plans =
+        Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential, most: usize::MAX };
     let encoding = Encoding::with_equals(context, plans)?;
     let mut solver = config.backend.start(&config.limits, u64::MAX);
     for clause in config.limits.watch(encoding.formula.clauses()) {

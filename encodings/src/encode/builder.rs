@@ -21,16 +21,23 @@ pub(super) struct Builder<'a> {
     pub(super) limits: &'a Limits,
     pub(super) formula: Formula,
     pub(super) variables: Variables,
+    /// No more clauses than these.
+    most: usize,
     groups: FxHashMap<(usize, Vec<OperatorId>), Lit>,
 }
 
 impl<'a> Builder<'a> {
     /// A formula with variables and without clauses, for plans with the operators that are allowed at each step.
-    pub(super) fn new(context: Context<'a>, allowed: &[Vec<bool>]) -> Result<Self, Interrupted> {
+    pub(super) fn new(context: Context<'a>, allowed: &[Vec<bool>], most: usize) -> Result<Self, Interrupted> {
         let Context { task, limits } = context;
         let mut formula = Formula::new();
         let variables = Variables::declare(context, &mut formula, allowed)?;
-        Ok(Self { task, limits, formula, variables, groups: FxHashMap::default() })
+        Ok(Self { task, limits, formula, variables, most, groups: FxHashMap::default() })
+    }
+
+    /// An error once a limit is reached, or if there are too many clauses.
+    pub(super) fn check(&self) -> Result<(), Interrupted> {
+        if self.formula.len() > self.most { Err(Interrupted) } else { self.limits.check() }
     }
 
     /// The variable of a group of operators at a step; members that cannot be at the step are left out.

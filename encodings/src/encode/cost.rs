@@ -140,9 +140,7 @@ impl Sum<'_, '_> {
     fn sources(&mut self) -> Option<Vec<Source>> {
         let mut sources = Vec::new();
         for step in 0..self.builder.variables.horizon() {
-            if self.builder.limits.reached() {
-                return None;
-            }
+            self.builder.check().ok()?;
             let own = self.increments(step).into_iter().zip(0..);
             sources.extend(own.map(|(increments, stage)| Source { step: dense(step), stage, increments }));
         }
@@ -237,9 +235,7 @@ impl Sum<'_, '_> {
     fn in_order(&mut self, sources: &[Source]) -> Option<BTreeMap<Int, Lit>> {
         let mut spent: BTreeMap<Int, Lit> = BTreeMap::new();
         for source in sources {
-            if self.builder.limits.reached() {
-                return None;
-            }
+            self.builder.check().ok()?;
             spent = self.add_amounts(source, &spent);
         }
         Some(spent)

@@ -31,6 +31,8 @@ pub(crate) struct Plans<'a> {
     pub(crate) cost: Option<CostLimit<'a>>,
     /// How many operators stand at a step.
     pub(crate) semantics: Semantics,
+    /// A formula that comes to more clauses is not finished.
+    pub(crate) most: usize,
 }
 
 /// A formula and what its variables mean.
@@ -43,7 +45,7 @@ pub(crate) struct Encoding<'a> {
 
 impl<'a> Encoding<'a> {
     /// Encodes plans; of those that differ by exchanging what is equal only some. What is equal is found out once for a task, and
-    /// kept in `symmetry`. None if a limit was reached meanwhile, or if numbers are too large for a formula.
+    /// kept in `symmetry`. None if a limit was reached meanwhile, if there are too many clauses, or if numbers are too large for a formula.
     pub(crate) fn new(context: Context<'a>, plans: Plans<'_>, symmetry: &OnceCell<Symmetry>) -> Option<Self> {
         let (mut builder, cost) = build(context, plans)?;
         if builder.variables.horizon() > 0 {
@@ -130,10 +132,10 @@ impl<'a> Encoding<'a> {
 
 /// All families of clauses but that of symmetries. None if a limit was reached meanwhile, or if numbers do not fit.
 fn build<'a>(context: Context<'a>, plans: Plans<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
-    let Plans { allowed, cost, semantics } = plans;
+    let Plans { allowed, cost, semantics, most } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());
     let interference = Interference::new(context, semantics, potential).ok()?;
-    let mut builder = Builder::new(context, allowed).ok()?;
+    let mut builder = Builder::new(context, allowed, most).ok()?;
     let horizon = builder.variables.horizon();
     for step in 0..horizon {
         at_step(&mut builder, step, interference.as_ref()).ok()?;
@@ -163,13 +165,13 @@ fn at_step(
     if let Some(interference) = interference {
         interference.add(builder, step)?;
     }
-    builder.limits.check()?;
+    builder.check()?;
     conditions(builder, step);
-    builder.limits.check()?;
+    builder.check()?;
     let fires = Fires::new(builder, step);
-    builder.limits.check()?;
+    builder.check()?;
     effects(builder, step, &fires);
-    builder.limits.check()?;
+    builder.check()?;
     frame(builder, step, &fires);
     selection(builder, step)
 }

@@ -41,9 +41,7 @@ pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     let numbers: Vec<Bits> = initial.iter().map(|n| Arithmetic::constant(*n, width(*n, *n))).collect();
     let mut all = vec![numbers];
     for step in 0..builder.variables.horizon() {
-        if builder.limits.reached() {
-            return None;
-        }
+        builder.check().ok()?;
         let numbers = all.last()?;
         let (next, next_ranges) = Transition { builder, step, numbers, ranges: &ranges }.encode()?;
         ranges = next_ranges;

@@ -101,7 +101,7 @@ fn check(family: Family) -> String {
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(&task, &limits),
-        Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential },
+        Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential, most: usize::MAX },
         &OnceCell::new(),
     )
     .expect("no limit");
@@ -127,7 +127,7 @@ fn lamps(semantics: Semantics, family: Family) -> String {
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(&task, &limits),
-        Plans { allowed: &allowed, cost: None, semantics },
+        Plans { allowed: &allowed, cost: None, semantics, most: usize::MAX },
         &OnceCell::new(),
     )
     .expect("no limit");
@@ -194,7 +194,7 @@ fn goal() {
 fn alone(family: Family, write: impl Fn(&mut Builder<'_>, usize)) -> String {
     let (task, limits) = (task(), Limits::none());
     let allowed = vec![vec![true; task.operators.len()]; 2];
-    let mut builder = Builder::new(Context::new(&task, &limits), &allowed).expect("no limit");
+    let mut builder = Builder::new(Context::new(&task, &limits), &allowed, usize::MAX).expect("no limit");
     for step in 0..2 {
         write(&mut builder, step);
     }

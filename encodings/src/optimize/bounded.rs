@@ -7,7 +7,7 @@ use crate::number::Int;
 use crate::optimize::config::Config;
 use crate::optimize::first::first_plan;
 use crate::optimize::run::{Best, Run, Tightened};
-use crate::optimize::solve::{solve, within};
+use crate::optimize::solve::{Allowance, solve, within};
 use crate::plan::decode;
 use crate::plan::ground::{GroundStep, cost, pass};
 use crate::plan::solution::{Improvement, Proof, Solution, Status, Unbounded};
@@ -51,7 +51,7 @@ pub(super) fn bounded_reading(asked: Run<'_>) -> Solution {
     let tightened = match run.extent(&bounds, best.plan.below(), &best) {
         Ok(mut extent) => {
             extent.allowed.truncate(steps);
-            within(&mut run, &bounds, &extent, &mut best, false)
+            within(&mut run, &bounds, &extent, &mut best, Allowance::UNLIMITED)
         }
         Err(Interrupted) => Tightened::Interrupted,
     };

@@ -17,13 +17,28 @@ pub enum Strategy {
     Cores,
 }
 
+/// What finds plans, and proves that there is none better.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Engine {
+    /// Search in the space of states first, then the SAT solver.
+    #[default]
+    Auto,
+    /// The SAT solver alone, with the bounds that its formulas rest on.
+    Sat,
+    /// Search alone.
+    Search,
+}
+
 /// What the user asks of the optimizer.
 #[derive(Debug, Clone)]
 pub struct Config {
     /// Only plans with at most this many steps count.
     pub horizon: Option<usize>,
-    /// Whether a quick search looks for a first plan; otherwise the SAT solver finds it, horizon by horizon.
-    pub quick_search: bool,
+    /// What finds plans, and proves that there is none better.
+    pub engine: Engine,
+    /// Whether the SAT solver has to confirm what is proved without it, however long it takes; otherwise it gets about as
+    /// long as a small proof took.
+    pub confirm: bool,
     /// How many operators stand at a step of the formulas; with a horizon, which counts actions, always one. If not
     /// given, several while a first plan is looked for, and one for the proof that there is no cheaper one.
     pub semantics: Option<Semantics>,
@@ -39,7 +54,8 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             horizon: None,
-            quick_search: true,
+            engine: Engine::default(),
+            confirm: false,
             semantics: None,
             strategy: Strategy::default(),
             backend: Backend::default(),

@@ -24,9 +24,9 @@ pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPla
     loop {
         let started = Instant::now();
         let window = bounds.window(run.context(), None, Some(horizon));
-        let encoding = window
-            .ok()
-            .and_then(|window| run.encoding(&window.allowed, None, run.semantics(Semantics::ExistsStep)));
+        let encoding = window.ok().and_then(|window| {
+            run.encoding(&window.allowed, None, run.semantics(Semantics::ExistsStep), usize::MAX)
+        });
         run.statistics.encode = run.statistics.encode.saturating_add(started.elapsed());
         let answer = encoding.map_or((Answer::Interrupted, None), |encoding| {
             let mut live = run.live(u64::MAX);

@@ -20,5 +20,5 @@ mod tighten;
 
 pub(crate) use bounded::can_repeat_reward;
 pub use cheapest::optimize;
-pub use config::{Config, Strategy};
+pub use config::{Config, Engine, Strategy};
 pub use objectives::{Front, Point, lexicographic, pareto};

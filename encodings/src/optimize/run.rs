@@ -98,14 +98,15 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// None if a limit was reached.
+    /// None if a limit was reached, or if there are more clauses than `most`.
     pub(super) fn encoding(
         &self,
         allowed: &[Vec<bool>],
         cost: Option<CostLimit<'_>>,
         semantics: Semantics,
+        most: usize,
     ) -> Option<Encoding<'a>> {
-        let plans = Plans { allowed, cost, semantics };
+        let plans = Plans { allowed, cost, semantics, most };
         Encoding::new(self.context(), plans, &self.symmetry)
     }
 

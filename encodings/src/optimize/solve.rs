@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::bounds::Bounds;
 use crate::encode::{CostLimit, Counting, Semantics};
 use crate::number::Int;
-use crate::optimize::config::Strategy;
+use crate::optimize::config::{Engine, Strategy};
 use crate::optimize::cores::raise;
 use crate::optimize::first::first_plan;
 use crate::optimize::run::{Best, Extent, Run, Tightened};
@@ -18,9 +18,10 @@ use crate::search::{Found, search};
 
 /// Formulas with more operator variables than this are not built.
 const FORMULA_LIMIT: usize = 30_000_000;
-/// What the quick search has proved, the SAT solver may spend this many conflicts on proving again…
-const CONFIRM_CONFLICTS: u64 = 1_000;
-/// … if the formula has at most this many operator variables.
+/// What is proved already, the SAT solver may spend on proving again: so many clauses and so many conflicts. Both take about five
+/// milliseconds.
+const CONFIRM: Allowance = Allowance { clauses: 50_000, conflicts: 60 };
+/// The formula has at most this many operator variables then.
 const CONFIRM_SIZE: usize = 5_000;
 /// With so many operators times steps it is not even looked at which of them are left.
 const CONFIRM_PRODUCT: usize = 1_500;
@@ -32,6 +33,18 @@ const CONFIRM_LIMIT: usize = 400;
 /// Costs from here on, as products of decimals have them once they are integers, make no formula small.
 const CONFIRM_COST: Int = 1 << 64;
 
+/// What the SAT solver may spend on a formula.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Allowance {
+    clauses: usize,
+    conflicts: u64,
+}
+
+impl Allowance {
+    /// As much as it takes.
+    pub(super) const UNLIMITED: Self = Self { clauses: usize::MAX, conflicts: u64::MAX };
+}
+
 /// A cheapest plan where no action earns anything.
 pub(super) fn solve(mut run: Run<'_>) -> Solution {
     let started = Instant::now();
@@ -42,7 +55,10 @@ pub(super) fn solve(mut run: Run<'_>) -> Solution {
         let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
         return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.into())));
     };
-    let found = if run.config.quick_search { search(run.context(), &bounds) } else { Found::Unknown(None) };
+    let found = match run.config.engine {
+        Engine::Sat => Found::Unknown(None),
+        Engine::Auto | Engine::Search => search(run.context(), &bounds),
+    };
     run.statistics.search = started.elapsed();
     let within = |plan: &GroundPlan| run.config.horizon.is_none_or(|horizon| plan.steps.len() <= horizon);
     let (incumbent, exact) = match found {
@@ -53,6 +69,9 @@ pub(super) fn solve(mut run: Run<'_>) -> Solution {
     };
     let incumbent = match incumbent {
         Some(plan) => plan,
+        None if run.config.engine == Engine::Search => {
+            return run.finish(Status::Unknown, None, Some(lower), 0, None);
+        }
         None => match first_plan(&mut run, &bounds) {
             Ok(plan) => plan,
             Err(solution) => return *solution,
@@ -70,9 +89,11 @@ fn improve(mut run: Run<'_>, bounds: &Bounds, incumbent: GroundPlan, lower: Int,
         return conclude(run, &best, 0, Some(proof));
     }
     let unproved = exact.then_some(Proof::Search);
-    if exact && run.task.operators.len().saturating_mul(best.plan.steps.len()) > CONFIRM_PRODUCT {
+    let is_large = run.task.operators.len().saturating_mul(best.plan.steps.len()) > CONFIRM_PRODUCT;
+    if run.config.engine == Engine::Search || exact && is_large && !run.config.confirm {
         return conclude(run, &best, 0, unproved);
     }
+    let allowance = if exact && !run.config.confirm { CONFIRM } else { Allowance::UNLIMITED };
     let mut stage = if exact { Int::MAX } else { best.plan.cost.saturating_sub(lower) / STAGES };
     loop {
         let limit = best.plan.below().min(lower.saturating_add(stage));
@@ -86,10 +107,10 @@ fn improve(mut run: Run<'_>, bounds: &Bounds, incumbent: GroundPlan, lower: Int,
             continue;
         }
         let is_small = extent.size() <= CONFIRM_SIZE && limit < CONFIRM_COST;
-        if exact && !is_small || extent.size() > FORMULA_LIMIT {
+        if exact && !is_small && !run.config.confirm || extent.size() > FORMULA_LIMIT {
             return conclude(run, &best, horizon, unproved);
         }
-        let tightened = within(&mut run, bounds, &extent, &mut best, exact);
+        let tightened = within(&mut run, bounds, &extent, &mut best, allowance);
         if exact && best.plan.cost <= limit {
             run.contradicted("a formula has a cheaper plan than the one that the search calls cheapest");
         }
@@ -116,20 +137,21 @@ pub(super) fn within(
     bounds: &Bounds,
     extent: &Extent,
     best: &mut Best,
-    exact: bool,
+    allowance: Allowance,
 ) -> Tightened {
-    let cores = !exact && extent.step_bound.is_some() && run.config.strategy == Strategy::Cores;
+    let is_unlimited = allowance.conflicts == u64::MAX;
+    let cores = is_unlimited && extent.step_bound.is_some() && run.config.strategy == Strategy::Cores;
     let started = Instant::now();
     let counting = if cores { Counting::Apart } else { Counting::Sum };
     let cost = CostLimit { limit: extent.limit, bounds, counting };
     let semantics = run.semantics(Semantics::Sequential);
-    let encoding = run.encoding(&extent.allowed, Some(cost), semantics);
+    let encoding = run.encoding(&extent.allowed, Some(cost), semantics, allowance.clauses);
     run.statistics.encode = run.statistics.encode.saturating_add(started.elapsed());
     let Some(encoding) = encoding else { return Tightened::Interrupted };
     if cores {
         raise(run, encoding, extent.limit, best)
     } else {
-        tighten(run, encoding, best, if exact { CONFIRM_CONFLICTS } else { u64::MAX })
+        tighten(run, encoding, best, allowance.conflicts)
     }
 }
 
@@ -140,16 +162,19 @@ fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
         run.task.operators.iter().map(|operator| operator.cost.minimum()).min().filter(|c| *c > 0)?;
     let limit = incumbent.below();
     let steps = usize::try_from(limit.checked_div(cheapest)?).ok()?;
-    if steps.saturating_mul(run.task.operators.len()) > CONFIRM_LIMIT || limit >= CONFIRM_COST {
+    let is_large = steps.saturating_mul(run.task.operators.len()) > CONFIRM_LIMIT || limit >= CONFIRM_COST;
+    if run.config.engine == Engine::Search || is_large && !run.config.confirm {
         return None;
     }
+    let allowance = if run.config.confirm { Allowance::UNLIMITED } else { CONFIRM };
     let started = Instant::now();
     let allowed = vec![vec![true; run.task.operators.len()]; steps];
     let bounds = Bounds::trivial(run.context()).ok()?;
     let cost = CostLimit { limit, bounds: &bounds, counting: Counting::Sum };
-    let encoding = run.encoding(&allowed, Some(cost), run.semantics(Semantics::Sequential));
+    let encoding =
+        run.encoding(&allowed, Some(cost), run.semantics(Semantics::Sequential), allowance.clauses);
     run.statistics.encode = run.statistics.encode.saturating_add(started.elapsed());
-    let mut live = run.live(u64::MAX);
+    let mut live = run.live(allowance.conflicts);
     let (answer, _) = run.call(&mut live, &encoding?, &[]);
     if answer == Answer::Satisfiable {
         run.contradicted("a formula has a plan that is cheaper than the lower bound");

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::limits::Limits;
 use crate::number::Int;
-use crate::optimize::{Config, Strategy, optimize};
+use crate::optimize::{Config, Engine, Strategy, optimize};
 use crate::plan::solution::{Solution, Status};
 use crate::plan::{Exact, metric};
 use crate::sat::Backend;
@@ -25,7 +25,7 @@ fn tasks(seeds: std::ops::Range<u64>) -> impl Iterator<Item = (String, Task, Int
 }
 
 fn config(backend: &Backend, strategy: Strategy, limits: Limits) -> Config {
-    Config { quick_search: false, strategy, backend: backend.clone(), limits, ..Config::default() }
+    Config { engine: Engine::Sat, strategy, backend: backend.clone(), limits, ..Config::default() }
 }
 
 /// A plan, and what is claimed of it: a proof wherever plans have a step bound.

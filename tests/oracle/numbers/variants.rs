@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use encodings::{Backend, Config, Limits, Semantics, Solution, Status, Strategy, Unbounded};
+use encodings::{Backend, Config, Engine, Limits, Semantics, Solution, Status, Strategy, Unbounded};
 use fastrand::Rng;
 use metaplan::mission::Planning as _;
 
@@ -21,7 +21,8 @@ const LIMIT: Duration = Duration::from_millis(500);
 fn config(rng: &mut Rng) -> Config {
     let semantics = [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep];
     Config {
-        quick_search: rng.bool(),
+        engine: one(rng, &[Engine::Auto, Engine::Sat, Engine::Search]),
+        confirm: rng.bool(),
         semantics: (!super::draw::once_in(rng, 4)).then(|| one(rng, &semantics)),
         strategy: one(rng, &[Strategy::Auto, Strategy::Tighten, Strategy::Cores]),
         backend: if rng.bool() { Backend::Batsat } else { Backend::Varisat },
@@ -39,8 +40,8 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
         let config = config(rng);
         let solution = encodings::optimize(&task, &config, &mut |_| {});
         let said = format!(
-            "{:?} {:?} {:?} quick search: {}",
-            config.semantics, config.strategy, config.backend, config.quick_search
+            "{:?} {:?} {:?} {:?} confirm: {}",
+            config.semantics, config.strategy, config.backend, config.engine, config.confirm
         );
         tally.count(format!("variant: {:?}", solution.status));
         check(puzzle, case, &solution, &said, tally);
