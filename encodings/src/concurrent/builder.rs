@@ -166,7 +166,8 @@ impl<'a> Builder<'a> {
             roles[start.index()] = Role::Start(dense(instances.len()));
             roles[end.index()] = Role::End(dense(instances.len()));
             let designs = designs(task, start);
-            instances.push(Instance { start, end, over_all, duration, designs, joint: Vec::new() });
+            let joint = Vec::new();
+            instances.push(Instance { start, end, over_all, duration, designs, joint, compressible: false });
         }
         Ok(instances)
     }

@@ -12,8 +12,10 @@
 //! [1] R. Dechter, I. Meiri, J. Pearl: Temporal constraint networks, Artificial Intelligence 49, 1991.
 //! [2] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
 
+mod compare;
+
 use crate::concurrent::time::{Float, Time, place};
-use crate::number::{Int, dense, words};
+use crate::number::{Int, dense};
 
 /// A kind of access to an atom or a number.
 pub(super) type Key = u32;
@@ -123,6 +125,11 @@ impl Clocks {
         after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
     }
 
+    /// Whether everything so far has happened by some time, as nothing of it can be put off.
+    pub(super) fn is_by(&self, time: Int) -> bool {
+        self.latest.lags.is_empty() && self.latest() <= time
+    }
+
     /// When nothing has happened yet.
     pub(super) fn new() -> Self {
         Self {
@@ -160,18 +167,6 @@ impl Clocks {
     fn entry(&self, key: Key) -> Option<&Time> {
         let position = self.entries.binary_search_by_key(&key, |(own, _)| *own).ok()?;
         Some(&self.entries[position].1)
-    }
-
-    /// What must agree between clocks that can be compared.
-    pub(super) fn signature(&self, out: &mut Vec<u32>) {
-        for open in &self.opens {
-            out.extend([open.instance, open.float]);
-            out.extend(words(open.offset));
-        }
-        if let Some((float, offset)) = self.group {
-            out.extend([u32::MAX, float]);
-            out.extend(words(offset));
-        }
     }
 
     /// The clocks after a happening; none if no time is left for it.
@@ -216,6 +211,28 @@ impl Clocks {
         next.group = (!happening.settled).then_some((float, offset));
         next.tidy();
         Some(next)
+    }
+
+    /// The end of an action under way will lie after accesses so far. None if no time is left for it.
+    #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
+    pub(super) fn expect_end(&mut self, instance: u32, duration: Int, after: &[(Key, Int)]) -> Option<()> {
+        let position = self.opens.binary_search_by_key(&instance, |open| open.instance).ok()?;
+        let Open { float, offset, .. } = self.opens[position];
+        let end = offset + duration;
+        let mut lower = Time::constant(0);
+        for (key, by) in after {
+            let Some(time) = self.entry(*key) else { continue };
+            let known = &self.floats[place(float)].lower;
+            let is_known = time.base + by - end <= known.base
+                && time.lags.iter().all(|(other, lag)| {
+                    let by = lag + by - end;
+                    (*other == float && by <= 0) || known.lag(*other).is_some_and(|known| by <= known)
+                });
+            if !is_known {
+                lower.put_off(time, *by);
+            }
+        }
+        if lower == Time::constant(0) { Some(()) } else { self.raise(float, &lower, end) }
     }
 
     /// A moment that is not before `lower`: the one at which all must happen, or a new one.
@@ -436,46 +453,5 @@ impl Clocks {
             *upper = (*upper).min(moment - lag);
         }
         (time.base <= moment).then_some(())
-    }
-
-    /// Forgets accesses that put nothing off any more: everything that heeds one comes after its guard has changed.
-    pub(super) fn forget(&mut self, guards: &[Option<u32>], separation: Int) {
-        let mut entries = std::mem::take(&mut self.entries);
-        entries.retain(|(key, time)| !self.is_past(*key, time, guards, separation));
-        self.entries = entries;
-    }
-
-    fn is_past(&self, key: Key, time: &Time, guards: &[Option<u32>], separation: Int) -> bool {
-        if time.precedes(&Time::constant(self.floor), separation) {
-            return true;
-        }
-        let guard = guards[key as usize].and_then(|guard| self.change(guard));
-        guard.is_some_and(|guard| time.precedes(guard, separation))
-    }
-
-    /// Whether whatever can follow `other` can follow `self`, no later. Their signatures must agree.
-    pub(super) fn no_later(&self, other: &Self, guards: &[Option<u32>], separation: Int) -> bool {
-        let floats = || self.floats.iter().zip(&other.floats);
-        let lasts = || self.opens.iter().zip(&other.opens);
-        let last = |(own, other): (&Open, &Open)| match (&own.last, &other.last) {
-            (Some(own), Some(other)) => own.precedes(other, 0),
-            _ => true,
-        };
-        if self.floor > other.floor
-            || (self.waits() && !other.waits())
-            || !self.latest.precedes(&other.latest, 0)
-            || !floats().all(|(own, other)| own.lower.precedes(&other.lower, 0) && own.upper >= other.upper)
-            || !lasts().all(last)
-        {
-            return false;
-        }
-        let mut theirs = other.entries.iter().peekable();
-        self.entries.iter().all(|(key, time)| {
-            while theirs.next_if(|(other, _)| other < key).is_some() {}
-            match theirs.peek() {
-                Some((other, later)) if other == key && time.precedes(later, 0) => true,
-                _ => other.is_past(*key, time, guards, separation),
-            }
-        })
     }
 }

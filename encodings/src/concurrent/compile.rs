@@ -3,6 +3,7 @@
 use rustc_hash::FxHashSet;
 
 use crate::concurrent::builder::Builder;
+use crate::concurrent::compress::compressible;
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::links::drop_links;
 use crate::concurrent::measure::Measure;
@@ -70,6 +71,12 @@ pub(super) fn compile(
     events.sort_unstable();
     task.time_scale = unit.0;
     drop_links(&mut task, &instances);
+    let compressible = compressible(&task, &happenings, &instances, limits);
+    for (own, compressible) in
+        instances.iter_mut().zip(compressible.map_err(|interrupted| vec![interrupted.into()])?)
+    {
+        own.compressible = compressible;
+    }
     let guards = vec![None; keys];
     let mut concurrent = Concurrent { task, happenings, instances, events, guards, measure, separation };
     concurrent.guard(limits).map_err(|interrupted| vec![interrupted.into()])?;
@@ -135,6 +142,14 @@ impl Concurrent {
             condition.holds_propositionally(&state.values)
                 && condition.holds_numerically(&state.numbers, &[], &[])
         })
+    }
+
+    /// The end of the action that a happening starts; a happening that starts none is its own end.
+    pub(super) fn end_of(&self, operator: OperatorId) -> OperatorId {
+        match self.happenings[operator.index()].role {
+            Role::Start(instance) => self.instances[instance as usize].end,
+            _ => operator,
+        }
     }
 
     /// Whether a happening writes what the joint condition over all of an instance reads.

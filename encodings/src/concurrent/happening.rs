@@ -43,4 +43,6 @@ pub(super) struct Instance {
     pub(super) designs: Designs,
     /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
     pub(super) joint: Vec<u32>,
+    /// Whether its end can come right after its start in a sequence, and nothing is lost.
+    pub(super) compressible: bool,
 }

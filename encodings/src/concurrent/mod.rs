@@ -10,15 +10,21 @@ mod access;
 mod builder;
 mod clocks;
 mod compile;
+mod compress;
 mod estimate;
+mod expansion;
 mod footprint;
+mod greedy;
+mod guidance;
 mod happening;
 mod links;
 mod measure;
+mod relaxed;
 mod schedule;
 mod search;
 mod split;
 mod time;
+mod turns;
 mod unit;
 
 use std::time::Instant;
@@ -41,12 +47,9 @@ use pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
 
 pub use compile::Concurrent;
 
-use estimate::Estimate;
 use happening::Role;
-use search::{Ended, Search, Sequence};
-
-/// How many nodes the greedy search for a first plan expands.
-const GREEDY: usize = 20_000;
+use search::{Ended, Sequence};
+use turns::take_turns;
 
 /// Grounds a domain and a problem that have passed `pddl::check`, for plans whose actions overlap. Interfering happenings are
 /// to lie `separation` apart, in the domain's time unit.
@@ -141,7 +144,6 @@ pub fn optimize_concurrent(
     let bounds = (costs || !task.initial.numbers.is_empty())
         .then(|| Bounds::new(Context::new(task, limits)).ok())
         .flatten();
-    let estimate = Estimate::new(concurrent);
     let mut hear = |sequence: &Sequence, lower: Int| {
         report(Improvement {
             cost: concurrent.measure.metric(sequence.value.0),
@@ -149,13 +151,9 @@ pub fn optimize_concurrent(
             horizon: sequence.happenings.len(),
         });
     };
-    let mut first = Search::new(concurrent, &estimate, bounds.as_ref(), true, None);
-    first.run(limits, GREEDY, &mut |sequence, _| hear(sequence, 0));
-    let mut search = Search::new(concurrent, &estimate, bounds.as_ref(), false, first.incumbent.take());
-    drop(first);
-    let ended = search.run(limits, usize::MAX, &mut hear);
-    let plan = search.incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
-    let (status, lower) = match (&ended, &search.incumbent) {
+    let (ended, incumbent) = take_turns(concurrent, bounds.as_ref(), limits, &mut hear);
+    let plan = incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
+    let (status, lower) = match (&ended, &incumbent) {
         (Ended::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
         (Ended::Exhausted, None) => (Status::Unsolvable, None),
         (Ended::Stopped(lower), Some(incumbent)) => (Status::Feasible, Some(*lower.min(&incumbent.value.0))),

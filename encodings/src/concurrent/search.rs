@@ -14,16 +14,13 @@ use std::collections::hash_map::Entry;
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
-use crate::concurrent::access::Accesses;
-use crate::concurrent::clocks::{self, Clocks, Kind};
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::estimate::Estimate;
-use crate::concurrent::happening::Role;
+use crate::concurrent::expansion::{Expansion, Nowhere, Situation};
 use crate::limits::Limits;
 use crate::number::{GROWTH_LIMIT, Int, dense, words};
 use crate::search::is_monotone;
-use crate::search::successors::OperatorIndex;
-use crate::task::{OperatorId, State};
+use crate::task::OperatorId;
 
 /// A plan as the search finds it.
 #[derive(Debug, Clone)]
@@ -44,17 +41,15 @@ pub(super) enum Ended {
 }
 
 struct Node {
-    state: State,
-    clocks: Clocks,
-    cost: Int,
+    situation: Situation,
     /// How many happenings lead here.
     depth: Int,
-    parent: Option<(u32, OperatorId)>,
+    /// The node before, what happened then, and whether its action has ended as well.
+    parent: Option<(u32, OperatorId, bool)>,
     dominated: bool,
 }
 
-/// The metric, the makespan, the sum of what is left, and the number of the node; greedily, the sum and the depth come
-/// first.
+/// The metric, the makespan, the sum of what is left, the depth, and the number of the node.
 type Priority = (Int, Int, Int, Int, u32);
 
 pub(super) struct Search<'a> {
@@ -62,8 +57,7 @@ pub(super) struct Search<'a> {
     estimate: &'a Estimate,
     /// Lower bounds on costs, and on resources; none if nothing costs.
     bounds: Option<&'a Bounds>,
-    index: OperatorIndex,
-    greedy: bool,
+    expansion: &'a Expansion<'a>,
     monotone: bool,
     nodes: Vec<Node>,
     seen: FxHashMap<Box<[u32]>, Vec<u32>>,
@@ -73,43 +67,32 @@ pub(super) struct Search<'a> {
     left_out: Option<Int>,
 }
 
-/// Numbers of a node do not fit their type.
-struct Unfit;
-
 impl<'a> Search<'a> {
     pub(super) fn new(
         concurrent: &'a Concurrent,
+        expansion: &'a Expansion<'a>,
         estimate: &'a Estimate,
         bounds: Option<&'a Bounds>,
-        greedy: bool,
-        incumbent: Option<Sequence>,
     ) -> Self {
-        let begins = |id: &OperatorId| {
-            matches!(concurrent.happenings[id.index()].role, Role::Start(_) | Role::Whole | Role::Timed(_))
-        };
-        let operators = (0..dense(concurrent.task.operators.len())).map(OperatorId).filter(begins);
+        let situation = expansion.root();
         let mut search = Self {
             concurrent,
             estimate,
             bounds,
-            index: OperatorIndex::over(&concurrent.task, operators),
-            greedy,
+            expansion,
             monotone: is_monotone(&concurrent.task),
             nodes: Vec::new(),
             seen: FxHashMap::default(),
             open: BinaryHeap::new(),
-            incumbent,
+            incumbent: None,
             left_out: None,
         };
-        let state = concurrent.task.initial.clone();
         // Costs and times are not negative.
-        let root = Node { state, clocks: Clocks::new(), cost: 0, depth: 0, parent: None, dominated: false };
-        search.push(root, 0);
+        search.push(Node { situation, depth: 0, parent: None, dominated: false }, 0);
         search
     }
 
-    /// Searches until nothing better is left, `most` nodes are expanded, or a limit is reached; greedily, until a plan is
-    /// found. `report` hears of each better plan and of what none can get below.
+    /// Searches until nothing better is left, `most` nodes are expanded, or a limit is reached. It can go on then. `report` hears of each better plan and of what none can get below.
     #[expect(clippy::arithmetic_side_effects, reason = "nodes are counted by 32 bits")]
     pub(super) fn run(
         &mut self,
@@ -120,28 +103,35 @@ impl<'a> Search<'a> {
         let mut expanded = 0;
         while let Some(Reverse(priority)) = self.open.pop() {
             let id = priority.4;
-            let value = if self.greedy { (priority.2, priority.3) } else { (priority.0, priority.1) };
+            let value = (priority.0, priority.1);
             if self.nodes[id as usize].dominated || !self.is_better(value) {
                 continue;
             }
-            if self.is_goal(id) {
+            if self.expansion.is_goal(&self.nodes[id as usize].situation) {
                 let sequence = self.sequence(id);
                 report(&sequence, value.0);
                 self.incumbent = Some(sequence);
-                if self.greedy {
-                    return Ended::Stopped(0);
-                }
                 continue;
             }
             if expanded == most || (expanded.is_multiple_of(64) && limits.reached()) {
-                // Greedily, others that are still open may be better.
-                let lower = if self.greedy { 0 } else { value.0 };
-                return Ended::Stopped(self.left_out.map_or(lower, |left_out| left_out.min(lower)));
+                self.open.push(Reverse(priority));
+                return Ended::Stopped(self.lower());
             }
             expanded += 1;
             self.expand(id, value.0);
         }
         self.left_out.map_or(Ended::Exhausted, Ended::Stopped)
+    }
+
+    /// Whether there is nothing left to expand.
+    pub(super) fn is_over(&self) -> bool {
+        self.open.is_empty()
+    }
+
+    /// No plan that is not known has a lower metric than this, in integers.
+    pub(super) fn lower(&self) -> Int {
+        let open = self.open.peek().map_or(0, |Reverse(priority)| priority.0);
+        self.left_out.map_or(open, |left_out| left_out.min(open))
     }
 
     /// Leaves out something below a node in which no plan has a lower metric than `lower`.
@@ -153,113 +143,39 @@ impl<'a> Search<'a> {
         self.incumbent.as_ref().is_none_or(|incumbent| value < incumbent.value)
     }
 
-    fn is_goal(&self, id: u32) -> bool {
-        let Node { state, clocks, .. } = &self.nodes[id as usize];
-        let concurrent = self.concurrent;
-        // What happens by itself up to the end has taken place, and nothing after the end; what comes soon after keeps apart.
-        let mut to_come = concurrent.events.iter().filter(|(time, _)| *time > clocks.floor());
-        let is_apart = |(time, event): &(Int, OperatorId)| {
-            let after = &concurrent.happenings[event.index()].accesses.after;
-            *time > clocks.latest() && clocks.are_apart(*time, after)
-        };
-        clocks.opens().is_empty()
-            && !clocks.unsettled()
-            && !clocks.waits()
-            && concurrent.task.is_goal(state)
-            && to_come.all(is_apart)
-    }
-
     /// Adds what can follow a node in which no plan has a lower metric than `lower`.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a node is no deeper than twice as many as there are nodes"
+    )]
     fn expand(&mut self, id: u32, lower: Int) {
-        let concurrent = self.concurrent;
-        let Node { state, clocks, .. } = &self.nodes[id as usize];
-        let mut next = self.index.applicable(&concurrent.task, state);
-        next.extend(clocks.opens().iter().map(|open| concurrent.instances[open.instance as usize].end));
-        for operator in next {
-            match self.successor(id, operator) {
-                Ok(Some(node)) => self.push(node, lower),
-                Ok(None) => {}
-                Err(Unfit) => self.leave_out(lower),
+        for operator in self.expansion.candidates(&self.nodes[id as usize].situation) {
+            let Node { situation, depth, .. } = &self.nodes[id as usize];
+            match self.expansion.after(situation, operator, true) {
+                Ok((situation, compressed)) => {
+                    let depth = depth + 1 + Int::from(compressed);
+                    let parent = Some((id, operator, compressed));
+                    self.push(Node { situation, depth, parent, dominated: false }, lower);
+                }
+                Err(Nowhere::Impossible | Nowhere::TooLate) => {}
+                Err(Nowhere::Unfit) => self.leave_out(lower),
             }
         }
-    }
-
-    /// The node after a happening; none if it cannot happen here.
-    #[expect(clippy::arithmetic_side_effects, reason = "a node is no deeper than there are nodes")]
-    fn successor(&self, id: u32, operator_id: OperatorId) -> Result<Option<Node>, Unfit> {
-        let concurrent = self.concurrent;
-        let Node { state, clocks, cost, depth, .. } = &self.nodes[id as usize];
-        let (operator, happening) =
-            (&concurrent.task.operators[operator_id.index()], &concurrent.happenings[operator_id.index()]);
-        if !operator.applicable(state, &[]) {
-            return Ok(None);
-        }
-        let (kind, instance) = match happening.role {
-            Role::Start(instance) => (Kind::Start, instance),
-            Role::End(instance) => (Kind::End, instance),
-            // Those that happen by themselves are told apart below.
-            Role::Whole | Role::Timed(_) => (Kind::Whole, u32::MAX),
-            Role::Never => return Ok(None),
-        };
-        if kind == Kind::Start && clocks.is_open(instance) || self.clashes(clocks, happening) {
-            return Ok(None);
-        }
-        let after = concurrent.task.successor(operator, state, &[]).ok_or(Unfit)?;
-        let open = clocks.opens().iter().map(|open| open.instance);
-        let going_on = open.filter(|open| kind != Kind::End || *open != instance);
-        let mut going_on = going_on.chain((kind == Kind::Start).then_some(instance));
-        let settled = going_on.all(|instance| concurrent.holds_over_all(instance, &after));
-        let sets = happening.sets.iter().copied();
-        let changes: Vec<u32> = sets
-            .filter(|variable| state.values[*variable as usize] != after.values[*variable as usize])
-            .collect();
-        let clocks = if let Role::Timed(time) = happening.role {
-            let Accesses { after, marks } = &happening.accesses;
-            clocks.timed(&clocks::Event { time, after, marks, changes: &changes, settled })
-        } else {
-            let own = concurrent.instances.get(instance as usize);
-            clocks.after(&clocks::Happening {
-                kind,
-                instance,
-                duration: own.map_or(0, |own| own.duration),
-                after: &happening.accesses.after,
-                marks: &happening.accesses.marks,
-                joint: own.is_some_and(|own| !own.joint.is_empty()),
-                touches: &|instance| concurrent.touches(operator_id, instance),
-                changes: &changes,
-                settled,
-            })
-        };
-        let Some(mut clocks) = clocks else { return Ok(None) };
-        clocks.forget(&concurrent.guards, concurrent.separation);
-        let cost = cost.checked_add(operator.cost.constant).ok_or(Unfit)?;
-        let parent = Some((id, operator_id));
-        Ok(Some(Node { state: after, clocks, cost, depth: depth + 1, parent, dominated: false }))
-    }
-
-    /// Whether an action under way uses a function with another design.
-    fn clashes(&self, clocks: &Clocks, happening: &crate::concurrent::happening::Happening) -> bool {
-        happening.designs.iter().any(|(function, design)| {
-            clocks.opens().iter().any(|open| {
-                let other = &self.concurrent.instances[open.instance as usize].designs;
-                other.iter().any(|(own, used)| own == function && used != design)
-            })
-        })
     }
 
     /// Adds a node, below one in which no plan has a lower metric than `lower`.
     fn push(&mut self, node: Node, lower: Int) {
         let concurrent = self.concurrent;
-        let Some(left) = self.estimate.left(concurrent, &node.state, &node.clocks) else { return };
+        let Situation { state, clocks, cost } = &node.situation;
+        let Some(left) = self.estimate.left(concurrent, state, clocks) else { return };
         let costs = match self.bounds {
-            Some(bounds) => match bounds.estimate(&node.state) {
+            Some(bounds) => match bounds.estimate(state) {
                 Some(costs) => costs,
                 None => return,
             },
             None => 0,
         };
-        let total =
-            node.cost.checked_add(costs).and_then(|cost| concurrent.measure.total(left.makespan, cost));
+        let total = cost.checked_add(costs).and_then(|cost| concurrent.measure.total(left.makespan, cost));
         let Some(total) = total.filter(|total| *total < GROWTH_LIMIT) else {
             self.leave_out(lower);
             return;
@@ -268,14 +184,15 @@ impl<'a> Search<'a> {
         if !self.is_better(value) {
             return;
         }
-        let mut key = node.state.values[..concurrent.task.basic].to_vec();
-        node.clocks.signature(&mut key);
+        let mut key = state.values[..concurrent.task.basic].to_vec();
+        clocks.signature(&mut key);
         if !self.monotone {
-            key.extend(node.state.numbers.iter().flat_map(|number| words(*number)));
+            key.extend(state.numbers.iter().flat_map(|number| words(*number)));
         }
         let id = dense(self.nodes.len());
         let (guards, separation) = (&concurrent.guards, concurrent.separation);
         let dominates = |own: &Node, other: &Node| {
+            let (own, other) = (&own.situation, &other.situation);
             own.cost <= other.cost
                 && own.state.numbers.iter().zip(&other.state.numbers).all(|(own, other)| own >= other)
                 && own.clocks.no_later(&other.clocks, guards, separation)
@@ -299,23 +216,24 @@ impl<'a> Search<'a> {
         }
         let depth = node.depth;
         self.nodes.push(node);
-        self.open.push(Reverse(if self.greedy {
-            (left.sum, depth, value.0, value.1, id)
-        } else {
-            (value.0, value.1, left.sum, depth, id)
-        }));
+        self.open.push(Reverse((value.0, value.1, left.sum, depth, id)));
     }
 
     fn sequence(&self, goal: u32) -> Sequence {
-        let node = &self.nodes[goal as usize];
-        let latest = node.clocks.latest();
-        let total = self.concurrent.measure.total(latest, node.cost);
+        let situation = |id: u32| &self.nodes[id as usize].situation;
+        let Situation { clocks, cost, .. } = situation(goal);
+        let latest = clocks.latest();
+        let total = self.concurrent.measure.total(latest, *cost);
         let value = (total.expect("invariant: what is on the way to a goal was measured"), latest);
         let (mut happenings, mut together) = (Vec::new(), Vec::new());
         let mut at = goal;
-        while let Some((parent, operator)) = self.nodes[at as usize].parent {
+        while let Some((parent, operator, compressed)) = self.nodes[at as usize].parent {
+            if compressed {
+                happenings.push(self.concurrent.end_of(operator));
+                together.push(false);
+            }
             happenings.push(operator);
-            together.push(self.nodes[parent as usize].clocks.unsettled());
+            together.push(situation(parent).clocks.unsettled());
             at = parent;
         }
         happenings.reverse();

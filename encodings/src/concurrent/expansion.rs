@@ -1,0 +1,175 @@
+//! Situations to those that can follow them: one happening on, or the start and the end of an action at once.
+
+use crate::concurrent::access::Accesses;
+use crate::concurrent::clocks::{self, Clocks, Kind};
+use crate::concurrent::compile::Concurrent;
+use crate::concurrent::happening::{Happening, Role};
+use crate::number::Int;
+use crate::search::successors::OperatorIndex;
+use crate::task::{OperatorId, State};
+
+/// Where a sequence of happenings has led.
+#[derive(Debug, Clone)]
+pub(super) struct Situation {
+    pub(super) state: State,
+    pub(super) clocks: Clocks,
+    /// In the task's cost unit.
+    pub(super) cost: Int,
+}
+
+/// Why a happening leads nowhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Nowhere {
+    /// It cannot happen here.
+    Impossible,
+    /// Timed initial literals come first.
+    TooLate,
+    /// Numbers do not fit their type.
+    Unfit,
+}
+
+/// What follows what.
+pub(super) struct Expansion<'a> {
+    concurrent: &'a Concurrent,
+    index: OperatorIndex,
+}
+
+impl<'a> Expansion<'a> {
+    pub(super) fn new(concurrent: &'a Concurrent) -> Self {
+        let begins = |id: &OperatorId| {
+            matches!(concurrent.happenings[id.index()].role, Role::Start(_) | Role::Whole | Role::Timed(_))
+        };
+        let operators = OperatorId::all(concurrent.task.operators.len()).filter(begins);
+        Self { concurrent, index: OperatorIndex::over(&concurrent.task, operators) }
+    }
+
+    /// When nothing has happened yet.
+    pub(super) fn root(&self) -> Situation {
+        Situation { state: self.concurrent.task.initial.clone(), clocks: Clocks::new(), cost: 0 }
+    }
+
+    /// The happenings whose propositional condition holds: starts, and ends of what is under way.
+    pub(super) fn candidates(&self, situation: &Situation) -> Vec<OperatorId> {
+        let mut next = self.index.applicable(&self.concurrent.task, &situation.state);
+        let opens = situation.clocks.opens().iter();
+        next.extend(opens.map(|open| self.concurrent.instances[open.instance as usize].end));
+        next
+    }
+
+    /// The timed initial literals that come next.
+    pub(super) fn next_event(&self, clocks: &Clocks) -> Option<(Int, OperatorId)> {
+        let events = &self.concurrent.events;
+        events.get(events.partition_point(|(time, _)| *time <= clocks.floor())).copied()
+    }
+
+    /// Whether a plan can end here.
+    pub(super) fn is_goal(&self, Situation { state, clocks, .. }: &Situation) -> bool {
+        let concurrent = self.concurrent;
+        // What happens by itself up to the end has taken place, and nothing after the end; what comes soon after keeps apart.
+        let mut to_come = concurrent.events.iter().filter(|(time, _)| *time > clocks.floor());
+        let is_apart = |(time, event): &(Int, OperatorId)| {
+            let after = &concurrent.happenings[event.index()].accesses.after;
+            *time > clocks.latest() && clocks.are_apart(*time, after)
+        };
+        clocks.opens().is_empty()
+            && !clocks.unsettled()
+            && !clocks.waits()
+            && concurrent.task.is_goal(state)
+            && to_come.all(is_apart)
+    }
+
+    /// The situation after a happening, and whether its action has ended as well: where that loses nothing, an end
+    /// comes right after its start. A plan may have to wait for timed initial literals with its last end, so while some are to come
+    /// this loses a plan now and then; `exact` is without that.
+    pub(super) fn after(
+        &self,
+        situation: &Situation,
+        operator: OperatorId,
+        exact: bool,
+    ) -> Result<(Situation, bool), Nowhere> {
+        let started = self.step(situation, operator)?;
+        let Some(end) = self.compressed(&started, operator) else { return Ok((started, false)) };
+        let Ok(ended) = self.step(&started, end) else { return Ok((started, false)) };
+        // Were timed initial literals to come in between, the action could not be put off.
+        let in_time =
+            self.next_event(&ended.clocks).is_none_or(|(time, _)| !exact && ended.clocks.is_by(time));
+        Ok(if in_time && !ended.clocks.unsettled() { (ended, true) } else { (started, false) })
+    }
+
+    fn compressed(&self, started: &Situation, operator: OperatorId) -> Option<OperatorId> {
+        let Role::Start(instance) = self.concurrent.happenings[operator.index()].role else { return None };
+        let instance = &self.concurrent.instances[instance as usize];
+        (instance.compressible && !started.clocks.unsettled()).then_some(instance.end)
+    }
+
+    /// The situation after one happening.
+    pub(super) fn step(&self, situation: &Situation, operator_id: OperatorId) -> Result<Situation, Nowhere> {
+        let concurrent = self.concurrent;
+        let Situation { state, clocks, cost } = situation;
+        let (operator, happening) =
+            (&concurrent.task.operators[operator_id.index()], &concurrent.happenings[operator_id.index()]);
+        if !operator.applicable(state, &[]) {
+            return Err(Nowhere::Impossible);
+        }
+        let (kind, instance) = match happening.role {
+            Role::Start(instance) => (Kind::Start, instance),
+            Role::End(instance) => (Kind::End, instance),
+            // Those that happen by themselves are told apart below.
+            Role::Whole | Role::Timed(_) => (Kind::Whole, u32::MAX),
+            Role::Never => return Err(Nowhere::Impossible),
+        };
+        if kind == Kind::Start && clocks.is_open(instance) || self.clashes(clocks, happening) {
+            return Err(Nowhere::Impossible);
+        }
+        let after = concurrent.task.successor(operator, state, &[]).ok_or(Nowhere::Unfit)?;
+        let open = clocks.opens().iter().map(|open| open.instance);
+        let going_on = open.filter(|open| kind != Kind::End || *open != instance);
+        let mut going_on = going_on.chain((kind == Kind::Start).then_some(instance));
+        let settled = going_on.all(|instance| concurrent.holds_over_all(instance, &after));
+        let sets = happening.sets.iter().copied();
+        let changes: Vec<u32> = sets
+            .filter(|variable| state.values[*variable as usize] != after.values[*variable as usize])
+            .collect();
+        let clocks = if let Role::Timed(time) = happening.role {
+            let Accesses { after, marks } = &happening.accesses;
+            clocks.timed(&clocks::Event { time, after, marks, changes: &changes, settled })
+        } else {
+            let own = concurrent.instances.get(instance as usize);
+            clocks.after(&clocks::Happening {
+                kind,
+                instance,
+                duration: own.map_or(0, |own| own.duration),
+                after: &happening.accesses.after,
+                marks: &happening.accesses.marks,
+                joint: own.is_some_and(|own| !own.joint.is_empty()),
+                touches: &|instance| concurrent.touches(operator_id, instance),
+                changes: &changes,
+                settled,
+            })
+        };
+        let mut clocks = clocks.ok_or(Nowhere::Impossible)?;
+        let opens: Vec<u32> = clocks.opens().iter().map(|open| open.instance).collect();
+        for instance in opens {
+            let own = &concurrent.instances[instance as usize];
+            let after = &concurrent.happenings[own.end.index()].accesses.after;
+            clocks.expect_end(instance, own.duration, after).ok_or(Nowhere::Impossible)?;
+        }
+        // Nothing can happen after what comes later in the sequence.
+        if self.next_event(&clocks).is_some_and(|(time, _)| clocks.latest() > time) {
+            return Err(Nowhere::TooLate);
+        }
+        clocks.forget(&concurrent.guards, concurrent.separation);
+        let cost = cost.checked_add(operator.cost.constant).ok_or(Nowhere::Unfit)?;
+        Ok(Situation { state: after, clocks, cost })
+    }
+
+    /// Whether an action under way uses a function with another design.
+    fn clashes(&self, clocks: &Clocks, happening: &Happening) -> bool {
+        happening.designs.iter().any(|(function, design)| {
+            clocks.opens().iter().any(|open| {
+                let other = &self.concurrent.instances[open.instance as usize].designs;
+                other.iter().any(|(own, used)| own == function && used != design)
+            })
+        })
+    }
+}

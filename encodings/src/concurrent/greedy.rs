@@ -1,0 +1,258 @@
+//! Lazy greedy best-first search over sequences of happenings: a plan soon, then better ones.
+//!
+//! Situations are evaluated when they are taken up, not when they are found, and stand in the order of what was left before them;
+//! happenings that the relaxed plan begins with have a queue of their own [1]. Of situations with the same state and the same actions under
+//! way only the first is pursued, so that this search may miss plans and proves nothing.
+//!
+//! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::collections::hash_map::Entry;
+
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+
+use crate::bounds::Bounds;
+use crate::concurrent::compile::Concurrent;
+use crate::concurrent::estimate::Estimate;
+use crate::concurrent::expansion::{Expansion, Nowhere, Situation};
+use crate::concurrent::guidance::{Guidance, Guide};
+use crate::concurrent::search::Sequence;
+use crate::limits::Limits;
+use crate::number::{Int, dense, words};
+use crate::task::OperatorId;
+
+/// So many more times preferred happenings come first after each progress.
+const BOOST: i64 = 1_000;
+
+/// A happening, and whether it takes place at the time of the one before.
+type Link = (OperatorId, bool);
+
+struct Node {
+    situation: Situation,
+    parent: u32,
+    /// What has happened since the parent.
+    links: SmallVec<[Link; 2]>,
+}
+
+/// What was left before it, the least makespan, the order, the node before, and the happening.
+type Entrance = Reverse<(u64, Int, u32, u32, OperatorId)>;
+
+/// Two queues: of all happenings, and of the preferred ones.
+#[derive(Default)]
+struct Queues {
+    heaps: [BinaryHeap<Entrance>; 2],
+    priorities: [i64; 2],
+    order: u32,
+}
+
+/// Why the search came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// A plan that is better than the incumbent.
+    Found,
+    /// Nothing is left.
+    Exhausted,
+    /// At a limit.
+    Stopped,
+}
+
+pub(super) struct Greedy<'a> {
+    concurrent: &'a Concurrent,
+    expansion: &'a Expansion<'a>,
+    estimate: &'a Estimate,
+    bounds: Option<&'a Bounds>,
+    guidance: Guidance<'a>,
+    nodes: Vec<Node>,
+    /// By what must agree: the least makespan with which it was reached.
+    seen: FxHashMap<Box<[u32]>, Int>,
+    queues: Queues,
+    /// Whether what is reached again, but sooner, is pursued again.
+    pub(super) reopens: bool,
+    nearest: u64,
+}
+
+impl<'a> Greedy<'a> {
+    pub(super) fn new(
+        concurrent: &'a Concurrent,
+        expansion: &'a Expansion<'a>,
+        estimate: &'a Estimate,
+        bounds: Option<&'a Bounds>,
+        guidance: Guidance<'a>,
+        reopens: bool,
+    ) -> Self {
+        let (nodes, seen) = (Vec::new(), FxHashMap::default());
+        let queues = Queues::default();
+        Self {
+            concurrent,
+            expansion,
+            estimate,
+            bounds,
+            guidance,
+            nodes,
+            seen,
+            queues,
+            reopens,
+            nearest: u64::MAX,
+        }
+    }
+
+    /// Searches for a plan that is better than the incumbent, until `work` is used up: each evaluation is one unit of it.
+    #[expect(clippy::arithmetic_side_effects, reason = "counted down from what was given")]
+    pub(super) fn run(
+        &mut self,
+        incumbent: &mut Option<Sequence>,
+        limits: &Limits,
+        mut work: usize,
+    ) -> Outcome {
+        if self.nodes.is_empty() {
+            let root = self.expansion.root();
+            if let Some(outcome) = self.take_up(root, 0, SmallVec::new(), incumbent) {
+                return outcome;
+            }
+        }
+        let mut pulse = limits.pulse();
+        loop {
+            if work == 0 || pulse.beat().is_err() {
+                return Outcome::Stopped;
+            }
+            let Some((parent, operator)) = self.queues.pop() else { return Outcome::Exhausted };
+            let Some((situation, links)) = self.follow(parent, operator) else { continue };
+            work -= 1;
+            if let Some(outcome) = self.take_up(situation, parent, links, incumbent) {
+                return outcome;
+            }
+        }
+    }
+
+    /// What follows a node by a happening; timed initial literals that come before it come first.
+    fn follow(&self, parent: u32, operator: OperatorId) -> Option<(Situation, SmallVec<[Link; 2]>)> {
+        let mut links = SmallVec::new();
+        let mut waited: Option<Situation> = None;
+        loop {
+            let before = waited.as_ref().unwrap_or(&self.nodes[parent as usize].situation);
+            let together = before.clocks.unsettled();
+            match self.expansion.after(before, operator, false) {
+                Ok((situation, compressed)) => {
+                    links.push((operator, together));
+                    if compressed {
+                        links.push((self.concurrent.end_of(operator), false));
+                    }
+                    return Some((situation, links));
+                }
+                Err(Nowhere::TooLate) => {
+                    let (_, event) = self.expansion.next_event(&before.clocks)?;
+                    let next = self.expansion.step(before, event).ok()?;
+                    links.push((event, together));
+                    waited = Some(next);
+                }
+                Err(Nowhere::Impossible | Nowhere::Unfit) => return None,
+            }
+        }
+    }
+
+    /// Evaluates a situation, and queues what can follow it.
+    fn take_up(
+        &mut self,
+        situation: Situation,
+        parent: u32,
+        links: SmallVec<[Link; 2]>,
+        incumbent: &mut Option<Sequence>,
+    ) -> Option<Outcome> {
+        let value = self.value(&situation)?;
+        if incumbent.as_ref().is_some_and(|incumbent| value >= incumbent.value)
+            || !self.is_new(&situation, value.1)
+        {
+            return None;
+        }
+        if self.expansion.is_goal(&situation) {
+            *incumbent = Some(self.sequence(&situation, parent, links));
+            return Some(Outcome::Found);
+        }
+        let Guide { left, preferred } = self.guidance.guide(&situation)?;
+        if left < self.nearest {
+            self.nearest = left;
+            self.queues.boost();
+        }
+        let id = dense(self.nodes.len());
+        for operator in self.expansion.candidates(&situation) {
+            let is_preferred = preferred.binary_search(&operator).is_ok();
+            self.queues.push((left, value.1, id, operator), is_preferred);
+        }
+        self.nodes.push(Node { situation, parent, links });
+        None
+    }
+
+    /// A lower bound of the metric of plans that go on from here, and of their makespan. None if there is none.
+    fn value(&self, situation: &Situation) -> Option<(Int, Int)> {
+        let Situation { state, clocks, cost } = situation;
+        let makespan = self.estimate.left(self.concurrent, state, clocks)?.makespan;
+        let costs = self.bounds.map_or(Some(0), |bounds| bounds.estimate(state))?;
+        Some((self.concurrent.measure.total(makespan, cost.checked_add(costs)?)?, makespan))
+    }
+
+    fn is_new(&mut self, situation: &Situation, makespan: Int) -> bool {
+        let Situation { state, clocks, .. } = situation;
+        let mut key = state.values[..self.concurrent.task.basic].to_vec();
+        key.extend(state.numbers.iter().flat_map(|number| words(*number)));
+        key.extend(clocks.opens().iter().map(|open| open.instance));
+        key.push(u32::from(clocks.unsettled()));
+        match self.seen.entry(key.into_boxed_slice()) {
+            Entry::Vacant(entry) => {
+                entry.insert(makespan);
+                true
+            }
+            Entry::Occupied(mut entry) => {
+                let is_sooner = self.reopens && makespan < *entry.get();
+                if is_sooner {
+                    entry.insert(makespan);
+                }
+                is_sooner
+            }
+        }
+    }
+
+    fn sequence(&self, situation: &Situation, parent: u32, links: SmallVec<[Link; 2]>) -> Sequence {
+        let latest = situation.clocks.latest();
+        let total = self.concurrent.measure.total(latest, situation.cost);
+        let value = (total.expect("invariant: what is a goal was measured"), latest);
+        let mut all: Vec<Link> = links.into_iter().rev().collect();
+        let mut at = parent as usize;
+        while let Some(node) = self.nodes.get(at) {
+            all.extend(node.links.iter().rev());
+            if node.links.is_empty() {
+                break;
+            }
+            at = node.parent as usize;
+        }
+        all.reverse();
+        let (happenings, together) = all.into_iter().unzip();
+        Sequence { value, happenings, together }
+    }
+}
+
+#[expect(clippy::arithmetic_side_effects, reason = "counts of what is held in memory, and of what was")]
+impl Queues {
+    fn boost(&mut self) {
+        self.priorities[1] -= BOOST;
+    }
+
+    fn push(&mut self, (left, makespan, parent, operator): (u64, Int, u32, OperatorId), is_preferred: bool) {
+        self.order = self.order.wrapping_add(1);
+        let entrance = Reverse((left, makespan, self.order, parent, operator));
+        self.heaps[0].push(entrance);
+        if is_preferred {
+            self.heaps[1].push(entrance);
+        }
+    }
+
+    fn pop(&mut self) -> Option<(u32, OperatorId)> {
+        let preferred = !self.heaps[1].is_empty()
+            && (self.heaps[0].is_empty() || self.priorities[1] <= self.priorities[0]);
+        let queue = usize::from(preferred);
+        self.priorities[queue] += 1;
+        let Reverse((_, _, _, parent, operator)) = self.heaps[queue].pop()?;
+        Some((parent, operator))
+    }
+}

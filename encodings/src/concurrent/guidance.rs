@@ -1,0 +1,185 @@
+//! A situation to how far the goal is, by a relaxed plan, and which happenings that plan begins with.
+//!
+//! Costs add up over what a rule needs [1], and the cheapest rule for each proposition makes the relaxed plan [2]. Its goals are those of the task,
+//! and the ends of all actions under way.
+//!
+//! [1] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
+//! [2] J. Hoffmann, B. Nebel: The FF planning system, JAIR 14, 2001; E. Keyder, H. Geffner: Heuristics for planning with action costs
+//! revisited, ECAI 2008.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::concurrent::expansion::Situation;
+use crate::concurrent::relaxed::{Proposition, Relaxed};
+use crate::number::{Int, dense};
+use crate::task::OperatorId;
+
+/// A cost that stands for being out of reach.
+const NEVER: u64 = u64::MAX;
+/// No relaxed plan counts more than this of one rule.
+const MOST: u64 = 1 << 20;
+
+/// How far the goal is.
+#[derive(Debug, Clone)]
+pub(super) struct Guide {
+    /// The weight of a relaxed plan.
+    pub(super) left: u64,
+    /// The happenings of the relaxed plan that need nothing else, ascending.
+    pub(super) preferred: Vec<OperatorId>,
+}
+
+/// A relaxed task with room for one evaluation at a time.
+pub(super) struct Guidance<'a> {
+    relaxed: &'a Relaxed,
+    /// By proposition.
+    costs: Vec<u64>,
+    /// By proposition: the rule that brings it about, and how many times.
+    supporters: Vec<Option<(u32, u64)>>,
+    /// By rule: how many of its needs are out of reach, and the sum of the costs of the others.
+    unmet: Vec<u32>,
+    sums: Vec<u64>,
+    marked: Vec<bool>,
+    /// By numeric condition: how much is missing.
+    missing: Vec<Option<Int>>,
+    open: BinaryHeap<Reverse<(u64, Proposition)>>,
+}
+
+impl<'a> Guidance<'a> {
+    pub(super) fn new(relaxed: &'a Relaxed) -> Self {
+        let (propositions, rules) = (relaxed.propositions, relaxed.rules.len());
+        Self {
+            relaxed,
+            costs: vec![NEVER; propositions],
+            supporters: vec![None; propositions],
+            unmet: vec![0; rules],
+            sums: vec![0; rules],
+            marked: vec![false; rules],
+            missing: vec![None; relaxed.numeric.len()],
+            open: BinaryHeap::new(),
+        }
+    }
+
+    /// None if the goal is out of reach, or the end of an action under way.
+    pub(super) fn guide(&mut self, situation: &Situation) -> Option<Guide> {
+        self.reach(situation);
+        let relaxed = self.relaxed;
+        let instances = situation.clocks.opens().iter().map(|open| open.instance as usize);
+        let ends: Vec<u32> = instances.map(|instance| relaxed.ends[instance]).collect();
+        if ends.iter().any(|end| self.unmet[*end as usize] > 0)
+            || relaxed.goal.iter().any(|goal| self.costs[*goal as usize] == NEVER)
+        {
+            return None;
+        }
+        Some(self.extract(&ends))
+    }
+
+    /// Dijkstra's algorithm over propositions.
+    #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
+    fn reach(&mut self, situation: &Situation) {
+        let relaxed = self.relaxed;
+        self.costs.fill(NEVER);
+        self.supporters.fill(None);
+        self.sums.fill(0);
+        for (unmet, rule) in self.unmet.iter_mut().zip(&relaxed.rules) {
+            *unmet = dense(rule.needs.len());
+        }
+        let state = &situation.state;
+        for (missing, numeric) in self.missing.iter_mut().zip(&relaxed.numeric) {
+            // What does not fit can be anything.
+            *missing = numeric.linear.value(&state.numbers, &[], &[]).map(Int::saturating_neg);
+        }
+        for (first, value) in relaxed.first.iter().zip(&state.values) {
+            self.improve(first + value, 0, None);
+        }
+        for default in &relaxed.defaults {
+            self.improve(*default, 0, None);
+        }
+        for position in 0..relaxed.numeric.len() {
+            if self.missing[position].is_none_or(|missing| missing <= 0) {
+                self.improve(relaxed.numeric[position].proposition, 0, None);
+            }
+        }
+        for rule in 0..relaxed.rules.len() {
+            if self.unmet[rule] == 0 {
+                self.fire(rule);
+            }
+        }
+        while let Some(Reverse((cost, proposition))) = self.open.pop() {
+            if cost > self.costs[proposition as usize] {
+                continue;
+            }
+            for rule in &relaxed.needing[proposition as usize] {
+                let rule = *rule as usize;
+                self.sums[rule] = self.sums[rule].saturating_add(cost);
+                self.unmet[rule] -= 1;
+                if self.unmet[rule] == 0 {
+                    self.fire(rule);
+                }
+            }
+        }
+    }
+
+    fn improve(&mut self, proposition: Proposition, cost: u64, by: Option<(u32, u64)>) {
+        let known = &mut self.costs[proposition as usize];
+        if cost < *known {
+            *known = cost;
+            self.supporters[proposition as usize] = by;
+            self.open.push(Reverse((cost, proposition)));
+        }
+    }
+
+    fn fire(&mut self, rule: usize) {
+        let relaxed = self.relaxed;
+        let own = &relaxed.rules[rule];
+        let weight = u64::from(own.weight);
+        let cost = self.sums[rule].saturating_add(weight).min(NEVER >> 1);
+        for add in &own.adds {
+            self.improve(*add, cost, Some((dense(rule), 1)));
+        }
+        for (position, by) in &own.raises {
+            let times = times(self.missing[*position as usize], *by);
+            let cost = self.sums[rule].saturating_add(weight.saturating_mul(times)).min(NEVER >> 1);
+            let proposition = relaxed.numeric[*position as usize].proposition;
+            self.improve(proposition, cost, Some((dense(rule), times)));
+        }
+    }
+
+    fn extract(&mut self, ends: &[u32]) -> Guide {
+        let relaxed = self.relaxed;
+        self.marked.fill(false);
+        let mut used: Vec<(OperatorId, u64)> = Vec::new();
+        let mut preferred = Vec::new();
+        let mut stack = relaxed.goal.clone();
+        let mut rules: Vec<(u32, u64)> = ends.iter().map(|end| (*end, 1)).collect();
+        loop {
+            while let Some((rule, times)) = rules.pop() {
+                let own = &relaxed.rules[rule as usize];
+                if let Some(origin) = own.origin {
+                    used.push((origin, times.saturating_mul(own.weight.into())));
+                }
+                if std::mem::replace(&mut self.marked[rule as usize], true) {
+                    continue;
+                }
+                stack.extend(&own.needs);
+                if own.needs.iter().all(|need| self.costs[*need as usize] == 0) {
+                    preferred.extend(own.origin);
+                }
+            }
+            let Some(proposition) = stack.pop() else { break };
+            rules.extend(self.supporters[proposition as usize].take());
+        }
+        used.sort_unstable_by_key(|(origin, times)| (*origin, Reverse(*times)));
+        used.dedup_by_key(|(origin, _)| *origin);
+        preferred.sort_unstable();
+        preferred.dedup();
+        Guide { left: used.iter().fold(0, |sum, (_, times)| times.saturating_add(sum)), preferred }
+    }
+}
+
+/// How many applications add what is missing.
+fn times(missing: Option<Int>, by: Option<Int>) -> u64 {
+    let (Some(missing), Some(by)) = (missing, by) else { return 1 };
+    let times = missing.checked_add(by.saturating_sub(1)).and_then(|all| all.checked_div(by));
+    times.and_then(|times| u64::try_from(times).ok()).unwrap_or(MOST).clamp(1, MOST)
+}

@@ -1,0 +1,59 @@
+//! The exact and the greedy search in turns that get longer: what one needs, the other has as well.
+//!
+//! Small tasks are proved before the greedy search begins. Where it does begin, its plans are the incumbents of both.
+
+use crate::bounds::Bounds;
+use crate::concurrent::compile::Concurrent;
+use crate::concurrent::estimate::Estimate;
+use crate::concurrent::expansion::Expansion;
+use crate::concurrent::greedy::{Greedy, Outcome};
+use crate::concurrent::guidance::Guidance;
+use crate::concurrent::relaxed::Relaxed;
+use crate::concurrent::search::{Ended, Search, Sequence};
+use crate::limits::Limits;
+use crate::number::Int;
+
+/// How many nodes the exact search expands before the greedy one has its turn.
+const SOON: usize = 500;
+/// How many situations the greedy search evaluates at its first turn, and how many nodes the exact one expands then.
+const GREEDY: usize = 20_000;
+const EXACT: usize = 2_000;
+
+/// Searches until nothing better is left, or a limit is reached. `report` hears of each better plan and of what none can get below.
+pub(super) fn take_turns(
+    concurrent: &Concurrent,
+    bounds: Option<&Bounds>,
+    limits: &Limits,
+    report: &mut dyn FnMut(&Sequence, Int),
+) -> (Ended, Option<Sequence>) {
+    let estimate = Estimate::new(concurrent);
+    let expansion = Expansion::new(concurrent);
+    let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
+    let mut ended = exact.run(limits, SOON, report);
+    if exact.is_over() || limits.reached() {
+        return (ended, exact.incumbent);
+    }
+    let relaxed = Relaxed::new(concurrent);
+    let begin = |reopens| {
+        let guidance = Guidance::new(&relaxed);
+        Greedy::new(concurrent, &expansion, &estimate, bounds, guidance, reopens)
+    };
+    let mut greedy = Some(begin(false));
+    let mut share = 1_usize;
+    while !exact.is_over() && !limits.reached() {
+        while let Some(own) = &mut greedy {
+            match own.run(&mut exact.incumbent, limits, GREEDY.saturating_mul(share)) {
+                Outcome::Found => {
+                    let lower = exact.lower();
+                    exact.incumbent.iter().for_each(|sequence| report(sequence, lower));
+                }
+                // What was left out may have come sooner.
+                Outcome::Exhausted => greedy = (!own.reopens).then(|| begin(true)),
+                Outcome::Stopped => break,
+            }
+        }
+        ended = exact.run(limits, EXACT.saturating_mul(share), report);
+        share = share.saturating_mul(2);
+    }
+    (ended, exact.incumbent)
+}
