@@ -55,7 +55,7 @@ def tasks(options, directory):
 
 def measure(options):
     known = report.read([options.csv]) if Path(options.csv).exists() else {}
-    some = planners(options.venv, options.program, options.slack, patience=options.patience)
+    some = planners(options.venv, options.program, options.slack, options.patience, options.memory)
     fresh = not known
     with tempfile.TemporaryDirectory() as directory, open(options.csv, "a", newline="") as file:
         writer = csv.DictWriter(file, FIELDS)
@@ -89,7 +89,8 @@ def one(planner, task, options):
     with tempfile.TemporaryDirectory() as place:
         load = os.getloadavg()[0]
         command = planner.command(*task.files, options.seconds, task.kind)
-        done = run(command, place, options.seconds, options.memory, options.core, planner.ask, options.patience)
+        # Who minds a limit by itself needs room to end in.
+        done = run(command, place, options.seconds, options.memory + (1024 if planner.ask else 0), options.core, planner.ask, options.patience)
         try:
             answer = planner.read(done.output, done.code, place)
         except (ValueError, KeyError, IndexError) as error:

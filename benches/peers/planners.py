@@ -26,14 +26,14 @@ Planner = namedtuple("Planner", "name kinds command read ask", defaults=[False])
 Answer = namedtuple("Answer", "status cost plan first", defaults=[None, None, None])
 
 
-def planners(venv, program=None, slack=1, heap=4, patience=PATIENCE):
-    """All planners by name. `slack`: Metaplan's limit on wall-clock time over that on processor time; `heap`: Java's, in GB."""
+def planners(venv, program=None, slack=1, patience=PATIENCE, megabytes=4096):
+    """All planners by name. `slack`: Metaplan's limit on wall-clock time over that on processor time."""
     python = str(venv / "bin" / "python")
     found = list(venv.glob("lib/python3*/site-packages"))
     site = found[0] if found else venv
     downward = [python, str(site / "up_fast_downward/downward/fast-downward.py")]
     symk = [python, str(site / "up_symk/symk/fast-downward.py")]
-    enhsp = ["java", f"-Xmx{heap}g", "-XX:+UseSerialGC", "-jar", str(site / "up_enhsp/ENHSP/enhsp.jar")]
+    enhsp = ["java", f"-Xmx{megabytes}m", "-XX:+UseSerialGC", "-jar", str(site / "up_enhsp/ENHSP/enhsp.jar")]
     kairos = [str(venv / "bin" / "kairos"), "solve"]
     lpg = str(site / "up_lpg" / "lpg")
     unified = [python, str(ROOT / "benches" / "peers" / "unified.py")]
@@ -41,7 +41,7 @@ def planners(venv, program=None, slack=1, heap=4, patience=PATIENCE):
         program = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "metaplan"
 
     def metaplan(domain, problem, seconds, kind):
-        limits = ["--time-limit", str(slack * seconds)] if seconds else []
+        limits = ["--time-limit", str(slack * seconds), "--memory-limit", str(megabytes)] if seconds else []
         return [str(program), "plan", domain, problem, "--format", "json", "--quiet", *limits, *["--concurrent"] * (kind == TEMPORAL)]
 
     def soon(domain, problem, seconds, _):
