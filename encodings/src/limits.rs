@@ -13,7 +13,11 @@ use std::time::{Duration, Instant};
 pub struct Limits {
     deadline: Option<Instant>,
     interrupt: Arc<AtomicBool>,
+    room: Option<usize>,
 }
+
+/// What a search may store, in bytes, unless it is told.
+const ROOM: usize = 1 << 31;
 
 impl Limits {
     /// No limit but the flag.
@@ -26,6 +30,18 @@ impl Limits {
     pub fn with_time(mut self, time: Duration) -> Self {
         self.deadline = Instant::now().checked_add(time);
         self
+    }
+
+    /// Lets a search store so many bytes, as it estimates them.
+    #[must_use]
+    pub fn with_room(mut self, bytes: usize) -> Self {
+        self.room = Some(bytes);
+        self
+    }
+
+    /// How many bytes a search may store.
+    pub(crate) fn room(&self) -> usize {
+        self.room.unwrap_or(ROOM)
     }
 
     /// The flag that stops the run when it is set.

@@ -40,6 +40,11 @@ impl Guard {
             let text = "`--memory-limit`: this platform does not tell how much memory a process occupies";
             return Err(Failure::usage(Message::error("M115", text)));
         }
+        if let Some(megabytes) = memory {
+            // Formulas and what is ground take the other half.
+            let half = usize::try_from(megabytes).unwrap_or(usize::MAX).saturating_mul(1 << 19);
+            limits = limits.with_room(half);
+        }
         let has_read = Arc::new(AtomicBool::new(false));
         if time.is_some() || memory.is_some() {
             give_up_late(limits.clone(), Arc::clone(&has_read), common.clone());

@@ -5,7 +5,7 @@ use crate::concurrent::clocks::{self, Clocks, Kind};
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::happening::{Happening, Role};
 use crate::number::Int;
-use crate::search::successors::OperatorIndex;
+use crate::search::generator::OperatorIndex;
 use crate::task::{OperatorId, State};
 
 /// Where a sequence of happenings has led.

@@ -1,30 +1,30 @@
-//! A quick search for a first plan: A* with Pareto dominance over numeric variables. Among the cheapest plans it
-//! finds one with fewest steps.
+//! A* with Pareto dominance over numeric variables. Among the cheapest plans it finds one with fewest steps.
 //!
 //! States that agree on all finite-domain variables are compared by cost and by numeric variables; where a higher value
 //! never hurts (a battery), a state that costs no less and has no more of anything is dropped. That is the label-setting
 //! search of resource-constrained shortest paths [1]. If it ends before its limits, its answer is exact. If it does not end
 //! soon, a greedy search, which looks at estimates only, finds some plan meanwhile.
 //!
+//! Of states with equal sums of cost and estimate, those come first from which fewer steps can lead to the goal, and of these the
+//! ones that are further: a plan that is found is cheapest once nothing that is left can be cheaper, or as cheap with fewer steps.
+//!
 //! [1] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
 //! windows, INFOR 26(3), 1988.
-
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-use std::collections::hash_map::Entry;
-
-use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::{Int, dense};
 use crate::plan::ground::{GroundPlan, GroundStep};
-use crate::search::successors::{OperatorIndex, Priced, undominated};
+use crate::search::directions::is_monotone;
+use crate::search::generator::OperatorIndex;
+use crate::search::open::Open;
+use crate::search::store::{NONE, Origin, Store};
+use crate::search::successors::{Priced, undominated};
 use crate::task::number::TaskNumber;
-use crate::task::{Condition, Fact, OperatorId, State, Task};
+use crate::task::{Fact, OperatorId, State, Task};
 
-/// How many states are stored at most.
+/// How many states are stored at most where an answer is wanted at once, or is written down.
 pub(crate) const STATE_LIMIT: usize = 400_000;
 /// After so many states without a plan the greedy search has its turn, with as many.
 const SOON: usize = 20_000;
@@ -40,21 +40,15 @@ pub(crate) enum Found<N = Int> {
     Unknown(Option<GroundPlan<N>>),
 }
 
-struct Node<N> {
-    state: State<N>,
-    cost: N,
-    steps: u32,
-    parent: Option<(u32, OperatorId, u32)>,
-    dominated: bool,
-}
-
 /// What a search needs to know of a task, whatever state it begins in.
 pub(crate) struct Prepared<N = Int> {
     /// For each operator its combinations of designs that no other one dominates, with their costs.
     choices: Vec<Priced<N>>,
+    /// For each operator the number of its first combination; at the end, how many there are.
+    numbers: Vec<u32>,
     index: OperatorIndex,
-    /// Whether more of any numeric variable never hurts.
-    monotone: bool,
+    /// What the dearest combination costs.
+    dearest: N,
 }
 
 impl<N: TaskNumber> Prepared<N> {
@@ -67,7 +61,29 @@ impl<N: TaskNumber> Prepared<N> {
             let Some(own) = undominated(operator?, monotone, false, limits)? else { return Ok(None) };
             choices.push(own);
         }
-        Ok(Some(Self { choices, index: OperatorIndex::new(task), monotone }))
+        let mut numbers = vec![0_u32];
+        let mut all = 0_u32;
+        for own in &choices {
+            let Some(next) = all.checked_add(dense(own.len())) else { return Ok(None) };
+            numbers.push(next);
+            all = next;
+        }
+        let dearest = choices.iter().flatten().map(|(_, cost)| cost).max().cloned();
+        let dearest = dearest.unwrap_or_else(N::zero);
+        Ok(Some(Self { choices, numbers, index: OperatorIndex::new(task), dearest }))
+    }
+
+    /// The operator of a combination, by number.
+    fn step(&self, number: u32) -> GroundStep {
+        let operator = self.numbers.partition_point(|first| *first <= number).saturating_sub(1);
+        let choice = number.saturating_sub(self.numbers[operator]);
+        let choice = self.choices[operator][choice as usize].0.clone();
+        GroundStep { operator: OperatorId(dense(operator)), choice }
+    }
+
+    /// The fewest steps that can cost so much.
+    fn steps_at_least(&self, cost: &N) -> u32 {
+        if self.dearest > N::zero() { cost.times_at_least(&self.dearest) } else { 0 }
     }
 }
 
@@ -90,27 +106,34 @@ pub(crate) struct Space<'a, N, E> {
     pub(crate) prepared: &'a Prepared<N>,
 }
 
+/// What comes first: the sum of cost and estimate, the steps that this takes at least, and then what is further.
+type Key<N> = (N, u32, u32);
+
 struct Search<'a, N, E> {
     task: &'a Task<N>,
     limits: &'a Limits,
     bounds: &'a E,
     prepared: &'a Prepared<N>,
-    nodes: Vec<Node<N>>,
-    seen: FxHashMap<Box<[u32]>, Vec<u32>>,
-    open: BinaryHeap<Reverse<(N, u32, u32)>>,
+    store: Store<N>,
+    open: Open<Key<N>>,
     /// Whether states were left out because their numbers do not fit.
     incomplete: bool,
     /// Whether only estimates decide what comes next.
     greedy: bool,
-    /// The cheapest goal state so far.
-    best: Option<u32>,
+    /// The cheapest goal state so far, with fewest steps of those, and their number.
+    best: Option<(u32, u32)>,
     /// What a known plan costs, if there is one: nothing dearer is looked at.
     limit: Option<N>,
+    /// How far the search was whenever the number of its states had doubled.
+    progress: Vec<N>,
+    /// The state that is expanded, and the one that it leads to.
+    state: State<N>,
+    next: State<N>,
 }
 
-/// Searches a task whose operators all cost at least 0.
+/// Searches a task whose operators all cost at least 0, as long as there is memory and hope to come to the end with it.
 pub(crate) fn search(context: Context<'_>, bounds: &Bounds) -> Found {
-    search_states(context, bounds, STATE_LIMIT)
+    search_states(context, bounds, usize::MAX)
 }
 
 /// Searches it, storing at most so many states.
@@ -152,14 +175,13 @@ fn search_within<N: TaskNumber, E: Estimate<N>>(
     hear: Hear<'_, N>,
 ) -> Found<N> {
     let known = limit.is_some();
-    let mut search = Search::new(space, initial, false);
-    search.limit = limit;
+    let mut search = Search::new(space, initial, false, limit);
     if let Some(found) = search.run(SOON.min(most), hear) {
         return found;
     }
     let mut some = None;
     if search.best.is_none() && !known {
-        let mut greedy = Search::new(space, initial, true);
+        let mut greedy = Search::new(space, initial, true, None);
         greedy.run(SOON.min(most), &mut |_, _| {});
         some = greedy.best_plan();
         search.limit = some.as_ref().map(|plan| plan.cost.clone());
@@ -187,39 +209,43 @@ pub(crate) fn closed_labels<N: TaskNumber>(
 ) -> Option<Vec<ClosedLabel<N>>> {
     let prepared = Prepared::new(context).ok()??;
     let task = context.task;
-    let mut search = Search::new(&Space { context, bounds, prepared: &prepared }, &task.initial, false);
+    let mut search = Search::new(&Space { context, bounds, prepared: &prepared }, &task.initial, false, None);
     match (search.run(STATE_LIMIT, &mut |_, _| {})?, cost) {
         (Found::Optimal(plan), Some(cost)) if plan.cost >= *cost => {}
         (Found::None, None) => {}
         _ => return None,
     }
-    let below = |node: &&Node<N>| {
-        let total = bounds.estimate(&node.state).and_then(|more| node.cost.plus(&more));
-        !node.dominated && total.is_some_and(|total| cost.is_none_or(|cost| total < *cost))
+    let mut state = task.initial.clone();
+    let label = |id: u32| {
+        search.store.unpack(id, &mut state);
+        let own = search.store.cost(id);
+        let total = bounds.estimate(&state).and_then(|more| own.plus(&more))?;
+        let is_below = cost.is_none_or(|cost| total < *cost);
+        is_below.then(|| (state.values[..task.basic].to_vec(), state.numbers.clone(), own.clone()))
     };
-    let label = |node: &Node<N>| {
-        (node.state.values[..task.basic].to_vec(), node.state.numbers.clone(), node.cost.clone())
-    };
-    Some(search.nodes.iter().filter(below).map(label).collect())
+    let nodes = (0..dense(search.store.len())).filter(|id| !search.store.is_dominated(*id));
+    Some(nodes.filter_map(label).collect())
 }
 
 impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
-    fn new(space: &Space<'a, N, E>, initial: &State<N>, greedy: bool) -> Self {
+    fn new(space: &Space<'a, N, E>, initial: &State<N>, greedy: bool, limit: Option<N>) -> Self {
         let Space { context: Context { task, limits }, bounds, prepared } = *space;
         let mut search = Search {
             task,
             limits,
             bounds,
             prepared,
-            nodes: Vec::new(),
-            seen: FxHashMap::default(),
-            open: BinaryHeap::new(),
+            store: Store::new(task),
+            open: Open::new(),
             incomplete: false,
             greedy,
             best: None,
-            limit: None,
+            limit,
+            progress: Vec::new(),
+            state: initial.clone(),
+            next: initial.clone(),
         };
-        search.push(initial.clone(), N::zero(), 0, None);
+        search.push(N::zero(), Origin { parent: NONE, step: NONE, steps: 0 });
         search
     }
 
@@ -227,51 +253,96 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     fn run(&mut self, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
         let mut pulse = self.limits.pulse();
         let mut told: Option<(Option<N>, N)> = None;
-        while self.nodes.len() <= most {
-            let Some(Reverse((total, steps, id))) = self.open.pop() else {
-                return Some(if self.incomplete { Found::Unknown(self.best_plan()) } else { Found::None });
+        while self.store.len() <= most && self.has_room() {
+            let Some(((total, least, _), id)) = self.open.pop() else {
+                return Some(self.ended());
             };
-            if self.nodes[id as usize].dominated {
+            if self.store.is_dominated(id) {
                 continue;
             }
-            if self.task.is_goal(&self.nodes[id as usize].state) {
-                if self.incomplete {
-                    return Some(Found::Unknown(self.best_plan()));
-                }
-                return Some(Found::Optimal(self.plan(id)));
+            let is_best = |(_, steps): (u32, u32)| {
+                self.greedy || self.limit.as_ref().is_some_and(|cost| (cost, steps) <= (&total, least))
+            };
+            if self.best.is_some_and(is_best) {
+                return Some(self.ended());
             }
             let is_told = |(limit, bound): &(Option<N>, N)| *limit == self.limit && *bound == total;
             if !self.incomplete && !told.as_ref().is_some_and(is_told) {
                 hear(self.limit.as_ref(), &total);
-                told = Some((self.limit.clone(), total));
+                told = Some((self.limit.clone(), total.clone()));
             }
-            if self.expand(id, steps, &mut pulse).is_err() {
+            if self.store.len() >> self.progress.len() >= STATE_LIMIT / 2 {
+                self.progress.push(total);
+                if !self.is_hopeful() {
+                    return Some(Found::Unknown(self.best_plan()));
+                }
+            }
+            if self.expand(id, &mut pulse).is_err() {
                 return Some(Found::Unknown(self.best_plan()));
             }
         }
         None
     }
 
+    /// Whether memory is left.
+    fn has_room(&self) -> bool {
+        self.store.bytes().saturating_add(self.open.bytes()) <= self.limits.room()
+    }
+
+    /// Whether the search can come to the cost of the best plan known before memory is full, if it goes on as it did while the number of its
+    /// states doubled last.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums of costs that fit, and less than what is limited by memory"
+    )]
+    fn is_hopeful(&self) -> bool {
+        let (Some(limit), [.., before, now]) = (&self.limit, &self.progress[..]) else { return true };
+        let (step, left) = (now.clone() + -before.clone(), limit.clone() + -now.clone());
+        if left <= N::zero() {
+            return true;
+        }
+        let bytes = self.store.bytes().saturating_add(self.open.bytes());
+        let doublings = self.limits.room().checked_div(bytes).map_or(0, usize::ilog2);
+        let enough = (0..=doublings).try_fold(N::zero(), |sum: N, _| sum.plus(&step));
+        enough.is_none_or(|enough| enough >= left)
+    }
+
+    /// The answer if nothing that is left can be better.
+    fn ended(&self) -> Found<N> {
+        match self.best_plan() {
+            plan if self.incomplete || self.greedy => Found::Unknown(plan),
+            Some(plan) => Found::Optimal(plan),
+            None => Found::None,
+        }
+    }
+
     fn best_plan(&self) -> Option<GroundPlan<N>> {
-        self.best.map(|goal| self.plan(goal))
+        self.best.map(|(goal, _)| self.plan(goal))
     }
 
     /// Adds all that can be reached from a node by one step. A node whose expansion is interrupted is not expanded, so that the
     /// search must end there.
-    #[expect(clippy::arithmetic_side_effects, reason = "steps are fewer than nodes")]
-    fn expand(&mut self, id: u32, steps: u32, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
-        let state = self.nodes[id as usize].state.clone();
-        let cost = self.nodes[id as usize].cost.clone();
-        let prepared = self.prepared;
-        for operator_id in prepared.index.applicable(self.task, &state) {
-            let operator = &self.task.operators[operator_id.index()];
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "steps are fewer than nodes, combinations are numbered"
+    )]
+    fn expand(&mut self, id: u32, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
+        let (task, prepared) = (self.task, self.prepared);
+        self.store.unpack(id, &mut self.state);
+        task.close(&mut self.state);
+        let cost = self.store.cost(id).clone();
+        let steps = self.store.origin(id).steps + 1;
+        for operator_id in prepared.index.applicable(task, &self.state) {
+            let operator = &task.operators[operator_id.index()];
             let sizes = operator.sizes();
-            for (index, (choice, step)) in prepared.choices[operator_id.index()].iter().enumerate() {
+            let first = prepared.numbers[operator_id.index()];
+            for ((choice, step), number) in prepared.choices[operator_id.index()].iter().zip(first..) {
                 pulse.beat()?;
-                if operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
-                    let parent = Some((id, operator_id, dense(index)));
-                    match (self.task.successor(operator, &state, choice), cost.plus(step)) {
-                        (Some(next), Some(cost)) => self.push(next, cost, steps + 1, parent),
+                if operator.condition.holds_numerically(&self.state.numbers, choice, &sizes) {
+                    self.next.clone_from(&self.state);
+                    let applied = operator.apply(&self.state, choice, &mut self.next);
+                    match (applied, cost.plus(step)) {
+                        (Some(()), Some(cost)) => self.push(cost, Origin { parent: id, step: number, steps }),
                         _ => self.incomplete = true,
                     }
                 }
@@ -280,96 +351,65 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         Ok(())
     }
 
-    fn push(&mut self, state: State<N>, cost: N, steps: u32, parent: Option<(u32, OperatorId, u32)>) {
-        let Some(estimate) = self.bounds.estimate(&state) else { return };
+    /// Adds the next state, whose derived variables have no values yet, unless it is no good.
+    fn push(&mut self, cost: N, origin: Origin) {
+        if self.is_beyond(&cost) {
+            return;
+        }
+        let Some(vacancy) = self.store.look_up(&self.next, &cost, origin.steps) else { return };
+        let Some(estimate) = self.bounds.estimate(&self.next) else { return };
         let Some(total) = cost.plus(&estimate).filter(N::is_moderate) else {
             self.incomplete = true;
             return;
         };
-        if self.limit.as_ref().is_some_and(|limit| total > *limit) {
+        let least = origin.steps.saturating_add(self.prepared.steps_at_least(&estimate));
+        if self.is_beyond(&total) || self.is_no_better(&total, least) {
             return;
         }
-        let id = dense(self.nodes.len());
-        match self.seen.entry(state.values[..self.task.basic].into()) {
-            Entry::Vacant(entry) => {
-                entry.insert(vec![id]);
-            }
-            Entry::Occupied(mut entry) => {
-                let (nodes, monotone) = (&mut self.nodes, self.prepared.monotone);
-                let at_least = |a: &[N], b: &[N]| {
-                    if monotone { a.iter().zip(b).all(|(a, b)| a >= b) } else { a == b }
-                };
-                let known = |id: &u32| &nodes[*id as usize];
-                let front = entry.get_mut();
-                if front.iter().any(|id| {
-                    (&known(id).cost, known(id).steps) <= (&cost, steps)
-                        && at_least(&known(id).state.numbers, &state.numbers)
-                }) {
-                    return;
-                }
-                front.retain(|id| {
-                    let node = &mut nodes[*id as usize];
-                    node.dominated = (&cost, steps) <= (&node.cost, node.steps)
-                        && at_least(&state.numbers, &node.state.numbers);
-                    !node.dominated
-                });
-                front.push(id);
-            }
+        let id = self.store.insert(&vacancy, origin);
+        if self.is_goal() {
+            self.best = Some((id, origin.steps));
+            self.limit = Some(cost);
         }
-        let improves = self.best.is_none() || self.limit.as_ref().is_none_or(|limit| cost < *limit);
-        if improves && self.task.is_goal(&state) {
-            self.best = Some(id);
-            self.limit = Some(cost.clone());
+        let key = if self.greedy {
+            (estimate, 0, 0)
+        } else {
+            (total, least, u32::MAX.saturating_sub(origin.steps))
+        };
+        self.open.push(key, id);
+    }
+
+    fn is_beyond(&self, cost: &N) -> bool {
+        self.limit.as_ref().is_some_and(|limit| cost > limit)
+    }
+
+    /// Whether the best plan so far is no worse than one with this cost and so many steps.
+    fn is_no_better(&self, cost: &N, steps: u32) -> bool {
+        let (Some((_, own)), Some(limit)) = (self.best, &self.limit) else { return false };
+        (limit, own) <= (cost, steps)
+    }
+
+    /// Whether the next state satisfies the goal.
+    fn is_goal(&mut self) -> bool {
+        let values = &self.next.values[..self.task.basic];
+        let is_basic = |fact: &&Fact| fact.variable.index() < values.len();
+        if !self.task.goal.facts.iter().filter(is_basic).all(|fact| fact.holds(values)) {
+            return false;
         }
-        self.nodes.push(Node { state, cost, steps, parent, dominated: false });
-        let priority = if self.greedy { estimate } else { total };
-        self.open.push(Reverse((priority, steps, id)));
+        self.task.close(&mut self.next);
+        self.task.is_goal(&self.next)
     }
 
     fn plan(&self, goal: u32) -> GroundPlan<N> {
         let mut steps = Vec::new();
         let mut at = goal;
-        while let Some((parent, operator, choice)) = self.nodes[at as usize].parent {
-            let choice = self.prepared.choices[operator.index()][choice as usize].0.clone();
-            steps.push(GroundStep { operator, choice });
+        while let Origin { parent, step, .. } = self.store.origin(at)
+            && parent != NONE
+        {
+            steps.push(self.prepared.step(step));
             at = parent;
         }
         steps.reverse();
-        GroundPlan { steps, cost: self.nodes[goal as usize].cost.clone() }
+        GroundPlan { steps, cost: self.store.cost(goal).clone() }
     }
-}
-
-/// Whether more of any numeric variable can only help: it enters conditions and effects with factors ≥ 0, and
-/// whether a derived variable holds that depends on numbers is asked only where it helps.
-pub(crate) fn is_monotone<N: TaskNumber>(task: &Task<N>) -> bool {
-    let conditions = task.operators.iter().map(|operator| &operator.condition).chain([&task.goal]);
-    let rules = || task.axioms.iter().flat_map(|layer| &layer.rules);
-    let conditions: Vec<_> = conditions.chain(rules().map(|rule| &rule.body)).collect();
-    let mut numeric = vec![false; task.variables.len()];
-    loop {
-        let depends = |rule: &&crate::task::Axiom<N>| {
-            let depends = |fact: &Fact| numeric[fact.variable.index()];
-            !numeric[rule.head.variable.index()]
-                && (rule.body.linears().next().is_some() || rule.body.facts.iter().any(depends))
-        };
-        let Some(rule) = rules().find(depends) else { break };
-        numeric[rule.head.variable.index()] = true;
-    }
-    let helps =
-        |fact: &Fact, positive: bool| !numeric[fact.variable.index()] || positive == (fact.value == 0);
-    let asked = conditions.iter().all(|condition| {
-        condition.facts.iter().all(|fact| helps(fact, true))
-            && condition.clauses.iter().flatten().all(|literal| helps(&literal.fact, literal.positive))
-    });
-    let conditional = task.operators.iter().flat_map(|operator| &operator.conditional);
-    let mut triggers = conditional.flat_map(|effect| &effect.condition);
-    if !asked || triggers.any(|literal| numeric[literal.fact.variable.index()]) {
-        return false;
-    }
-    let comparisons = conditions.into_iter().flat_map(Condition::linears);
-    let effects =
-        task.operators.iter().flat_map(|operator| &operator.numeric_effects).map(|effect| &effect.value);
-    comparisons
-        .chain(effects)
-        .all(|linear| linear.coefficients.iter().all(|(_, factor)| *factor >= N::zero()))
 }

@@ -1,4 +1,4 @@
-//! What can be done in a state: operators by what they require, and the designs worth choosing.
+//! The designs worth choosing for an operator.
 
 use std::collections::hash_map::Entry;
 
@@ -6,49 +6,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
+use crate::task::Operator;
 use crate::task::number::TaskNumber;
 use crate::task::quantity::{Quantity, SlotSet};
-use crate::task::{Operator, OperatorId, State, Task};
-
-/// Operators by that fact of their condition whose variable has the most values.
-pub(crate) struct OperatorIndex {
-    by_fact: FxHashMap<(u32, u32), Vec<OperatorId>>,
-    always: Vec<OperatorId>,
-}
-
-impl OperatorIndex {
-    pub(crate) fn new<N>(task: &Task<N>) -> Self {
-        Self::over(task, OperatorId::all(task.operators.len()))
-    }
-
-    /// An index of some operators, ascending.
-    pub(crate) fn over<N>(task: &Task<N>, operators: impl Iterator<Item = OperatorId>) -> Self {
-        let mut index = Self { by_fact: FxHashMap::default(), always: Vec::new() };
-        for id in operators {
-            let widest = task.operators[id.index()]
-                .condition
-                .facts
-                .iter()
-                .max_by_key(|fact| task.variables[fact.variable.index()].values.len());
-            match widest {
-                Some(fact) => index.by_fact.entry((fact.variable.0, fact.value)).or_default().push(id),
-                None => index.always.push(id),
-            }
-        }
-        index
-    }
-
-    /// The operators whose propositional condition holds, ascending.
-    pub(crate) fn applicable<N>(&self, task: &Task<N>, state: &State<N>) -> Vec<OperatorId> {
-        let mut found = self.always.clone();
-        for (variable, value) in state.values.iter().enumerate() {
-            found.extend(self.by_fact.get(&(dense(variable), *value)).into_iter().flatten());
-        }
-        found.retain(|id| task.operators[id.index()].condition.holds_propositionally(&state.values));
-        found.sort_unstable();
-        found
-    }
-}
 
 /// As many combinations of designs are looked at for one operator at most…
 const COMBINATION_LIMIT: usize = 2_000_000;

@@ -23,12 +23,15 @@ use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::Int;
 use crate::plan::ground::{GroundPlan, GroundStep};
 use crate::plan::resolve;
-use crate::search::astar::is_monotone;
-use crate::search::successors::{OperatorIndex, undominated};
+use crate::search::directions::is_monotone;
+use crate::search::generator::OperatorIndex;
+use crate::search::successors::undominated;
 use crate::task::{OperatorId, State, Task};
 
 /// How many labels are made at most.
 const LABEL_LIMIT: usize = 100_000;
+/// How many pairs of labels are compared at most.
+const PAIR_LIMIT: usize = 50_000_000;
 
 /// Where a plan can have come to.
 #[derive(Debug, Clone)]
@@ -42,8 +45,10 @@ struct Label {
 }
 
 impl Label {
-    fn place(&self, task: &Task) -> Place {
-        (self.state.values[..task.basic].into(), self.designs.clone())
+    /// Where numbers have to be equal, they are part of the place.
+    fn place(&self, task: &Task, monotone: bool) -> Place {
+        let numbers = if monotone { Vec::new() } else { self.state.numbers.clone() };
+        (self.state.values[..task.basic].into(), self.designs.clone(), numbers)
     }
 }
 
@@ -64,8 +69,8 @@ struct Choice {
 /// An operator's combinations of designs in order; none if there are too many.
 type Choices = Option<Vec<Choice>>;
 
-/// Where a label has come to: its values and designs.
-type Place = (Box<[u32]>, Vec<Option<ObjectId>>);
+/// Where a label has come to: its values, designs, and numbers.
+type Place = (Box<[u32]>, Vec<Option<ObjectId>>, Vec<Int>);
 
 /// Labels, and their positions by where they have come to.
 #[derive(Default)]
@@ -156,6 +161,7 @@ struct Ties<'a> {
     cost: Int,
     steps: usize,
     made: Cell<usize>,
+    compared: Cell<usize>,
     pulse: RefCell<Pulse<'a>>,
 }
 
@@ -194,6 +200,7 @@ pub(crate) fn choose_from(
         cost: plan.cost,
         steps: plan.steps.len(),
         made: Cell::new(0),
+        compared: Cell::new(0),
         pulse: RefCell::new(limits.pulse()),
     };
     let start = Label { state: beginning.state.clone(), designs, cost: 0, steps: 0, changes: (0, 0) };
@@ -341,7 +348,8 @@ impl Ties<'_> {
     fn is_beaten(&self, labels: &Labels, next: &Label, strictly: bool) -> bool {
         let is_better =
             |known: &Label| (known.cost, known.steps, known.changes) != (next.cost, next.steps, next.changes);
-        labels.fronts.get(&next.place(self.task)).is_some_and(|front| {
+        labels.fronts.get(&next.place(self.task, self.prepared.monotone)).is_some_and(|front| {
+            self.compared.set(self.compared.get().saturating_add(front.len()));
             let mut known = front.iter().map(|position| &labels.all[*position]);
             known.any(|known| self.no_worse(known, next) && (!strictly || is_better(known)))
         })
@@ -355,11 +363,15 @@ impl Ties<'_> {
     /// Keeps a label; none if there are too many.
     #[expect(clippy::arithmetic_side_effects, reason = "labels are counted up to their limit")]
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
-        labels.fronts.entry(label.place(self.task)).or_default().push(labels.all.len());
+        labels
+            .fronts
+            .entry(label.place(self.task, self.prepared.monotone))
+            .or_default()
+            .push(labels.all.len());
         labels.all.push(label);
         let made = self.made.get() + 1;
         self.made.set(made);
-        (made < LABEL_LIMIT).then_some(())
+        (made < LABEL_LIMIT && self.compared.get() < PAIR_LIMIT).then_some(())
     }
 
     fn no_worse(&self, a: &Label, b: &Label) -> bool {

@@ -336,6 +336,31 @@ impl<N: TaskNumber> Operator<N> {
         self.condition.holds_propositionally(&state.values)
             && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())
     }
+
+    /// Changes what is equal to a state to the state after this operator, but for its derived variables.
+    pub(crate) fn apply(&self, state: &State<N>, choice: &[u32], next: &mut State<N>) -> Option<()> {
+        for effect in &self.effects {
+            next.values[effect.variable.index()] = effect.value;
+        }
+        for conditional in &self.conditional {
+            if conditional.condition.iter().all(|literal| literal.holds(&state.values)) {
+                for effect in &conditional.effects {
+                    next.values[effect.variable.index()] = effect.value;
+                }
+            }
+        }
+        if !self.numeric_effects.is_empty() {
+            let sizes = self.sizes();
+            for effect in &self.numeric_effects {
+                let value = effect.value.value(&state.numbers, choice, &sizes)?;
+                if !value.is_moderate() {
+                    return None;
+                }
+                next.numbers[effect.variable.index()] = value;
+            }
+        }
+        Some(())
+    }
 }
 
 impl Task {
@@ -368,26 +393,7 @@ impl<N: TaskNumber> Task<N> {
         choice: &[u32],
     ) -> Option<State<N>> {
         let mut next = state.clone();
-        for effect in &operator.effects {
-            next.values[effect.variable.index()] = effect.value;
-        }
-        for conditional in &operator.conditional {
-            if conditional.condition.iter().all(|literal| literal.holds(&state.values)) {
-                for effect in &conditional.effects {
-                    next.values[effect.variable.index()] = effect.value;
-                }
-            }
-        }
-        if !operator.numeric_effects.is_empty() {
-            let sizes = operator.sizes();
-            for effect in &operator.numeric_effects {
-                let value = effect.value.value(&state.numbers, choice, &sizes)?;
-                if !value.is_moderate() {
-                    return None;
-                }
-                next.numbers[effect.variable.index()] = value;
-            }
-        }
+        operator.apply(state, choice, &mut next)?;
         self.close(&mut next);
         Some(next)
     }

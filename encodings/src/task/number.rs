@@ -36,6 +36,9 @@ pub(crate) trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Defaul
     /// Whether a fluent or a sum of costs may become as large as this.
     fn is_moderate(&self) -> bool;
 
+    /// How often a number above 0 has to be added up at least to come to this one; 0 if that is not known.
+    fn times_at_least(&self, part: &Self) -> u32;
+
     /// Whether all sums over the numbers of a quantity fit: those of its tables' greatest magnitudes and its constant do.
     fn fits(quantity: &Quantity<Self>) -> bool;
 
@@ -81,6 +84,11 @@ impl TaskNumber for Int {
         (-GROWTH_LIMIT..=GROWTH_LIMIT).contains(self)
     }
 
+    fn times_at_least(&self, part: &Self) -> u32 {
+        let less_one = self.saturating_sub(1).checked_div_euclid(*part).unwrap_or(-1);
+        u32::try_from(less_one.saturating_add(1)).unwrap_or(0)
+    }
+
     fn fits(quantity: &Quantity<Self>) -> bool {
         let greatest = |table: &Table<Int>| table.values.iter().map(|value| value.unsigned_abs()).max();
         let mut all = quantity.tables.iter().filter_map(greatest);
@@ -123,6 +131,10 @@ impl TaskNumber for Rational {
 
     fn is_moderate(&self) -> bool {
         self.bits() <= BIT_LIMIT
+    }
+
+    fn times_at_least(&self, part: &Self) -> u32 {
+        self.to_int().zip(part.to_int()).map_or(0, |(whole, part)| whole.times_at_least(&part))
     }
 
     fn fits(_: &Quantity<Self>) -> bool {
