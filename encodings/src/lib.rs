@@ -34,6 +34,7 @@ mod ground;
 mod bounds;
 mod context;
 mod plan;
+mod satisfice;
 mod search;
 
 mod encode;
@@ -62,7 +63,7 @@ pub use exact::{ExactTask, ground_exact, optimize_exact};
 pub use ground::{Config as GroundConfig, ground};
 pub use limits::Limits;
 pub use optimize::{Config, Engine, Front, Point, Strategy, lexicographic, optimize, pareto};
-pub use plan::solution::{Improvement, Proof, Solution, Statistics, Status, Unbounded};
+pub use plan::solution::{Improvement, Part, Proof, Solution, Statistics, Status, Unbounded};
 pub use plan::transitions::{Situation, Transition};
 pub use plan::{Exact, Plan, Step};
 pub use replan::{First, Progress, Query, Replanned, Replanner};

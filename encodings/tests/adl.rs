@@ -10,24 +10,29 @@ use metaplan_encodings::{Config, Engine, GroundConfig, Limits, Solution, Status,
 use pddl::{Source, read};
 use random::Random;
 
-/// Solves a task with the quick search, or with the SAT solver alone.
-fn solve(domain: &str, problem: &str, engine: Engine) -> Solution {
+/// Engines, each with the states that the exact search stores before others have their turn.
+const WAYS: [(Engine, usize); 5] =
+    [(Engine::Auto, 20_000), (Engine::Auto, 30), (Engine::Auto, 1), (Engine::Search, 1), (Engine::Sat, 0)];
+
+/// Solves a task in one of the ways.
+fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solution {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
     let task = ground(&domain, &problem, &GroundConfig::default())
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain:?}"));
     let limits = Limits::none();
-    optimize(&task, &Config { horizon: None, engine, limits, ..Config::default() }, &mut |_| {})
+    let config = Config { engine, head_start, limits, ..Config::default() };
+    optimize(&task, &config, &mut |_| {})
 }
 
-/// Both ways find the cost; none stands for "no plan exists".
+/// All ways find the cost; none stands for "no plan exists".
 fn check(name: &str, domain: &str, problem: &str, expected: Option<&str>) {
-    for engine in [Engine::Auto, Engine::Sat] {
-        let solution = solve(domain, problem, engine);
+    for (engine, head_start) in WAYS {
+        let solution = solve(domain, problem, engine, head_start);
         let found = solution.plan.map(|plan| plan.cost.to_string());
-        assert_eq!(found.as_deref(), expected, "{name}, {engine:?}");
+        assert_eq!(found.as_deref(), expected, "{name}, {engine:?}, {head_start}");
         let status = if expected.is_some() { Status::Optimal } else { Status::Unsolvable };
-        assert_eq!(solution.status, status, "{name}, {engine:?}");
+        assert_eq!(solution.status, status, "{name}, {engine:?}, {head_start}");
     }
 }
 
@@ -327,6 +332,13 @@ fn agree(seeds: std::ops::Range<u64>) {
         let (quick, sat) = (run(Engine::Auto), run(Engine::Sat));
         let cost = |solution: &Solution| solution.plan.as_ref().map(|plan| plan.cost.to_string());
         assert_eq!(cost(&quick), cost(&sat), "seed {seed}\n{domain}\n{problem}\n{quick:?}\n{sat:?}");
+        let known = optimize(&task, &Config { head_start: 1_000_000, ..Config::default() }, &mut |_| {});
+        for head_start in [1, 10, 100] {
+            let config = Config { engine: Engine::Search, head_start, ..Config::default() };
+            let found = optimize(&task, &config, &mut |_| {});
+            let context = || format!("seed {seed}, {head_start}\n{domain}\n{problem}\n{known:?}\n{found:?}");
+            assert_eq!((found.status, cost(&found)), (known.status, cost(&known)), "{}", context());
+        }
         solved += usize::from(cost(&quick).is_some());
         longest = longest.max(quick.plan.map_or(0, |plan| plan.steps.len()));
     }

@@ -156,7 +156,7 @@ fn configuration(arguments: &Arguments, limits: Limits) -> Config {
     let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
     let strategy = arguments.strategy.into();
     let (engine, confirm) = (arguments.engine.into(), arguments.confirm);
-    Config { horizon, engine, confirm, semantics, strategy, backend, limits }
+    Config { horizon, engine, confirm, semantics, strategy, backend, limits, ..Config::default() }
 }
 
 impl Arguments {

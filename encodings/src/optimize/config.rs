@@ -36,6 +36,9 @@ pub struct Config {
     pub horizon: Option<usize>,
     /// What finds plans, and proves that there is none better.
     pub engine: Engine,
+    /// How many states A\* stores before the other parts of the planner have their turn. What they may do in the first round grows
+    /// with it.
+    pub head_start: usize,
     /// Whether the SAT solver has to confirm what is proved without it, however long it takes; otherwise it gets about as
     /// long as a small proof took.
     pub confirm: bool,
@@ -55,6 +58,7 @@ impl Default for Config {
         Self {
             horizon: None,
             engine: Engine::default(),
+            head_start: 20_000,
             confirm: false,
             semantics: None,
             strategy: Strategy::default(),

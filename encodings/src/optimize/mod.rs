@@ -12,6 +12,7 @@ mod config;
 mod cores;
 mod first;
 mod objectives;
+mod portfolio;
 mod run;
 mod solve;
 #[cfg(test)]

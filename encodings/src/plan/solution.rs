@@ -65,6 +65,17 @@ pub enum Unbounded {
     Suspected,
 }
 
+/// A part of the planner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// A\* with lower bounds.
+    Search,
+    /// Search by relaxed plans and landmarks, for a plan soon.
+    Satisficing,
+    /// The SAT solver.
+    Sat,
+}
+
 /// Figures of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Statistics {
@@ -86,7 +97,13 @@ pub struct Statistics {
     pub contradiction: Option<String>,
     /// The program by whose word alone a formula has no model, if the answer rests on that: its refutation was not checked.
     pub unchecked: Option<String>,
-    /// Time for bounds and the quick search.
+    /// What found the plan.
+    pub found_by: Option<Part>,
+    /// States that the search for a plan soon has looked at.
+    pub evaluated: u64,
+    /// How often that search has begun anew.
+    pub restarts: usize,
+    /// Time for bounds and searches.
     pub search: Duration,
     /// Time for building formulas.
     pub encode: Duration,

@@ -109,7 +109,8 @@ pub(crate) struct Space<'a, N, E> {
 /// What comes first: the sum of cost and estimate, the steps that this takes at least, and then what is further.
 type Key<N> = (N, u32, u32);
 
-struct Search<'a, N, E> {
+/// A search that can be gone on with.
+pub(crate) struct Search<'a, N, E> {
     task: &'a Task<N>,
     limits: &'a Limits,
     bounds: &'a E,
@@ -124,6 +125,8 @@ struct Search<'a, N, E> {
     best: Option<(u32, u32)>,
     /// What a known plan costs, if there is one: nothing dearer is looked at.
     limit: Option<N>,
+    /// Whether that plan is none of this search.
+    is_told: bool,
     /// How far the search was whenever the number of its states had doubled.
     progress: Vec<N>,
     /// The state that is expanded, and the one that it leads to.
@@ -228,7 +231,7 @@ pub(crate) fn closed_labels<N: TaskNumber>(
 }
 
 impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
-    fn new(space: &Space<'a, N, E>, initial: &State<N>, greedy: bool, limit: Option<N>) -> Self {
+    pub(crate) fn new(space: &Space<'a, N, E>, initial: &State<N>, greedy: bool, limit: Option<N>) -> Self {
         let Space { context: Context { task, limits }, bounds, prepared } = *space;
         let mut search = Search {
             task,
@@ -241,6 +244,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             greedy,
             best: None,
             limit,
+            is_told: false,
             progress: Vec::new(),
             state: initial.clone(),
             next: initial.clone(),
@@ -249,8 +253,17 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         search
     }
 
+    /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
+    pub(crate) fn know(&mut self, cost: N) {
+        if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
+            self.limit = Some(cost);
+            self.best = None;
+            self.is_told = true;
+        }
+    }
+
     /// None if there are more states than `most` before anything is known; it may be called again.
-    fn run(&mut self, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
+    pub(crate) fn run(&mut self, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
         let mut pulse = self.limits.pulse();
         let mut told: Option<(Option<N>, N)> = None;
         while self.store.len() <= most && self.has_room() {
@@ -270,6 +283,9 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             if !self.incomplete && !told.as_ref().is_some_and(is_told) {
                 hear(self.limit.as_ref(), &total);
                 told = Some((self.limit.clone(), total.clone()));
+            }
+            if self.is_told && self.limit.as_ref() == Some(&total) {
+                return Some(Found::Unknown(None));
             }
             if self.store.len() >> self.progress.len() >= STATE_LIMIT / 2 {
                 self.progress.push(total);
@@ -316,7 +332,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         }
     }
 
-    fn best_plan(&self) -> Option<GroundPlan<N>> {
+    pub(crate) fn best_plan(&self) -> Option<GroundPlan<N>> {
         self.best.map(|(goal, _)| self.plan(goal))
     }
 
@@ -370,6 +386,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         if self.is_goal() {
             self.best = Some((id, origin.steps));
             self.limit = Some(cost);
+            self.is_told = false;
         }
         let key = if self.greedy {
             (estimate, 0, 0)

@@ -10,6 +10,6 @@ pub(crate) mod successors;
 pub(crate) mod ties;
 
 pub(crate) use astar::{
-    Estimate, Found, Prepared, STATE_LIMIT, Space, closed_labels, search, search_from, search_states,
+    Estimate, Found, Prepared, STATE_LIMIT, Search, Space, closed_labels, search, search_from, search_states,
 };
 pub(crate) use directions::is_monotone;

@@ -1,7 +1,7 @@
 //! What numbers of a ground task are: integers that are scaled, or rationals.
 
 use num_bigint::BigInt;
-use num_traits::Signed;
+use num_traits::{Signed, ToPrimitive as _};
 
 use crate::number::{GROWTH_LIMIT, Int, LIMIT, Rational};
 use crate::task::quantity::{Number, Quantity, Table};
@@ -23,6 +23,9 @@ pub(crate) trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Defaul
 
     /// A rational times a factor; none if that is no number of this kind.
     fn from_rational(number: &Rational, scale: Int) -> Option<Self>;
+
+    /// About the number, for estimates.
+    fn approximate(&self) -> f64;
 
     /// The number as a rational.
     fn to_rational(&self) -> Rational;
@@ -66,6 +69,10 @@ impl TaskNumber for Int {
     fn from_rational(number: &Rational, scale: Int) -> Option<Self> {
         let scaled = (number.clone() * &Rational::from_integer(scale)).to_int();
         scaled.filter(|integer| (-LIMIT..LIMIT).contains(integer))
+    }
+
+    fn approximate(&self) -> f64 {
+        *self as f64
     }
 
     fn to_rational(&self) -> Rational {
@@ -115,6 +122,10 @@ impl TaskNumber for Rational {
 
     fn from_rational(number: &Rational, scale: Int) -> Option<Self> {
         Some(number.clone() * &Self::from_integer(scale))
+    }
+
+    fn approximate(&self) -> f64 {
+        self.to_big().to_f64().unwrap_or(f64::MAX)
     }
 
     fn to_rational(&self) -> Rational {

@@ -23,6 +23,7 @@ fn config(rng: &mut Rng) -> Config {
     Config {
         engine: one(rng, &[Engine::Auto, Engine::Sat, Engine::Search]),
         confirm: rng.bool(),
+        head_start: one(rng, &[1, 10, 100, 20_000]),
         semantics: (!super::draw::once_in(rng, 4)).then(|| one(rng, &semantics)),
         strategy: one(rng, &[Strategy::Auto, Strategy::Tighten, Strategy::Cores]),
         backend: if rng.bool() { Backend::Batsat } else { Backend::Varisat },
@@ -40,8 +41,13 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
         let config = config(rng);
         let solution = encodings::optimize(&task, &config, &mut |_| {});
         let said = format!(
-            "{:?} {:?} {:?} {:?} confirm: {}",
-            config.semantics, config.strategy, config.backend, config.engine, config.confirm
+            "{:?} {:?} {:?} {:?} confirm: {} head start: {}",
+            config.semantics,
+            config.strategy,
+            config.backend,
+            config.engine,
+            config.confirm,
+            config.head_start
         );
         tally.count(format!("variant: {:?}", solution.status));
         check(puzzle, case, &solution, &said, tally);

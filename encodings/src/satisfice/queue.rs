@@ -1,0 +1,50 @@
+//! A queue of numbers by small costs, the cheapest first.
+
+/// Costs from here on are kept together, in no order but that of their costs once it is their turn.
+const BUCKETS: usize = 1 << 16;
+
+/// Numbers in buckets by cost. What is put in while it is emptied costs no less than what was taken out last.
+#[derive(Debug, Default)]
+pub(super) struct Queue {
+    buckets: Vec<Vec<u32>>,
+    at: usize,
+    /// How many are in buckets.
+    count: usize,
+    dear: std::collections::BinaryHeap<std::cmp::Reverse<(u32, u32)>>,
+}
+
+impl Queue {
+    pub(super) fn clear(&mut self) {
+        for bucket in &mut self.buckets {
+            bucket.clear();
+        }
+        self.dear.clear();
+        (self.at, self.count) = (0, 0);
+    }
+
+    pub(super) fn push(&mut self, cost: u32, item: u32) {
+        let place = cost as usize;
+        if place >= BUCKETS {
+            self.dear.push(std::cmp::Reverse((cost, item)));
+            return;
+        }
+        if self.buckets.len() <= place {
+            self.buckets.resize_with(place.saturating_add(1), Vec::new);
+        }
+        self.buckets[place].push(item);
+        self.count = self.count.saturating_add(1);
+    }
+
+    pub(super) fn pop(&mut self) -> Option<(u32, u32)> {
+        if self.count == 0 {
+            return self.dear.pop().map(|std::cmp::Reverse(least)| least);
+        }
+        loop {
+            if let Some(item) = self.buckets[self.at].pop() {
+                self.count = self.count.saturating_sub(1);
+                return Some((crate::number::dense(self.at), item));
+            }
+            self.at = self.at.saturating_add(1);
+        }
+    }
+}
