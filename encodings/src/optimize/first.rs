@@ -4,15 +4,12 @@ use std::time::Instant;
 
 use crate::bounds::Bounds;
 use crate::encode::Semantics;
+use crate::optimize::allowance::{Allowance, FORMULA_LIMIT};
 use crate::optimize::run::Run;
-use crate::optimize::solve::Allowance;
 use crate::plan::ground::GroundPlan;
 use crate::plan::solution::{Proof, Solution, Status};
 use crate::sat::Answer;
 use crate::task::Task;
-
-/// Formulas with more operator variables than this are not built.
-const FORMULA_LIMIT: usize = 30_000_000;
 
 /// Longer and longer formulas without a cost limit, several of them open at a time [1].
 ///

@@ -6,13 +6,16 @@
 //! one, by one of two strategies. Only then is the answer called optimal. Where no step bound exists (free cycles), the search's own
 //! exhaustion may serve; otherwise the answer is a plan that is not proved optimal.
 
+mod allowance;
 mod bounded;
 mod cheapest;
 mod config;
+mod confirm;
 mod cores;
 mod first;
 mod objectives;
 mod portfolio;
+mod prover;
 mod run;
 mod solve;
 #[cfg(test)]

@@ -8,10 +8,12 @@ use std::time::{Duration, Instant};
 
 use crate::bounds::Bounds;
 use crate::number::Int;
+use crate::optimize::allowance::Allowance;
 use crate::optimize::config::Engine;
+use crate::optimize::confirm::{conclude, proved_by_bound, proved_by_search};
 use crate::optimize::first::{First, FirstPlan};
+use crate::optimize::prover::{Prover, Proving};
 use crate::optimize::run::{Best, Run};
-use crate::optimize::solve::{Allowance, Prover, Proving, conclude, proved_by_bound, proved_by_search};
 use crate::plan::ground::GroundPlan;
 use crate::plan::solution::{Part, Proof, Solution, Status};
 use crate::satisfice::{Advance, Satisficer};

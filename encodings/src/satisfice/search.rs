@@ -9,7 +9,7 @@
 
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::plan::ground::{GroundPlan, GroundStep, cost};
-use crate::satisfice::Known;
+use crate::satisfice::known::Known;
 use crate::satisfice::open::Open;
 use crate::satisfice::store::Store;
 use crate::task::number::TaskNumber;
