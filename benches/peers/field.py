@@ -20,6 +20,7 @@ import argparse
 import csv
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -112,7 +113,8 @@ def last_words(output, status):
     lines = [line.strip() for line in output.splitlines() if line.strip()]
     if status == "limit" or not lines:
         return ""
-    told = [line for line in lines if "rror" in line or "support" in line or "xception" in line]
+    told = ([line for line in lines if '"message"' in line]
+            or [line for line in lines if "rror" in line or "support" in line or "xception" in line])
     return (told or lines)[-1][:160]
 
 
@@ -170,6 +172,8 @@ def main():
     elif options.planners != ["metaplan"]:
         parser.error("--venv is needed")
     options.program = options.program.absolute()
+    # Stopped, it stops its planner, too.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     measure(options)
     print(report.table(report.read([options.csv])))
 

@@ -145,9 +145,9 @@ def lpg_answer(output, code, place):
         return Answer("plan", float(cost.group(1)) if cost else None, [f"{start}: {action} [{length}]" for start, action, length in steps])
     if re.search(r"not supported|syntax error|parse error|unknown", output, re.IGNORECASE):
         return Answer("refused")
-    if re.search(r"goals can be simplified to false|no solution exists|Unsolvable", output, re.IGNORECASE):
+    if re.search(r"can be simplified to false|no solution exists|unsolvable", output, re.IGNORECASE):
         return Answer("unsolvable")
-    return Answer("limit" if re.search(r"max.*time|no solution|not found|timeout|increase", output, re.IGNORECASE) else "error")
+    return Answer("limit" if re.search(r"search limit exceeded|no solution|max.*time", output, re.IGNORECASE) else "error")
 
 
 def unified_answer(output, code, _=None):

@@ -31,11 +31,28 @@ def run(command, directory, seconds, megabytes, core=None, ask=False, patience=P
     process = subprocess.Popen(command, cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                                errors="replace", start_new_session=True,
                                preexec_fn=lambda: limit(command, hard, megabytes))
+    try:
+        output, asked, killed = wait(process, started, seconds, hard, patience, ask)
+    finally:
+        # Also where this program is stopped.
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+    wall = time.monotonic() - started
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    # Who is stopped by the limit has used a little less than it, as far as the parent is told.
+    late = asked or killed or cpu >= 0.9 * hard
+    # The kernel tells the largest child so far only.
+    peak = round(after.ru_maxrss / 1024) if after.ru_maxrss > before.ru_maxrss else ""
+    return Run(wall, cpu, peak, 124 if killed else process.returncode, output, late)
+
+
+def wait(process, started, seconds, hard, patience, ask):
+    """A process's output, whether it was asked to end, and whether it was killed."""
     asked, killed = False, False
     while True:
         try:
-            output, _ = process.communicate(timeout=0.2)
-            break
+            return process.communicate(timeout=0.2)[0], asked, killed
         except subprocess.TimeoutExpired:
             if killed:
                 continue
@@ -46,14 +63,6 @@ def run(command, directory, seconds, megabytes, core=None, ask=False, patience=P
             elif ask and not asked and (spent > seconds or passed > patience * seconds):
                 asked = True
                 os.kill(process.pid, signal.SIGINT)
-    wall = time.monotonic() - started
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    # Who is stopped by the limit has used a little less than it, as far as the parent is told.
-    late = asked or killed or cpu >= 0.9 * hard
-    # The kernel tells the largest child so far only.
-    peak = round(after.ru_maxrss / 1024) if after.ru_maxrss > before.ru_maxrss else ""
-    return Run(wall, cpu, peak, 124 if killed else process.returncode, output, late)
 
 
 def used(group):

@@ -62,7 +62,9 @@ class Outputs(unittest.TestCase):
             Path(place, "plan_1.SOL").write_text("; MakeSpan 91.00\n\n0.0002:   (WALK DRIVER2 S2 P1-2) [20.0000])\n")
             self.assertEqual(planners.lpg_answer("", 0, place), ("plan", 91.0, ["0.0002: (WALK DRIVER2 S2 P1-2) [20.0000]"], None))
         with tempfile.TemporaryDirectory() as place:
-            self.assertEqual(planners.lpg_answer("Duration inequalities are not supported by this version", 0, place).status, "refused")
+            ends = {"Duration inequalities are not supported by this version": "refused", "...... search limit exceeded.": "limit",
+                    "ff: goal can be simplified to FALSE. No plan will solve it": "unsolvable"}
+            self.assertEqual({told: planners.lpg_answer(told, 0, place).status for told in ends}, ends)
 
     def test_unified(self):
         told = "; status SOLVED_SATISFICING\n0: (light_match match2)[5]\n0.01: (mend_fuse fuse1 match2)[4.5]\n"
