@@ -25,6 +25,7 @@ mod error;
 mod limits;
 mod number;
 
+mod compile;
 mod lifted;
 mod normalize;
 mod task;

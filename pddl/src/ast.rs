@@ -126,6 +126,8 @@ pub struct Domain {
     pub functions: Vec<Declaration>,
     /// `:derived` axioms, in the order of the file.
     pub derived: Vec<Derived>,
+    /// `:constraints`.
+    pub constraints: Vec<Constraint>,
     /// `:action` and `:durative-action`, in the order of the file.
     pub actions: Vec<Action>,
 }
@@ -159,8 +161,69 @@ pub struct Action {
     pub parameters: Vec<TypedName>,
     /// What it needs and does.
     pub body: ActionBody,
+    /// The preferences among its conditions.
+    pub preferences: Vec<Preference>,
     /// The whole schema.
     pub span: Span,
+}
+
+/// `(preference NAME CONDITION)` among the conditions of an action: that the condition does not hold is counted, and no more.
+#[derive(Debug, Clone)]
+pub struct Preference {
+    /// The variables of the quantifiers that it stands below; each of their instances counts by itself.
+    pub variables: Vec<TypedName>,
+    /// Its name; others may have the same one.
+    pub name: Identifier,
+    /// When it should hold; `AtStart` in an instantaneous action.
+    pub time: ConditionTime,
+    /// What should hold.
+    pub condition: Condition,
+    /// The whole preference.
+    pub span: Span,
+}
+
+/// A constraint on the trajectory of a plan: on all its states, rather than on the last one.
+#[derive(Debug, Clone)]
+pub struct Constraint {
+    /// The variables of the quantifiers that it stands below; as a preference, each of their instances counts by itself.
+    pub variables: Vec<TypedName>,
+    /// The name, if it is a preference: the number of its instances that are violated is `(is-violated NAME)`. Others may have
+    /// the same name. A constraint without one has to hold.
+    pub preference: Option<Identifier>,
+    /// What it says. A preference in the goal is about the last state.
+    pub trajectory: Trajectory,
+    /// The whole constraint.
+    pub span: Span,
+}
+
+/// What a constraint says of the states that a plan goes through (A. Gerevini, P. Haslum, D. Long, A. Saetti, Y. Dimopoulos:
+/// Deterministic planning in the fifth international planning competition: PDDL3, Artificial Intelligence 173, 2009).
+#[derive(Debug, Clone)]
+pub enum Trajectory {
+    /// `(and …)`.
+    And(Vec<Trajectory>),
+    /// `(forall (…) …)`.
+    ForAll(Vec<TypedName>, Box<Trajectory>),
+    /// `(at end A)`: A in the last state.
+    AtEnd(Condition),
+    /// `(always A)`: A in every state.
+    Always(Condition),
+    /// `(sometime A)`: A in some state.
+    Sometime(Condition),
+    /// `(at-most-once A)`: the states with A, if any, follow each other.
+    AtMostOnce(Condition),
+    /// `(sometime-after A B)`: B in every state with A, or later.
+    SometimeAfter(Condition, Condition),
+    /// `(sometime-before A B)`: B before every state with A.
+    SometimeBefore(Condition, Condition),
+    /// `(within T A)`: A in a state that is reached at time T at the latest.
+    Within(BigRational, Condition),
+    /// `(always-within T A B)`: B in every state with A, or T later at most.
+    AlwaysWithin(BigRational, Condition, Condition),
+    /// `(hold-during T U A)`: A from time T on until time U.
+    HoldDuring(BigRational, BigRational, Condition),
+    /// `(hold-after T A)`: A from time T on.
+    HoldAfter(BigRational, Condition),
 }
 
 /// What an action needs and does.
@@ -281,7 +344,7 @@ pub enum Comparison {
 pub enum Expression {
     /// A number, exactly as written.
     Number(BigRational, Span),
-    /// A numeric function.
+    /// A numeric function. In a metric, also `(is-violated NAME)`, whose argument is the name of a preference.
     Fluent(Atom),
     /// `?duration`, inside durative actions.
     Duration(Span),
@@ -349,8 +412,10 @@ pub struct Problem {
     pub objects: Vec<TypedName>,
     /// `:init`.
     pub init: Vec<InitialElement>,
-    /// `:goal`.
+    /// `:goal`, without its preferences.
     pub goal: Condition,
+    /// `:constraints`, and the preferences of the goal.
+    pub constraints: Vec<Constraint>,
     /// `:metric`.
     pub metric: Option<Metric>,
 }

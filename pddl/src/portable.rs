@@ -6,8 +6,8 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{
-    ActionBody, Atom, Comparison, Condition, Declaration, Domain, Effect, EffectTime, Expression, Identifier,
-    InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
+    ActionBody, Atom, Comparison, Condition, Constraint, Declaration, Domain, Effect, EffectTime, Expression,
+    Identifier, InitialElement, Name, Problem, Span, Term, Trajectory, TypeExpression, TypedName,
 };
 use super::types::TypeHierarchy;
 
@@ -155,6 +155,8 @@ fn require(domain: &mut Domain, problem: &Problem) {
     needed.insert("strips");
     walk(domain, problem, &mut |part| needed.extend(part.needs()));
     let mut insert = |flag, is_used: bool| is_used && needed.insert(flag);
+    let soft = domain.constraints.iter().chain(&problem.constraints).any(|own| own.preference.is_some());
+    insert("preferences", soft);
     insert("typing", !domain.types.is_empty());
     insert("derived-predicates", !domain.derived.is_empty());
     let is_timed = |element: &InitialElement| matches!(element, InitialElement::Timed(..));
@@ -187,11 +189,19 @@ enum Part<'t> {
     /// A function in an expression or as the target of an effect.
     Function(&'t Atom),
     Duration(Comparison, EffectTime),
+    Constraint(&'t Constraint),
+    /// A preference of an action.
+    Preference,
 }
 
 impl Part<'_> {
     fn needs(self) -> Option<&'static str> {
         match self {
+            Self::Preference => Some("preferences"),
+            Self::Constraint(Constraint { preference, trajectory, .. }) => match trajectory {
+                Trajectory::AtEnd(_) if preference.is_some() => Some("preferences"),
+                _ => Some("constraints"),
+            },
             Self::Condition(condition) => match condition {
                 Condition::And(_) | Condition::Atom(_) => None,
                 Condition::Or(_) | Condition::Imply(..) => Some("disjunctive-preconditions"),
@@ -225,16 +235,22 @@ type Found<'f> = &'f mut dyn FnMut(Part<'_>);
 fn walk(domain: &Domain, problem: &Problem, found: Found<'_>) {
     walk_domain(domain, found);
     walk_condition(&problem.goal, found);
+    walk_constraints(&problem.constraints, found);
     if let Some(metric) = &problem.metric {
         walk_expression(&metric.expression, found);
     }
 }
 
 fn walk_domain(domain: &Domain, found: Found<'_>) {
+    walk_constraints(&domain.constraints, found);
     for axiom in &domain.derived {
         walk_condition(&axiom.condition, found);
     }
     for action in &domain.actions {
+        for preference in &action.preferences {
+            found(Part::Preference);
+            walk_condition(&preference.condition, found);
+        }
         match &action.body {
             ActionBody::Instantaneous { precondition, effect } => {
                 walk_condition(precondition, found);
@@ -252,6 +268,37 @@ fn walk_domain(domain: &Domain, found: Found<'_>) {
                     walk_effect(effect, found);
                 }
             }
+        }
+    }
+}
+
+fn walk_constraints(constraints: &[Constraint], found: Found<'_>) {
+    for constraint in constraints {
+        found(Part::Constraint(constraint));
+        walk_trajectory(&constraint.trajectory, found);
+    }
+}
+
+fn walk_trajectory(trajectory: &Trajectory, found: Found<'_>) {
+    match trajectory {
+        Trajectory::And(parts) => {
+            for part in parts {
+                walk_trajectory(part, found);
+            }
+        }
+        Trajectory::ForAll(_, body) => walk_trajectory(body, found),
+        Trajectory::AtEnd(what)
+        | Trajectory::Always(what)
+        | Trajectory::Sometime(what)
+        | Trajectory::AtMostOnce(what)
+        | Trajectory::Within(_, what)
+        | Trajectory::HoldDuring(_, _, what)
+        | Trajectory::HoldAfter(_, what) => walk_condition(what, found),
+        Trajectory::SometimeAfter(first, second)
+        | Trajectory::SometimeBefore(first, second)
+        | Trajectory::AlwaysWithin(_, first, second) => {
+            walk_condition(first, found);
+            walk_condition(second, found);
         }
     }
 }

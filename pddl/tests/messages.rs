@@ -241,19 +241,23 @@ says!(object_fluent, "(:functions (battery)" => "(:functions (place-of ?t - tool
       │
       = help: use a predicate with one more argument; numeric functions are `- number`
 ");
-says!(preference, "(:goal (at b))" => "(:goal (preference p (at b)))", @r"
-    error[P113]: preferences are not supported
-      ┌─ problem.pddl:5:10
+says!(misplaced_preference, "(:goal (at b))" => "(:goal (or (at a) (preference p (at b))))", @r"
+    error[P106]: a preference cannot stand here
+      ┌─ problem.pddl:5:21
       │
-    5 │   (:goal (preference p (at b))))
-      │          ^^^^^^^^^^^
+    5 │   (:goal (or (at a) (preference p (at b)))))
+      │                     ^^^^^^^^^^^
+      │
+      = help: preferences are parts of goals, preconditions and `:constraints`, below `and` and `forall` only
 ");
-says!(trajectory_constraint, "(:goal (at b))" => "(:goal (at b)) (:constraints (always (at a)))", @r"
-    error[P113]: constraints on trajectories (PDDL 3, `:constraints`) are not supported
-      ┌─ problem.pddl:5:18
+says!(unknown_preference, "(:goal (at b))" => "(:goal (preference drilled (at b))) (:metric minimize (is-violated driled))", @r"
+    error[P118]: unknown preference `driled`
+      ┌─ problem.pddl:5:70
       │
-    5 │   (:goal (at b)) (:constraints (always (at a))))
-      │                  ^^^^^^^^^^^^^
+    5 │   (:goal (preference drilled (at b))) (:metric minimize (is-violated driled)))
+      │                                                                      ^^^^^^
+      │
+      = help: did you mean `drilled`?
 ");
 says!(two_values, "(= (battery) 10)" => "(= (battery) 10) (= (battery) 11)", @r"
     error[P127]: this function has another value already

@@ -34,6 +34,9 @@ fn name() -> impl Strategy<Value = String> {
             "number",
             "object",
             "oneof",
+            "within",
+            "always",
+            "sometime",
         ];
         !reserved.contains(&name.to_lowercase().as_str())
     })
@@ -93,6 +96,50 @@ fn condition() -> impl Strategy<Value = String> {
     })
 }
 
+/// A condition with preferences, which stand below `and` and `forall` only.
+fn soft_condition() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        condition(),
+        (name(), condition()).prop_map(|(name, body)| format!("(preference {name} {body})")),
+    ];
+    leaf.prop_recursive(3, 8, 3, |inner| {
+        prop_oneof![
+            prop::collection::vec(inner.clone(), 0..3).prop_map(|parts| format!("(and {})", parts.join(" "))),
+            (typed_list("?"), inner).prop_map(|(entries, body)| format!("(forall ({entries}) {body})")),
+        ]
+    })
+}
+
+fn trajectory() -> impl Strategy<Value = String> {
+    let one = prop_oneof![Just("always"), Just("sometime"), Just("at-most-once"), Just("at end")];
+    let two = prop_oneof![Just("sometime-after"), Just("sometime-before"), Just("always-within 2.5")];
+    let timed = prop_oneof![Just("within 3"), Just("hold-during 0.5 4"), Just("hold-after 2")];
+    let leaf = prop_oneof![
+        (prop_oneof![one, timed], condition()).prop_map(|(head, body)| format!("({head} {body})")),
+        (two, condition(), condition())
+            .prop_map(|(head, first, second)| format!("({head} {first} {second})")),
+    ];
+    leaf.prop_recursive(2, 6, 3, |inner| {
+        prop_oneof![
+            prop::collection::vec(inner.clone(), 0..3).prop_map(|parts| format!("(and {})", parts.join(" "))),
+            (typed_list("?"), inner).prop_map(|(entries, body)| format!("(forall ({entries}) {body})")),
+        ]
+    })
+}
+
+fn constraints() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        trajectory(),
+        (name(), trajectory()).prop_map(|(name, body)| format!("(preference {name} {body})")),
+    ];
+    leaf.prop_recursive(2, 6, 3, |inner| {
+        prop_oneof![
+            prop::collection::vec(inner.clone(), 0..3).prop_map(|parts| format!("(and {})", parts.join(" "))),
+            (typed_list("?"), inner).prop_map(|(entries, body)| format!("(forall ({entries}) {body})")),
+        ]
+    })
+}
+
 fn effect() -> impl Strategy<Value = String> {
     let assignment =
         prop_oneof![Just("assign"), Just("increase"), Just("decrease"), Just("scale-up"), Just("scale-down")];
@@ -115,16 +162,23 @@ fn action() -> impl Strategy<Value = String> {
     let time = prop_oneof![Just("at start"), Just("at end")];
     let any_time = prop_oneof![Just("at start"), Just("at end"), Just("over all")];
     prop_oneof![
-        (name(), typed_list("?"), condition(), effect()).prop_map(|(name, parameters, condition, effect)| {
+        (name(), typed_list("?"), soft_condition(), effect()).prop_map(|(name, parameters, condition, effect)| {
             format!("(:action {name} :parameters ({parameters}) :precondition {condition} :effect {effect})")
         }),
         (
             (name(), typed_list("?"), expression()),
-            prop::collection::vec((any_time, condition()), 0..3),
+            prop::collection::vec((any_time, any::<bool>(), condition()), 0..3),
             prop::collection::vec((time, effect()), 0..3),
         )
             .prop_map(|((name, parameters, duration), conditions, effects)| {
-                let conditions: Vec<_> = conditions.iter().map(|(time, what)| format!("({time} {what})")).collect();
+                let timed = |(time, is_soft, what): &(&str, bool, String)| {
+                    if *is_soft && *time != "over all" {
+                        format!("(preference p ({time} {what}))")
+                    } else {
+                        format!("({time} {what})")
+                    }
+                };
+                let conditions: Vec<_> = conditions.iter().map(timed).collect();
                 let effects: Vec<_> = effects.iter().map(|(time, what)| format!("({time} {what})")).collect();
                 format!(
                     "(:durative-action {name} :parameters ({parameters}) :duration (>= ?duration (+ {duration})) :condition (and {}) :effect (and {}))",
@@ -137,9 +191,10 @@ fn action() -> impl Strategy<Value = String> {
 
 fn domain() -> impl Strategy<Value = String> {
     let sections = (typed_list(""), typed_list(""), typed_list("?"), condition());
-    (sections, prop::collection::vec(action(), 0..3)).prop_map(|((types, constants, head, body), actions)| {
+    let rest = (constraints(), prop::collection::vec(action(), 0..3));
+    (sections, rest).prop_map(|((types, constants, head, body), (constraints, actions))| {
         format!(
-            "(define (domain d) (:types {types}) (:constants {constants}) (:predicates (p {head})) (:functions (f {head})) (:derived (p {head}) {body}) {})",
+            "(define (domain d) (:types {types}) (:constants {constants}) (:predicates (p {head})) (:functions (f {head})) (:derived (p {head}) {body}) (:constraints {constraints}) {})",
             actions.join("\n"),
         )
     })
@@ -155,10 +210,15 @@ fn problem() -> impl Strategy<Value = String> {
         (fact.clone(), number()).prop_map(|(fact, value)| format!("(= {fact} {value})")),
         (fact, "[0-9]{1,3}").prop_map(|(fact, time)| format!("(at {time} {fact})")),
     ];
-    (typed_list(""), prop::collection::vec(element, 0..5), condition(), expression()).prop_map(
-        |(objects, init, goal, metric)| {
+    let metric = prop_oneof![
+        expression(),
+        (name(), expression()).prop_map(|(name, rest)| format!("(+ (is-violated {name}) {rest})")),
+    ];
+    let init = prop::collection::vec(element, 0..5);
+    (typed_list(""), init, soft_condition(), constraints(), metric).prop_map(
+        |(objects, init, goal, constraints, metric)| {
             format!(
-                "(define (problem p) (:domain d) (:objects {objects}) (:init {}) (:goal {goal}) (:metric minimize {metric}))",
+                "(define (problem p) (:domain d) (:objects {objects}) (:init {}) (:constraints {constraints}) (:goal {goal}) (:metric minimize {metric}))",
                 init.join(" "),
             )
         },

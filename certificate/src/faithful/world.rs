@@ -53,6 +53,10 @@ impl<'w> World<'w> {
             timeline: Timeline::default(),
             rules: FxHashMap::default(),
         };
+        let has_preferences = domain.actions.iter().any(|action| !action.preferences.is_empty());
+        if has_preferences || !domain.constraints.is_empty() || !problem.constraints.is_empty() {
+            return Err(Cause::unsupported("preferences, or constraints on trajectories"));
+        }
         for declaration in domain.predicates.iter().chain(&domain.functions) {
             world.intern(&declaration.identifier.name);
         }

@@ -71,6 +71,13 @@ pub fn ground_concurrent(
         return Err(overflow());
     }
     let separation = Rational::from_big(separation.clone());
+    if let Some(place) = first_constraint(domain, problem) {
+        return Err(vec![Error::Unsupported {
+            construct: "a preference, or a constraint on trajectories, where actions overlap".into(),
+            instead: "plan without `--concurrent`: states are in one order only where actions are".into(),
+            place,
+        }]);
+    }
     let mut lifted = normalize(domain, problem, &config.objectives)?;
     let place = Place { file: File::Problem, span: Span::default() };
     let number = |number| Expression::Number(Rational::from_integer(number));
@@ -93,6 +100,14 @@ pub fn ground_concurrent(
     let (lifted, designs) = (&split.lifted, &split.designs);
     let (task, reached) = ground_lifted(lifted, designs, &none, &Generality::default(), &config.limits)?;
     compile::compile(task, &split, &reached, &separation, weight, &config.limits)
+}
+
+/// Where the first preference or constraint on trajectories stands.
+fn first_constraint(domain: &Domain, problem: &Problem) -> Option<Place> {
+    let of_actions = domain.actions.iter().flat_map(|action| &action.preferences).map(|own| own.span);
+    let of_domain = domain.constraints.iter().map(|own| own.span).chain(of_actions);
+    let of_problem = problem.constraints.iter().map(|own| Place { file: File::Problem, span: own.span });
+    of_domain.map(|span| Place { file: File::Domain, span }).chain(of_problem).next()
 }
 
 /// Durations that the planner would have to choose.

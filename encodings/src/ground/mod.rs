@@ -29,6 +29,7 @@ mod reach;
 mod tests;
 pub(crate) mod vocabulary;
 
+use crate::compile::compile;
 use crate::error::Error;
 use crate::lifted::Lifted;
 use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
@@ -58,7 +59,8 @@ pub(crate) fn ground_for<N: TaskNumber>(
     config: &Config,
     generality: &Generality,
 ) -> Result<Task<N>, Vec<Error>> {
-    let mut lifted = normalize(domain, problem, &config.objectives)?;
+    let plain = compile(domain, problem, &config.objectives)?;
+    let mut lifted = normalize(&plain.domain, &plain.problem, &plain.objectives)?;
     zero::split(&mut lifted)?;
     events::begin(&mut lifted);
     let designs: Vec<_> =

@@ -4,6 +4,7 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
+use crate::compile::is_hidden;
 use crate::context::Context;
 use crate::lifted::ObjectId;
 use crate::number::{Int, Rational};
@@ -100,6 +101,9 @@ pub(crate) fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N
     let actions = plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none());
     for (step, start) in actions.zip(starts(task, &plan.steps)) {
         let operator = &task.operators[step.operator.index()];
+        if is_hidden(&task.schema_names[operator.schema as usize]) {
+            continue;
+        }
         let sizes = operator.sizes();
         let duration = operator.duration.at(&step.choice, &sizes).to_rational();
         let cost = task.objective.signed(&operator.cost.at(&step.choice, &sizes));

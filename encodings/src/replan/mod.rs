@@ -25,6 +25,7 @@ mod usage;
 use std::fmt;
 use std::sync::Arc;
 
+use crate::compile::is_needed;
 use crate::ground::{Config, Generality, ground_for};
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits};
@@ -58,8 +59,11 @@ pub struct Replanner {
 impl Replanner {
     /// Grounds a problem with all that `available` says of some object taken for available. None if the domain does not lend
     /// itself to that: where availability is asked for otherwise than as a condition of actions on their parameters, where
-    /// facts change by themselves, where actions earn something, or where the problem cannot be ground at all.
+    /// facts change by themselves, where there are preferences or constraints on trajectories, where actions earn something, or where the problem cannot be ground at all.
     pub fn new(domain: &Domain, problem: &Problem, available: &[Name], config: &Config) -> Option<Self> {
+        if is_needed(domain, problem) {
+            return None;
+        }
         let requirements = usage::requirements(domain, available)?;
         let in_goal = |name: &Name| usage::in_condition(&problem.goal, name) > 0;
         let is_timed = |element: &InitialElement| matches!(element, InitialElement::Timed(..));

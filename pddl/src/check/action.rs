@@ -89,6 +89,7 @@ impl<'a> Checker<'a> {
         match &action.body {
             ActionBody::Instantaneous { precondition, effect } => {
                 self.condition(precondition, &mut scope);
+                self.preferences(&action.preferences, &mut scope);
                 self.effect(effect, &mut scope);
             }
             ActionBody::Durative { duration, conditions, effects } => {
@@ -99,6 +100,7 @@ impl<'a> Checker<'a> {
                 for (_, condition) in conditions {
                     self.condition(condition, &mut scope);
                 }
+                self.preferences(&action.preferences, &mut scope);
                 for (_, effect) in effects {
                     self.effect(effect, &mut scope);
                 }

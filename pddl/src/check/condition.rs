@@ -4,6 +4,7 @@ use crate::ast::{Atom, Condition, Declaration, Expression, Identifier, Term, Typ
 
 use crate::print::{signature, type_text};
 
+use super::soft::is_violation;
 use super::{Checker, Scope, did_you_mean};
 
 /// Which space of names an atom belongs to.
@@ -67,6 +68,9 @@ impl<'a> Checker<'a> {
     pub(super) fn expression(&mut self, expression: &'a Expression, scope: &Scope<'a>) {
         match expression {
             Expression::Number(..) => {}
+            Expression::Fluent(atom) if is_violation(atom) => {
+                self.sink.error("P137", atom.span, "`is-violated` has a value in the metric only");
+            }
             Expression::Fluent(atom) => self.atom(atom, Kind::Function, scope),
             Expression::Duration(span) => {
                 if !self.in_durative_action {

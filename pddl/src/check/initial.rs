@@ -8,6 +8,7 @@ use smallvec::SmallVec;
 use crate::ast::{Atom, Condition, Expression, InitialElement, Metric, Name, Span, Term};
 
 use super::condition::Kind;
+use super::soft::is_violation;
 use super::{Checker, Scope};
 
 /// An atom without its places.
@@ -102,6 +103,7 @@ impl<'a> Checker<'a> {
     fn metric_expression(&mut self, expression: &'a Expression) {
         match expression {
             Expression::TotalTime(_) => {}
+            Expression::Fluent(atom) if is_violation(atom) => self.violation(atom),
             Expression::Operation(_, operands, _) => {
                 for operand in operands {
                     self.metric_expression(operand);

@@ -4,6 +4,7 @@ mod action;
 mod condition;
 mod declarations;
 mod initial;
+mod soft;
 mod symbols;
 
 use rustc_hash::FxHashSet;
@@ -40,6 +41,7 @@ pub fn check(
     checker.objects(domain, domain_source, problem);
     checker.initial_state(&problem.init);
     checker.goal(&problem.goal);
+    checker.constraints(&problem.constraints);
     if let Some(metric) = &problem.metric {
         checker.metric(metric);
     }
@@ -73,6 +75,7 @@ fn check_domain_with(domain: &Domain, source: &Source, symbols: &Symbols<'_>) ->
     checker.constants(domain);
     checker.predicates_and_functions(domain);
     checker.derived(domain);
+    checker.constraints(&domain.constraints);
     checker.actions(domain);
     let evidence = checker.undeclared_inferred.len();
     let mut diagnostics = checker.sink.finish();

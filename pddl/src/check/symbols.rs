@@ -22,6 +22,7 @@ pub(super) struct Symbols<'a> {
     pub(super) functions: FxHashMap<&'a Name, &'a Declaration>,
     pub(super) derived: FxHashSet<&'a Name>,
     pub(super) objects: FxHashMap<&'a Name, Object<'a>>,
+    pub(super) preferences: FxHashSet<&'a Name>,
 }
 
 impl<'a> Symbols<'a> {
@@ -31,7 +32,12 @@ impl<'a> Symbols<'a> {
         if let Some(problem) = problem {
             insert_objects(&mut objects, &problem.objects, false);
         }
+        let of_actions = domain.actions.iter().flat_map(|action| &action.preferences).map(|own| &own.name);
+        let constraints =
+            domain.constraints.iter().chain(problem.into_iter().flat_map(|own| &own.constraints));
+        let named = of_actions.chain(constraints.filter_map(|own| own.preference.as_ref()));
         Self {
+            preferences: named.map(|own| &own.name).collect(),
             types: TypeHierarchy::of(domain),
             predicates: by_name(&domain.predicates),
             functions: by_name(&domain.functions),

@@ -29,7 +29,9 @@ impl Parser<'_> {
             "imply" => self.implication(item),
             "exists" | "forall" => self.quantified(item),
             "preference" => {
-                self.refuse(item, "preferences");
+                self.sink
+                    .error("P106", list_start(item), "a preference cannot stand here")
+                    .help("preferences are parts of goals, preconditions and `:constraints`, below `and` and `forall` only");
                 None
             }
             symbol => match comparison(symbol) {

@@ -22,6 +22,7 @@ impl Parser<'_> {
             predicates: Vec::new(),
             functions: Vec::new(),
             derived: Vec::new(),
+            constraints: Vec::new(),
             actions: Vec::new(),
         };
         for section in sections {
@@ -71,6 +72,7 @@ impl Parser<'_> {
                 domain.predicates.extend(declarations);
             }
             ":functions" => domain.functions.extend(self.function_list(section.rest())),
+            ":constraints" => return self.constraints(section, &mut domain.constraints),
             ":derived" => return domain.derived.extend(self.derived(section)),
             ":action" => return domain.actions.extend(self.action(section)),
             ":durative-action" => return domain.actions.extend(self.durative_action(section)),
@@ -97,7 +99,6 @@ impl Parser<'_> {
     pub(super) fn other_section(&mut self, section: Item<'_>, kind: &str) {
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         let refused = match keyword.as_str() {
-            ":constraints" => Some("constraints on trajectories (PDDL 3, `:constraints`)"),
             ":process" | ":event" => Some("processes and events (PDDL+)"),
             ":task" | ":method" | ":htn" => Some("hierarchical tasks and methods (HDDL)"),
             ":axiom" => Some("axioms of PDDL 1.2 (`:axiom`; use `:derived`)"),
@@ -134,7 +135,7 @@ impl Parser<'_> {
     fn action(&mut self, section: Item<'_>) -> Option<Action> {
         let (identifier, fields) = self.action_fields(section, &ACTION_KEYS)?;
         let (mut parameters, mut precondition, mut effect) = (Vec::new(), None, None);
-        let mut variables = Vec::new();
+        let (mut variables, mut preferences) = (Vec::new(), Vec::new());
         for (keyword, value) in fields {
             match keyword {
                 ":parameters" => parameters = self.parameters(value),
@@ -145,7 +146,7 @@ impl Parser<'_> {
                         .help("plans name their objects, too, behind those of `:parameters`");
                     variables = self.parameters(value);
                 }
-                ":precondition" => precondition = self.condition(value),
+                ":precondition" => precondition = self.precondition(value, &mut preferences),
                 _ => effect = self.effect(value),
             }
         }
@@ -154,7 +155,7 @@ impl Parser<'_> {
             precondition: precondition.unwrap_or(Condition::And(Vec::new())),
             effect: effect.unwrap_or(Effect::And(Vec::new())),
         };
-        Some(Action { identifier, parameters, body, span: section.span() })
+        Some(Action { identifier, parameters, body, preferences, span: section.span() })
     }
 
     fn durative_action(&mut self, section: Item<'_>) -> Option<Action> {
@@ -170,16 +171,17 @@ impl Parser<'_> {
         }
         let mut parameters = Vec::new();
         let (mut duration, mut conditions, mut effects) = (Vec::new(), Vec::new(), Vec::new());
+        let mut preferences = Vec::new();
         for (keyword, value) in fields {
             match keyword {
                 ":parameters" => parameters = self.parameters(value),
                 ":duration" => self.duration(value, &mut duration),
-                ":condition" => self.timed_conditions(value, &mut conditions),
+                ":condition" => self.durative_condition(value, &mut conditions, &mut preferences),
                 _ => self.timed_effects(value, &mut effects),
             }
         }
         let body = ActionBody::Durative { duration, conditions, effects };
-        Some(Action { identifier, parameters, body, span: section.span() })
+        Some(Action { identifier, parameters, body, preferences, span: section.span() })
     }
 
     /// The name of an action and its keywords with their values, each keyword one of `keys`.

@@ -11,7 +11,7 @@ type TimedConditions = Vec<(ConditionTime, Condition)>;
 type TimedEffects = Vec<(EffectTime, Effect)>;
 
 /// The time and the content of `(at start (…))`, `(over all (…))` or `(at end (…))`.
-fn timed(item: Item<'_>) -> Option<(ConditionTime, Item<'_>)> {
+pub(super) fn timed(item: Item<'_>) -> Option<(ConditionTime, Item<'_>)> {
     if !is_timed(item) {
         return None;
     }
@@ -32,7 +32,7 @@ fn effect_time(time: ConditionTime) -> Option<EffectTime> {
     }
 }
 
-fn is_conjunction(item: Item<'_>) -> bool {
+pub(super) fn is_conjunction(item: Item<'_>) -> bool {
     item.is_headed("and") || (item.is_list() && item.items().next().is_none())
 }
 
@@ -74,7 +74,8 @@ impl Parser<'_> {
             let quantify = |(time, part)| (time, Condition::ForAll(variables.clone(), Box::new(part)));
             found.extend(inner.into_iter().map(quantify));
         } else if item.is_headed("preference") {
-            self.refuse(item, "preferences");
+            // It is none where it can stand.
+            self.condition(item);
         } else {
             self.without_time(item, "condition", "`(at start (…))`, `(over all (…))` or `(at end (…))`");
         }

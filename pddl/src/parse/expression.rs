@@ -107,10 +107,6 @@ impl Parser<'_> {
         if head.eq_ignore_ascii_case("total-time") && item.rest().next().is_none() {
             return Some(Expression::TotalTime(item.span()));
         }
-        if head.eq_ignore_ascii_case("is-violated") {
-            self.refuse(item, "preferences (`is-violated`)");
-            return None;
-        }
         if comparison(head).is_some() {
             self.expected(item, "a number");
             return None;

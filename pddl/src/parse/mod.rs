@@ -9,6 +9,8 @@ mod effect;
 mod expression;
 mod init;
 mod problem;
+mod soft;
+mod trajectory;
 mod typed;
 
 use rustc_hash::FxHashMap;

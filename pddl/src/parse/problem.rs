@@ -1,6 +1,6 @@
 //! Problems.
 
-use crate::ast::{Condition, Identifier, Metric, Problem, Span};
+use crate::ast::{Condition, Constraint, Identifier, Metric, Problem, Span};
 use crate::sexp::Item;
 
 use super::Parser;
@@ -30,6 +30,7 @@ impl Parser<'_> {
             objects: Vec::new(),
             init: Vec::new(),
             goal: Condition::And(Vec::new()),
+            constraints: Vec::new(),
             metric: None,
         };
         let mut once = Once::default();
@@ -66,9 +67,10 @@ impl Parser<'_> {
             }
             ":goal" => {
                 if self.first(section, &mut once.goal_span) {
-                    once.goal = self.goal(section);
+                    once.goal = self.goal(section, &mut problem.constraints);
                 }
             }
+            ":constraints" => self.constraints(section, &mut problem.constraints),
             ":metric" => {
                 if self.first(section, &mut once.metric_span) {
                     once.metric = self.metric(section);
@@ -105,11 +107,11 @@ impl Parser<'_> {
     }
 
     /// The goal; several conditions side by side are read as their conjunction.
-    fn goal(&mut self, section: Item<'_>) -> Option<Condition> {
+    fn goal(&mut self, section: Item<'_>, constraints: &mut Vec<Constraint>) -> Option<Condition> {
         let mut items = section.rest();
         match (items.next(), items.next()) {
             (None, _) => Some(Condition::And(Vec::new())),
-            (Some(item), None) => self.condition(item),
+            (Some(item), None) => self.goal_condition(item, constraints),
             (Some(_), Some(second)) => {
                 self.sink
                     .error("P108", super::at_start(second), "a goal is one condition")

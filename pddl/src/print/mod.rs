@@ -3,6 +3,7 @@
 //! Empty sections and empty preconditions are left out, because several planners reject them.
 
 mod layout;
+mod soft;
 mod tree;
 
 use crate::ast::{
@@ -26,6 +27,7 @@ pub fn print_domain(domain: &Domain) -> String {
             list(":derived", 2, [text(signature(&axiom.head)), tree::condition(&axiom.condition)])
         }),
     );
+    sections.extend(soft::constraints(&domain.constraints.iter().collect::<Vec<_>>()));
     sections.extend(domain.actions.iter().map(action));
     layout(&list("define", 2, sections).broken())
 }
@@ -39,7 +41,14 @@ pub fn print_problem(problem: &Problem) -> String {
     sections.extend(requirements(&problem.requirements));
     sections.extend(entries(":objects", &problem.objects));
     sections.push(list(":init", 1, problem.init.iter().map(initial)).broken());
-    sections.push(list(":goal", 1, [tree::condition(&problem.goal)]));
+    let (of_goal, others): (Vec<_>, Vec<_>) =
+        problem.constraints.iter().partition(|one| soft::is_of_goal(one));
+    sections.push(list(
+        ":goal",
+        1,
+        [soft::with(&problem.goal, of_goal.into_iter().map(|own| soft::constraint(own, true)))],
+    ));
+    sections.extend(soft::constraints(&others));
     sections.extend(problem.metric.as_ref().map(|metric| {
         let direction = match metric.direction {
             Direction::Minimize => "minimize",
@@ -53,6 +62,11 @@ pub fn print_problem(problem: &Problem) -> String {
 /// A condition on one line, for messages.
 pub(crate) fn condition_text(condition: &Condition) -> String {
     tree::condition(condition).on_one_line()
+}
+
+/// A constraint on one line, for messages.
+pub(crate) fn constraint_text(constraint: &crate::ast::Constraint) -> String {
+    soft::constraint(constraint, false).on_one_line()
 }
 
 /// A declaration as written: `(at ?x - robot)`.
@@ -84,15 +98,20 @@ fn action(action: &Action) -> Doc {
     let mut parts = vec![name, field(":parameters", parameters)];
     match &action.body {
         ActionBody::Instantaneous { precondition, effect } => {
-            if !matches!(precondition, Condition::And(parts) if parts.is_empty()) {
-                parts.push(field(":precondition", tree::condition(precondition)));
+            if !matches!(precondition, Condition::And(parts) if parts.is_empty())
+                || !action.preferences.is_empty()
+            {
+                let preferences = action.preferences.iter().map(|own| soft::preference(own, false));
+                parts.push(field(":precondition", soft::with(precondition, preferences)));
             }
             parts.push(field(":effect", tree::effect(effect)));
             list(":action", 2, parts).broken()
         }
         ActionBody::Durative { duration, conditions, effects } => {
             parts.push(field(":duration", tree::duration(duration)));
-            parts.push(field(":condition", list("and", 1, conditions.iter().map(tree::timed_condition))));
+            let conditions = conditions.iter().map(tree::timed_condition);
+            let preferences = action.preferences.iter().map(|own| soft::preference(own, true));
+            parts.push(field(":condition", list("and", 1, conditions.chain(preferences))));
             parts.push(field(":effect", list("and", 1, effects.iter().map(tree::timed_effect))));
             list(":durative-action", 2, parts).broken()
         }

@@ -57,7 +57,7 @@ fn comparison(operator: Comparison) -> &'static str {
     }
 }
 
-fn variables(entries: &[TypedName]) -> Doc {
+pub(super) fn variables(entries: &[TypedName]) -> Doc {
     text(format!("({})", typed("?", entries).join(" ")))
 }
 

@@ -48,6 +48,10 @@ pub(super) fn run<'e, 'p>(
             let started = execution.begin(step, &time)?;
             overlaps_not_with_itself(&started, &going_on)?;
             let part = started.first_part();
+            execution.prefer(&started, ConditionTime::AtStart, &time)?;
+            if part == Part::Whole {
+                execution.prefer(&started, ConditionTime::AtEnd, &time)?;
+            }
             parts.happenings.push((Some(step), execution.happening(&started, part, &time)?));
             if part == Part::Start {
                 going_on.push(started);
@@ -55,12 +59,15 @@ pub(super) fn run<'e, 'p>(
             *total_time = time.clone();
         }
         for ended in &ending {
+            execution.prefer(ended, ConditionTime::AtEnd, &time)?;
             parts.happenings.push((Some(ended.step), execution.happening(ended, Part::End, &time)?));
             *total_time = time.clone();
         }
         running = going_on;
         parts.keep_apart(execution, &time, &mut recent)?;
+        let is_event = parts.happenings.iter().all(|(step, _)| step.is_none());
         parts.apply(execution, &time)?;
+        execution.record.note(&time, &execution.state, is_event);
         for running in &running {
             execution.check(running, ConditionTime::OverAll, &time)?;
         }

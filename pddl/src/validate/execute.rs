@@ -12,6 +12,7 @@ use super::evaluate::{Evaluator, Undefined};
 use super::explain::{undefined_text, unmet};
 use super::interference::Footprint;
 use super::options::Options;
+use super::record::Record;
 use super::running::{Running, conditions, effects, is_durative};
 use super::step::{Instance, Step, unresolved};
 use super::verdict::{Violation, ViolationKind};
@@ -27,6 +28,7 @@ pub(super) struct Execution<'e, 'p> {
     pub(super) pending: Vec<(BigRational, Ground, bool)>,
     /// The last events that took place, with their time.
     pub(super) last_event: Option<(BigRational, Footprint)>,
+    pub(super) record: Record,
 }
 
 impl<'e, 'p> Execution<'e, 'p> {
@@ -47,7 +49,8 @@ impl<'e, 'p> Execution<'e, 'p> {
         // Of two literals of one time about one atom, the later one in the file prevails.
         pending.reverse();
         pending.sort_by(|left, right| right.0.cmp(&left.0));
-        Self { world, options, state, pending, last_event: None }
+        let record = Record::new(world, &state);
+        Self { world, options, state, pending, last_event: None, record }
     }
 
     pub(super) fn evaluator<'s>(&'s self, duration: Option<&'s BigRational>) -> Evaluator<'s, 'p> {
@@ -280,6 +283,10 @@ impl<'e, 'p> Execution<'e, 'p> {
     }
 }
 
-fn undefined_violation(step: &Step<'_>, time: &BigRational, undefined: &Undefined) -> Box<Violation> {
+pub(super) fn undefined_violation(
+    step: &Step<'_>,
+    time: &BigRational,
+    undefined: &Undefined,
+) -> Box<Violation> {
     step.violation(time, ViolationKind::Undefined, undefined_text(undefined))
 }

@@ -84,6 +84,7 @@ impl<'e, 'p> Execution<'e, 'p> {
     pub(super) fn apply_next_timed(&mut self) {
         if let Some((time, event)) = self.take_next_timed() {
             self.apply_events(event.changes);
+            self.record.note(&time, &self.state, true);
             self.last_event = Some((time, event.footprint));
         }
     }
@@ -125,7 +126,9 @@ impl<'e, 'p> Execution<'e, 'p> {
         if let Some(touched) = now.and_then(|(_, event)| happening.footprint.interferes(event)) {
             return Err(self.disturbed(running.step, time, time, &touched));
         }
-        self.apply(running.step, time, happening.changes)
+        self.apply(running.step, time, happening.changes)?;
+        self.record.note(time, &self.state, false);
+        Ok(())
     }
 
     /// An action at one time, and an event at another one, that interfere.

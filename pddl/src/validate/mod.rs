@@ -17,10 +17,12 @@ mod happening;
 mod interference;
 mod options;
 mod plan;
+mod record;
 mod running;
 mod sequential;
 mod solve;
 mod step;
+mod trajectory;
 mod verdict;
 mod world;
 
@@ -71,8 +73,13 @@ fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdic
     } else {
         sequential::run(&mut execution, steps, &mut total_time)
     };
-    let violation = result.and_then(|()| goal_holds(world, &execution.state, &total_time)).err();
-    let metric = violation.is_none().then(|| metric_value(world, &execution.state, &total_time)).flatten();
+    let result = result.and_then(|()| goal_holds(world, &execution.state, &total_time));
+    let judged = result.and_then(|()| execution.judge(&total_time));
+    let metric = judged
+        .as_ref()
+        .ok()
+        .and_then(|violated| metric_value(world, &execution.state, violated, &total_time));
+    let violation = judged.err();
     let values = changeable_values(world, &execution.state);
     Verdict { valid: violation.is_none(), total_time, metric, values, violation }
 }
@@ -109,9 +116,15 @@ fn goal_holds(world: &World<'_>, state: &State, time: &BigRational) -> Result<()
     }))
 }
 
-fn metric_value(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
+fn metric_value(
+    world: &World<'_>,
+    state: &State,
+    violated: &[Name],
+    total_time: &BigRational,
+) -> Option<BigRational> {
     let metric = world.problem.metric.as_ref()?;
-    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
+    let counted = world.counted(violated, state);
+    let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, &counted) };
     evaluator.value(&metric.expression, &Bindings::default()).ok()
 }
 

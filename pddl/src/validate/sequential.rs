@@ -33,6 +33,10 @@ pub(super) fn run<'e, 'p>(
         execution.pass(&time, false);
         let running = execution.begin(step, &time)?;
         let part = running.first_part();
+        execution.prefer(&running, ConditionTime::AtStart, &time)?;
+        if part == Part::Whole {
+            execution.prefer(&running, ConditionTime::AtEnd, &time)?;
+        }
         execution.execute(&running, part, &time)?;
         if part == Part::Start {
             finish(execution, &running)?;
@@ -54,6 +58,7 @@ fn finish<'e, 'p>(
         execution.apply_next_timed();
         execution.check(running, ConditionTime::OverAll, &next)?;
     }
+    execution.prefer(running, ConditionTime::AtEnd, &running.end)?;
     execution.execute(running, Part::End, &running.end)
 }
 

@@ -74,6 +74,8 @@ pub enum ViolationKind {
     Interference,
     /// The goal.
     Goal,
+    /// A constraint on the states that the plan goes through.
+    Constraint,
 }
 
 impl ViolationKind {
@@ -92,6 +94,7 @@ impl ViolationKind {
             Self::Overlap => "overlap",
             Self::Interference => "interference",
             Self::Goal => "goal",
+            Self::Constraint => "constraint",
         }
     }
 }

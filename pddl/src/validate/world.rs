@@ -12,6 +12,9 @@ use crate::number::dense;
 use crate::strata::Strata;
 use crate::types::TypeHierarchy;
 
+/// The function that counts the violations of a preference.
+const IS_VIOLATED: &str = "is-violated";
+
 /// A name as a number: equal names, equal numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Symbol(u32);
@@ -65,6 +68,10 @@ impl<'p> World<'p> {
         for entry in domain.constants.iter().chain(&problem.objects) {
             world.insert_object(entry);
         }
+        world.intern(&Name::new(IS_VIOLATED));
+        for name in world.preferences() {
+            world.intern(name);
+        }
         let names: Vec<Name> = world.types.names().cloned().collect();
         for name in names {
             let identifier = Identifier { name: name.clone(), span: Span::default() };
@@ -96,6 +103,26 @@ impl<'p> World<'p> {
             self.place.insert(symbol, self.objects.len());
             self.objects.push((symbol, vec![&entry.r#type]));
         }
+    }
+
+    /// The names of all preferences, some of them more than once.
+    fn preferences(&self) -> impl Iterator<Item = &'p Name> + use<'p> {
+        let constraints = self.domain.constraints.iter().chain(&self.problem.constraints);
+        let named = constraints.filter_map(|constraint| constraint.preference.as_ref());
+        let of_actions = self.domain.actions.iter().flat_map(|action| &action.preferences);
+        named.chain(of_actions.map(|preference| &preference.name)).map(|name| &name.name)
+    }
+
+    /// The state with the number of violations of each preference, as a metric asks for it.
+    pub(super) fn counted(&self, violated: &[Name], state: &State) -> State {
+        let mut state = state.clone();
+        let function = self.symbol(&Name::new(IS_VIOLATED));
+        for name in self.preferences() {
+            let count = violated.iter().filter(|other| *other == name).count();
+            let arguments = Arguments::from_slice(&[self.symbol(name)]);
+            state.values.insert((function, arguments), BigRational::from_integer(count.into()));
+        }
+        state
     }
 
     /// The number of a name; one that no fact has for a name that is declared nowhere.

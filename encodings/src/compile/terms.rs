@@ -1,0 +1,81 @@
+//! Conditions that are made up, simplified where they are decided.
+
+use pddl::ast::{Atom, Condition, Identifier, Name, Span, Term, TypedName};
+
+pub(super) fn identifier(name: &str) -> Identifier {
+    Identifier { name: Name::new(name), span: Span::default() }
+}
+
+/// An atom without arguments.
+pub(super) fn flag(name: &str) -> Atom {
+    Atom { predicate: identifier(name), arguments: Vec::new(), span: Span::default() }
+}
+
+pub(super) fn holds(name: &str) -> Condition {
+    Condition::Atom(flag(name))
+}
+
+pub(super) fn truth() -> Condition {
+    Condition::And(Vec::new())
+}
+
+pub(super) fn falsity() -> Condition {
+    Condition::Or(Vec::new())
+}
+
+pub(super) fn is_true(condition: &Condition) -> bool {
+    matches!(condition, Condition::And(parts) if parts.is_empty())
+}
+
+pub(super) fn is_false(condition: &Condition) -> bool {
+    matches!(condition, Condition::Or(parts) if parts.is_empty())
+}
+
+pub(super) fn all(parts: impl IntoIterator<Item = Condition>) -> Condition {
+    let mut kept = Vec::new();
+    for part in parts {
+        match part {
+            part if is_false(&part) => return falsity(),
+            Condition::And(inner) => kept.extend(inner),
+            part => kept.push(part),
+        }
+    }
+    if kept.len() == 1 { kept.swap_remove(0) } else { Condition::And(kept) }
+}
+
+pub(super) fn any(parts: impl IntoIterator<Item = Condition>) -> Condition {
+    let mut kept = Vec::new();
+    for part in parts {
+        match part {
+            part if is_true(&part) => return truth(),
+            Condition::Or(inner) => kept.extend(inner),
+            part => kept.push(part),
+        }
+    }
+    if kept.len() == 1 { kept.swap_remove(0) } else { Condition::Or(kept) }
+}
+
+pub(super) fn not(condition: Condition) -> Condition {
+    match condition {
+        part if is_true(&part) => falsity(),
+        part if is_false(&part) => truth(),
+        Condition::Not(inner) => *inner,
+        part => Condition::Not(Box::new(part)),
+    }
+}
+
+pub(super) fn equal(left: &Term, right: &Term) -> Condition {
+    match (left, right) {
+        (Term::Constant(left), Term::Constant(right)) if left.name == right.name => truth(),
+        (Term::Constant(_), Term::Constant(_)) => falsity(),
+        (Term::Variable(left), Term::Variable(right)) if left.name == right.name => truth(),
+        _ => Condition::Equal(left.clone(), right.clone(), Span::default()),
+    }
+}
+
+pub(super) fn exists(variables: &[TypedName], body: Condition) -> Condition {
+    if variables.is_empty() || is_false(&body) {
+        return body;
+    }
+    Condition::Exists(variables.to_vec(), Box::new(body))
+}
