@@ -1,5 +1,7 @@
 //! Formulas against an oracle: for every number of steps, a formula has a plan at the oracle's cost, and none one below.
 
+#[path = "../tests/random/adl.rs"]
+pub(crate) mod adl;
 #[path = "../tests/missions/mod.rs"]
 pub(crate) mod missions;
 #[path = "../tests/random/mod.rs"]
@@ -180,7 +182,7 @@ pub(crate) fn fleet(seed: u64) -> (String, String) {
 }
 
 /// Where a state leads to, and what that costs.
-fn successors(task: &Task, state: &State) -> Vec<(State, Int)> {
+pub(crate) fn successors(task: &Task, state: &State) -> Vec<(State, Int)> {
     let mut all = Vec::new();
     for operator in &task.operators {
         for choice in operator.choices().filter(|choice| operator.applicable(state, choice)) {

@@ -7,10 +7,13 @@
 //!
 //! [1] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
+mod cut;
 mod partition;
 mod projection;
+mod relaxed;
 mod resources;
 
+pub(crate) use cut::LandmarkCut;
 pub(crate) use projection::Projection;
 
 use partition::Partition;

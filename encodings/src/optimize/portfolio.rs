@@ -17,7 +17,7 @@ use crate::optimize::run::{Best, Run};
 use crate::plan::ground::GroundPlan;
 use crate::plan::solution::{Part, Proof, Solution, Status};
 use crate::satisfice::{Advance, Satisficer};
-use crate::search::{Found, Prepared, Search, Space, ties};
+use crate::search::{Duo, Found, Prepared, Space, ties};
 
 /// For each state that the exact search stores in a round: how many nodes the search for some plan goes through, and how many clauses a
 /// formula has at most.
@@ -27,14 +27,12 @@ const CLAUSES: usize = 50;
 const STATES: u64 = 4;
 /// The allowance of formulas is halved so often at most.
 const LEAST: u32 = 3;
-/// The exact search stores no more states than these.
-const ROOM: usize = 20_000_000;
 
 /// What is left to be tried, and what is known.
 struct Portfolio<'r, 'a> {
     run: Run<'a>,
     bounds: &'r Bounds,
-    exact: Option<Search<'r, Int, Bounds>>,
+    exact: Option<Duo<'r, Int, Bounds>>,
     satisficer: Option<Satisficer<'a, Int>>,
     first: Option<FirstPlan>,
     prover: Option<Prover>,
@@ -67,8 +65,8 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     let Ok(prepared) = Prepared::new(context) else {
         return run.finish(Status::Unknown, None, Some(lower), 0, None);
     };
-    let space = prepared.as_ref().map(|prepared| Space { context, bounds, prepared });
-    let exact = space.map(|space| Search::new(&space, &context.task.initial, false, None));
+    let space = prepared.as_ref().map(|prepared| Space { context, bounds, prepared, orbits: None });
+    let exact = space.map(|space| Duo::new(space, &context.task.initial));
     let is_sat = run.config.engine != Engine::Search;
     let mut portfolio = Portfolio {
         first: is_sat.then(|| FirstPlan::new(&run)),
@@ -100,7 +98,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let mut stored = unit;
         for round in 0..u32::MAX {
             let work = unit.saturating_mul(1_usize.checked_shl(round.min(20)).unwrap_or(1));
-            stored = stored.saturating_add(work).min(ROOM);
+            stored = stored.saturating_add(work);
             let turns = [Self::satisfice, Self::search_to, Self::ask];
             for turn in turns {
                 if self.run.config.limits.reached() {
@@ -119,18 +117,14 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 
     fn search_to(&mut self, _: usize, stored: usize) -> Turn {
-        let turn = self.search_exactly(stored);
-        if stored >= ROOM {
-            self.exact = None;
-        }
-        turn
+        self.search_exactly(stored)
     }
 
     fn search_exactly(&mut self, stored: usize) -> Turn {
         let mut lower = self.lower;
         let exact = self.exact.as_mut()?;
         if let Some(best) = &self.best {
-            exact.know(best.cost);
+            exact.know(&best.cost);
         }
         let found = exact.run(stored, &mut |_, bound| lower = lower.max(*bound));
         if lower > self.lower {

@@ -76,7 +76,7 @@ pub(super) fn solve(
                 report(Progress { metric: cost.map(signed), bound: signed(bound) });
             }
         };
-        let space = Space { context, bounds: &set.bounds, prepared };
+        let space = Space { context, bounds: &set.bounds, prepared, orbits: None };
         let found = search_from(&space, &start.state, limit, most, &mut hear);
         let plan = match found {
             Found::Optimal(plan) => plan,

@@ -2,8 +2,7 @@
 //!
 //! States that agree on all finite-domain variables are compared by cost and by numeric variables; where a higher value
 //! never hurts (a battery), a state that costs no less and has no more of anything is dropped. That is the label-setting
-//! search of resource-constrained shortest paths [1]. If it ends before its limits, its answer is exact. If it does not end
-//! soon, a greedy search, which looks at estimates only, finds some plan meanwhile.
+//! search of resource-constrained shortest paths [1]. If it ends before its limits, its answer is exact.
 //!
 //! Of states with equal sums of cost and estimate, those come first from which fewer steps can lead to the goal, and of these the
 //! ones that are further: a plan that is found is cheapest once nothing that is left can be cheaper, or as cheap with fewer steps.
@@ -11,7 +10,9 @@
 //! [1] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
 //! windows, INFOR 26(3), 1988.
 
-use crate::bounds::Bounds;
+use std::sync::Arc;
+
+use crate::bounds::{Bounds, LandmarkCut};
 use crate::context::Context;
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::{Int, dense};
@@ -19,15 +20,18 @@ use crate::plan::ground::{GroundPlan, GroundStep};
 use crate::search::directions::is_monotone;
 use crate::search::generator::OperatorIndex;
 use crate::search::open::Open;
+use crate::search::orbits::Orbits;
 use crate::search::store::{NONE, Origin, Store};
 use crate::search::successors::{Priced, undominated};
 use crate::task::number::TaskNumber;
 use crate::task::{Fact, OperatorId, State, Task};
 
-/// How many states are stored at most where an answer is wanted at once, or is written down.
-pub(crate) const STATE_LIMIT: usize = 400_000;
-/// After so many states without a plan the greedy search has its turn, with as many.
-const SOON: usize = 20_000;
+/// As many states are stored before the first look at how far the search is.
+const FEW: usize = 200_000;
+/// What it takes to take a state and to see what can be done in it, in steps of a computer…
+const NODE_WORK: u64 = 2_000;
+/// … and to make a state after it, and to look it up.
+const STATE_WORK: u64 = 600;
 
 /// What the search found.
 #[derive(Debug)]
@@ -91,11 +95,48 @@ impl<N: TaskNumber> Prepared<N> {
 pub(crate) trait Estimate<N> {
     /// None if the goal cannot be reached.
     fn estimate(&self, state: &State<N>) -> Option<N>;
+
+    /// A sharper one that takes longer, if there is one.
+    fn sharper(&self, _: &Task<N>) -> Option<Box<dyn Sharper<N>>> {
+        None
+    }
+
+    /// What is known of objects that are interchangeable.
+    fn orbits(&self, _: Context<'_, N>) -> Option<Orbits> {
+        None
+    }
+}
+
+/// A lower bound that takes long, and is looked at only where a state is to be expanded.
+pub(crate) trait Sharper<N> {
+    /// None if the goal cannot be reached.
+    fn estimate(&mut self, state: &State<N>) -> Option<N>;
+
+    /// What it took so far, in steps of a computer.
+    fn work(&self) -> u64;
+}
+
+impl Sharper<Int> for LandmarkCut {
+    fn estimate(&mut self, state: &State) -> Option<Int> {
+        self.sum(&state.values).map(Int::from)
+    }
+
+    fn work(&self) -> u64 {
+        self.work()
+    }
 }
 
 impl Estimate<Int> for Bounds {
     fn estimate(&self, state: &State) -> Option<Int> {
         self.estimate(state)
+    }
+
+    fn sharper(&self, task: &Task) -> Option<Box<dyn Sharper<Int>>> {
+        LandmarkCut::new(task).map(|cut| Box::new(cut) as Box<dyn Sharper<Int>>)
+    }
+
+    fn orbits(&self, context: Context<'_>) -> Option<Orbits> {
+        Orbits::new(context).ok().flatten()
     }
 }
 
@@ -104,10 +145,28 @@ pub(crate) struct Space<'a, N, E> {
     pub(crate) context: Context<'a, N>,
     pub(crate) bounds: &'a E,
     pub(crate) prepared: &'a Prepared<N>,
+    /// Set if states that interchangeable objects tell apart count as one.
+    pub(crate) orbits: Option<Arc<Orbits>>,
 }
 
-/// What comes first: the sum of cost and estimate, the steps that this takes at least, and then what is further.
+/// Which node comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// That with the least sum of cost and estimate, then with the fewest steps in all: the plan has fewest steps of the cheapest.
+    Fewest,
+    /// Of equal sums that with the fewest steps to go: the plan is cheapest.
+    Nearest,
+    /// That with the least estimate, whatever was paid.
+    Greedy,
+}
+
+/// The cost and the steps that count, and then what is further.
 type Key<N> = (N, u32, u32);
+
+/// What is further comes first.
+fn later(steps: u32) -> u32 {
+    u32::MAX.saturating_sub(steps)
+}
 
 /// A search that can be gone on with.
 pub(crate) struct Search<'a, N, E> {
@@ -115,18 +174,28 @@ pub(crate) struct Search<'a, N, E> {
     limits: &'a Limits,
     bounds: &'a E,
     prepared: &'a Prepared<N>,
-    store: Store<N>,
+    pub(super) store: Store<N>,
     open: Open<Key<N>>,
     /// Whether states were left out because their numbers do not fit.
     incomplete: bool,
-    /// Whether only estimates decide what comes next.
-    greedy: bool,
-    /// The cheapest goal state so far, with fewest steps of those, and their number.
-    best: Option<(u32, u32)>,
+    order: Order,
+    /// Looked at, too, when a state is to be expanded.
+    pub(super) sharper: Option<Box<dyn Sharper<N>>>,
+    /// What it took so far apart from that, in steps of a computer.
+    own_work: u64,
+    /// Among how many searches memory is divided.
+    sharing: usize,
+    /// The lower bound so far.
+    bound: Option<N>,
+    is_interrupted: bool,
+    /// The best goal state so far.
+    best: Option<u32>,
     /// What a known plan costs, if there is one: nothing dearer is looked at.
     limit: Option<N>,
     /// Whether that plan is none of this search.
     is_told: bool,
+    /// How many steps it has, if that counts: nothing as dear with as many is looked at.
+    fewest: Option<u32>,
     /// How far the search was whenever the number of its states had doubled.
     progress: Vec<N>,
     /// The state that is expanded, and the one that it leads to.
@@ -134,175 +203,180 @@ pub(crate) struct Search<'a, N, E> {
     next: State<N>,
 }
 
-/// Searches a task whose operators all cost at least 0, as long as there is memory and hope to come to the end with it.
-pub(crate) fn search(context: Context<'_>, bounds: &Bounds) -> Found {
-    search_states(context, bounds, usize::MAX)
-}
-
-/// Searches it, storing at most so many states.
-pub(crate) fn search_states<N: TaskNumber>(
-    context: Context<'_, N>,
-    bounds: &impl Estimate<N>,
-    most: usize,
-) -> Found<N> {
-    match Prepared::new(context) {
-        Ok(Some(prepared)) => {
-            let space = Space { context, bounds, prepared: &prepared };
-            search_within(&space, &context.task.initial, None, most, &mut |_, _| {})
-        }
-        Ok(None) | Err(Interrupted) => Found::Unknown(None),
-    }
-}
-
 /// Hears, while a search goes on, what the best plan so far costs, if there is one, and what none costs less than.
 pub(crate) type Hear<'a, N> = &'a mut dyn FnMut(Option<&N>, &N);
 
-/// Searches it from a state of its own, storing at most so many states, for a plan that costs at most `limit`: what a known one
-/// costs, or `Int::MAX`.
-pub(crate) fn search_from(
-    space: &Space<'_, Int, Bounds>,
-    initial: &State,
-    limit: Int,
-    most: usize,
-    hear: Hear<'_, Int>,
-) -> Found {
-    let limit = (limit < Int::MAX).then_some(limit);
-    search_within(space, initial, limit, most, hear)
-}
-
-fn search_within<N: TaskNumber, E: Estimate<N>>(
-    space: &Space<'_, N, E>,
-    initial: &State<N>,
-    limit: Option<N>,
-    most: usize,
-    hear: Hear<'_, N>,
-) -> Found<N> {
-    let known = limit.is_some();
-    let mut search = Search::new(space, initial, false, limit);
-    if let Some(found) = search.run(SOON.min(most), hear) {
-        return found;
-    }
-    let mut some = None;
-    if search.best.is_none() && !known {
-        let mut greedy = Search::new(space, initial, true, None);
-        greedy.run(SOON.min(most), &mut |_, _| {});
-        some = greedy.best_plan();
-        search.limit = some.as_ref().map(|plan| plan.cost.clone());
-    }
-    match search.run(most, hear) {
-        Some(Found::Unknown(plan)) => Found::Unknown(cheaper(plan, some)),
-        Some(found) => found,
-        None => Found::Unknown(cheaper(search.best_plan(), some)),
-    }
-}
-
-fn cheaper<N: Ord>(one: Option<GroundPlan<N>>, other: Option<GroundPlan<N>>) -> Option<GroundPlan<N>> {
-    one.into_iter().chain(other).min_by(|a, b| (&a.cost, a.steps.len()).cmp(&(&b.cost, b.steps.len())))
-}
-
-/// A state's basic values and numbers, and what was paid on the way to it.
-pub(crate) type ClosedLabel<N> = (Vec<u32>, Vec<N>, N);
-
-/// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
-/// nothing left; none if there is a cheaper plan, or if a limit comes first.
-pub(crate) fn closed_labels<N: TaskNumber>(
-    context: Context<'_, N>,
-    bounds: &impl Estimate<N>,
-    cost: Option<&N>,
-) -> Option<Vec<ClosedLabel<N>>> {
-    let prepared = Prepared::new(context).ok()??;
-    let task = context.task;
-    let mut search = Search::new(&Space { context, bounds, prepared: &prepared }, &task.initial, false, None);
-    match (search.run(STATE_LIMIT, &mut |_, _| {})?, cost) {
-        (Found::Optimal(plan), Some(cost)) if plan.cost >= *cost => {}
-        (Found::None, None) => {}
-        _ => return None,
-    }
-    let mut state = task.initial.clone();
-    let label = |id: u32| {
-        search.store.unpack(id, &mut state);
-        let own = search.store.cost(id);
-        let total = bounds.estimate(&state).and_then(|more| own.plus(&more))?;
-        let is_below = cost.is_none_or(|cost| total < *cost);
-        is_below.then(|| (state.values[..task.basic].to_vec(), state.numbers.clone(), own.clone()))
-    };
-    let nodes = (0..dense(search.store.len())).filter(|id| !search.store.is_dominated(*id));
-    Some(nodes.filter_map(label).collect())
-}
-
 impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
-    pub(crate) fn new(space: &Space<'a, N, E>, initial: &State<N>, greedy: bool, limit: Option<N>) -> Self {
-        let Space { context: Context { task, limits }, bounds, prepared } = *space;
+    pub(super) fn new(space: &Space<'a, N, E>, initial: &State<N>, order: Order, limit: Option<N>) -> Self {
+        let Space { context: Context { task, limits }, bounds, prepared, ref orbits } = *space;
         let mut search = Search {
             task,
             limits,
             bounds,
             prepared,
-            store: Store::new(task),
+            store: Store::new(task, orbits.clone()),
             open: Open::new(),
             incomplete: false,
-            greedy,
+            order,
+            sharper: None,
+            own_work: 0,
+            sharing: 1,
+            bound: None,
+            is_interrupted: false,
             best: None,
             limit,
             is_told: false,
+            fewest: None,
             progress: Vec::new(),
             state: initial.clone(),
             next: initial.clone(),
         };
-        search.push(N::zero(), Origin { parent: NONE, step: NONE, steps: 0 });
+        search.push(N::zero(), &N::zero(), Origin { parent: NONE, step: NONE, steps: 0 });
         search
     }
 
-    /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
-    pub(crate) fn know(&mut self, cost: N) {
-        if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
-            self.limit = Some(cost);
-            self.best = None;
-            self.is_told = true;
-        }
+    /// None if there are more states than `most` before anything is known; it may be called again.
+    pub(super) fn run(&mut self, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
+        self.go_on(most, u64::MAX, hear)
     }
 
-    /// None if there are more states than `most` before anything is known; it may be called again.
-    pub(crate) fn run(&mut self, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
+    /// None if there was more work than that before anything is known; it may be called again.
+    pub(super) fn run_until(&mut self, work: u64, hear: Hear<'_, N>) -> Option<Found<N>> {
+        let found = self.go_on(usize::MAX, work, hear);
+        if found.is_none() && !self.has_room() { Some(Found::Unknown(self.best_plan())) } else { found }
+    }
+
+    fn go_on(&mut self, most: usize, work: u64, hear: Hear<'_, N>) -> Option<Found<N>> {
         let mut pulse = self.limits.pulse();
         let mut told: Option<(Option<N>, N)> = None;
-        while self.store.len() <= most && self.has_room() {
-            let Some(((total, least, _), id)) = self.open.pop() else {
-                return Some(self.ended());
-            };
+        while self.store.len() <= most && self.has_room() && self.work() <= work {
+            let Some((key, id)) = self.open.pop() else { return Some(self.ended()) };
             if self.store.is_dominated(id) {
                 continue;
             }
-            let is_best = |(_, steps): (u32, u32)| {
-                self.greedy || self.limit.as_ref().is_some_and(|cost| (cost, steps) <= (&total, least))
-            };
-            if self.best.is_some_and(is_best) {
+            let (total, least, _) = &key;
+            if self.is_enough(total, *least) {
                 return Some(self.ended());
             }
-            let is_told = |(limit, bound): &(Option<N>, N)| *limit == self.limit && *bound == total;
+            let is_told = |(limit, bound): &(Option<N>, N)| *limit == self.limit && *bound == *total;
             if !self.incomplete && !told.as_ref().is_some_and(is_told) {
-                hear(self.limit.as_ref(), &total);
+                hear(self.limit.as_ref(), total);
                 told = Some((self.limit.clone(), total.clone()));
             }
-            if self.is_told && self.limit.as_ref() == Some(&total) {
+            if self.bound.as_ref().is_none_or(|bound| bound < total) {
+                self.bound = Some(total.clone());
+            }
+            if self.is_met() {
                 return Some(Found::Unknown(None));
             }
-            if self.store.len() >> self.progress.len() >= STATE_LIMIT / 2 {
-                self.progress.push(total);
+            if self.store.len() >> self.progress.len() >= FEW {
+                self.progress.extend(self.bound.clone());
                 if !self.is_hopeful() {
                     return Some(Found::Unknown(self.best_plan()));
                 }
             }
-            if self.expand(id, &mut pulse).is_err() {
+            self.store.unpack(id, &mut self.state);
+            let Some((total, ..)) = self.sharpened(id, key) else { continue };
+            if self.expand(id, &total, &mut pulse).is_err() {
+                self.is_interrupted = true;
                 return Some(Found::Unknown(self.best_plan()));
             }
         }
         None
     }
 
+    /// Looks closer at the state that is to be expanded; none if it has to wait, or to go.
+    fn sharpened(&mut self, id: u32, key: Key<N>) -> Option<Key<N>> {
+        let Some(sharper) = &mut self.sharper else { return Some(key) };
+        if !self.store.look_closer(id) {
+            return Some(key);
+        }
+        let estimate = sharper.estimate(&self.state)?;
+        let total = self.store.cost(id).plus(&estimate)?;
+        if total <= key.0 {
+            return Some(key);
+        }
+        let steps = self.store.origin(id).steps;
+        let to_go = self.prepared.steps_at_least(&estimate);
+        let least = steps.saturating_add(to_go);
+        if !self.is_beyond(&total) && !self.is_no_better(&total, least) {
+            let rank = if self.order == Order::Nearest { to_go } else { key.1.max(least) };
+            self.open.push((total, rank, key.2), id);
+        }
+        None
+    }
+
+    /// What it took so far, in steps of a computer.
+    pub(super) fn work(&self) -> u64 {
+        self.own_work.saturating_add(self.sharper.as_ref().map_or(0, |sharper| sharper.work()))
+    }
+
+    /// Whether nothing that comes with such a cost and so many steps, or later, is better than the plan that is known.
+    fn is_enough(&self, cost: &N, steps: u32) -> bool {
+        if self.order == Order::Greedy {
+            return self.best.is_some();
+        }
+        let (Some(limit), Some(fewest)) = (&self.limit, self.fewest) else { return false };
+        (limit, if self.order == Order::Nearest { 0 } else { fewest }) <= (cost, steps)
+    }
+
+    /// What a known plan costs.
+    pub(super) fn limit(&self) -> Option<&N> {
+        self.limit.as_ref()
+    }
+
+    /// A plan that costs this much is known; one as cheap is looked for all the same.
+    pub(super) fn limit_to(&mut self, cost: &N) {
+        if self.limit.as_ref().is_none_or(|limit| cost < limit) {
+            self.limit = Some(cost.clone());
+        }
+    }
+
+    /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
+    pub(crate) fn know(&mut self, cost: N) {
+        if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
+            self.limit = Some(cost);
+            self.fewest = None;
+            self.best = None;
+            self.is_told = true;
+        }
+    }
+
+    /// Whether no plan costs less than the one that it was told of.
+    pub(super) fn is_met(&self) -> bool {
+        self.is_told && self.limit == self.bound
+    }
+
+    /// Whether a limit of time ended it.
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.is_interrupted
+    }
+
+    /// Memory is divided among so many searches.
+    pub(super) fn share_room(&mut self, count: usize) {
+        self.sharing = count.max(1);
+    }
+
+    /// What no plan costs less than.
+    pub(super) fn bound(&self) -> Option<&N> {
+        self.bound.as_ref()
+    }
+
+    /// What that may be once there are twice as many states so many times, if it goes on as it did.
+    #[expect(clippy::arithmetic_side_effects, reason = "sums of costs that fit")]
+    pub(super) fn bound_after_doubling(&self, times: u32) -> Option<N> {
+        let [.., before, now] = &self.progress[..] else { return None };
+        let step = now.clone() + -before.clone();
+        (0..times).try_fold(self.bound.clone()?, |bound, _| bound.plus(&step))
+    }
+
+    fn room(&self) -> usize {
+        self.limits.room().checked_div(self.sharing).unwrap_or(0)
+    }
+
     /// Whether memory is left.
     fn has_room(&self) -> bool {
-        self.store.bytes().saturating_add(self.open.bytes()) <= self.limits.room()
+        self.store.bytes().saturating_add(self.open.bytes()) <= self.room()
     }
 
     /// Whether the search can come to the cost of the best plan known before memory is full, if it goes on as it did while the number of its
@@ -314,11 +388,12 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     fn is_hopeful(&self) -> bool {
         let (Some(limit), [.., before, now]) = (&self.limit, &self.progress[..]) else { return true };
         let (step, left) = (now.clone() + -before.clone(), limit.clone() + -now.clone());
-        if left <= N::zero() {
+        // Where costs do not grow, states say nothing of what is left.
+        if left <= N::zero() || step <= N::zero() {
             return true;
         }
         let bytes = self.store.bytes().saturating_add(self.open.bytes());
-        let doublings = self.limits.room().checked_div(bytes).map_or(0, usize::ilog2);
+        let doublings = self.room().checked_div(bytes).map_or(0, usize::ilog2);
         let enough = (0..=doublings).try_fold(N::zero(), |sum: N, _| sum.plus(&step));
         enough.is_none_or(|enough| enough >= left)
     }
@@ -326,26 +401,26 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     /// The answer if nothing that is left can be better.
     fn ended(&self) -> Found<N> {
         match self.best_plan() {
-            plan if self.incomplete || self.greedy => Found::Unknown(plan),
+            plan if self.incomplete || self.order == Order::Greedy => Found::Unknown(plan),
             Some(plan) => Found::Optimal(plan),
             None => Found::None,
         }
     }
 
-    pub(crate) fn best_plan(&self) -> Option<GroundPlan<N>> {
-        self.best.map(|(goal, _)| self.plan(goal))
+    pub(super) fn best_plan(&self) -> Option<GroundPlan<N>> {
+        self.best.map(|goal| self.plan(goal))
     }
 
-    /// Adds all that can be reached from a node by one step. A node whose expansion is interrupted is not expanded, so that the
+    /// Adds all that can be reached by one step from a node, whose state is unpacked. A node whose expansion is interrupted is not expanded, so that the
     /// search must end there.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than nodes, combinations are numbered"
     )]
-    fn expand(&mut self, id: u32, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
+    fn expand(&mut self, id: u32, total: &N, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
         let (task, prepared) = (self.task, self.prepared);
-        self.store.unpack(id, &mut self.state);
         task.close(&mut self.state);
+        self.own_work += NODE_WORK;
         let cost = self.store.cost(id).clone();
         let steps = self.store.origin(id).steps + 1;
         for operator_id in prepared.index.applicable(task, &self.state) {
@@ -354,11 +429,14 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             let first = prepared.numbers[operator_id.index()];
             for ((choice, step), number) in prepared.choices[operator_id.index()].iter().zip(first..) {
                 pulse.beat()?;
+                self.own_work += STATE_WORK;
                 if operator.condition.holds_numerically(&self.state.numbers, choice, &sizes) {
                     self.next.clone_from(&self.state);
                     let applied = operator.apply(&self.state, choice, &mut self.next);
                     match (applied, cost.plus(step)) {
-                        (Some(()), Some(cost)) => self.push(cost, Origin { parent: id, step: number, steps }),
+                        (Some(()), Some(cost)) => {
+                            self.push(cost, total, Origin { parent: id, step: number, steps });
+                        }
                         _ => self.incomplete = true,
                     }
                 }
@@ -367,8 +445,9 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         Ok(())
     }
 
-    /// Adds the next state, whose derived variables have no values yet, unless it is no good.
-    fn push(&mut self, cost: N, origin: Origin) {
+    /// Adds the next state, whose derived variables have no values yet, unless it is no good. No plan through it costs less than
+    /// `through`, as one through the state before does.
+    fn push(&mut self, cost: N, through: &N, origin: Origin) {
         if self.is_beyond(&cost) {
             return;
         }
@@ -378,20 +457,22 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             self.incomplete = true;
             return;
         };
+        let total = if self.order == Order::Greedy { total } else { total.max(through.clone()) };
         let least = origin.steps.saturating_add(self.prepared.steps_at_least(&estimate));
         if self.is_beyond(&total) || self.is_no_better(&total, least) {
             return;
         }
         let id = self.store.insert(&vacancy, origin);
         if self.is_goal() {
-            self.best = Some((id, origin.steps));
+            self.best = Some(id);
+            self.fewest = Some(origin.steps);
             self.limit = Some(cost);
             self.is_told = false;
         }
-        let key = if self.greedy {
-            (estimate, 0, 0)
-        } else {
-            (total, least, u32::MAX.saturating_sub(origin.steps))
+        let key = match self.order {
+            Order::Greedy => (estimate, 0, 0),
+            Order::Nearest => (total, least.saturating_sub(origin.steps), later(origin.steps)),
+            Order::Fewest => (total, least, later(origin.steps)),
         };
         self.open.push(key, id);
     }
@@ -400,10 +481,10 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         self.limit.as_ref().is_some_and(|limit| cost > limit)
     }
 
-    /// Whether the best plan so far is no worse than one with this cost and so many steps.
+    /// Whether a known plan is no worse than one with this cost and so many steps.
     fn is_no_better(&self, cost: &N, steps: u32) -> bool {
-        let (Some((_, own)), Some(limit)) = (self.best, &self.limit) else { return false };
-        (limit, own) <= (cost, steps)
+        let (Some(limit), Some(fewest)) = (&self.limit, self.fewest) else { return false };
+        (limit, fewest) <= (cost, steps)
     }
 
     /// Whether the next state satisfies the goal.

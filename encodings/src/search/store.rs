@@ -6,6 +6,7 @@
 //! compared; those that no other one of the place dominates are its front.
 
 use std::hash::{Hash, Hasher};
+use std::sync::Arc;
 
 use hashbrown::HashTable;
 use rustc_hash::FxHasher;
@@ -13,6 +14,7 @@ use rustc_hash::FxHasher;
 use crate::number::dense;
 use crate::search::directions::{Asked, directions};
 use crate::search::front::{Criteria, Front};
+use crate::search::orbits::Orbits;
 use crate::task::number::TaskNumber;
 use crate::task::{State, Task};
 
@@ -69,6 +71,8 @@ struct Node {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Standing {
     Open,
+    /// A sharper estimate was looked at.
+    Closer,
     Dominated,
 }
 
@@ -94,6 +98,13 @@ pub(super) struct Store<N> {
     /// The key and the other numbers of the state that is looked at.
     key: Vec<u32>,
     own: Vec<u32>,
+    /// Where interchangeable objects are exchanged in keys, the words of the values as they are: of each node, and of the state that is
+    /// looked at.
+    orbits: Option<Arc<Orbits>>,
+    plain: Vec<u32>,
+    own_plain: Vec<u32>,
+    values: Vec<u32>,
+    image: Vec<u32>,
 }
 
 /// A state that was looked up, and is not dominated.
@@ -152,8 +163,16 @@ fn fields(sizes: &[usize]) -> (Vec<Field>, usize) {
     (fields, used.len())
 }
 
+fn pack(fields: &[Field], values: &[u32], words: usize, to: &mut Vec<u32>) {
+    to.clear();
+    to.resize(words, 0);
+    for field in fields {
+        to[field.word] |= values[field.variable] << field.shift;
+    }
+}
+
 impl<N: TaskNumber> Store<N> {
-    pub(super) fn new(task: &Task<N>) -> Self {
+    pub(super) fn new(task: &Task<N>, orbits: Option<Arc<Orbits>>) -> Self {
         let sizes: Vec<usize> =
             task.variables[..task.basic].iter().map(|variable| variable.values.len()).collect();
         let (fields, words) = fields(&sizes);
@@ -181,6 +200,11 @@ impl<N: TaskNumber> Store<N> {
             numbers: Numbers { all: Vec::new(), table: HashTable::new() },
             key: Vec::new(),
             own: Vec::new(),
+            orbits,
+            plain: Vec::new(),
+            own_plain: Vec::new(),
+            values: Vec::new(),
+            image: Vec::new(),
         }
     }
 
@@ -204,10 +228,14 @@ impl<N: TaskNumber> Store<N> {
 
     /// Looks a state up; none if a known one is as good.
     pub(super) fn look_up(&mut self, state: &State<N>, cost: &N, steps: u32) -> Option<Vacancy> {
-        self.key.clear();
-        self.key.resize(self.width.saturating_sub(self.exact.len()), 0);
-        for field in &self.fields {
-            self.key[field.word] |= state.values[field.variable] << field.shift;
+        let words = self.words();
+        if let Some(orbits) = &self.orbits {
+            pack(&self.fields, &state.values, words, &mut self.own_plain);
+            self.values.clone_from(&state.values);
+            orbits.order(&mut self.values, &mut self.image);
+            pack(&self.fields, &self.values, words, &mut self.key);
+        } else {
+            pack(&self.fields, &state.values, words, &mut self.key);
         }
         for variable in &self.exact {
             let position = self.numbers.position(&state.numbers[*variable]);
@@ -238,6 +266,11 @@ impl<N: TaskNumber> Store<N> {
         (!is_dominated).then_some(Vacancy { hash, place, cost })
     }
 
+    /// How many words of a key are values.
+    fn words(&self) -> usize {
+        self.width.saturating_sub(self.exact.len())
+    }
+
     /// The nodes of a front that is no tree.
     fn chain(&self, first: u32) -> impl Iterator<Item = u32> {
         let some = |node: u32| (node != NONE).then_some(node);
@@ -251,6 +284,9 @@ impl<N: TaskNumber> Store<N> {
         let node = Node { place, origin, cost: vacancy.cost, next: NONE, state: Standing::Open };
         self.nodes.push(node);
         self.others.extend_from_slice(&self.own);
+        if self.orbits.is_some() {
+            self.plain.extend_from_slice(&self.own_plain);
+        }
         let front = self.fronts[place as usize];
         if front != NONE && front & TREE != 0 {
             self.insert_into_tree(front ^ TREE, id);
@@ -326,6 +362,16 @@ impl<N: TaskNumber> Store<N> {
         self.nodes[node as usize].state == Standing::Dominated
     }
 
+    /// Notes that a state is looked at closer; false if it was already.
+    pub(super) fn look_closer(&mut self, node: u32) -> bool {
+        let state = &mut self.nodes[node as usize].state;
+        let is_first = *state == Standing::Open;
+        if is_first {
+            *state = Standing::Closer;
+        }
+        is_first
+    }
+
     pub(super) fn origin(&self, node: u32) -> Origin {
         self.nodes[node as usize].origin
     }
@@ -337,12 +383,12 @@ impl<N: TaskNumber> Store<N> {
     /// Unpacks a state; its derived variables stay as they are.
     pub(super) fn unpack(&self, node: u32, state: &mut State<N>) {
         let key = self.key_of(self.nodes[node as usize].place);
+        let words = if self.orbits.is_some() { key_of(&self.plain, self.words(), node) } else { key };
         for field in &self.fields {
-            state.values[field.variable] = (key[field.word] >> field.shift) & field.mask;
+            state.values[field.variable] = (words[field.word] >> field.shift) & field.mask;
         }
         let number = |position: u32| self.numbers.all[position as usize].clone();
-        let first = key.len().saturating_sub(self.exact.len());
-        for (variable, position) in self.exact.iter().zip(&key[first..]) {
+        for (variable, position) in self.exact.iter().zip(&key[self.words()..]) {
             state.numbers[*variable] = number(*position);
         }
         for (compared, position) in self.compared.iter().zip(self.others_of(node)) {

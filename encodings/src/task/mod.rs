@@ -2,6 +2,7 @@
 
 pub(crate) mod common_denominator;
 mod dense_ids;
+pub(crate) mod exchange;
 mod ground;
 pub(crate) mod number;
 pub(crate) mod quantity;
