@@ -35,6 +35,14 @@ pub enum Error {
         /// Where.
         place: Place,
     },
+    /// A numeric fluent that is read, and has no value at first.
+    #[error("`{name}` without an initial value cannot be planned with: a value for it in `:init`")]
+    NoValue {
+        /// The function.
+        name: String,
+        /// Where it is read.
+        place: Place,
+    },
     /// A name that the checker would have refused.
     #[error("unknown {kind} `{name}`")]
     Unknown {
@@ -82,10 +90,15 @@ impl Error {
         }
     }
 
+    /// Whether a fluent is read that has no value at first.
+    pub(crate) fn is_value_missing(&self) -> bool {
+        matches!(self, Self::NoValue { .. })
+    }
+
     /// The stable code of the cause.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Unsupported { .. } => "E301",
+            Self::Unsupported { .. } | Self::NoValue { .. } => "E301",
             Self::Unknown { .. } => "E302",
             Self::NonLinear { .. } => "E303",
             Self::Overflow { .. } => "E304",
@@ -97,9 +110,10 @@ impl Error {
     /// Where the cause stands, if it stands in a file.
     pub fn place(&self) -> Option<Place> {
         match self {
-            Self::Unsupported { place, .. } | Self::Unknown { place, .. } | Self::NonLinear { place } => {
-                Some(*place)
-            }
+            Self::Unsupported { place, .. }
+            | Self::NoValue { place, .. }
+            | Self::Unknown { place, .. }
+            | Self::NonLinear { place } => Some(*place),
             Self::Overflow { .. } | Self::Rules(_) | Self::Interrupted => None,
         }
     }

@@ -36,9 +36,9 @@ use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::error::{Error, File, Place};
 use crate::ground::{Config as GroundConfig, Generality, ground_lifted};
-use crate::lifted::{Expression, Metric, Rational};
+use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::limits::Limits;
-use crate::normalize::normalize;
+use crate::normalize::{normalize, partial};
 use crate::number::Int;
 use crate::plan::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::plan::{Plan, Step};
@@ -78,7 +78,23 @@ pub fn ground_concurrent(
             place,
         }]);
     }
-    let mut lifted = normalize(domain, problem, &config.objectives)?;
+    let lifted = || normalize(domain, problem, &config.objectives);
+    match ground_normal(lifted()?, config, &separation) {
+        Err(errors) if errors.iter().any(Error::is_value_missing) => {
+            let mut lifted = lifted()?;
+            partial::guard(&mut lifted);
+            ground_normal(lifted, config, &separation)
+        }
+        found => found,
+    }
+}
+
+/// Grounds a normalised task.
+fn ground_normal(
+    mut lifted: Lifted,
+    config: &GroundConfig,
+    separation: &Rational,
+) -> Result<Concurrent, Vec<Error>> {
     let place = Place { file: File::Problem, span: Span::default() };
     let number = |number| Expression::Number(Rational::from_integer(number));
     let (weight, metric) = match lifted.metrics.first() {
@@ -99,7 +115,7 @@ pub fn ground_concurrent(
     let none = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
     let (task, reached) = ground_lifted(lifted, designs, &none, &Generality::default(), &config.limits)?;
-    compile::compile(task, &split, &reached, &separation, weight, &config.limits)
+    compile::compile(task, &split, &reached, separation, weight, &config.limits)
 }
 
 /// Where the first preference or constraint on trajectories stands.

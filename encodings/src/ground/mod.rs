@@ -34,7 +34,7 @@ use crate::error::Error;
 use crate::lifted::Lifted;
 use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::limits::Limits;
-use crate::normalize::{events, normalize, zero};
+use crate::normalize::{events, normalize, partial, zero};
 use crate::task::Task;
 use crate::task::number::TaskNumber;
 use pddl::ast::{Domain, Problem};
@@ -60,7 +60,24 @@ pub(crate) fn ground_for<N: TaskNumber>(
     generality: &Generality,
 ) -> Result<Task<N>, Vec<Error>> {
     let plain = compile(domain, problem, &config.objectives)?;
-    let mut lifted = normalize(&plain.domain, &plain.problem, &plain.objectives)?;
+    let lifted = || normalize(&plain.domain, &plain.problem, &plain.objectives);
+    let found = ground_normal(lifted()?, config, generality);
+    match found {
+        Err(errors) if generality.numbers.is_none() && errors.iter().any(Error::is_value_missing) => {
+            let mut lifted = lifted()?;
+            partial::guard(&mut lifted);
+            ground_normal(lifted, config, generality)
+        }
+        found => found,
+    }
+}
+
+/// Grounds a task in which start and end of actions of duration 0 are still apart.
+fn ground_normal<N: TaskNumber>(
+    mut lifted: Lifted,
+    config: &Config,
+    generality: &Generality,
+) -> Result<Task<N>, Vec<Error>> {
     zero::split(&mut lifted)?;
     events::begin(&mut lifted);
     let designs: Vec<_> =

@@ -80,6 +80,8 @@ pub(crate) struct Predicate {
 pub(crate) struct Function {
     pub(crate) name: Name,
     pub(crate) fluent: bool,
+    /// Whether it may have no value; conditions see to it that it is not read then.
+    pub(crate) partial: bool,
 }
 
 /// An action schema with its parameters as `Term::Parameter` indices.

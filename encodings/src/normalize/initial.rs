@@ -54,7 +54,7 @@ pub(super) fn time(names: &mut Names, events: &[Event]) -> Time {
             derived: false,
             running: false,
         };
-        let function = |name| Function { name: Name::new(name), fluent: true };
+        let function = |name| Function { name: Name::new(name), fluent: true, partial: false };
         names.functions.extend([function("the clock"), function("a moment")]);
         names.predicates.extend([predicate("the phase", 1), predicate("has waited", 0)]);
         names.objects.extend((0..=events.len()).map(|number| Name::new(&format!("phase {number}"))));

@@ -10,6 +10,7 @@ pub(crate) mod events;
 mod fluents;
 mod initial;
 mod names;
+pub(crate) mod partial;
 pub(crate) mod zero;
 
 use crate::error::{Error, File, Place};

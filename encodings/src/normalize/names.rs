@@ -73,11 +73,15 @@ impl Names {
         let mut functions: Vec<_> = domain
             .functions
             .iter()
-            .map(|declared| Function { name: declared.identifier.name.clone(), fluent: false })
+            .map(|declared| Function {
+                name: declared.identifier.name.clone(),
+                fluent: false,
+                partial: false,
+            })
             .collect();
         let total_cost = Name::new("total-cost");
         if functions.iter().all(|function| function.name != total_cost) {
-            functions.push(Function { name: total_cost, fluent: false });
+            functions.push(Function { name: total_cost, fluent: false, partial: false });
         }
         let predicate_ids =
             predicates.iter().zip(0..).map(|(p, id)| (p.name.clone(), PredicateId(id))).collect();

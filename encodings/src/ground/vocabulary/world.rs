@@ -10,7 +10,7 @@ use crate::error::{Error, Place};
 use crate::ground::vocabulary::atom::{AtomId, AtomSet, Binding, Key};
 use crate::ground::vocabulary::failure::Failure;
 use crate::ground::vocabulary::reached::Reached;
-use crate::lifted::{Arguments, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term};
+use crate::lifted::{Arguments, Function, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term};
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 use crate::task::quantity::NumericId;
@@ -164,13 +164,10 @@ impl<'a> World<'a> {
         if let Some(known) = self.numerics.get_index_of(&Key(function, arguments)) {
             return Ok(NumericId::of(known));
         }
-        let name = &self.lifted.functions[function.index()].name;
-        if self.value(function, arguments).is_none() && *name != Name::new("total-cost") {
-            return Err(Failure::Error(Error::Unsupported {
-                construct: format!("`{name}` without an initial value"),
-                instead: "a value for it in `:init`".into(),
-                place,
-            }));
+        let Function { name, partial, .. } = &self.lifted.functions[function.index()];
+        let is_set = *partial || *name == Name::new("total-cost");
+        if !is_set && self.value(function, arguments).is_none() {
+            return Err(Failure::Error(Error::NoValue { name: name.to_string(), place }));
         }
         Ok(NumericId(dense(self.numerics.insert_full((function, arguments.into()), ()).0)))
     }
