@@ -21,7 +21,7 @@ use crate::search::{Duo, Found, Prepared, Space, ties};
 
 /// For each state that the exact search stores in a round: how many nodes the search for some plan goes through, and how many clauses a
 /// formula has at most.
-const NODES: usize = 500;
+const NODES: usize = 200;
 const CLAUSES: usize = 50;
 /// For each conflict of the SAT solver, how many states the exact search stores.
 const STATES: u64 = 4;

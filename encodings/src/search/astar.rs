@@ -15,16 +15,14 @@ use std::sync::Arc;
 use crate::bounds::{Bounds, LandmarkCut};
 use crate::context::Context;
 use crate::limits::{Interrupted, Limits, Pulse};
-use crate::number::{Int, dense};
-use crate::plan::ground::{GroundPlan, GroundStep};
-use crate::search::directions::is_monotone;
-use crate::search::generator::OperatorIndex;
+use crate::number::Int;
+use crate::plan::ground::GroundPlan;
 use crate::search::open::Open;
 use crate::search::orbits::Orbits;
+use crate::search::prepared::Prepared;
 use crate::search::store::{NONE, Origin, Store};
-use crate::search::successors::{Priced, undominated};
 use crate::task::number::TaskNumber;
-use crate::task::{Fact, OperatorId, State, Task};
+use crate::task::{Fact, State, Task};
 
 /// As many states are stored before the first look at how far the search is.
 const FEW: usize = 200_000;
@@ -42,53 +40,6 @@ pub(crate) enum Found<N = Int> {
     None,
     /// A limit was reached first; the best plan so far.
     Unknown(Option<GroundPlan<N>>),
-}
-
-/// What a search needs to know of a task, whatever state it begins in.
-pub(crate) struct Prepared<N = Int> {
-    /// For each operator its combinations of designs that no other one dominates, with their costs.
-    choices: Vec<Priced<N>>,
-    /// For each operator the number of its first combination; at the end, how many there are.
-    numbers: Vec<u32>,
-    index: OperatorIndex,
-    /// What the dearest combination costs.
-    dearest: N,
-}
-
-impl<N: TaskNumber> Prepared<N> {
-    /// None if some operator has too many combinations of designs.
-    pub(crate) fn new(context: Context<'_, N>) -> Result<Option<Self>, Interrupted> {
-        let Context { task, limits } = context;
-        let monotone = is_monotone(task);
-        let mut choices = Vec::with_capacity(task.operators.len());
-        for operator in limits.watch(&task.operators) {
-            let Some(own) = undominated(operator?, monotone, false, limits)? else { return Ok(None) };
-            choices.push(own);
-        }
-        let mut numbers = vec![0_u32];
-        let mut all = 0_u32;
-        for own in &choices {
-            let Some(next) = all.checked_add(dense(own.len())) else { return Ok(None) };
-            numbers.push(next);
-            all = next;
-        }
-        let dearest = choices.iter().flatten().map(|(_, cost)| cost).max().cloned();
-        let dearest = dearest.unwrap_or_else(N::zero);
-        Ok(Some(Self { choices, numbers, index: OperatorIndex::new(task), dearest }))
-    }
-
-    /// The operator of a combination, by number.
-    fn step(&self, number: u32) -> GroundStep {
-        let operator = self.numbers.partition_point(|first| *first <= number).saturating_sub(1);
-        let choice = number.saturating_sub(self.numbers[operator]);
-        let choice = self.choices[operator][choice as usize].0.clone();
-        GroundStep { operator: OperatorId(dense(operator)), choice }
-    }
-
-    /// The fewest steps that can cost so much.
-    fn steps_at_least(&self, cost: &N) -> u32 {
-        if self.dearest > N::zero() { cost.times_at_least(&self.dearest) } else { 0 }
-    }
 }
 
 /// A lower bound on the cost from a state to the goal.

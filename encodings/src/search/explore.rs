@@ -12,7 +12,8 @@ use crate::context::Context;
 use crate::limits::Interrupted;
 use crate::number::{Int, dense};
 use crate::plan::ground::GroundPlan;
-use crate::search::astar::{Estimate, Found, Hear, Order, Prepared, Search, Space};
+use crate::search::astar::{Estimate, Found, Hear, Order, Search, Space};
+use crate::search::prepared::Prepared;
 use crate::task::State;
 use crate::task::number::TaskNumber;
 
@@ -148,7 +149,8 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
         own.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
     }
 
-    /// Goes on until each search has done as much work as so many states are worth; the first time, until there are so many states.
+    /// Goes on until each search has done as much work as so many states are worth (a quarter of that with landmarks, where these are
+    /// few); the first time, until there are so many states.
     /// None if nothing is known then. That no plan is cheaper than one that it was told of is an unknown plan.
     pub(crate) fn run(&mut self, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
         if !self.has_begun {
@@ -171,7 +173,9 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
             };
             let search = &mut self.searches[position];
             search.share_room(count);
-            let found = search.run_until(until, &mut told);
+            // Most of what is proved at all is proved soon, and without landmarks.
+            let is_soon = search.sharper.is_some() && most <= STATE_LIMIT;
+            let found = search.run_until(if is_soon { until / 4 } else { until }, &mut told);
             let (is_met, is_interrupted) = (search.is_met(), search.is_interrupted());
             let best = self.best_plan();
             match found {

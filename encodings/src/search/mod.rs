@@ -7,10 +7,12 @@ mod front;
 pub(crate) mod generator;
 mod open;
 mod orbits;
+mod prepared;
 mod store;
 pub(crate) mod successors;
 pub(crate) mod ties;
 
-pub(crate) use astar::{Estimate, Found, Prepared, Space};
+pub(crate) use astar::{Estimate, Found, Space};
 pub(crate) use directions::is_monotone;
 pub(crate) use explore::{Duo, STATE_LIMIT, closed_labels, search, search_from, search_states};
+pub(crate) use prepared::Prepared;
