@@ -32,7 +32,7 @@ import report
 from planners import CLASSICAL, NUMERIC, PACKAGES, ROOT, TEMPORAL, planners
 from process import PATIENCE, run
 
-FIELDS = ["suite", "task", "problem", "planner", "status", "cost", "verdict", "measured", "first_s", "cpu_s", "wall_s", "limit_s",
+FIELDS = ["suite", "task", "problem", "planner", "status", "cost", "verdict", "measured", "cpu_s", "wall_s", "limit_s",
           "exit", "load", "note"]
 SUITES = {"classical": CLASSICAL, "unsolvable": CLASSICAL, "temporal": TEMPORAL, "numeric": NUMERIC, "ours": None}
 # How far apart a planner keeps interfering happenings at least, in the decimals that it prints, where that is less than a thousandth.
@@ -102,9 +102,8 @@ def one(planner, task, options):
             status = "limit"
         verdict, measured = validate(answer.plan, planner.name, task, place, options) if answer.plan else ("", "")
     note = "" if status in ("optimal", "plan", "unsolvable") else last_words(done.output, status)
-    first = "" if answer.first is None else round(answer.first, 3)
     cost = "" if answer.cost is None else answer.cost
-    return dict(zip(FIELDS, [*task[:3], planner.name, status, cost, verdict, measured, first, round(done.cpu, 3), round(done.wall, 3),
+    return dict(zip(FIELDS, [*task[:3], planner.name, status, cost, verdict, measured, round(done.cpu, 3), round(done.wall, 3),
                              options.seconds, done.code, round(load, 1), note]))
 
 

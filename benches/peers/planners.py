@@ -22,8 +22,8 @@ ALL = {CLASSICAL, NUMERIC, TEMPORAL}
 # The kinds of tasks that it reads, its command (domain, problem, seconds, kind), how its output is read (output, exit code, working
 # directory), and whether it answers SIGINT with its best plan so far.
 Planner = namedtuple("Planner", "name kinds command read ask", defaults=[False])
-# Status, cost by the planner's word, the plan in the lines that a validator reads, and when there was a first plan (seconds).
-Answer = namedtuple("Answer", "status cost plan first", defaults=[None, None, None])
+# Status, cost by the planner's word, and the plan in the lines that a validator reads.
+Answer = namedtuple("Answer", "status cost plan", defaults=[None, None])
 
 
 def planners(venv, program=None, slack=1, patience=PATIENCE, megabytes=4096):
@@ -87,14 +87,7 @@ def metaplan_answer(output, code, _=None):
     for step in told["steps"]:
         action = f"({' '.join([step['action'], *step['arguments']])})"
         lines.append(f"{step['start']}: {action} [{step['duration']}]" if temporal else action)
-    return Answer(status, told["cost"], lines, first_plan(told.get("statistics", {})))
-
-
-def first_plan(statistics):
-    """Seconds to the first plan, where the statistics tell each improvement."""
-    improvements = statistics.get("improvements") or []
-    times = [float(one["milliseconds"]) / 1000 for one in improvements if isinstance(one, dict) and "milliseconds" in one]
-    return min(times, default=None)
+    return Answer(status, told["cost"], lines)
 
 
 def kairos_answer(output, code, anytime):
