@@ -1,6 +1,8 @@
 //! Every construct of the language, one by one: what is read, printed as written, and refused by name.
 
-use metaplan_pddl::{Severity, Source, parse_domain, parse_problem, print_domain, print_problem, read};
+use metaplan_pddl::{
+    Severity, Source, parse_domain, parse_problem, print_domain, print_problem, read, render,
+};
 
 const DOMAIN: &str = "(define (domain d) (:types place dock - place tool) (:constants home - dock)
  (:predicates (at ?x - place) (link ?x ?y - place) (has ?t - tool) (ready) (path ?x ?y - place) (alone ?x - place))
@@ -208,6 +210,11 @@ fn what_is_not_supported_is_refused_by_name() {
         let refusal = found.iter().find(|found| found.code == "P113" && found.severity == Severity::Error);
         let refusal = refusal.unwrap_or_else(|| panic!("{what}: {found:#?}"));
         assert!(refusal.message.contains(words), "{what}: {}", refusal.message);
+        let shown = render(std::slice::from_ref(refusal), &[&domain, &problem], false);
+        assert!(
+            shown.contains("= help: "),
+            "{what} is refused without a word on what would be right: {shown}"
+        );
     }
 }
 

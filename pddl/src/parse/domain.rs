@@ -99,13 +99,21 @@ impl Parser<'_> {
     pub(super) fn other_section(&mut self, section: Item<'_>, kind: &str) {
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         let refused = match keyword.as_str() {
-            ":process" | ":event" => Some("processes and events (PDDL+)"),
-            ":task" | ":method" | ":htn" => Some("hierarchical tasks and methods (HDDL)"),
-            ":axiom" => Some("axioms of PDDL 1.2 (`:axiom`; use `:derived`)"),
+            ":process" | ":event" => Some((
+                "processes and events (PDDL+)",
+                "only actions, and timed initial literals at known times, change the state here",
+            )),
+            ":task" | ":method" | ":htn" => Some((
+                "hierarchical tasks and methods (HDDL)",
+                "a plan here reaches a goal; state what the tasks are to bring about as `:goal`",
+            )),
+            ":axiom" => {
+                Some(("axioms of PDDL 1.2 (`:axiom`)", "write `(:derived (predicate ?x) (condition))`"))
+            }
             _ => None,
         };
-        if let Some(what) = refused {
-            self.refuse(section, what);
+        if let Some((what, instead)) = refused {
+            self.refuse(section, what).help(instead);
             return;
         }
         if keyword == ":length" {

@@ -4,7 +4,7 @@ use crate::ast::{Comparison, Condition, ConditionTime, DurationConstraint, Effec
 use crate::sexp::Item;
 
 use super::condition::is_timed;
-use super::expression::comparison;
+use super::expression::{CONTINUOUS, comparison};
 use super::{Parser, list_start};
 
 type TimedConditions = Vec<(ConditionTime, Condition)>;
@@ -115,7 +115,7 @@ impl Parser<'_> {
         } else if item.is_headed("when") {
             self.timed_when(item, found);
         } else if item.items().any(mentions_continuous_time) {
-            self.refuse(item, "continuous effects (`#t`)");
+            self.refuse(item, "continuous effects (`#t`)").help(CONTINUOUS);
         } else {
             self.without_time(item, "effect", "`(at start (…))` or `(at end (…))`");
         }
@@ -143,7 +143,8 @@ impl Parser<'_> {
         self.timed_effects(effect, &mut effects);
         for (time, effect) in effects {
             if conditions.iter().any(|(condition_time, _)| effect_time(*condition_time) != Some(time)) {
-                self.refuse(item, "conditional effects that take place at another time than their condition");
+                self.refuse(item, "conditional effects that take place at another time than their condition")
+                    .help("remember the condition in an atom: `(when (at start (p)) (at start (q)))` and `(when (at end (q)) …)`");
                 return;
             }
             let condition = Condition::And(conditions.iter().map(|(_, part)| part.clone()).collect());

@@ -39,7 +39,8 @@ impl Parser<'_> {
             "forall" => self.universal_effect(item),
             "when" => self.conditional_effect(item),
             "probabilistic" | "oneof" => {
-                self.refuse(item, "effects that depend on chance");
+                self.refuse(item, "effects that depend on chance")
+                    .help("a plan here is one sequence, and an action has one outcome in each state");
                 None
             }
             symbol => match assignment(symbol) {

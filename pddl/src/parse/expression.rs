@@ -31,6 +31,9 @@ fn arithmetic(symbol: &str) -> Option<Arithmetic> {
     })
 }
 
+/// What can stand for a continuous effect.
+pub(super) const CONTINUOUS: &str = "numbers change at the start and the end of actions only: `(at end (increase (f) (* 2 ?duration)))` for a rate of 2";
+
 impl Parser<'_> {
     /// `?x` or `name`.
     pub(super) fn term(&mut self, item: Item<'_>) -> Option<Term> {
@@ -87,7 +90,7 @@ impl Parser<'_> {
             return Some(Expression::Duration(item.span()));
         }
         if symbol.eq_ignore_ascii_case("#t") {
-            self.refuse(item, "continuous effects (`#t`)");
+            self.refuse(item, "continuous effects (`#t`)").help(CONTINUOUS);
             return None;
         }
         if symbol.eq_ignore_ascii_case("total-time") {

@@ -37,10 +37,12 @@ impl Parser<'_> {
 
     fn fact(&mut self, item: Item<'_>) -> Option<crate::ast::Atom> {
         let head = item.head().unwrap_or_default();
-        if ["or", "not", "forall", "exists", "imply", "when", "oneof", "<", ">", "<=", ">=", "="]
+        if ["or", "not", "forall", "exists", "imply", "when", "oneof", "unknown", "<", ">", "<=", ">=", "="]
             .contains(&head)
         {
-            self.sink.error("P106", list_start(item), format!("`{head}` cannot stand in the initial state"));
+            self.sink
+                .error("P106", list_start(item), format!("`{head}` cannot stand in the initial state"))
+                .help("the initial state is known: it lists what holds, and what it does not list is false");
             return None;
         }
         self.atom(item, "a predicate")
@@ -63,7 +65,8 @@ impl Parser<'_> {
         let [time, literal] = self.operands(item, "(at 5 (predicate object))")?;
         let time = self.number(time)?;
         if literal.is_headed("=") {
-            self.refuse(literal, "timed initial values");
+            self.refuse(literal, "timed initial values")
+                .help("only facts change at a time; let one mean the value: `(at 5 (full))`");
             return None;
         }
         let (atom, holds) = if literal.is_headed("not") {

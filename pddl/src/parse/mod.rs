@@ -164,7 +164,11 @@ impl Parser<'_> {
                 None => "a list".to_owned(),
             },
         };
-        self.sink.error("P106", at_start(item), format!("expected {what}, found {found}"))
+        let diagnostic = self.sink.error("P106", at_start(item), format!("expected {what}, found {found}"));
+        if item.symbol().is_some_and(|symbol| symbol.starts_with("{{") || symbol.starts_with("{%")) {
+            diagnostic.help("this file is a template; give the file that is made from it");
+        }
+        diagnostic
     }
 
     /// A construct that is known and not planned with.
