@@ -64,7 +64,7 @@ pub use exact::{ExactTask, ground_exact, optimize_exact};
 pub use ground::{Config as GroundConfig, ground};
 pub use limits::Limits;
 pub use optimize::{Config, Engine, Front, Point, Strategy, lexicographic, optimize, pareto};
-pub use plan::solution::{Improvement, Part, Proof, Solution, Statistics, Status, Unbounded};
+pub use plan::solution::{Improvement, Moment, Part, Proof, Solution, Statistics, Status, Unbounded};
 pub use plan::transitions::{Situation, Transition};
 pub use plan::{Exact, Plan, Step};
 pub use replan::{First, Progress, Query, Replanned, Replanner};

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use encodings::{
-    Alternatives, Exact, Front, Plan, Point, Proof, Solution, Statistics, Status, Step, Unbounded,
+    Alternatives, Exact, Front, Moment, Part, Plan, Point, Proof, Solution, Statistics, Status, Step,
+    Unbounded,
 };
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -88,7 +89,21 @@ struct StatisticsPart {
     families: Map<String, Value>,
     conflicts: u64,
     solver_calls: usize,
+    /// What found the plan: `search`, `satisficing` or `sat`.
+    found_by: Option<&'static str>,
+    expanded: u64,
+    generated: u64,
+    evaluated: u64,
+    restarts: usize,
+    history: Vec<MomentPart>,
     milliseconds: MillisecondsPart,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct MomentPart {
+    milliseconds: f64,
+    cost: Option<Value>,
+    lower_bound: Value,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -210,6 +225,25 @@ impl Objective {
     }
 }
 
+/// The part of the planner in a word.
+fn part(part: Part) -> &'static str {
+    match part {
+        Part::Search => "search",
+        Part::Satisficing => "satisficing",
+        Part::Sat => "sat",
+    }
+}
+
+impl MomentPart {
+    fn of(moment: &Moment) -> Self {
+        Self {
+            milliseconds: milliseconds(moment.time),
+            cost: moment.cost.as_ref().map(exact_to_json),
+            lower_bound: exact_to_json(&moment.lower_bound),
+        }
+    }
+}
+
 /// The status in a word.
 fn word(status: Status) -> &'static str {
     match status {
@@ -265,6 +299,12 @@ impl StatisticsPart {
             families: families.map(|(family, count)| ((*family).to_owned(), (*count).into())).collect(),
             conflicts: statistics.conflicts,
             solver_calls: statistics.calls,
+            found_by: statistics.found_by.map(part),
+            expanded: statistics.expanded,
+            generated: statistics.generated,
+            evaluated: statistics.evaluated,
+            restarts: statistics.restarts,
+            history: statistics.history.iter().map(MomentPart::of).collect(),
             milliseconds: MillisecondsPart {
                 read: milliseconds(preparation.read),
                 ground: milliseconds(preparation.ground),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use encodings::{Solution, Status};
+use encodings::{Part, Solution, Status};
 use metaplan::answers::{Preparation, milliseconds};
 use metaplan::mission::verdict;
 
@@ -42,7 +42,26 @@ fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
     let statistics = &solution.statistics;
     let families: Vec<_> =
         statistics.families.iter().map(|(family, count)| format!("{family} {count}")).collect();
-    format!(
+    let mut text = String::new();
+    let found_by = match statistics.found_by {
+        Some(Part::Search) => "plan by search; ",
+        Some(Part::Satisficing) => "plan by relaxed plans and landmarks; ",
+        Some(Part::Sat) => "plan by the SAT solver; ",
+        None => "",
+    };
+    let _ = writeln!(
+        text,
+        "{found_by}{} states expanded, {} generated, {} evaluated, {} restarts",
+        statistics.expanded, statistics.generated, statistics.evaluated, statistics.restarts
+    );
+    for moment in &statistics.history {
+        let cost =
+            moment.cost.as_ref().map_or_else(|| "no plan yet".to_owned(), |cost| format!("cost {cost}"));
+        let time = milliseconds(moment.time);
+        let _ = writeln!(text, "after {time} ms: {cost}, lower bound {}", moment.lower_bound);
+    }
+    let _ = write!(
+        text,
         "{} operators; {} variables, {} clauses ({}); {} conflicts in {} solver calls\n\
          read {} ms, ground {} ms, search {} ms, encode {} ms, solve {} ms\n",
         statistics.operators,
@@ -56,5 +75,6 @@ fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
         milliseconds(statistics.search),
         milliseconds(statistics.encode),
         milliseconds(statistics.solve),
-    )
+    );
+    text
 }

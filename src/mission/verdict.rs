@@ -50,9 +50,12 @@ pub fn verdict(solution: &Solution) -> String {
         (Status::UnsolvableWithinHorizon, _, _) => {
             format!("no plan with up to {}, {proved}; longer ones were not considered\n", steps(horizon))
         }
-        (Status::Unknown, _, _) => {
-            "a limit was reached before a plan was found; nothing is proved\n".to_owned()
-        }
+        (Status::Unknown, _, _) => match &solution.lower_bound {
+            Some(bound) => format!(
+                "a limit was reached before a plan was found; no plan has a better metric than {bound}\n"
+            ),
+            None => "a limit was reached before a plan was found; nothing is proved\n".to_owned(),
+        },
     }
 }
 

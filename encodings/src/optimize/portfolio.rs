@@ -121,15 +121,20 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 
     fn search_exactly(&mut self, stored: usize) -> Turn {
-        let mut lower = self.lower;
-        let exact = self.exact.as_mut()?;
-        if let Some(best) = &self.best {
-            exact.know(&best.cost);
+        let Self { exact, run, lower, reason, best, .. } = self;
+        let exact = exact.as_mut()?;
+        let cost = best.as_ref().map(|plan| plan.cost);
+        if let Some(cost) = cost {
+            exact.know(&cost);
         }
-        let found = exact.run(stored, &mut |_, bound| lower = lower.max(*bound));
-        if lower > self.lower {
-            (self.lower, self.reason) = (lower, Proof::Search);
-        }
+        let before = exact.figures();
+        let found = exact.run(stored, &mut |_, bound| {
+            if *bound > *lower {
+                (*lower, *reason) = (*bound, Proof::Search);
+                run.note(cost, *bound);
+            }
+        });
+        exact.figures().add_to(before, &mut run.statistics);
         match found {
             Some(Found::Optimal(plan)) => Some(Ending::Exact(plan)),
             Some(Found::None) if self.best.is_none() => Some(Ending::Unsolvable),
@@ -152,11 +157,15 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let nodes = work.saturating_mul(NODES).saturating_mul(share) as u64;
         let most = nodes.checked_div(satisficer.size()).unwrap_or(nodes).max(1);
         let limit = self.best.as_ref().map(|plan| plan.cost);
-        match satisficer.run(limit.as_ref(), most) {
+        let before = satisficer.figures;
+        let advance = satisficer.run(limit.as_ref(), most);
+        satisficer.figures.add_to(before, &mut self.run.statistics);
+        match advance {
             Ok(Advance::Plan(plan)) => self.improve(plan, Part::Satisficing),
             Ok(Advance::Unsolvable) => Some(Ending::Unsolvable),
             Ok(Advance::Paused) => None,
             Ok(Advance::Ended) => {
+                self.run.statistics.restarts = satisficer.restarts();
                 self.satisficer = None;
                 None
             }
@@ -238,7 +247,6 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let search = started.elapsed().saturating_sub(sat);
         statistics.search = statistics.search.saturating_add(search).max(Duration::ZERO);
         if let Some(satisficer) = &self.satisficer {
-            statistics.evaluated = satisficer.evaluated;
             statistics.restarts = satisficer.restarts();
         }
     }

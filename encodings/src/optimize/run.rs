@@ -1,7 +1,7 @@
 //! One run of the optimizer: what it asks the SAT solver, what it has heard, and how it ends.
 
 use std::cell::OnceCell;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::bounds::Bounds;
 use crate::context::Context;
@@ -10,10 +10,13 @@ use crate::limits::Interrupted;
 use crate::number::Int;
 use crate::optimize::config::Config;
 use crate::plan::ground::{GroundPlan, GroundStep, cost, pass};
-use crate::plan::solution::{Improvement, Proof, Solution, Statistics, Status};
+use crate::plan::solution::{Improvement, Moment, Proof, Solution, Statistics, Status};
 use crate::plan::{decode, metric};
 use crate::sat::{Answer, Backend, Lit, Solver};
 use crate::task::Task;
+
+/// Bounds that come so soon after another are not noted.
+const BETWEEN: Duration = Duration::from_millis(20);
 
 /// A task with what has come of it so far.
 pub(super) struct Run<'a> {
@@ -21,6 +24,7 @@ pub(super) struct Run<'a> {
     pub(super) config: &'a Config,
     pub(super) report: &'a mut dyn FnMut(Improvement),
     pub(super) statistics: Statistics,
+    started: Instant,
     /// Found out when it is first needed.
     symmetry: OnceCell<Symmetry>,
 }
@@ -68,7 +72,7 @@ pub(super) struct Live {
 impl<'a> Run<'a> {
     pub(super) fn new(task: &'a Task, config: &'a Config, report: &'a mut dyn FnMut(Improvement)) -> Self {
         let statistics = Statistics { operators: task.operators.len(), ..Statistics::default() };
-        Self { task, config, report, statistics, symmetry: OnceCell::new() }
+        Self { task, config, report, statistics, started: Instant::now(), symmetry: OnceCell::new() }
     }
 
     pub(super) fn context(&self) -> Context<'a> {
@@ -81,7 +85,24 @@ impl<'a> Run<'a> {
         self.statistics.contradiction = Some(what.to_owned());
     }
 
+    /// Notes what the best plan costs, if there is one, and what none costs less than.
+    pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
+        let time = self.started.elapsed();
+        let cost = cost.map(|cost| metric(self.task, &cost));
+        let lower_bound = metric(self.task, &lower);
+        let history = &mut self.statistics.history;
+        if let Some(last) = history.last() {
+            let is_same = last.cost == cost && last.lower_bound == lower_bound;
+            let is_soon = last.cost == cost && time.saturating_sub(last.time) < BETWEEN;
+            if is_same || is_soon {
+                return;
+            }
+        }
+        history.push(Moment { time, cost, lower_bound });
+    }
+
     pub(super) fn announce(&mut self, best: &Best, horizon: usize) {
+        self.note(Some(best.plan.cost), best.lower);
         let improvement = Improvement {
             cost: metric(self.task, &best.plan.cost),
             lower_bound: metric(self.task, &best.lower),

@@ -76,6 +76,17 @@ pub enum Part {
     Sat,
 }
 
+/// What was known at some time of a run.
+#[derive(Debug, Clone)]
+pub struct Moment {
+    /// Since the optimizer has begun.
+    pub time: Duration,
+    /// The metric of the best plan so far.
+    pub cost: Option<Exact>,
+    /// No plan has a better metric than this.
+    pub lower_bound: Exact,
+}
+
 /// Figures of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Statistics {
@@ -99,10 +110,16 @@ pub struct Statistics {
     pub unchecked: Option<String>,
     /// What found the plan.
     pub found_by: Option<Part>,
-    /// States that the search for a plan soon has looked at.
+    /// States whose successors were looked at, by all searches.
+    pub expanded: u64,
+    /// Successors that these have.
+    pub generated: u64,
+    /// States that were estimated: successors that were new, and not dominated.
     pub evaluated: u64,
-    /// How often that search has begun anew.
+    /// How often the search for a plan soon has begun anew, to find a better one.
     pub restarts: usize,
+    /// Better plans and better bounds in the order of their times, those left out that came at once after another.
+    pub history: Vec<Moment>,
     /// Time for bounds and searches.
     pub search: Duration,
     /// Time for building formulas.

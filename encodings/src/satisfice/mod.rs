@@ -22,6 +22,7 @@ mod store;
 use crate::context::Context;
 use crate::limits::{Interrupted, Limits};
 use crate::plan::ground::GroundPlan;
+use crate::search::Figures;
 use crate::task::number::TaskNumber;
 
 use known::Known;
@@ -37,8 +38,8 @@ const PHASES: [(bool, Weight); 6] = [
     (true, Weight::Times(1)),
 ];
 
-/// A search may store so many states times words; then the next one has its turn.
-const ROOM: usize = 400_000_000;
+/// A search may take this part of the words that bytes are left for; then the next one has its turn.
+const PART: usize = 16;
 
 /// What came of going on for a while.
 pub(crate) enum Advance<N> {
@@ -58,15 +59,14 @@ pub(crate) struct Satisficer<'a, N> {
     limits: &'a Limits,
     phase: usize,
     search: Option<Search<N>>,
-    /// States that were looked at.
-    pub(crate) evaluated: u64,
+    pub(crate) figures: Figures,
 }
 
 impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// None if an operator has too many combinations of designs.
     pub(crate) fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Some(known) = Known::new(context)? else { return Ok(None) };
-        Ok(Some(Self { known, limits: context.limits, phase: 0, search: None, evaluated: 0 }))
+        Ok(Some(Self { known, limits: context.limits, phase: 0, search: None, figures: Figures::default() }))
     }
 
     /// What it takes to look at a state, about, in nodes and propositions.
@@ -91,10 +91,8 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
                 none.insert(Search::new(&mut self.known, weight, prices))
             }
         };
-        let before = search.evaluated;
-        let outcome = search.run(&mut self.known, limit, most, self.limits);
-        self.evaluated = self.evaluated.saturating_add(search.evaluated.saturating_sub(before));
-        let is_large = search.size() > ROOM;
+        let outcome = search.run(&mut self.known, limit, most, self.limits, &mut self.figures);
+        let is_large = search.size() > self.limits.room() / PART;
         match outcome? {
             Outcome::Plan(plan) => {
                 self.next();

@@ -12,6 +12,7 @@ use crate::plan::ground::{GroundPlan, GroundStep, cost};
 use crate::satisfice::known::Known;
 use crate::satisfice::open::Open;
 use crate::satisfice::store::Store;
+use crate::search::Figures;
 use crate::task::number::TaskNumber;
 use crate::task::{OperatorId, State};
 
@@ -58,7 +59,6 @@ pub(super) struct Search<N> {
     best: [u32; 2],
     /// Whether states were left out because their numbers do not fit, or because they are too dear.
     pub(super) incomplete: bool,
-    pub(super) evaluated: u64,
 }
 
 impl<N: TaskNumber> Search<N> {
@@ -76,7 +76,6 @@ impl<N: TaskNumber> Search<N> {
             open: Open::new(estimates),
             best: [u32::MAX; 2],
             incomplete: false,
-            evaluated: 0,
         };
         let initial = known.task.initial.clone();
         let reached = known.status.initially(&known.relaxation, &initial);
@@ -99,11 +98,13 @@ impl<N: TaskNumber> Search<N> {
         limit: Option<&N>,
         mut most: u64,
         limits: &Limits,
+        figures: &mut Figures,
     ) -> Result<Outcome<N>, Interrupted> {
         let mut pulse: Pulse<'_> = limits.pulse();
         while most > 0 {
             pulse.beat()?;
             let Some((parent, step)) = self.open.pop() else { return Ok(Outcome::Exhausted) };
+            figures.generated = figures.generated.saturating_add(1);
             let (operator, choice, cost) = known.step(step);
             let (total, price) = {
                 let parent = &self.nodes[parent as usize];
@@ -145,6 +146,8 @@ impl<N: TaskNumber> Search<N> {
                 }
             }
             most = most.saturating_sub(1);
+            figures.evaluated = figures.evaluated.saturating_add(1);
+            figures.expanded = figures.expanded.saturating_add(1);
             if known.task.is_goal(&state) {
                 return Ok(Outcome::Plan(self.plan(known, id)));
             }
@@ -155,7 +158,6 @@ impl<N: TaskNumber> Search<N> {
 
     /// Estimates a state and notes its steps.
     fn look(&mut self, known: &mut Known<'_, N>, id: u32, state: &State<N>, reached: &[u64]) {
-        self.evaluated = self.evaluated.saturating_add(1);
         let Some(relaxed) = known.explorer.estimate(&known.relaxation, &self.prices, state) else { return };
         let left = known.status.left(reached);
         let mut progress = false;

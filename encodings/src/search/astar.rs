@@ -17,6 +17,7 @@ use crate::context::Context;
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::Int;
 use crate::plan::ground::GroundPlan;
+use crate::search::figures::Figures;
 use crate::search::open::Open;
 use crate::search::orbits::Orbits;
 use crate::search::prepared::Prepared;
@@ -149,6 +150,7 @@ pub(crate) struct Search<'a, N, E> {
     fewest: Option<u32>,
     /// How far the search was whenever the number of its states had doubled.
     progress: Vec<N>,
+    pub(crate) figures: Figures,
     /// The state that is expanded, and the one that it leads to.
     state: State<N>,
     next: State<N>,
@@ -179,6 +181,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             is_told: false,
             fewest: None,
             progress: Vec::new(),
+            figures: Figures::default(),
             state: initial.clone(),
             next: initial.clone(),
         };
@@ -374,6 +377,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         self.own_work += NODE_WORK;
         let cost = self.store.cost(id).clone();
         let steps = self.store.origin(id).steps + 1;
+        self.figures.expanded += 1;
         for operator_id in prepared.index.applicable(task, &self.state) {
             let operator = &task.operators[operator_id.index()];
             let sizes = operator.sizes();
@@ -399,10 +403,12 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     /// Adds the next state, whose derived variables have no values yet, unless it is no good. No plan through it costs less than
     /// `through`, as one through the state before does.
     fn push(&mut self, cost: N, through: &N, origin: Origin) {
+        self.figures.generated = self.figures.generated.saturating_add(1);
         if self.is_beyond(&cost) {
             return;
         }
         let Some(vacancy) = self.store.look_up(&self.next, &cost, origin.steps) else { return };
+        self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let Some(estimate) = self.bounds.estimate(&self.next) else { return };
         let Some(total) = cost.plus(&estimate).filter(N::is_moderate) else {
             self.incomplete = true;

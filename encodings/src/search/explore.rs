@@ -13,6 +13,7 @@ use crate::limits::Interrupted;
 use crate::number::{Int, dense};
 use crate::plan::ground::GroundPlan;
 use crate::search::astar::{Estimate, Found, Hear, Order, Search, Space};
+use crate::search::figures::Figures;
 use crate::search::prepared::Prepared;
 use crate::task::State;
 use crate::task::number::TaskNumber;
@@ -129,19 +130,33 @@ pub(crate) struct Duo<'a, N, E> {
     has_begun: bool,
     /// What no plan costs less than.
     bound: Option<N>,
-    /// The best plan of searches that were given up.
+    /// The best plan of searches that were given up, and what they have done.
     best: Option<GroundPlan<N>>,
+    figures: Figures,
 }
 
 impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
     pub(crate) fn new(space: Space<'a, N, E>, initial: &State<N>) -> Self {
         let searches = vec![Search::new(&space, initial, Order::Fewest, None)];
-        Self { space, initial: initial.clone(), searches, has_begun: false, bound: None, best: None }
+        Self {
+            space,
+            initial: initial.clone(),
+            searches,
+            has_begun: false,
+            bound: None,
+            best: None,
+            figures: Figures::default(),
+        }
     }
 
     /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
     pub(crate) fn know(&mut self, cost: &N) {
         self.searches.iter_mut().for_each(|search| search.know(cost.clone()));
+    }
+
+    /// What all searches have done.
+    pub(crate) fn figures(&self) -> Figures {
+        self.searches.iter().fold(self.figures, |sum, search| sum.plus(search.figures))
     }
 
     pub(crate) fn best_plan(&self) -> Option<GroundPlan<N>> {
@@ -198,6 +213,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
         }
         for position in ended.into_iter().rev() {
             let search = self.searches.remove(position);
+            self.figures = self.figures.plus(search.figures);
             self.best = cheaper(self.best.take(), search.best_plan());
         }
         self.searches.is_empty().then(|| Found::Unknown(self.best.clone()))
@@ -211,6 +227,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
         let limit = self.searches[0].limit().cloned();
         if self.space.orbits.is_some() {
             self.best = self.best_plan();
+            self.figures = self.figures();
             self.searches = vec![Search::new(&self.space, &self.initial, Order::Fewest, limit.clone())];
         }
         if let Some(sharper) = bounds.sharper(context.task) {

@@ -3,6 +3,7 @@
 mod astar;
 mod directions;
 mod explore;
+mod figures;
 mod front;
 pub(crate) mod generator;
 mod open;
@@ -15,4 +16,5 @@ pub(crate) mod ties;
 pub(crate) use astar::{Estimate, Found, Space};
 pub(crate) use directions::is_monotone;
 pub(crate) use explore::{Duo, STATE_LIMIT, closed_labels, search, search_from, search_states};
+pub(crate) use figures::Figures;
 pub(crate) use prepared::Prepared;
