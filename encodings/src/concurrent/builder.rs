@@ -6,6 +6,7 @@ use crate::concurrent::access::{Designs, Keys, prune};
 use crate::concurrent::footprint::{Footprint, Footprints};
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::split::{Half, Split};
+use crate::concurrent::timer::TIMER;
 use crate::concurrent::unit::Unit;
 use crate::context::Context;
 use crate::error::Error;
@@ -13,7 +14,7 @@ use crate::ground::evaluate::reads::Reads;
 use crate::ground::vocabulary::atom::{AtomId, Binding};
 use crate::ground::vocabulary::reached::Reached;
 use crate::ground::vocabulary::world::World;
-use crate::lifted::{Change, Effect, ObjectId};
+use crate::lifted::{Change, Effect, Expression, ObjectId};
 use crate::limits::Limits;
 use crate::number::{Int, dense};
 use crate::task::quantity::NumericId;
@@ -101,11 +102,11 @@ impl<'a> Builder<'a> {
                     Change::Add(predicate, _) | Change::Delete(predicate, _) => {
                         !own(predicate) && !self.split.lifted.predicates[predicate.index()].running
                     }
-                    Change::Assign { .. } => true,
+                    Change::Assign { function, .. } => !self.split.durations.contains(&function),
                 })
                 .cloned()
                 .collect();
-            let written = self.footprints.writes(schema, &effects, &binding).and_then(|footprint| {
+            let written = self.footprints.writes(&effects, &binding).and_then(|footprint| {
                 if origin.half == Half::Whole {
                     self.join(id, origin.schema, &binding)?;
                 }
@@ -155,7 +156,9 @@ impl<'a> Builder<'a> {
             if self.held.contains(&key.0) && over_all.is_none() {
                 continue;
             }
-            let duration = unit.duration(task, start)?;
+            let timer = timer(task, start);
+            // One that the state decides is looked at when it starts.
+            let duration = if timer.is_some() { self.separation } else { unit.duration(task, start)? };
             if duration < self.separation {
                 let schema = &self.split.schemas[key.0];
                 let construct =
@@ -167,7 +170,16 @@ impl<'a> Builder<'a> {
             roles[end.index()] = Role::End(dense(instances.len()));
             let designs = designs(task, start);
             let joint = Vec::new();
-            instances.push(Instance { start, end, over_all, duration, designs, joint, compressible: false });
+            instances.push(Instance {
+                start,
+                end,
+                over_all,
+                duration,
+                timer,
+                designs,
+                joint,
+                compressible: false,
+            });
         }
         Ok(instances)
     }
@@ -176,8 +188,8 @@ impl<'a> Builder<'a> {
     fn join(&mut self, id: OperatorId, schema: usize, binding: &Binding) -> Result<(), Error> {
         let schema = &self.split.schemas[schema];
         if schema.duration.is_some() {
-            let start = self.footprints.writes(schema, &schema.start_effects, binding)?;
-            let end = self.footprints.writes(schema, &schema.end_effects, binding)?;
+            let start = self.footprints.writes(&schema.start_effects, binding)?;
+            let end = self.footprints.writes(&schema.end_effects, binding)?;
             self.joined.push((id, [start, end]));
         }
         Ok(())
@@ -191,21 +203,30 @@ impl<'a> Builder<'a> {
             let operator = &task.operators[id.index()];
             let schema = &self.split.schemas[self.split.origins[operator.schema as usize].schema];
             let binding = binding(operator, schema.variables);
-            let complete = |written: &Footprint, condition, effects| {
+            let complete = |written: &Footprint, condition, effects, duration: Option<&Expression>| {
                 let mut reads = Reads::default();
                 reads.condition(&self.split.lifted, condition, &binding);
                 reads.effects(&self.split.lifted, effects, &binding);
+                if let Some(duration) = duration {
+                    reads.expression(duration, &binding);
+                }
                 let (reads, reads_numbers) = index.look_up(&reads);
                 Footprint { reads, reads_numbers, ..written.clone() }
             };
-            let start = complete(start, &schema.start_condition, &schema.start_effects);
-            start.interferes(&complete(end, &schema.at_end, &schema.end_effects)).then_some(*id)
+            let duration = schema.duration.as_ref();
+            let start = complete(start, &schema.start_condition, &schema.start_effects, duration);
+            start.interferes(&complete(end, &schema.at_end, &schema.end_effects, None)).then_some(*id)
         };
         let contradictory = limits.watch(&self.joined).filter_map(|pair| match pair {
             Ok(pair) => contradicts(pair).map(Ok),
             Err(interrupted) => Some(Err(interrupted.into())),
         });
         contradictory.collect()
+    }
+
+    /// Whether happenings are kept apart that need not be in some states.
+    pub(super) fn supposes(&self) -> bool {
+        self.footprints.supposes
     }
 
     /// What each operator waits for and lets others wait for, and how many kinds of access there are.
@@ -253,6 +274,9 @@ impl<'a> Builder<'a> {
         if !matches!(role, Role::End(_)) {
             reads.condition(lifted, &schema.start_condition, &binding);
             reads.effects(lifted, &schema.start_effects, &binding);
+            if let Some(duration) = &schema.duration {
+                reads.expression(duration, &binding);
+            }
         }
         if !matches!(role, Role::Start(_)) {
             reads.condition(lifted, &schema.at_end, &binding);
@@ -261,6 +285,12 @@ impl<'a> Builder<'a> {
         over_all.condition(lifted, &schema.over_all, &binding);
         Some((reads, over_all))
     }
+}
+
+/// The number that says how long an instance takes, if the state decides that.
+fn timer(task: &Task, start: OperatorId) -> Option<NumericId> {
+    let mut changed = task.operators[start.index()].numeric_effects.iter().map(|effect| effect.variable);
+    changed.find(|number| task.number_names[number.index()].starts_with(TIMER))
 }
 
 /// Adds what comes from conditions over all and from designs.

@@ -13,6 +13,7 @@
 //! [2] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
 
 mod compare;
+mod pack;
 
 use crate::concurrent::time::{Float, Time, place};
 use crate::number::{Int, dense};
@@ -26,6 +27,7 @@ pub(super) struct Open {
     pub(super) instance: u32,
     pub(super) float: Float,
     pub(super) offset: Int,
+    pub(super) duration: Int,
     /// Of an action with a condition over all that several happenings can keep up together: the last of them.
     last: Option<Time>,
 }
@@ -67,7 +69,7 @@ pub(super) enum Kind {
 pub(super) struct Happening<'h> {
     pub(super) kind: Kind,
     pub(super) instance: u32,
-    /// Of the instance.
+    /// Of the instance, if it starts.
     pub(super) duration: Int,
     /// It lies this much after the last access of these kinds.
     pub(super) after: &'h [(Key, Int)],
@@ -123,6 +125,15 @@ impl Clocks {
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn are_apart(&self, time: Int, after: &[(Key, Int)]) -> bool {
         after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
+    }
+
+    /// About how many bytes this takes.
+    pub(super) fn bytes(&self) -> usize {
+        let times = self.entries.len().saturating_add(self.changed.len());
+        let pairs = times.saturating_mul(size_of::<(Key, Time)>());
+        let floats = self.floats.len().saturating_mul(size_of::<Start>());
+        let opens = self.opens.len().saturating_mul(size_of::<Open>());
+        pairs.saturating_add(floats).saturating_add(opens).saturating_add(size_of::<Self>())
     }
 
     /// Whether everything so far has happened by some time, as nothing of it can be put off.
@@ -187,13 +198,13 @@ impl Clocks {
         let (float, offset) = match happening.kind {
             Kind::Start => {
                 let (float, offset) = next.moment(lower, self.group)?;
-                next.open(happening.instance, float, offset);
+                next.open((happening.instance, happening.duration), float, offset);
                 (float, offset)
             }
             Kind::End => {
                 let position = next.opens.iter().position(|open| open.instance == happening.instance)?;
-                let Open { float, offset, .. } = next.opens.remove(position);
-                let end = offset + happening.duration;
+                let Open { float, offset, duration, .. } = next.opens.remove(position);
+                let end = offset + duration;
                 next.raise(float, &lower, end)?;
                 match self.group {
                     Some((other, at)) if other == float => (at == end).then_some((other, at))?,
@@ -215,9 +226,9 @@ impl Clocks {
 
     /// The end of an action under way will lie after accesses so far. None if no time is left for it.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    pub(super) fn expect_end(&mut self, instance: u32, duration: Int, after: &[(Key, Int)]) -> Option<()> {
+    pub(super) fn expect_end(&mut self, instance: u32, after: &[(Key, Int)]) -> Option<()> {
         let position = self.opens.binary_search_by_key(&instance, |open| open.instance).ok()?;
-        let Open { float, offset, .. } = self.opens[position];
+        let Open { float, offset, duration, .. } = self.opens[position];
         let end = offset + duration;
         let mut lower = Time::constant(0);
         for (key, by) in after {
@@ -250,9 +261,9 @@ impl Clocks {
         Float::try_from(self.floats.len() - 1).expect("invariant: fewer actions under way than operators")
     }
 
-    fn open(&mut self, instance: u32, float: Float, offset: Int) {
+    fn open(&mut self, (instance, duration): (u32, Int), float: Float, offset: Int) {
         let position = self.opens.partition_point(|open| open.instance < instance);
-        self.opens.insert(position, Open { instance, float, offset, last: None });
+        self.opens.insert(position, Open { instance, float, offset, duration, last: None });
     }
 
     /// The time that lies so much after a float.

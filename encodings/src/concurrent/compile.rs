@@ -8,7 +8,7 @@ use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::links::drop_links;
 use crate::concurrent::measure::Measure;
 use crate::concurrent::split::{Half, Split};
-use crate::concurrent::unit::Unit;
+use crate::concurrent::unit::{LIMIT as TIME_LIMIT, Unit};
 use crate::context::Context;
 use crate::error::{Error, File, Place};
 use crate::ground::vocabulary::reached::Reached;
@@ -30,6 +30,8 @@ pub struct Concurrent {
     /// For each kind of access a variable whose current value everything reads that waits for such accesses.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure,
+    /// Whether every plan is among those that the search goes through, with the times that it can have.
+    pub(super) is_exact: bool,
     /// How far apart interfering happenings are, in the task's time unit.
     pub(super) separation: Int,
 }
@@ -63,6 +65,7 @@ pub(super) fn compile(
             _ => {}
         }
     }
+    let is_exact = split.is_exact && !builder.supposes();
     let (happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();
     for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
@@ -78,7 +81,8 @@ pub(super) fn compile(
         own.compressible = compressible;
     }
     let guards = vec![None; keys];
-    let mut concurrent = Concurrent { task, happenings, instances, events, guards, measure, separation };
+    let mut concurrent =
+        Concurrent { task, happenings, instances, events, guards, measure, is_exact, separation };
     concurrent.guard(limits).map_err(|interrupted| vec![interrupted.into()])?;
     Ok(concurrent)
 }
@@ -102,7 +106,10 @@ impl Concurrent {
         let mut common: Vec<Option<Vec<u32>>> = vec![None; self.guards.len()];
         for pair in limits.watch(self.task.operators.iter().zip(&mut self.happenings)) {
             let (operator, happening) = pair?;
-            happening.sets = operator.effects.iter().map(|fact| fact.variable.0).collect();
+            let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+            happening.sets = operator.effects.iter().chain(conditional).map(|fact| fact.variable.0).collect();
+            happening.sets.sort_unstable();
+            happening.sets.dedup();
             let facts = operator.condition.facts.iter().map(|fact| fact.variable);
             let facts: Vec<u32> = facts
                 .filter(|variable| variable.index() < self.task.basic)
@@ -132,6 +139,14 @@ impl Concurrent {
             happening.sets.retain(|variable| heeded.contains(variable));
         }
         Ok(())
+    }
+
+    /// How long an instance takes that has just started; none if it takes less than the separation, or a time that does not fit.
+    pub(super) fn duration(&self, instance: &Instance, after: &State) -> Option<Int> {
+        let Some(timer) = instance.timer else { return Some(instance.duration) };
+        let factor = self.task.time_scale.checked_div(self.task.number_scale)?;
+        let duration = after.numbers[timer.index()].checked_mul(factor)?;
+        (self.separation..TIME_LIMIT).contains(&duration).then_some(duration)
     }
 
     /// Whether what must hold over all of an instance holds in a state.

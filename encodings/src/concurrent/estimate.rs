@@ -50,11 +50,11 @@ impl Estimate {
         clippy::arithmetic_side_effects,
         reason = "fewer than 2^32 happenings, less than 2^91 apart, and a variable has fewer than 2^32 values"
     )]
-    pub(super) fn left(&self, concurrent: &Concurrent, state: &State, clocks: &Clocks) -> Option<Left> {
+    pub(super) fn left(&self, state: &State, clocks: &Clocks) -> Option<Left> {
         // No plan ends with waiting for what happens by itself.
         let mut left = Left { makespan: clocks.latest().max(clocks.floor()), sum: 0 };
         for open in clocks.opens() {
-            let end = clocks.start(open) + concurrent.instances[open.instance as usize].duration;
+            let end = clocks.start(open) + open.duration;
             left.makespan = left.makespan.max(end);
         }
         for path in &self.paths {
@@ -119,7 +119,9 @@ fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
         }
     }
     let mut edges = Vec::new();
-    for (operator, happening) in operators() {
+    for (operator, happening) in operators().filter(|(_, happening)| happening.role != Role::Never) {
+        let conditional = operator.conditional.iter().filter_map(|effect| of(&effect.effects));
+        edges.extend(conditional.map(|to| (None, to, 0)));
         let Some(to) = of(&operator.effects) else { continue };
         let from = of(&operator.condition.facts);
         match happening.role {

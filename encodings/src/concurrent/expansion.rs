@@ -135,10 +135,12 @@ impl<'a> Expansion<'a> {
             clocks.timed(&clocks::Event { time, after, marks, changes: &changes, settled })
         } else {
             let own = concurrent.instances.get(instance as usize);
+            let started = own.filter(|_| kind == Kind::Start);
+            let duration = started.map_or(Some(0), |own| concurrent.duration(own, &after));
             clocks.after(&clocks::Happening {
                 kind,
                 instance,
-                duration: own.map_or(0, |own| own.duration),
+                duration: duration.ok_or(Nowhere::Unfit)?,
                 after: &happening.accesses.after,
                 marks: &happening.accesses.marks,
                 joint: own.is_some_and(|own| !own.joint.is_empty()),
@@ -152,7 +154,7 @@ impl<'a> Expansion<'a> {
         for instance in opens {
             let own = &concurrent.instances[instance as usize];
             let after = &concurrent.happenings[own.end.index()].accesses.after;
-            clocks.expect_end(instance, own.duration, after).ok_or(Nowhere::Impossible)?;
+            clocks.expect_end(instance, after).ok_or(Nowhere::Impossible)?;
         }
         // Nothing can happen after what comes later in the sequence.
         if self.next_event(&clocks).is_some_and(|(time, _)| clocks.latest() > time) {

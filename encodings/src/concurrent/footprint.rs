@@ -15,7 +15,7 @@ use crate::ground::vocabulary::atom::{AtomId, Binding, arguments};
 use crate::ground::vocabulary::failure::Failure;
 use crate::ground::vocabulary::residual::Residual;
 use crate::ground::vocabulary::world::World;
-use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId, Schema};
+use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId};
 use crate::number::dense;
 use crate::task::quantity::NumericId;
 use pddl::ast::Assignment;
@@ -60,23 +60,20 @@ impl Footprint {
 /// Collects what is written, then looks up what is read of it.
 pub(super) struct Footprints<'a> {
     world: World<'a>,
+    /// Whether more is written somewhere than will be in some state.
+    pub(super) supposes: bool,
 }
 
 impl<'a> Footprints<'a> {
     pub(super) fn new(world: World<'a>) -> Self {
-        Self { world }
+        Self { world, supposes: false }
     }
 
-    /// What effects write.
+    /// What effects write, or may write.
     ///
     /// # Errors
-    /// An effect under a condition that the state decides.
-    pub(super) fn writes(
-        &mut self,
-        schema: &Schema,
-        effects: &[Effect],
-        binding: &Binding,
-    ) -> Result<Footprint, Error> {
+    /// A number without a value.
+    pub(super) fn writes(&mut self, effects: &[Effect], binding: &Binding) -> Result<Footprint, Error> {
         let mut footprint = Footprint::default();
         for effect in effects {
             let mut bindings = Vec::new();
@@ -89,16 +86,10 @@ impl<'a> Footprints<'a> {
                 match residual(&mut self.world, &effect.condition, &mut binding) {
                     Ok(Residual::True) => self.write(&effect.change, &binding, &mut footprint)?,
                     Ok(Residual::False) | Err(Failure::Undefined) => {}
+                    // Whether it applies depends on the state. That it may is enough to keep others away.
                     Ok(_) => {
-                        return Err(Error::Unsupported {
-                            construct: format!(
-                                "an effect of `{}` under a condition that changes, where actions overlap",
-                                schema.name
-                            ),
-                            instead: "an effect without a condition, or planning without `--concurrent`"
-                                .into(),
-                            place: schema.place,
-                        });
+                        self.supposes = true;
+                        self.write(&effect.change, &binding, &mut footprint)?;
                     }
                     Err(Failure::Error(error)) => return Err(error),
                 }

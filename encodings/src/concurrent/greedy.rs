@@ -1,16 +1,18 @@
 //! Lazy greedy best-first search over sequences of happenings: a plan soon, then better ones.
 //!
 //! Situations are evaluated when they are taken up, not when they are found, and stand in the order of what was left before them;
-//! happenings that the relaxed plan begins with have a queue of their own [1]. Of situations with the same state and the same actions under
+//! happenings that the relaxed plan begins with have a queue of their own [1]. In a third one those come first that follow a situation with a fact
+//! which no other one had before with as many goals to go [2]: a way that the relaxed plan does not see is found there. Of situations with the same state and the same actions under
 //! way only the first is pursued, so that this search may miss plans and proves nothing.
 //!
-//! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
+//! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010. [2] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::collections::hash_map::Entry;
+use std::hash::{Hash, Hasher};
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
 
 use crate::bounds::Bounds;
@@ -26,6 +28,9 @@ use crate::task::OperatorId;
 /// So many more times preferred happenings come first after each progress.
 const BOOST: i64 = 1_000;
 
+/// The queue of preferred happenings.
+const PREFERRED: usize = 1;
+
 /// A happening, and whether it takes place at the time of the one before.
 type Link = (OperatorId, bool);
 
@@ -36,14 +41,14 @@ struct Node {
     links: SmallVec<[Link; 2]>,
 }
 
-/// What was left before it, the least makespan, the order, the node before, and the happening.
-type Entrance = Reverse<(u64, Int, u32, u32, OperatorId)>;
+/// Whether it is nothing new, what was left before it, the least makespan, the order, the node before, and the happening.
+type Entrance = Reverse<(bool, u64, Int, u32, u32, OperatorId)>;
 
-/// Two queues: of all happenings, and of the preferred ones.
+/// Three queues: of all happenings, of the preferred ones, and of all again, what follows something new first.
 #[derive(Default)]
 struct Queues {
-    heaps: [BinaryHeap<Entrance>; 2],
-    priorities: [i64; 2],
+    heaps: [BinaryHeap<Entrance>; 3],
+    priorities: [i64; 3],
     order: u32,
 }
 
@@ -65,12 +70,23 @@ pub(super) struct Greedy<'a> {
     bounds: Option<&'a Bounds>,
     guidance: Guidance<'a>,
     nodes: Vec<Node>,
-    /// By what must agree: the least makespan with which it was reached.
-    seen: FxHashMap<Box<[u32]>, Int>,
+    /// By a hash of what must agree: the least makespan with which it was reached.
+    seen: FxHashMap<u64, Int>,
+    /// About how many bytes the nodes take.
+    bytes: usize,
     queues: Queues,
+    /// The facts that have held, by how many goals were to go.
+    known: Vec<FxHashSet<(u32, u32)>>,
     /// Whether what is reached again, but sooner, is pursued again.
     pub(super) reopens: bool,
     nearest: u64,
+}
+
+/// Two situations with one hash are taken for the same: this search claims nothing.
+fn hash_of(key: &[u32]) -> u64 {
+    let mut hasher = FxHasher::default();
+    key.hash(&mut hasher);
+    hasher.finish()
 }
 
 impl<'a> Greedy<'a> {
@@ -84,7 +100,9 @@ impl<'a> Greedy<'a> {
     ) -> Self {
         let (nodes, seen) = (Vec::new(), FxHashMap::default());
         let queues = Queues::default();
+        let bytes = 0;
         Self {
+            bytes,
             concurrent,
             expansion,
             estimate,
@@ -93,6 +111,7 @@ impl<'a> Greedy<'a> {
             nodes,
             seen,
             queues,
+            known: Vec::new(),
             reopens,
             nearest: u64::MAX,
         }
@@ -117,6 +136,10 @@ impl<'a> Greedy<'a> {
             if work == 0 || pulse.beat().is_err() {
                 return Outcome::Stopped;
             }
+            // A quarter of the room is for this.
+            if self.bytes.saturating_add(self.queues.bytes()) > limits.room() / 4 {
+                return Outcome::Exhausted;
+            }
             let Some((parent, operator)) = self.queues.pop() else { return Outcome::Exhausted };
             let Some((situation, links)) = self.follow(parent, operator) else { continue };
             work -= 1;
@@ -134,6 +157,8 @@ impl<'a> Greedy<'a> {
             let before = waited.as_ref().unwrap_or(&self.nodes[parent as usize].situation);
             let together = before.clocks.unsettled();
             match self.expansion.after(before, operator, false) {
+                // That others make up for it at the same time is rare.
+                Ok((situation, _)) if situation.clocks.unsettled() && !self.reopens => return None,
                 Ok((situation, compressed)) => {
                     links.push((operator, together));
                     if compressed {
@@ -175,11 +200,14 @@ impl<'a> Greedy<'a> {
             self.nearest = left;
             self.queues.boost();
         }
+        let is_old = !self.has_news(&situation);
         let id = dense(self.nodes.len());
         for operator in self.expansion.candidates(&situation) {
             let is_preferred = preferred.binary_search(&operator).is_ok();
-            self.queues.push((left, value.1, id, operator), is_preferred);
+            self.queues.push((left, value.1), id, operator, (is_preferred, is_old));
         }
+        let values = size_of_val(&situation.state.values[..]);
+        self.bytes = self.bytes.saturating_add(values).saturating_add(situation.clocks.bytes());
         self.nodes.push(Node { situation, parent, links });
         None
     }
@@ -187,9 +215,21 @@ impl<'a> Greedy<'a> {
     /// A lower bound of the metric of plans that go on from here, and of their makespan. None if there is none.
     fn value(&self, situation: &Situation) -> Option<(Int, Int)> {
         let Situation { state, clocks, cost } = situation;
-        let makespan = self.estimate.left(self.concurrent, state, clocks)?.makespan;
+        let makespan = self.estimate.left(state, clocks)?.makespan;
         let costs = self.bounds.map_or(Some(0), |bounds| bounds.estimate(state))?;
         Some((self.concurrent.measure.total(makespan, cost.checked_add(costs)?)?, makespan))
+    }
+
+    /// Whether a fact holds that has not held in a situation with as many goals to go.
+    fn has_news(&mut self, Situation { state, .. }: &Situation) -> bool {
+        let task = &self.concurrent.task;
+        let to_go = task.goal.facts.iter().filter(|fact| !fact.holds(&state.values)).count();
+        if self.known.len() <= to_go {
+            self.known.resize(to_go.saturating_add(1), FxHashSet::default());
+        }
+        let known = &mut self.known[to_go];
+        let facts = (0..).zip(&state.values[..task.basic]);
+        facts.fold(false, |news, (variable, value)| known.insert((variable, *value)) || news)
     }
 
     fn is_new(&mut self, situation: &Situation, makespan: Int) -> bool {
@@ -198,7 +238,7 @@ impl<'a> Greedy<'a> {
         key.extend(state.numbers.iter().flat_map(|number| words(*number)));
         key.extend(clocks.opens().iter().map(|open| open.instance));
         key.push(u32::from(clocks.unsettled()));
-        match self.seen.entry(key.into_boxed_slice()) {
+        match self.seen.entry(hash_of(&key)) {
             Entry::Vacant(entry) => {
                 entry.insert(makespan);
                 true
@@ -234,25 +274,37 @@ impl<'a> Greedy<'a> {
 
 #[expect(clippy::arithmetic_side_effects, reason = "counts of what is held in memory, and of what was")]
 impl Queues {
-    fn boost(&mut self) {
-        self.priorities[1] -= BOOST;
+    fn bytes(&self) -> usize {
+        self.heaps.iter().map(BinaryHeap::len).sum::<usize>() * size_of::<Entrance>()
     }
 
-    fn push(&mut self, (left, makespan, parent, operator): (u64, Int, u32, OperatorId), is_preferred: bool) {
+    fn boost(&mut self) {
+        self.priorities[PREFERRED] -= BOOST;
+    }
+
+    fn push(
+        &mut self,
+        value: (u64, Int),
+        parent: u32,
+        operator: OperatorId,
+        (is_preferred, is_old): (bool, bool),
+    ) {
         self.order = self.order.wrapping_add(1);
-        let entrance = Reverse((left, makespan, self.order, parent, operator));
-        self.heaps[0].push(entrance);
-        if is_preferred {
-            self.heaps[1].push(entrance);
+        let (left, makespan) = value;
+        let entrance = |is_old| Reverse((is_old, left, makespan, self.order, parent, operator));
+        let entrances = [entrance(false), entrance(false), entrance(is_old)];
+        for (queue, (heap, entrance)) in self.heaps.iter_mut().zip(entrances).enumerate() {
+            if queue != PREFERRED || is_preferred {
+                heap.push(entrance);
+            }
         }
     }
 
     fn pop(&mut self) -> Option<(u32, OperatorId)> {
-        let preferred = !self.heaps[1].is_empty()
-            && (self.heaps[0].is_empty() || self.priorities[1] <= self.priorities[0]);
-        let queue = usize::from(preferred);
+        let filled = (0..self.heaps.len()).filter(|queue| !self.heaps[*queue].is_empty());
+        let queue = filled.min_by_key(|queue| self.priorities[*queue])?;
         self.priorities[queue] += 1;
-        let Reverse((_, _, _, parent, operator)) = self.heaps[queue].pop()?;
+        let Reverse((_, _, _, _, parent, operator)) = self.heaps[queue].pop()?;
         Some((parent, operator))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::concurrent::access::{Accesses, Designs};
 use crate::number::Int;
-use crate::task::OperatorId;
+use crate::task::{NumericId, OperatorId};
 
 /// What a happening is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,7 +39,10 @@ pub(super) struct Instance {
     pub(super) end: OperatorId,
     /// The operator whose condition must hold over all.
     pub(super) over_all: Option<OperatorId>,
+    /// At least, if the state decides.
     pub(super) duration: Int,
+    /// The number that holds the duration from the start to the end, if the state decides it.
+    pub(super) timer: Option<NumericId>,
     pub(super) designs: Designs,
     /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
     pub(super) joint: Vec<u32>,

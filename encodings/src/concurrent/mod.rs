@@ -23,7 +23,9 @@ mod relaxed;
 mod schedule;
 mod search;
 mod split;
+mod store;
 mod time;
+mod timer;
 mod turns;
 mod unit;
 
@@ -43,7 +45,7 @@ use crate::number::Int;
 use crate::plan::solution::{Improvement, Proof, Solution, Statistics, Status};
 use crate::plan::{Plan, Step};
 use crate::task::OperatorId;
-use pddl::ast::{ActionBody, Comparison, Direction, Domain, Problem, Span};
+use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Problem, Span};
 
 pub use compile::Concurrent;
 
@@ -62,10 +64,6 @@ pub fn ground_concurrent(
     config: &GroundConfig,
     separation: &BigRational,
 ) -> Result<Concurrent, Vec<Error>> {
-    let errors = open_durations(domain);
-    if !errors.is_empty() {
-        return Err(errors);
-    }
     let overflow = || vec![Error::Overflow { what: "the separation".into() }];
     if !separation.is_positive() {
         return Err(overflow());
@@ -79,11 +77,11 @@ pub fn ground_concurrent(
         }]);
     }
     let lifted = || normalize(domain, problem, &config.objectives);
-    match ground_normal(lifted()?, config, &separation) {
+    match ground_normal(domain, lifted()?, config, &separation) {
         Err(errors) if errors.iter().any(Error::is_value_missing) => {
             let mut lifted = lifted()?;
             partial::guard(&mut lifted);
-            ground_normal(lifted, config, &separation)
+            ground_normal(domain, lifted, config, &separation)
         }
         found => found,
     }
@@ -91,6 +89,7 @@ pub fn ground_concurrent(
 
 /// Grounds a normalised task.
 fn ground_normal(
+    domain: &Domain,
     mut lifted: Lifted,
     config: &GroundConfig,
     separation: &Rational,
@@ -111,7 +110,8 @@ fn ground_normal(
         ),
     };
     lifted.metrics = vec![metric];
-    let split = split::split(lifted, &config.solves);
+    let mut split = split::split(lifted, &config.solves, &|action| mentions_duration(domain, action));
+    split.is_exact = is_fixed(domain);
     let none = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
     let (task, reached) = ground_lifted(lifted, designs, &none, &Generality::default(), &config.limits)?;
@@ -126,26 +126,48 @@ fn first_constraint(domain: &Domain, problem: &Problem) -> Option<Place> {
     of_domain.map(|span| Place { file: File::Domain, span }).chain(of_problem).next()
 }
 
-/// Durations that the planner would have to choose.
-fn open_durations(domain: &Domain) -> Vec<Error> {
-    let open = |action: &pddl::ast::Action| match &action.body {
-        ActionBody::Durative { duration, .. } => match &duration[..] {
-            [only] if only.operator == Comparison::Equal => None,
-            _ => Some(Error::Unsupported {
-                construct: format!(
-                    "a duration of `{}` that is not fixed, where actions overlap",
-                    action.identifier.name
-                ),
-                instead: "one `(= ?duration …)`".into(),
-                place: Place {
-                    file: File::Domain,
-                    span: duration.first().map_or(action.span, |constraint| constraint.span),
-                },
-            }),
-        },
-        ActionBody::Instantaneous { .. } => None,
+/// Whether no action has a duration that could be another one.
+fn is_fixed(domain: &Domain) -> bool {
+    let number = |constraint: &ast::DurationConstraint| match &constraint.expression {
+        ast::Expression::Number(number, _) => Some(number.clone()),
+        _ => None,
     };
-    domain.actions.iter().filter_map(open).collect()
+    domain.actions.iter().all(|action| match &action.body {
+        ActionBody::Durative { duration, .. } => match &duration[..] {
+            [only] => only.operator == Comparison::Equal,
+            [one, other] => {
+                let bounds = [one.operator, other.operator];
+                let both = [Comparison::GreaterOrEqual, Comparison::LessOrEqual];
+                both.iter().all(|bound| bounds.contains(bound))
+                    && number(one).is_some_and(|one| number(other) == Some(one))
+            }
+            _ => false,
+        },
+        ActionBody::Instantaneous { .. } => true,
+    })
+}
+
+/// Whether the end of an action mentions `?duration`.
+fn mentions_duration(domain: &Domain, action: u32) -> bool {
+    let Some(action) = domain.actions.get(action as usize) else { return false };
+    let ActionBody::Durative { effects, .. } = &action.body else { return false };
+    effects.iter().any(|(time, effect)| *time == EffectTime::AtEnd && measures(effect))
+}
+
+fn measures(effect: &ast::Effect) -> bool {
+    fn mentioned(expression: &ast::Expression) -> bool {
+        match expression {
+            ast::Expression::Duration(_) => true,
+            ast::Expression::Operation(_, operands, _) => operands.iter().any(mentioned),
+            _ => false,
+        }
+    }
+    match effect {
+        ast::Effect::And(parts) => parts.iter().any(measures),
+        ast::Effect::ForAll(_, inner) | ast::Effect::When(_, inner) => measures(inner),
+        ast::Effect::Assign(_, _, value, _) => mentioned(value),
+        ast::Effect::Add(_) | ast::Effect::Delete(_) => false,
+    }
 }
 
 /// Finds a best plan whose actions overlap; of those, one with the least makespan. `report` hears of every improvement.
@@ -202,15 +224,16 @@ pub fn optimize_concurrent(
 
 /// A sequence in names, its actions in the order of their starts.
 fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
-    let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together);
+    let durations = schedule::durations(concurrent, &sequence.happenings);
+    let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together, &durations);
     let mut steps: Vec<((Int, OperatorId), Step)> = Vec::new();
-    for (id, time) in sequence.happenings.iter().zip(times) {
-        let (end, duration) = match concurrent.happenings[id.index()].role {
+    for ((id, time), duration) in sequence.happenings.iter().zip(times).zip(durations) {
+        let end = match concurrent.happenings[id.index()].role {
             Role::Start(instance) => {
                 let instance = &concurrent.instances[instance as usize];
-                (concurrent.task.operators[instance.end.index()].cost.constant, instance.duration)
+                concurrent.task.operators[instance.end.index()].cost.constant
             }
-            Role::Whole => (0, 0),
+            Role::Whole => 0,
             _ => continue,
         };
         let operator = &concurrent.task.operators[id.index()];

@@ -174,7 +174,18 @@ impl<'a> Maker<'a> {
         let weight = match role {
             Role::Never => return,
             Role::Timed(_) => 0,
-            Role::Start(_) | Role::Whole => 1,
+            Role::Whole => 1,
+            Role::Start(instance) => {
+                // What the start does not bring about itself has to hold before; only other happenings at the same time could help.
+                let over_all = concurrent.instances[instance as usize].over_all;
+                let required =
+                    over_all.into_iter().flat_map(|id| &self.task.operators[id.index()].condition.facts);
+                let sets = |fact: &&Fact| operator.effects.iter().all(|own| own.variable != fact.variable);
+                needs.extend(required.filter(sets).map(|fact| self.fact(*fact)));
+                needs.sort_unstable();
+                needs.dedup();
+                1
+            }
             Role::End(instance) => {
                 let own = &concurrent.instances[instance as usize];
                 if let Some(over_all) = own.over_all {

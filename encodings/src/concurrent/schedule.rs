@@ -14,9 +14,14 @@ type Bound = (usize, usize, Int);
 /// The earliest times of a sequence that the search has found. `together` says which happenings take place at the time of
 /// the one before.
 #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-pub(super) fn schedule(concurrent: &Concurrent, sequence: &[OperatorId], together: &[bool]) -> Vec<Int> {
+pub(super) fn schedule(
+    concurrent: &Concurrent,
+    sequence: &[OperatorId],
+    together: &[bool],
+    durations: &[Int],
+) -> Vec<Int> {
     let mut times = vec![0; sequence.len()];
-    let bounds = bounds(concurrent, sequence, together, &mut times);
+    let bounds = bounds(concurrent, sequence, (together, durations), &mut times);
     // No chain of bounds is longer than the sequence.
     for _ in 0..=sequence.len() {
         let mut changed = false;
@@ -34,6 +39,24 @@ pub(super) fn schedule(concurrent: &Concurrent, sequence: &[OperatorId], togethe
     times
 }
 
+/// How long the actions take that start in a sequence, by position; 0 for what starts none.
+pub(super) fn durations(concurrent: &Concurrent, sequence: &[OperatorId]) -> Vec<Int> {
+    let mut state = concurrent.task.initial.clone();
+    let mut durations = Vec::with_capacity(sequence.len());
+    for id in sequence {
+        let after = concurrent.task.successor(&concurrent.task.operators[id.index()], &state, &[]);
+        state = after.expect("invariant: the search has been there");
+        durations.push(match concurrent.happenings[id.index()].role {
+            Role::Start(instance) => {
+                let duration = concurrent.duration(&concurrent.instances[instance as usize], &state);
+                duration.expect("invariant: the search has started it")
+            }
+            _ => 0,
+        });
+    }
+    durations
+}
+
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the first happening is together with none; durations are below 2^90"
@@ -41,7 +64,7 @@ pub(super) fn schedule(concurrent: &Concurrent, sequence: &[OperatorId], togethe
 fn bounds(
     concurrent: &Concurrent,
     sequence: &[OperatorId],
-    together: &[bool],
+    (together, durations): (&[bool], &[Int]),
     times: &mut [Int],
 ) -> Vec<Bound> {
     let mut bounds = Vec::new();
@@ -82,8 +105,8 @@ fn bounds(
                 }
             }
             Role::End(instance) => {
-                let duration = concurrent.instances[instance as usize].duration;
                 if let Some(start) = started.remove(&instance) {
+                    let duration = durations[start];
                     bounds.extend([(start, index, duration), (index, start, -duration)]);
                 }
             }

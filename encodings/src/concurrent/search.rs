@@ -9,16 +9,14 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::collections::hash_map::Entry;
-
-use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::estimate::Estimate;
 use crate::concurrent::expansion::{Expansion, Nowhere, Situation};
+use crate::concurrent::store::{Origin, Store};
 use crate::limits::Limits;
-use crate::number::{GROWTH_LIMIT, Int, dense, words};
+use crate::number::{GROWTH_LIMIT, Int};
 use crate::search::is_monotone;
 use crate::task::OperatorId;
 
@@ -40,17 +38,8 @@ pub(super) enum Ended {
     Stopped(Int),
 }
 
-struct Node {
-    situation: Situation,
-    /// How many happenings lead here.
-    depth: Int,
-    /// The node before, what happened then, and whether its action has ended as well.
-    parent: Option<(u32, OperatorId, bool)>,
-    dominated: bool,
-}
-
 /// The metric, the makespan, the sum of what is left, the depth, and the number of the node.
-type Priority = (Int, Int, Int, Int, u32);
+type Priority = (Int, Int, Int, u32, u32);
 
 pub(super) struct Search<'a> {
     concurrent: &'a Concurrent,
@@ -58,9 +47,7 @@ pub(super) struct Search<'a> {
     /// Lower bounds on costs, and on resources; none if nothing costs.
     bounds: Option<&'a Bounds>,
     expansion: &'a Expansion<'a>,
-    monotone: bool,
-    nodes: Vec<Node>,
-    seen: FxHashMap<Box<[u32]>, Vec<u32>>,
+    store: Store<'a>,
     open: BinaryHeap<Reverse<Priority>>,
     pub(super) incumbent: Option<Sequence>,
     /// What was left out because its numbers do not fit: no plan of it has a lower metric than this, in integers.
@@ -74,51 +61,52 @@ impl<'a> Search<'a> {
         estimate: &'a Estimate,
         bounds: Option<&'a Bounds>,
     ) -> Self {
-        let situation = expansion.root();
+        // A duration is no resource.
+        let monotone =
+            is_monotone(&concurrent.task) && concurrent.instances.iter().all(|own| own.timer.is_none());
         let mut search = Self {
             concurrent,
             estimate,
             bounds,
             expansion,
-            monotone: is_monotone(&concurrent.task),
-            nodes: Vec::new(),
-            seen: FxHashMap::default(),
+            store: Store::new(concurrent, monotone),
             open: BinaryHeap::new(),
             incumbent: None,
             left_out: None,
         };
         // Costs and times are not negative.
-        search.push(Node { situation, depth: 0, parent: None, dominated: false }, 0);
+        search.push(&expansion.root(), None, 0);
         search
     }
 
-    /// Searches until nothing better is left, `most` nodes are expanded, or a limit is reached. It can go on then. `report` hears of each better plan and of what none can get below.
-    #[expect(clippy::arithmetic_side_effects, reason = "nodes are counted by 32 bits")]
+    /// Searches until nothing better is left, `most` situations were looked at, or a limit is reached. It can go on then. `report` hears of each better plan and of what none can get below.
+    #[expect(clippy::arithmetic_side_effects, reason = "what was looked at is counted by 64 bits")]
     pub(super) fn run(
         &mut self,
         limits: &Limits,
         most: usize,
         report: &mut dyn FnMut(&Sequence, Int),
     ) -> Ended {
-        let mut expanded = 0;
+        let mut looked_at = 0;
+        let mut pulse = limits.pulse();
         while let Some(Reverse(priority)) = self.open.pop() {
             let id = priority.4;
             let value = (priority.0, priority.1);
-            if self.nodes[id as usize].dominated || !self.is_better(value) {
+            if self.store.is_dominated(id) || !self.is_better(value) {
                 continue;
             }
-            if self.expansion.is_goal(&self.nodes[id as usize].situation) {
-                let sequence = self.sequence(id);
+            let situation = self.store.situation(id);
+            if self.expansion.is_goal(&situation) {
+                let sequence = self.sequence(id, &situation);
                 report(&sequence, value.0);
                 self.incumbent = Some(sequence);
                 continue;
             }
-            if expanded == most || (expanded.is_multiple_of(64) && limits.reached()) {
+            if looked_at >= most || self.is_full(limits) || pulse.beat().is_err() {
                 self.open.push(Reverse(priority));
                 return Ended::Stopped(self.lower());
             }
-            expanded += 1;
-            self.expand(id, value.0);
+            looked_at += self.expand(id, &situation, value.0);
         }
         self.left_out.map_or(Ended::Exhausted, Ended::Stopped)
     }
@@ -126,6 +114,12 @@ impl<'a> Search<'a> {
     /// Whether there is nothing left to expand.
     pub(super) fn is_over(&self) -> bool {
         self.open.is_empty()
+    }
+
+    /// Whether it takes half of the room that there is.
+    pub(super) fn is_full(&self, limits: &Limits) -> bool {
+        let open = self.open.len().saturating_mul(size_of::<Priority>());
+        self.store.bytes().saturating_add(open) > limits.room() / 2
     }
 
     /// No plan that is not known has a lower metric than this, in integers.
@@ -143,31 +137,34 @@ impl<'a> Search<'a> {
         self.incumbent.as_ref().is_none_or(|incumbent| value < incumbent.value)
     }
 
-    /// Adds what can follow a node in which no plan has a lower metric than `lower`.
+    /// Adds what can follow a node in which no plan has a lower metric than `lower`. Returns how much that is.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a node is no deeper than twice as many as there are nodes"
     )]
-    fn expand(&mut self, id: u32, lower: Int) {
-        for operator in self.expansion.candidates(&self.nodes[id as usize].situation) {
-            let Node { situation, depth, .. } = &self.nodes[id as usize];
+    fn expand(&mut self, id: u32, situation: &Situation, lower: Int) -> usize {
+        let candidates = self.expansion.candidates(situation);
+        let count = candidates.len();
+        let depth = self.store.origin(id).map_or(0, |origin| origin.depth);
+        for operator in candidates {
             match self.expansion.after(situation, operator, true) {
-                Ok((situation, compressed)) => {
-                    let depth = depth + 1 + Int::from(compressed);
-                    let parent = Some((id, operator, compressed));
-                    self.push(Node { situation, depth, parent, dominated: false }, lower);
+                Ok((next, compressed)) => {
+                    let depth = depth + 1 + u32::from(compressed);
+                    let together = situation.clocks.unsettled();
+                    let origin = Origin { parent: id, operator, compressed, together, depth };
+                    self.push(&next, Some(origin), lower);
                 }
                 Err(Nowhere::Impossible | Nowhere::TooLate) => {}
                 Err(Nowhere::Unfit) => self.leave_out(lower),
             }
         }
+        count + 1
     }
 
-    /// Adds a node, below one in which no plan has a lower metric than `lower`.
-    fn push(&mut self, node: Node, lower: Int) {
-        let concurrent = self.concurrent;
-        let Situation { state, clocks, cost } = &node.situation;
-        let Some(left) = self.estimate.left(concurrent, state, clocks) else { return };
+    /// Adds a situation, below a node in which no plan has a lower metric than `lower`.
+    fn push(&mut self, situation: &Situation, origin: Option<Origin>, lower: Int) {
+        let Situation { state, clocks, cost } = situation;
+        let Some(left) = self.estimate.left(state, clocks) else { return };
         let costs = match self.bounds {
             Some(bounds) => match bounds.estimate(state) {
                 Some(costs) => costs,
@@ -175,7 +172,8 @@ impl<'a> Search<'a> {
             },
             None => 0,
         };
-        let total = cost.checked_add(costs).and_then(|cost| concurrent.measure.total(left.makespan, cost));
+        let total =
+            cost.checked_add(costs).and_then(|cost| self.concurrent.measure.total(left.makespan, cost));
         let Some(total) = total.filter(|total| *total < GROWTH_LIMIT) else {
             self.leave_out(lower);
             return;
@@ -184,57 +182,26 @@ impl<'a> Search<'a> {
         if !self.is_better(value) {
             return;
         }
-        let mut key = state.values[..concurrent.task.basic].to_vec();
-        clocks.signature(&mut key);
-        if !self.monotone {
-            key.extend(state.numbers.iter().flat_map(|number| words(*number)));
+        let depth = origin.map_or(0, |origin| origin.depth);
+        if let Some(id) = self.store.add(situation, origin) {
+            self.open.push(Reverse((value.0, value.1, left.sum, depth, id)));
         }
-        let id = dense(self.nodes.len());
-        let (guards, separation) = (&concurrent.guards, concurrent.separation);
-        let dominates = |own: &Node, other: &Node| {
-            let (own, other) = (&own.situation, &other.situation);
-            own.cost <= other.cost
-                && own.state.numbers.iter().zip(&other.state.numbers).all(|(own, other)| own >= other)
-                && own.clocks.no_later(&other.clocks, guards, separation)
-        };
-        match self.seen.entry(key.into_boxed_slice()) {
-            Entry::Vacant(entry) => {
-                entry.insert(vec![id]);
-            }
-            Entry::Occupied(mut entry) => {
-                let (front, nodes) = (entry.get_mut(), &mut self.nodes);
-                if front.iter().any(|known| dominates(&nodes[*known as usize], &node)) {
-                    return;
-                }
-                front.retain(|known| {
-                    let known = &mut nodes[*known as usize];
-                    known.dominated = dominates(&node, known);
-                    !known.dominated
-                });
-                front.push(id);
-            }
-        }
-        let depth = node.depth;
-        self.nodes.push(node);
-        self.open.push(Reverse((value.0, value.1, left.sum, depth, id)));
     }
 
-    fn sequence(&self, goal: u32) -> Sequence {
-        let situation = |id: u32| &self.nodes[id as usize].situation;
-        let Situation { clocks, cost, .. } = situation(goal);
+    fn sequence(&self, goal: u32, Situation { clocks, cost, .. }: &Situation) -> Sequence {
         let latest = clocks.latest();
         let total = self.concurrent.measure.total(latest, *cost);
         let value = (total.expect("invariant: what is on the way to a goal was measured"), latest);
         let (mut happenings, mut together) = (Vec::new(), Vec::new());
         let mut at = goal;
-        while let Some((parent, operator, compressed)) = self.nodes[at as usize].parent {
-            if compressed {
-                happenings.push(self.concurrent.end_of(operator));
+        while let Some(origin) = self.store.origin(at) {
+            if origin.compressed {
+                happenings.push(self.concurrent.end_of(origin.operator));
                 together.push(false);
             }
-            happenings.push(operator);
-            together.push(situation(parent).clocks.unsettled());
-            at = parent;
+            happenings.push(origin.operator);
+            together.push(origin.together);
+            at = origin.parent;
         }
         happenings.reverse();
         together.reverse();

@@ -7,11 +7,12 @@
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
 
+use crate::concurrent::timer::{Timer, depends_on_state};
 use crate::error::{File, Place};
 use crate::lifted::configuration::{SlotParameter, conjuncts, design_parameters, is_static};
 use crate::lifted::{
-    Bound, Change, Effect, Event, Expression, Formula, Lifted, ObjectId, Predicate, PredicateId, Rational,
-    Schema, Term,
+    Bound, Change, Effect, Event, Expression, Formula, FunctionId, Lifted, ObjectId, Predicate, PredicateId,
+    Rational, Schema, Term,
 };
 use crate::number::dense;
 use pddl::ast::{Comparison, Name, Span};
@@ -47,11 +48,17 @@ pub(super) struct Split {
     /// The design parameters of each schema of the split task.
     pub(super) designs: Vec<Vec<SlotParameter>>,
     pub(super) events: Vec<Event>,
+    /// The functions that hold durations.
+    pub(super) durations: Vec<FunctionId>,
+    /// Whether no duration was chosen where another one could be better.
+    pub(super) is_exact: bool,
 }
 
 /// Splits a task. `solves` names the predicates that say which design solves which function.
-pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
-    let schemas = std::mem::take(&mut lifted.schemas);
+/// `mentions` says whether the end of the action at a position mentions `?duration`.
+pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) -> bool) -> Split {
+    let mut schemas = std::mem::take(&mut lifted.schemas);
+    let mut durations = Vec::new();
     let events = std::mem::take(&mut lifted.events);
     let (mut origins, mut designs) = (Vec::new(), Vec::new());
     let waited = lifted.time.waited;
@@ -62,9 +69,17 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
         let goal = std::mem::replace(&mut lifted.goal, Formula::truth());
         lifted.goal = Formula::And(vec![goal, done]);
     }
-    for (index, schema) in schemas.iter().enumerate() {
+    for (index, schema) in schemas.iter_mut().enumerate() {
+        let duration = schema.duration.as_ref().filter(|duration| depends_on_state(&lifted, duration));
+        let timer = duration.is_some().then(|| Timer::new(&mut lifted, schema));
+        if let Some(timer) = &timer {
+            durations.push(timer.function);
+            if mentions(schema.action) {
+                *schema = timer.with_end(schema);
+            }
+        }
         let own = design_parameters(&lifted, schema, solves);
-        for (half, mut part) in parts(&mut lifted, schema) {
+        for (half, mut part) in parts(&mut lifted, schema, timer.as_ref()) {
             if !events.is_empty() && matches!(half, Half::End | Half::Whole) {
                 part.end_effects.push(effect(Change::Delete(waited, Vec::new())));
             }
@@ -80,7 +95,7 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name]) -> Split {
         origins.push(Origin { schema: usize::MAX, half: Half::Timed(index) });
         designs.push(Vec::new());
     }
-    Split { lifted, schemas, origins, designs, events }
+    Split { lifted, schemas, origins, designs, events, durations, is_exact: true }
 }
 
 fn effect(change: Change) -> Effect {
@@ -92,7 +107,7 @@ fn literal(predicate: PredicateId, terms: &[Term]) -> Formula {
 }
 
 /// The happenings of a schema.
-fn parts(lifted: &mut Lifted, schema: &Schema) -> Vec<(Half, Schema)> {
+fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Half, Schema)> {
     let instantaneous = |condition: Vec<Formula>, effects: Vec<Effect>| Schema {
         start_condition: Formula::And(condition),
         start_effects: Vec::new(),
@@ -137,12 +152,12 @@ fn parts(lifted: &mut Lifted, schema: &Schema) -> Vec<(Half, Schema)> {
     condition.extend(settled);
     let mut effects = schema.start_effects.clone();
     effects.push(effect(Change::Add(running, parameters.clone())));
-    all.push((
-        Half::Start,
-        Schema { duration: schema.duration.clone(), ..instantaneous(condition, effects) },
-    ));
+    effects.extend(timer.map(|timer| timer.set(schema, duration.clone())));
+    let fixed = schema.duration.clone().filter(|_| timer.is_none());
+    all.push((Half::Start, Schema { duration: fixed, ..instantaneous(condition, effects) }));
 
     let mut condition = vec![literal(running, &parameters), schema.at_end.clone()];
+    condition.extend(timer.map(|timer| timer.is_set(schema)));
     if !changing.is_empty() {
         let mut symbol = |text: &str| {
             let name = Name::new(&format!("{text} {}", schema.name));
@@ -158,6 +173,7 @@ fn parts(lifted: &mut Lifted, schema: &Schema) -> Vec<(Half, Schema)> {
     }
     let mut effects = schema.end_effects.clone();
     effects.push(effect(Change::Delete(running, parameters)));
+    effects.extend(timer.map(|timer| timer.clear(schema)));
     all.push((Half::End, instantaneous(condition, effects)));
     all
 }

@@ -13,11 +13,11 @@ use crate::concurrent::search::{Ended, Search, Sequence};
 use crate::limits::Limits;
 use crate::number::Int;
 
-/// How many nodes the exact search expands before the greedy one has its turn.
-const SOON: usize = 500;
-/// How many situations the greedy search evaluates at its first turn, and how many nodes the exact one expands then.
-const GREEDY: usize = 20_000;
-const EXACT: usize = 2_000;
+/// How many situations the exact search looks at before the greedy one has its turn.
+const SOON: usize = 10_000;
+/// How many situations the greedy search evaluates at its first turn, and how many the exact one looks at then.
+const GREEDY: usize = 5_000;
+const EXACT: usize = 20_000;
 
 /// Searches until nothing better is left, or a limit is reached. `report` hears of each better plan and of what none can get below.
 pub(super) fn take_turns(
@@ -29,9 +29,10 @@ pub(super) fn take_turns(
     let estimate = Estimate::new(concurrent);
     let expansion = Expansion::new(concurrent);
     let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
+    let root = exact.lower();
     let mut ended = exact.run(limits, SOON, report);
     if exact.is_over() || limits.reached() {
-        return (ended, exact.incumbent);
+        return (claimed(ended, concurrent, root), exact.incumbent);
     }
     let relaxed = Relaxed::new(concurrent);
     let begin = |reopens| {
@@ -40,7 +41,7 @@ pub(super) fn take_turns(
     };
     let mut greedy = Some(begin(false));
     let mut share = 1_usize;
-    while !exact.is_over() && !limits.reached() {
+    while !(exact.is_over() || limits.reached() || (greedy.is_none() && exact.is_full(limits))) {
         while let Some(own) = &mut greedy {
             match own.run(&mut exact.incumbent, limits, GREEDY.saturating_mul(share)) {
                 Outcome::Found => {
@@ -55,5 +56,10 @@ pub(super) fn take_turns(
         ended = exact.run(limits, EXACT.saturating_mul(share), report);
         share = share.saturating_mul(2);
     }
-    (ended, exact.incumbent)
+    (claimed(ended, concurrent, root), exact.incumbent)
+}
+
+/// What can be said of all plans where the search leaves some out: what could be said before it began.
+fn claimed(ended: Ended, concurrent: &Concurrent, root: Int) -> Ended {
+    if concurrent.is_exact { ended } else { Ended::Stopped(root) }
 }

@@ -7,7 +7,7 @@ use crate::number::{Int, checked_lcm};
 use crate::task::{OperatorId, Task};
 
 /// Times and durations stay below this.
-const LIMIT: Int = 1 << 90;
+pub(super) const LIMIT: Int = 1 << 90;
 
 /// The unit of all times: so many to the unit of the files.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,11 @@ impl Unit {
     /// A unit in which durations, separation and timed initial literals are integers.
     pub(super) fn new(task: &Task, split: &Split, separation: &Rational) -> Result<Self, Error> {
         let mut times = split.events.iter().map(|event| &event.time).chain([separation]);
-        let common = times.try_fold(task.time_scale, |scale, time| {
+        // Durations that the state decides are numbers.
+        let numbers = if split.durations.is_empty() { 1 } else { task.number_scale };
+        let scale = checked_lcm(task.time_scale, numbers).filter(|scale| *scale < LIMIT);
+        let scale = scale.ok_or_else(|| Error::Overflow { what: "durations".into() })?;
+        let common = times.try_fold(scale, |scale, time| {
             checked_lcm(scale, time.denominator()?).filter(|scale| *scale < LIMIT)
         });
         common.map(Self).ok_or_else(|| Error::Overflow { what: "durations and times".into() })

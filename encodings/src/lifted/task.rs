@@ -244,7 +244,7 @@ pub(crate) enum Change {
 }
 
 /// A numeric expression.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Expression {
     Number(Rational),
     Function(FunctionId, Vec<Term>, Place),

@@ -10,6 +10,7 @@ impl Clocks {
         for open in &self.opens {
             out.extend([open.instance, open.float]);
             out.extend(words(open.offset));
+            out.extend(words(open.duration));
         }
         if let Some((float, offset)) = self.group {
             out.extend([u32::MAX, float]);

@@ -98,7 +98,8 @@ impl Reads {
         }
     }
 
-    fn expression(&mut self, expression: &Expression, binding: &Binding) {
+    /// Adds what an expression mentions.
+    pub(crate) fn expression(&mut self, expression: &Expression, binding: &Binding) {
         match expression {
             Expression::Number(_) | Expression::TotalTime => {}
             Expression::Function(function, terms, _) => {

@@ -1,0 +1,101 @@
+//! Durations that the state decides: a number for each schema that a start sets and an end clears.
+//!
+//! `?duration` is what the expression comes to in the state in which the action starts [1]. So the start assigns it to a number of its own, from
+//! which the end and its effects take it, and the clocks.
+//!
+//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
+
+use crate::lifted::{
+    Change, Effect, Expression, Formula, Function, FunctionId, Lifted, Rational, Schema, Term,
+};
+use crate::number::dense;
+use pddl::ast::{Assignment, Comparison, Name};
+
+/// What the names of these numbers begin with: no name in a file has a blank.
+pub(super) const TIMER: &str = "(duration of ";
+
+/// Whether some action changes what an expression mentions.
+pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool {
+    let any = |parts: &[Expression]| parts.iter().any(|part| depends_on_state(lifted, part));
+    match expression {
+        Expression::Number(_) | Expression::TotalTime => false,
+        Expression::Function(function, ..) => lifted.functions[function.index()].fluent,
+        Expression::Sum(parts) | Expression::Product(parts, _) => any(parts),
+        Expression::Negate(inner) => depends_on_state(lifted, inner),
+        Expression::Quotient(left, right, _) => {
+            depends_on_state(lifted, left) || depends_on_state(lifted, right)
+        }
+    }
+}
+
+/// A number for the durations of a schema.
+pub(super) struct Timer {
+    pub(super) function: FunctionId,
+    terms: Vec<Term>,
+}
+
+impl Timer {
+    pub(super) fn new(lifted: &mut Lifted, schema: &Schema) -> Self {
+        let function = FunctionId(dense(lifted.functions.len()));
+        let name = Name::new(&format!("duration of {}", schema.name));
+        lifted.functions.push(Function { name, fluent: true, partial: true });
+        Self { function, terms: (0..dense(schema.parameters.len())).map(Term::Parameter).collect() }
+    }
+
+    pub(super) fn expression(&self, schema: &Schema) -> Expression {
+        Expression::Function(self.function, self.terms.clone(), schema.place)
+    }
+
+    /// The timer gets this value.
+    pub(super) fn set(&self, schema: &Schema, expression: Expression) -> Effect {
+        let change = Change::Assign {
+            assignment: Assignment::Assign,
+            function: self.function,
+            terms: self.terms.clone(),
+            expression,
+            place: schema.place,
+        };
+        Effect { bound: Vec::new(), condition: Formula::truth(), change }
+    }
+
+    pub(super) fn clear(&self, schema: &Schema) -> Effect {
+        self.set(schema, Expression::Number(Rational::from_integer(0)))
+    }
+
+    pub(super) fn is_set(&self, schema: &Schema) -> Formula {
+        let zero = Expression::Number(Rational::from_integer(0));
+        Formula::Compare(Comparison::Greater, self.expression(schema), zero, schema.place)
+    }
+
+    /// The schema whose end takes its duration from the timer.
+    pub(super) fn with_end(&self, schema: &Schema) -> Schema {
+        let Some(duration) = &schema.duration else { return schema.clone() };
+        let replace = |expression: &Expression| replaced(expression, duration, &self.expression(schema));
+        let mut own = schema.clone();
+        for effect in &mut own.end_effects {
+            if let Change::Assign { expression, .. } = &mut effect.change {
+                *expression = replace(expression);
+            }
+        }
+        own
+    }
+}
+
+/// An expression with another one put for each part that is equal to `part`.
+fn replaced(expression: &Expression, part: &Expression, other: &Expression) -> Expression {
+    let each = |parts: &[Expression]| parts.iter().map(|own| replaced(own, part, other)).collect();
+    if expression == part {
+        return other.clone();
+    }
+    match expression {
+        Expression::Sum(parts) => Expression::Sum(each(parts)),
+        Expression::Product(parts, place) => Expression::Product(each(parts), *place),
+        Expression::Negate(inner) => Expression::Negate(Box::new(replaced(inner, part, other))),
+        Expression::Quotient(left, right, place) => Expression::Quotient(
+            Box::new(replaced(left, part, other)),
+            Box::new(replaced(right, part, other)),
+            *place,
+        ),
+        Expression::Number(_) | Expression::Function(..) | Expression::TotalTime => expression.clone(),
+    }
+}

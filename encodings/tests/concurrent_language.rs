@@ -1,0 +1,95 @@
+//! Overlapping actions whose durations or effects the state decides, and durations that are bounded: what is planned, and what is claimed of it.
+
+use metaplan_encodings::{GroundConfig, Limits, Status, ground_concurrent, optimize_concurrent};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, read};
+
+/// The metric of the plan that is found with a separation of a thousandth, which the validator has executed.
+fn check(actions: &str, init: &str, goal: &str, expected: (Status, Option<&str>)) {
+    let domain =
+        format!("(define (domain d) (:predicates (p) (q) (g) (on ?x)) (:functions (fuel) (log)) {actions})");
+    let problem = format!(
+        "(define (problem n) (:domain d) (:objects a b) (:init (= (fuel) 4) (= (log) 0) {init})
+           (:goal (and {goal})) (:metric minimize (total-time)))"
+    );
+    let read = read(&Source::new("domain", domain.clone()), &Source::new("problem", problem.clone()));
+    let (domain_read, problem_read, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}"));
+    let separation = BigRational::new(BigInt::from(1), BigInt::from(1000));
+    let task = ground_concurrent(&domain_read, &problem_read, &GroundConfig::default(), &separation)
+        .unwrap_or_else(|errors| panic!("{errors:?}"));
+    let solution = optimize_concurrent(&task, &Limits::none(), &mut |_| {});
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+    assert_eq!((solution.status, cost.as_deref()), expected, "{domain}\n{problem}");
+    let Some(plan) = &solution.plan else { return };
+    let lines = plan.steps.iter().map(|step| {
+        let words = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
+        format!("{}: ({words}) [{}]\n", step.start, step.duration)
+    });
+    let text: String = lines.collect();
+    let parsed = PlanText::parse(&Source::new("plan", text.clone())).expect("a plan");
+    let options = Options { concurrent: true, tolerance: separation };
+    let verdict = validate(&domain_read, &problem_read, &parsed, &options);
+    assert!(verdict.valid, "{text}{:?}", verdict.violation);
+    assert_eq!(verdict.metric, Some(plan.cost.to_rational()), "{text}");
+}
+
+fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String {
+    format!(
+        "(:durative-action {name} :parameters () :duration {duration}
+           :condition (and {condition}) :effect (and {effect}))\n"
+    )
+}
+
+#[test]
+fn a_duration_is_that_of_the_state_at_the_start() {
+    let fill =
+        || durative("fill", "(= ?duration (- 10 (fuel)))", "", "(at end (assign (fuel) 10)) (at end (g))");
+    check(&fill(), "", "(g)", (Status::Optimal, Some("6")));
+    // It may pay to have more before.
+    let pour = durative(
+        "pour",
+        "(= ?duration 1)",
+        "(at start (q))",
+        "(at start (increase (fuel) 5)) (at start (not (q)))",
+    );
+    check(&[fill(), pour.clone()].concat(), "(q)", "(g)", (Status::Optimal, Some("1.001")));
+    // `?duration` at the end is what it was at the start, whatever has changed since.
+    let counted = || {
+        durative(
+            "fill",
+            "(= ?duration (- 10 (fuel)))",
+            "",
+            "(at end (increase (log) ?duration)) (at end (g))",
+        )
+    };
+    let drained = "(at start (assign (fuel) 0)) (at end (p))";
+    let drain = durative("drain", "(= ?duration 1)", "", drained);
+    check(&[counted(), drain.clone()].concat(), "", "(g) (p) (>= (log) 6)", (Status::Optimal, Some("6")));
+    check(&[counted(), drain].concat(), "", "(g) (p) (>= (log) 10)", (Status::Optimal, Some("10.001")));
+    // One that takes no time is one happening, whose end must not change what its duration rests on.
+    check(&fill().replace("10", "4"), "", "(g)", (Status::Unsolvable, None));
+    let counts = durative("counts", "(= ?duration (- 4 (fuel)))", "", "(at end (g))");
+    check(&[counts, pour].concat(), "(q)", "(g)", (Status::Optimal, Some("0")));
+}
+
+#[test]
+fn what_effects_under_a_condition_do_is_planned_and_not_claimed_to_be_best() {
+    let helps = durative("helps", "(= ?duration 2)", "", "(at start (p)) (at end (not (p)))");
+    let asks =
+        |effect: &str| durative("asks", "(= ?duration 1)", "", &format!("(at end (when (p) {effect}))"));
+    check(&[asks("(g)"), helps.clone()].concat(), "", "(g)", (Status::Feasible, Some("2")));
+    // That no plan exists does not rest on the times here.
+    check(&asks("(g)"), "", "(g)", (Status::Unsolvable, None));
+    let each = "(:durative-action each :parameters () :duration (= ?duration 3) :condition ()
+                  :effect (at end (forall (?x) (when (on ?x) (not (on ?x))))))";
+    check(each, "(on a)", "(not (on a)) (not (on b))", (Status::Feasible, Some("3")));
+}
+
+#[test]
+fn durations_within_bounds() {
+    let bounded = |bounds: &str| durative("a", bounds, "", "(at end (g))");
+    check(&bounded("(and (>= ?duration 4) (<= ?duration 4))"), "", "(g)", (Status::Optimal, Some("4")));
+    check(&bounded("(and (>= ?duration 4) (<= ?duration 6))"), "", "(g)", (Status::Feasible, Some("4")));
+}
