@@ -20,6 +20,7 @@ import argparse
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -33,7 +34,7 @@ from planners import CLASSICAL, NUMERIC, PACKAGES, ROOT, TEMPORAL, planners
 from process import PATIENCE, run
 
 FIELDS = ["suite", "task", "problem", "planner", "status", "cost", "verdict", "measured", "cpu_s", "wall_s", "limit_s",
-          "exit", "load", "note"]
+          "exit", "load", "aim", "note"]
 SUITES = {"classical": CLASSICAL, "unsolvable": CLASSICAL, "temporal": TEMPORAL, "numeric": NUMERIC, "ours": None}
 # How far apart a planner keeps interfering happenings at least, in the decimals that it prints, where that is less than a thousandth.
 TOLERANCE = {"kairos": "0.00099", "kairos-first": "0.00099", "lpg": "0.0002"}
@@ -104,7 +105,13 @@ def one(planner, task, options):
     note = "" if status in ("optimal", "plan", "unsolvable") else last_words(done.output, status)
     cost = "" if answer.cost is None else answer.cost
     return dict(zip(FIELDS, [*task[:3], planner.name, status, cost, verdict, measured, round(done.cpu, 3), round(done.wall, 3),
-                             options.seconds, done.code, round(load, 1), note]))
+                             options.seconds, done.code, round(load, 1), aim(task), note]))
+
+
+def aim(task):
+    """Whether more is better."""
+    found = re.search(r":metric\s+(minimize|maximize)", Path(task.files[1]).read_text(), re.IGNORECASE)
+    return found.group(1).lower() if found else "minimize"
 
 
 def last_words(output, status):

@@ -72,14 +72,15 @@ def disagreements(rows):
 def worse(place, row, plans):
     """Plans that are cheaper than an optimum that is claimed, and claims that do not cost what the validator says."""
     claimed = value(row)
+    sign = -1 if row.get("aim") == "maximize" else 1
     cheaper = [(name, cost) for name, cost in plans if cost is not None and claimed is not None
-               and cost < claimed - ROUNDING * max(1, abs(claimed))]
+               and sign * (claimed - cost) > ROUNDING * max(1, abs(claimed))]
     told = float(row["cost"])
     if row["planner"] in ("metaplan", "oracle") and claimed is not None and abs(told - claimed) > ROUNDING * max(1, abs(told)):
         yield f"{place}: {row['planner']} says {told}, its plan costs {claimed}"
     for name, cost in cheaper:
         line = f"{place}: {row['planner']} claims {claimed} as optimal, {name} has a plan of {cost}"
-        small = place.startswith("temporal") and claimed - cost < 200 * EPSILON
+        small = place.startswith("temporal") and abs(claimed - cost) < 200 * EPSILON
         yield f"note: {line} (as little as different epsilons make)" if small else line
 
 

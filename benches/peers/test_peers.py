@@ -99,6 +99,11 @@ class Reports(unittest.TestCase):
         # An optimum that no plan shows: both claims are told, whichever is wrong.
         self.assertEqual(len(report.disagreements(rows("ours", optimal, row("oracle", "optimal", "9")))), 1)
 
+    def test_more_may_be_better(self):
+        optimal, worse = ({**one, "aim": "maximize"} for one in (row("one", "optimal", "5", "valid", "5"), row("two", "plan", "4", "valid", "4")))
+        self.assertEqual(report.disagreements(rows("classical", optimal, worse)), [])
+        self.assertEqual(len(report.disagreements(rows("classical", optimal, {**worse, "cost": "6", "measured": "6"}))), 1)
+
     def test_epsilon_is_a_note(self):
         claims = [row("one", "optimal", "10.004", "valid", "10.004"), row("two", "plan", "10.001", "valid", "10.001")]
         self.assertTrue(all(line.startswith("note:") for line in report.disagreements(rows("temporal", *claims))))
