@@ -9,7 +9,7 @@ use encodings::{
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::mission::Blocking;
+use crate::mission::{Blocking, times};
 use crate::number::exact_to_json;
 
 /// A plan with its proof and its figures.
@@ -262,14 +262,15 @@ fn steps(plan: &Plan) -> Vec<StepPart> {
 impl StepPart {
     fn of(step: &Step) -> Self {
         let configuration = step.configuration.iter();
+        let (start, duration) = times(step);
         Self {
             action: step.action.clone(),
             arguments: step.arguments.clone(),
             configuration: configuration
                 .map(|(function, design)| (function.clone(), design.clone().into()))
                 .collect(),
-            start: exact_to_json(&step.start),
-            duration: exact_to_json(&step.duration),
+            start: exact_to_json(&start),
+            duration: exact_to_json(&duration),
             cost: exact_to_json(&step.cost),
             reconfigured: step.reconfigured.clone(),
         }

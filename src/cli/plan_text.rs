@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use std::fmt::Write as _;
 
 use encodings::{Plan, Step};
-use metaplan::mission::{decimal, plan_lines, popf_text};
+use metaplan::mission::{decimal, plan_lines, popf_text, times};
 
 use crate::cli::output;
 
@@ -30,7 +30,8 @@ pub(super) fn plan_text(plan: &Plan, format: PlanFormat) -> String {
         let call: Vec<&str> =
             std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
         if temporal {
-            let (start, duration) = (decimal(&step.start), decimal(&step.duration));
+            let (start, duration) = times(step);
+            let (start, duration) = (decimal(&start), decimal(&duration));
             let _ = writeln!(text, "{start}: ({})  [{duration}]", call.join(" "));
         } else {
             let _ = writeln!(text, "({})", call.join(" "));

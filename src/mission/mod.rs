@@ -7,6 +7,7 @@ mod confirm;
 mod planning;
 mod plansys2;
 mod sections;
+mod times;
 mod verdict;
 
 pub use ::mission::{Bindings, CoAdaptation, Mission, Names};
@@ -16,4 +17,5 @@ pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
 pub use plansys2::{PlanLine, decimal, instant, plan_lines, popf_text, spaced};
 pub use sections::{BindingsSection, KnowledgeSection, PlanningSection, Scenario};
+pub use times::times;
 pub use verdict::{blocking_text, verdict};

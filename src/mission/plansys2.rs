@@ -11,6 +11,7 @@ use num_rational::BigRational;
 use pddl::ast::Problem;
 
 use crate::mission::confirm::{Reading, verdict_of};
+use crate::mission::times::times;
 
 /// An action of a plan for PlanSys2.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,10 +46,10 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
 
 /// The lines of a plan, whose arguments are as the domain's file writes them.
 pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
-    let line = |step: &Step| PlanLine {
-        start: step.start.clone(),
-        action: call(step),
-        duration: lasting(step).into(),
+    let line = |step: &Step| {
+        let (start, duration) = times(step);
+        let duration = if duration.is_zero() { instant().into() } else { duration };
+        PlanLine { start, action: call(step), duration }
     };
     plan.steps.iter().map(line).collect()
 }
