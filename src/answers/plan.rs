@@ -101,7 +101,6 @@ struct StatisticsPart {
 
 #[derive(Debug, Clone, Serialize)]
 struct MomentPart {
-    milliseconds: f64,
     cost: Option<Value>,
     lower_bound: Value,
 }
@@ -113,6 +112,8 @@ struct MillisecondsPart {
     search: f64,
     encode: f64,
     solve: f64,
+    /// The times of the history.
+    history: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -237,7 +238,6 @@ fn part(part: Part) -> &'static str {
 impl MomentPart {
     fn of(moment: &Moment) -> Self {
         Self {
-            milliseconds: milliseconds(moment.time),
             cost: moment.cost.as_ref().map(exact_to_json),
             lower_bound: exact_to_json(&moment.lower_bound),
         }
@@ -312,6 +312,7 @@ impl StatisticsPart {
                 search: milliseconds(statistics.search),
                 encode: milliseconds(statistics.encode),
                 solve: milliseconds(statistics.solve),
+                history: statistics.history.iter().map(|moment| milliseconds(moment.time)).collect(),
             },
         }
     }

@@ -1,7 +1,7 @@
 //! One run of the optimizer: what it asks the SAT solver, what it has heard, and how it ends.
 
 use std::cell::OnceCell;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::bounds::Bounds;
 use crate::context::Context;
@@ -15,8 +15,8 @@ use crate::plan::{decode, metric};
 use crate::sat::{Answer, Backend, Lit, Solver};
 use crate::task::Task;
 
-/// Bounds that come so soon after another are not noted.
-const BETWEEN: Duration = Duration::from_millis(20);
+/// Bounds are noted that are this part higher than the one before.
+const PART: Int = 100;
 
 /// A task with what has come of it so far.
 pub(super) struct Run<'a> {
@@ -25,6 +25,8 @@ pub(super) struct Run<'a> {
     pub(super) report: &'a mut dyn FnMut(Improvement),
     pub(super) statistics: Statistics,
     started: Instant,
+    /// What was noted last.
+    noted: Option<(Option<Int>, Int)>,
     /// Found out when it is first needed.
     symmetry: OnceCell<Symmetry>,
 }
@@ -72,7 +74,15 @@ pub(super) struct Live {
 impl<'a> Run<'a> {
     pub(super) fn new(task: &'a Task, config: &'a Config, report: &'a mut dyn FnMut(Improvement)) -> Self {
         let statistics = Statistics { operators: task.operators.len(), ..Statistics::default() };
-        Self { task, config, report, statistics, started: Instant::now(), symmetry: OnceCell::new() }
+        Self {
+            task,
+            config,
+            report,
+            statistics,
+            started: Instant::now(),
+            noted: None,
+            symmetry: OnceCell::new(),
+        }
     }
 
     pub(super) fn context(&self) -> Context<'a> {
@@ -87,18 +97,19 @@ impl<'a> Run<'a> {
 
     /// Notes what the best plan costs, if there is one, and what none costs less than.
     pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
-        let time = self.started.elapsed();
-        let cost = cost.map(|cost| metric(self.task, &cost));
-        let lower_bound = metric(self.task, &lower);
-        let history = &mut self.statistics.history;
-        if let Some(last) = history.last() {
-            let is_same = last.cost == cost && last.lower_bound == lower_bound;
-            let is_soon = last.cost == cost && time.saturating_sub(last.time) < BETWEEN;
-            if is_same || is_soon {
-                return;
-            }
+        let is_news = self.noted.is_none_or(|(known, bound)| {
+            let more = lower.saturating_sub(bound);
+            known != cost || more > bound / PART || more > 0 && cost == Some(lower)
+        });
+        if !is_news {
+            return;
         }
-        history.push(Moment { time, cost, lower_bound });
+        self.noted = Some((cost, lower));
+        self.statistics.history.push(Moment {
+            time: self.started.elapsed(),
+            cost: cost.map(|cost| metric(self.task, &cost)),
+            lower_bound: metric(self.task, &lower),
+        });
     }
 
     pub(super) fn announce(&mut self, best: &Best, horizon: usize) {

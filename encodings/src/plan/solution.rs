@@ -118,7 +118,7 @@ pub struct Statistics {
     pub evaluated: u64,
     /// How often the search for a plan soon has begun anew, to find a better one.
     pub restarts: usize,
-    /// Better plans and better bounds in the order of their times, those left out that came at once after another.
+    /// Better plans in the order of their times, and bounds that had risen by a hundredth.
     pub history: Vec<Moment>,
     /// Time for bounds and searches.
     pub search: Duration,
