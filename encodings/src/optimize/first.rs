@@ -57,7 +57,9 @@ impl FirstPlan {
             match decide(run, bounds, horizon, allowance) {
                 (_, Some(plan)) => return First::Plan(plan),
                 (Answer::Unsatisfiable, None) => self.refuted = self.refuted.max(horizon),
-                (Answer::Satisfiable | Answer::Interrupted, None) => {
+                // A plan whose cost does not fit is none, and longer ones cost no less.
+                (Answer::Satisfiable, None) => return First::Over,
+                (Answer::Interrupted, None) => {
                     if run.config.limits.reached() {
                         return First::Over;
                     }

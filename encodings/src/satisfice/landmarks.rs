@@ -87,7 +87,7 @@ impl Landmarks {
             exclusive,
         };
         finder.find(limits)?;
-        finder.reasonable();
+        finder.reasonable(limits)?;
         Ok(finder.finish())
     }
 }
@@ -248,71 +248,60 @@ impl<N: TaskNumber> Finder<'_, N> {
     }
 
     /// Orders that keep landmarks from being given up again.
-    fn reasonable(&mut self) {
-        let goals: Vec<u32> =
-            (0..dense(self.all.len())).filter(|own| self.all[*own as usize].is_goal).collect();
-        let mut found: Vec<(u32, u32)> = Vec::new();
-        for later in &goals {
-            for sooner in goals.iter().filter(|sooner| *sooner != later) {
-                if self.interferes(*sooner, *later) {
-                    found.push((*sooner, *later));
-                }
-            }
-        }
+    fn reasonable(&mut self, limits: &Limits) -> Result<(), Interrupted> {
+        let all = 0..dense(self.all.len());
+        let sides: Vec<Vec<Proposition>> = all.clone().map(|own| self.side(own)).collect();
+        let goals: Vec<u32> = all.filter(|own| self.all[*own as usize].is_goal).collect();
+        let pairs = goals.iter().flat_map(|later| goals.iter().map(move |sooner| (*sooner, *later)));
         let mut needed: Vec<(u32, u32)> = self.needed.iter().copied().collect();
         needed.sort_unstable();
-        let mut before: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.all.len()];
         for (one, other) in &self.orders {
-            before.entry(*other).or_default().push(*one);
+            before[*other as usize].push(*one);
         }
-        for (later, common) in &needed {
-            let mut others = before.get(common).cloned().unwrap_or_default();
-            others.sort_unstable();
-            for sooner in others.into_iter().filter(|sooner| sooner != later) {
-                if self.interferes(sooner, *later) {
-                    found.push((sooner, *later));
-                }
+        for own in &mut before {
+            own.sort_unstable();
+        }
+        let others = needed
+            .iter()
+            .flat_map(|(later, common)| before[*common as usize].iter().map(move |sooner| (*sooner, *later)));
+        let mut reach = closure(self.all.len(), &self.orders);
+        for pair in limits.watch(pairs.chain(others)) {
+            let (sooner, later) = pair?;
+            if sooner == later
+                || has(&reach[later as usize], sooner)
+                || self.orders.contains(&(sooner, later))
+            {
+                continue;
             }
-        }
-        let mut after: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
-        for (one, other) in &self.orders {
-            after.entry(*one).or_default().push(*other);
-        }
-        for (sooner, later) in found {
-            if !self.orders.contains(&(later, sooner)) && !leads(&after, later, sooner) {
+            let [other] = self.all[later as usize].any_of[..] else { continue };
+            if sides[sooner as usize].iter().any(|own| self.are_mutex(*own, other)) {
                 self.orders.insert((sooner, later));
-                after.entry(sooner).or_default().push(later);
+                connect(&mut reach, sooner, later);
             }
         }
+        Ok(())
     }
 
-    /// Whether to bring about the first landmark makes the second one false.
-    fn interferes(&self, first: u32, second: u32) -> bool {
-        let ([one], [other]) = (&self.all[first as usize].any_of[..], &self.all[second as usize].any_of[..])
-        else {
-            return false;
-        };
-        if one == other {
-            return false;
-        }
-        if self.are_mutex(*one, *other) {
-            return true;
-        }
-        // What all achievers bring about besides.
-        let mut achievers = self.adders[*one as usize].iter();
-        let Some(start) = achievers.next() else { return false };
-        let mut common = self.all_effects(*start);
+    /// What holds when a landmark is brought about: itself, what all of its achievers bring about besides, and what is needed right before. None
+    /// if it is a disjunction.
+    fn side(&self, landmark: u32) -> Vec<Proposition> {
+        let [one] = self.all[landmark as usize].any_of[..] else { return Vec::new() };
+        let mut achievers = self.adders[one as usize].iter();
+        let mut side = achievers.next().map_or_else(Vec::new, |start| self.all_effects(*start));
         for node in achievers {
             let effects = self.all_effects(*node);
-            common.retain(|effect| effects.contains(effect));
+            side.retain(|effect| effects.contains(effect));
         }
-        if common.iter().any(|effect| effect != one && self.are_mutex(*effect, *other)) {
-            return true;
+        side.push(one);
+        for (needed, by) in &self.needed {
+            if *by == landmark && self.all[*needed as usize].any_of.len() == 1 {
+                side.extend(&self.all[*needed as usize].any_of);
+            }
         }
-        self.needed.iter().any(|(needed, by)| {
-            *by == first
-                && matches!(&self.all[*needed as usize].any_of[..], [only] if self.are_mutex(*only, *other))
-        })
+        side.sort_unstable();
+        side.dedup();
+        side
     }
 
     /// The effects of a node, with those of its operator.
@@ -351,17 +340,40 @@ impl<N: TaskNumber> Finder<'_, N> {
     }
 }
 
-/// Whether orders lead from one landmark to another.
-fn leads(after: &FxHashMap<u32, Vec<u32>>, from: u32, to: u32) -> bool {
-    let mut open = vec![from];
-    let mut seen = FxHashSet::default();
-    while let Some(own) = open.pop() {
-        if own == to {
-            return true;
-        }
-        open.extend(after.get(&own).into_iter().flatten().filter(|next| seen.insert(**next)));
+/// For each landmark a bit for each that comes after it, by any number of orders.
+fn closure(count: usize, orders: &FxHashSet<(u32, u32)>) -> Vec<Vec<u64>> {
+    let mut reach = vec![vec![0_u64; count.div_ceil(64)]; count];
+    for (one, other) in orders {
+        reach[*one as usize][(other >> 6) as usize] |= 1 << (other & 63);
     }
-    false
+    for middle in 0..dense(count) {
+        let further = reach[middle as usize].clone();
+        join(&mut reach, middle, &further);
+    }
+    reach
+}
+
+fn has(words: &[u64], landmark: u32) -> bool {
+    words[(landmark >> 6) as usize] >> (landmark & 63) & 1 == 1
+}
+
+/// What leads to a landmark leads to these, too.
+fn join(reach: &mut [Vec<u64>], landmark: u32, further: &[u64]) {
+    for own in reach.iter_mut().filter(|own| has(own, landmark)) {
+        for (word, more) in own.iter_mut().zip(further) {
+            *word |= more;
+        }
+    }
+}
+
+/// Adds an order, and all that follows.
+fn connect(reach: &mut [Vec<u64>], sooner: u32, later: u32) {
+    let mut further = reach[later as usize].clone();
+    further[(later >> 6) as usize] |= 1 << (later & 63);
+    for (word, more) in reach[sooner as usize].iter_mut().zip(&further) {
+        *word |= more;
+    }
+    join(reach, sooner, &further);
 }
 
 /// The predicate of a fact, as its value's name begins.
