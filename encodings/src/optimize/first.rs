@@ -60,7 +60,8 @@ impl FirstPlan {
                 // A plan whose cost does not fit is none, and longer ones cost no less.
                 (Answer::Satisfiable, None) => return First::Over,
                 (Answer::Interrupted, None) => {
-                    if run.config.limits.reached() {
+                    // Without an allowance that could be used up, numbers are too large for a formula.
+                    if run.config.limits.reached() || allowance.conflicts == u64::MAX {
                         return First::Over;
                     }
                     self.open.push(horizon);
