@@ -103,6 +103,19 @@ fn derived_predicates_and_numbers_in_disjunctions() {
     check("never", "(and (reaches a b) (isolated b))", None);
 }
 
+/// Two clocks of which one gains on the other by less than a double tells apart from nothing.
+#[test]
+fn differences_that_no_double_holds_count() {
+    let domain = "(define (domain clocks) (:functions (fast) (slow) (total-cost))
+     (:action tick :parameters ()
+       :effect (and (increase (fast) 10000000000000001) (increase (slow) 10000000000000000)
+         (increase (total-cost) 1))))";
+    let problem = "(define (problem p) (:domain clocks)
+     (:init (= (fast) 0) (= (slow) 0) (= (total-cost) 0))
+     (:goal (>= (- (fast) (slow)) 6)) (:metric minimize (total-cost)))";
+    check("clocks", domain, problem, Some("6"));
+}
+
 const DURATIVE: &str = "(define (domain rooms)
  (:requirements :durative-actions)
  (:predicates (lit) (warm) (dark) (inside) (done))

@@ -35,7 +35,9 @@ pub(super) fn proved_by_bound(mut run: Run<'_>, best: &Best) -> Solution {
 pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPlan, lower: Int) -> Solution {
     let mut best = Best { plan, lower };
     run.announce(&best, best.plan.steps.len());
-    if best.plan.cost <= lower {
+    // What the search itself has raised is not what it is measured by.
+    let floor = bounds.estimate(&run.task.initial);
+    if floor.is_some_and(|floor| best.plan.cost <= floor) {
         return proved_by_bound(run, &best);
     }
     let by_search = Some(Proof::Search);

@@ -204,7 +204,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
                 let mut best = Best { plan: plan.clone(), lower: self.lower };
                 let proving = self.prover.as_mut()?.advance(&mut self.run, self.bounds, &mut best, allowance);
                 if best.lower > self.lower {
-                    let step_bound = self.prover.as_ref().map_or(0, |prover| prover.horizon);
+                    let step_bound = self.prover.as_ref().map_or(0, |prover| prover.step_bound);
                     (self.lower, self.reason) = (best.lower, Proof::Sat { step_bound });
                 }
                 if best.plan.cost < plan.cost {

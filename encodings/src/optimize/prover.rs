@@ -22,6 +22,8 @@ pub(super) struct Prover {
     stage: Option<Int>,
     /// Steps up to which plans were considered.
     pub(super) horizon: usize,
+    /// The step bound of the formula that has raised the lower bound last.
+    pub(super) step_bound: usize,
 }
 
 /// What formulas have come to.
@@ -67,6 +69,7 @@ impl Prover {
             match (within(run, bounds, &extent, best, allowance), extent.step_bound) {
                 (Tightened::Exhausted, Some(step_bound)) => {
                     best.lower = best.plan.cost.min(limit.saturating_add(1));
+                    self.step_bound = step_bound;
                     if best.lower == best.plan.cost {
                         return Proving::Proved(Proof::Sat { step_bound });
                     }

@@ -3,10 +3,12 @@
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use crate::bounds::Bounds;
+use crate::context::Context;
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::optimize::{Config, Engine, Strategy, optimize};
-use crate::plan::solution::{Solution, Status};
+use crate::plan::solution::{Proof, Solution, Status};
 use crate::plan::{Exact, metric};
 use crate::sat::Backend;
 use crate::task::Task;
@@ -98,6 +100,30 @@ fn check_reports(context: &str, (task, best): (&Task, Int), config: &Config, sto
         assert_eq!((cost, bound), (Some(best.clone()), Some(best)), "{}", context(Some(&solution)));
     }
     reports >= stop_after
+}
+
+/// What is said of a proof is what has proved it: a bound is that of the initial state, before anything was searched.
+fn check_reasons(seeds: std::ops::Range<u64>) {
+    let (mut by_bound, mut by_others) = (0, 0);
+    for (text, task, best) in tasks(seeds) {
+        let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
+        let floor = bounds.estimate(&task.initial);
+        for head_start in [20_000, 10, 1] {
+            let config = Config { engine: Engine::Search, head_start, ..Config::default() };
+            let solution = optimize(&task, &config, &mut |_| {});
+            let is_met = floor == Some(best);
+            by_bound += usize::from(is_met);
+            by_others += usize::from(!is_met);
+            let expected = if is_met { Proof::Bound } else { Proof::Search };
+            assert_eq!(solution.proof, Some(expected), "{head_start}: {text:?}");
+        }
+    }
+    assert!(by_bound > 0 && by_others > 0, "{by_bound} by bound, {by_others} by search");
+}
+
+#[test]
+fn proofs_say_what_has_proved_it() {
+    check_reasons(0..12);
 }
 
 fn check_anytime(seeds: std::ops::Range<u64>) {

@@ -348,23 +348,32 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
     }
 }
 
-/// What an operator adds to a sum at its best; none if it adds nothing, infinite if that is no constant.
+/// What an operator adds to a sum at its best; none if it adds nothing, infinite if that is no constant or does not fit. Whether it is
+/// above 0 is decided exactly: what nothing adds to is out of reach.
 fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option<f64> {
-    let mut gain = 0.0;
+    let mut gain = N::zero();
     for (variable, factor) in sum {
         let Some(effect) = operator.numeric_effects.iter().find(|effect| effect.variable == *variable) else {
             continue;
         };
-        match &effect.value.coefficients[..] {
+        let quantity = &effect.value.quantity;
+        let amount = match &effect.value.coefficients[..] {
             [(own, one)] if own == variable && one.is_one() => {
-                let quantity = &effect.value.quantity;
-                let amount = if *factor < N::zero() { quantity.minimum() } else { maximum(quantity) };
-                gain += factor.approximate() * amount.approximate();
+                if *factor < N::zero() {
+                    quantity.minimum()
+                } else {
+                    maximum(quantity)
+                }
             }
             _ => return Some(f64::INFINITY),
-        }
+        };
+        let Some(next) = factor.times(&amount).and_then(|more| gain.plus(&more)) else {
+            return Some(f64::INFINITY);
+        };
+        gain = next;
     }
-    (gain > 0.0).then_some(gain)
+    // What is above 0 may be too little for a double.
+    (gain > N::zero()).then(|| gain.approximate().max(f64::MIN_POSITIVE))
 }
 
 #[expect(clippy::arithmetic_side_effects, reason = "numbers of a task are far from the least integer")]

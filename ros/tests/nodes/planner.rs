@@ -38,8 +38,9 @@ const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b c d - place
 /// Pigeons without enough holes: nothing is found out in any reasonable time.
 fn hopeless() -> (String, String) {
     let domain = "(define (domain holes) (:requirements :typing) (:types pigeon hole)
-      (:predicates (free ?h - hole) (out ?p - pigeon) (in ?p - pigeon ?h - hole) (home ?p - pigeon))
-      (:action enter :parameters (?p - pigeon ?h - hole) :precondition (and (out ?p) (free ?h))
+      (:predicates (free ?h - hole) (out ?p - pigeon) (in ?p - pigeon ?h - hole) (home ?p - pigeon)
+        (fits ?p - pigeon ?h - hole))
+      (:action enter :parameters (?p - pigeon ?h - hole) :precondition (and (out ?p) (free ?h) (fits ?p ?h))
         :effect (and (not (out ?p)) (not (free ?h)) (in ?p ?h) (home ?p)))
       (:action leave :parameters (?p - pigeon ?h - hole) :precondition (in ?p ?h)
         :effect (and (out ?p) (free ?h) (not (in ?p ?h)) (not (home ?p)))))";
@@ -48,8 +49,14 @@ fn hopeless() -> (String, String) {
     let facts = |before: &str, count: usize| {
         (0..count).map(|i| format!("({before}{i}) ")).collect::<Vec<_>>().concat()
     };
+    // No two pigeons and no two holes are alike, so that no symmetry helps.
+    let fits = (0..20)
+        .flat_map(|pigeon| (0..19).map(move |hole| (pigeon, hole)))
+        .filter(|(pigeon, hole)| (pigeon * pigeon * hole + 5 * hole * hole + pigeon) % 23 >= 4)
+        .map(|(pigeon, hole)| format!("(fits p{pigeon} h{hole}) "))
+        .collect::<String>();
     let problem = format!(
-        "(define (problem p) (:domain holes) (:objects {}- pigeon {}- hole) (:init {}{}) (:goal (and {})))",
+        "(define (problem p) (:domain holes) (:objects {}- pigeon {}- hole) (:init {}{}{fits}) (:goal (and {})))",
         names("p", 20),
         names("h", 19),
         facts("out p", 20),
