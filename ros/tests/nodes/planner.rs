@@ -54,7 +54,8 @@ fn hopeless() -> (String, String) {
         .flat_map(|pigeon| (0..19).map(move |hole| (pigeon, hole)))
         .filter(|(pigeon, hole)| (pigeon * pigeon * hole + 5 * hole * hole + pigeon) % 23 >= 4)
         .map(|(pigeon, hole)| format!("(fits p{pigeon} h{hole}) "))
-        .collect::<String>();
+        .collect::<Vec<_>>()
+        .concat();
     let problem = format!(
         "(define (problem p) (:domain holes) (:objects {}- pigeon {}- hole) (:init {}{}{fits}) (:goal (and {})))",
         names("p", 20),
