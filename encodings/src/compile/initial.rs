@@ -4,8 +4,13 @@ use num_rational::BigRational;
 use num_traits::Zero;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, InitialElement, Name, Problem, Term};
+use pddl::ast::{
+    Arithmetic, Atom, Comparison, Condition, Domain, Expression, InitialElement, Name, Problem, Span, Term,
+};
 
+use crate::error::{Error, File};
+
+use super::additions::unsupported;
 use super::instances::{Binding, Objects, term};
 
 type Key = (Name, Vec<Name>);
@@ -13,6 +18,7 @@ type Key = (Name, Vec<Name>);
 /// What holds at first. Derived predicates are not asked for.
 pub(super) struct Initial<'t> {
     objects: &'t Objects<'t>,
+    domain: &'t Domain,
     facts: FxHashSet<Key>,
     values: FxHashMap<Key, BigRational>,
 }
@@ -25,7 +31,7 @@ fn key(atom: &Atom, binding: &Binding) -> Key {
 }
 
 impl<'t> Initial<'t> {
-    pub(super) fn of(problem: &Problem, objects: &'t Objects<'t>) -> Self {
+    pub(super) fn of(domain: &'t Domain, problem: &Problem, objects: &'t Objects<'t>) -> Self {
         let (mut facts, mut values) = (FxHashSet::default(), FxHashMap::default());
         values.insert((Name::new("total-cost"), Vec::new()), BigRational::zero());
         for element in &problem.init {
@@ -39,12 +45,73 @@ impl<'t> Initial<'t> {
                 InitialElement::NegatedFact(_) | InitialElement::Timed(..) => {}
             }
         }
-        Self { objects, facts, values }
+        Self { objects, domain, facts, values }
     }
 
     /// Whether a condition holds; one that depends on an undefined value does not.
     pub(super) fn holds(&self, condition: &Condition) -> bool {
         self.truth(condition, &mut Vec::new()) == Some(true)
+    }
+
+    /// Whether a condition always is true or false: where it may be neither, what is not met is not the same as its negation.
+    pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
+        match self.undefined(condition, &mut Vec::new()) {
+            None => Ok(()),
+            Some(name) => Err(unsupported(
+                format!(
+                    "a constraint or preference on `{name}`, which has no initial value for some objects"
+                ),
+                "an initial value for each",
+                place,
+            )),
+        }
+    }
+
+    /// A function that a condition reads, and that may be without a value. Variables that nothing binds stand for all objects.
+    fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<&'c Name> {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().find_map(|part| self.undefined(part, binding))
+            }
+            Condition::Not(inner) => self.undefined(inner, binding),
+            Condition::Imply(premise, conclusion) => {
+                self.undefined(premise, binding).or_else(|| self.undefined(conclusion, binding))
+            }
+            Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
+                let instances = self.objects.bindings(variables, binding).into_iter();
+                instances.map(|mut inner| self.undefined(body, &mut inner)).find_map(|found| found)
+            }
+            Condition::Atom(_) | Condition::Equal(..) => None,
+            Condition::Compare(_, left, right, _) => {
+                [left, right].into_iter().find_map(|side| self.undefined_in(side, binding))
+            }
+        }
+    }
+
+    fn undefined_in<'c>(&self, expression: &'c Expression, binding: &Binding) -> Option<&'c Name> {
+        match expression {
+            Expression::Fluent(atom) => (!self.has_value(atom, binding)).then_some(&atom.predicate.name),
+            Expression::Operation(_, operands, _) => {
+                operands.iter().find_map(|operand| self.undefined_in(operand, binding))
+            }
+            Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => None,
+        }
+    }
+
+    fn has_value(&self, atom: &Atom, binding: &Binding) -> bool {
+        let is_bound = |argument: &Term| matches!(term(argument, binding), Term::Constant(_));
+        if atom.arguments.iter().all(is_bound) {
+            return self.values.contains_key(&key(atom, binding));
+        }
+        let name = &atom.predicate.name;
+        let mut declared = self.domain.functions.iter().filter(|own| own.identifier.name == *name);
+        let instances = declared.next().map(|own| {
+            let members =
+                own.parameters.iter().map(|parameter| self.objects.members(&parameter.r#type).count());
+            members.fold(1, usize::saturating_mul)
+        });
+        let known = self.values.keys().filter(|(own, _)| own == name).count();
+        instances.is_some_and(|instances| known >= instances)
     }
 
     /// The truth value in Kleene's logic; none where it depends on an undefined value.

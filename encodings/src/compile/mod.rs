@@ -68,6 +68,14 @@ pub(crate) fn compile<'t>(
             errors.push(error);
         }
     }
+    for preference in domain.actions.iter().flat_map(|action| &action.preferences) {
+        let is_asked = asked.contains(&preference.name.name);
+        let place = (File::Domain, preference.span);
+        if let Err(error) = if is_asked { monitors.is_defined(&preference.condition, place) } else { Ok(()) }
+        {
+            errors.push(error);
+        }
+    }
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
     if has_events && !asked.is_empty() {
         errors.push(unsupported(

@@ -50,7 +50,7 @@ impl<'t> Monitors<'t> {
             domain,
             problem,
             objects,
-            initial: Initial::of(problem, objects),
+            initial: Initial::of(domain, problem, objects),
             additions: domain.actions.iter().map(|_| Default::default()).collect(),
             memory: Vec::new(),
             goals: Vec::new(),
@@ -58,6 +58,11 @@ impl<'t> Monitors<'t> {
             instances: 0,
             fresh: 0,
         }
+    }
+
+    /// Whether a condition of an action always is true or false.
+    pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
+        self.initial.is_defined(condition, place)
     }
 
     /// Takes up a constraint.
@@ -87,7 +92,11 @@ impl<'t> Monitors<'t> {
             let construct = format!("more than {INSTANCES} instances of constraints and preferences");
             return Err(unsupported(construct, "constraints over fewer objects", place));
         }
-        let mut ground = |condition: &Condition| instance(condition, &mut binding, &mut self.fresh);
+        let (fresh, initial) = (&mut self.fresh, &self.initial);
+        let mut ground = |condition: &Condition| {
+            let ground = instance(condition, &mut binding, fresh);
+            initial.is_defined(&ground, place).map(|()| ground)
+        };
         match trajectory {
             Trajectory::And(parts) => {
                 let each = parts.iter().map(|part| self.trajectory(part, binding.clone(), hard, place));
@@ -98,25 +107,25 @@ impl<'t> Monitors<'t> {
                 let each = instances.map(|binding| self.trajectory(body, binding, hard, place));
                 Ok(all(each.collect::<Result<Vec<_>, _>>()?))
             }
-            Trajectory::AtEnd(what) => Ok(ground(what)),
+            Trajectory::AtEnd(what) => ground(what),
             Trajectory::Always(what) => {
-                let what = ground(what);
+                let what = ground(what)?;
                 self.always(&what, hard, place)
             }
             Trajectory::Sometime(what) => {
-                let what = ground(what);
+                let what = ground(what)?;
                 self.sometime(&what, place)
             }
             Trajectory::AtMostOnce(what) => {
-                let what = ground(what);
+                let what = ground(what)?;
                 self.at_most_once(&what, hard, place)
             }
             Trajectory::SometimeAfter(first, second) => {
-                let (first, second) = (ground(first), ground(second));
+                let (first, second) = (ground(first)?, ground(second)?);
                 self.sometime_after(&first, &second, place)
             }
             Trajectory::SometimeBefore(first, second) => {
-                let (first, second) = (ground(first), ground(second));
+                let (first, second) = (ground(first)?, ground(second)?);
                 self.sometime_before(&first, &second, hard, place)
             }
             Trajectory::Within(..)

@@ -107,3 +107,43 @@ fn the_validator_judges_random_plans_by_the_definition() {
     }
     assert!(valid > 50 && invalid > 50, "{valid} valid and {invalid} invalid plans");
 }
+
+/// A comparison with an undefined number is neither true nor false, so that a plan without it would be no plan at all.
+#[test]
+fn numbers_without_an_initial_value_are_refused() {
+    let domain = "(define (domain d) (:predicates (done)) (:functions (f) (g) (total-cost))
+      (:action set_f :effect (and (assign (f) 5) (increase (total-cost) 10)))
+      (:action set_g :effect (and (assign (g) 5) (increase (total-cost) 1)))
+      (:action finish :precondition (preference a (> (f) 3)) :effect (and (done) (increase (total-cost) 1))))";
+    let soft = |preference: &str| format!("(:constraints (preference a {preference}))");
+    let (sometime, in_the_end) = (soft("(sometime (> (+ (f) (g)) 3))"), soft("(at end (> (f) 3))"));
+    let defined = soft("(sometime (> (g) 3))");
+    let ground_with = |values: &str, constraints: &str| {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init (= (total-cost) 0) {values}) (:goal (done)) {constraints}
+               (:metric minimize (+ (total-cost) (* 4 (is-violated a)))))"
+        );
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", &problem)).expect("PDDL");
+        ground(&domain, &problem, &GroundConfig::default())
+    };
+    for (values, constraints) in
+        [("", ""), ("(= (g) 0)", &sometime[..]), ("(= (g) 0)", &in_the_end[..]), ("(= (g) 0)", &defined[..])]
+    {
+        let errors = ground_with(values, constraints).expect_err("it would be neither met nor violated");
+        assert!(errors.iter().all(|error| error.to_string().contains("no initial value")), "{errors:?}");
+    }
+    for constraints in ["", &sometime[..], &in_the_end[..]] {
+        let task = ground_with("(= (f) 0) (= (g) 0)", constraints).expect("a task");
+        let solution = optimize(&task, &Config::default(), &mut |_| {});
+        // To do nothing about it costs 4 more for each; to set g is enough for the sum.
+        let expected = if constraints.is_empty() {
+            "5"
+        } else if constraints == sometime {
+            "6"
+        } else {
+            "9"
+        };
+        assert_eq!(solution.plan.expect("a plan").cost.to_string(), expected, "{constraints}");
+    }
+}
