@@ -108,18 +108,18 @@ fn case_of(name: String, task: Task, unit: Option<Q>) -> Case {
 
 #[test]
 fn actions_one_after_another() {
-    run(2000, |seed| vec![case("temporal", seed, None)]).finish();
+    run(1000, |seed| vec![case("temporal", seed, None)]).finish();
 }
 
 #[test]
 fn actions_with_designs() {
     let case = |seed| vec![case_of(format!("designs-{seed}"), Maker::with_designs(seed), None)];
-    run(1000, case).finish();
+    run(500, case).finish();
 }
 
 #[test]
 fn overlapping_actions() {
-    run(500, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
+    run(300, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
 }
 
 /// The kinds of failures of a task.
