@@ -75,6 +75,25 @@ fn a_duration_is_that_of_the_state_at_the_start() {
 }
 
 #[test]
+fn a_duration_of_the_state_may_be_divided_by_what_no_action_changes() {
+    let fill = |divisor: &str| {
+        let duration = format!("(= ?duration (/ (- 10 (fuel)) {divisor}))");
+        durative("fill", &duration, "", "(at end (assign (fuel) 10)) (at end (g))")
+    };
+    check(&fill("4"), "", "(g)", (Status::Optimal, Some("1.5")));
+    check(&fill("0.15"), "", "(g)", (Status::Optimal, Some("40")));
+    // By what it is divided, its time depends on, and not the number itself.
+    let pour = durative(
+        "pour",
+        "(= ?duration 1)",
+        "(at start (q))",
+        "(at start (increase (fuel) 5)) (at end (not (q)))",
+    );
+    check(&[fill("2"), pour.clone()].concat(), "(q)", "(g)", (Status::Optimal, Some("0.501")));
+    check(&[fill("0.5"), pour].concat(), "(q)", "(g) (>= (fuel) 10)", (Status::Optimal, Some("2.001")));
+}
+
+#[test]
 fn what_effects_under_a_condition_do_is_planned_and_not_claimed_to_be_best() {
     let helps = durative("helps", "(= ?duration 2)", "", "(at start (p)) (at end (not (p)))");
     let asks =

@@ -7,14 +7,14 @@ use crate::concurrent::footprint::{Footprint, Footprints};
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::timer::TIMER;
-use crate::concurrent::unit::Unit;
+use crate::concurrent::unit::{Divisors, Unit};
 use crate::context::Context;
 use crate::error::Error;
 use crate::ground::evaluate::reads::Reads;
 use crate::ground::vocabulary::atom::{AtomId, Binding};
 use crate::ground::vocabulary::reached::Reached;
 use crate::ground::vocabulary::world::World;
-use crate::lifted::{Change, Effect, Expression, ObjectId};
+use crate::lifted::{Change, Effect, Expression, ObjectId, Rational};
 use crate::limits::Limits;
 use crate::number::{Int, dense};
 use crate::task::quantity::NumericId;
@@ -53,8 +53,8 @@ type InstanceKey = (usize, Vec<ObjectId>);
 pub(super) struct Builder<'a> {
     footprints: Footprints<'a>,
     split: &'a Split,
-    /// In the unit of all times.
-    separation: Int,
+    /// In the unit of all times, once that is known.
+    pub(super) separation: Int,
     /// What each operator writes.
     written: Vec<Footprint>,
     /// What the start and the end of an operator write that are one happening.
@@ -66,12 +66,12 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(super) fn new(split: &'a Split, reached: &'a Reached, separation: Int, limits: &'a Limits) -> Self {
+    pub(super) fn new(split: &'a Split, reached: &'a Reached, limits: &'a Limits) -> Self {
         let held = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
         Self {
             footprints: Footprints::new(World::new(&split.lifted, reached, limits)),
             split,
-            separation,
+            separation: 0,
             written: Vec::new(),
             joined: Vec::new(),
             instances: FxHashMap::default(),
@@ -143,6 +143,7 @@ impl<'a> Builder<'a> {
         &self,
         context: Context<'_>,
         unit: Unit,
+        divisors: &Divisors,
         roles: &mut [Role],
     ) -> Result<Vec<Instance>, Error> {
         let Context { task, limits } = context;
@@ -156,7 +157,9 @@ impl<'a> Builder<'a> {
             if self.held.contains(&key.0) && over_all.is_none() {
                 continue;
             }
-            let timer = timer(task, start);
+            let one = Rational::from_integer(1);
+            let factor = || unit.factor(task, divisors.get(&start).unwrap_or(&one));
+            let timer = timer(task, start).map(|timer| Ok::<_, Error>((timer, factor()?))).transpose()?;
             // One that the state decides is looked at when it starts.
             let duration = if timer.is_some() { self.separation } else { unit.duration(task, start)? };
             if duration < self.separation {
@@ -193,6 +196,31 @@ impl<'a> Builder<'a> {
             self.joined.push((id, [start, end]));
         }
         Ok(())
+    }
+
+    /// What the numbers are divided by that hold durations.
+    ///
+    /// # Errors
+    /// One that is not positive.
+    pub(super) fn divisors(&mut self, Context { task, limits }: Context<'_>) -> Result<Divisors, Error> {
+        let mut divisors = Divisors::default();
+        for key in limits.watch(&self.order) {
+            let key = key?;
+            let schema = &self.split.schemas[key.0];
+            let (Some(start), Some(divisor)) = (self.instances[key].start, &self.split.divisors[key.0])
+            else {
+                continue;
+            };
+            let binding = binding(&task.operators[start.index()], schema.variables);
+            let divisor = self.footprints.constant(divisor, &binding)?.filter(Rational::is_positive);
+            let divisor = divisor.ok_or_else(|| Error::Unsupported {
+                construct: format!("a duration of `{}` that is divided by no positive number", schema.name),
+                instead: "a positive divisor".into(),
+                place: schema.place,
+            })?;
+            divisors.insert(start, divisor);
+        }
+        Ok(divisors)
     }
 
     /// The operators whose start and end are one happening although they interfere.

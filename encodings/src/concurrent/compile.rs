@@ -46,17 +46,19 @@ pub(super) fn compile(
     limits: &Limits,
 ) -> Result<Concurrent, Vec<Error>> {
     let one = |error| vec![error];
-    let unit = Unit::new(&task, split, separation).map_err(one)?;
-    let separation = unit.of(separation).map_err(one)?;
     refuse_rewards(&task, split).map_err(one)?;
     // Operators are watched as they are collected, each as a whole.
     let unlimited = Limits::none();
-    let mut builder = Builder::new(split, reached, separation, &unlimited);
+    let mut builder = Builder::new(split, reached, &unlimited);
     let context = Context::new(&task, limits);
     builder.collect(context)?;
+    let divisors = builder.divisors(context).map_err(one)?;
+    let unit = Unit::new(&task, split, separation, &divisors).map_err(one)?;
+    let separation = unit.of(separation).map_err(one)?;
+    builder.separation = separation;
     let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(one)?;
     let mut roles = vec![Role::Never; task.operators.len()];
-    let mut instances = builder.instances(context, unit, &mut roles).map_err(one)?;
+    let mut instances = builder.instances(context, unit, &divisors, &mut roles).map_err(one)?;
     let contradictory = builder.contradictory(context).map_err(one)?;
     for ((operator, role), id) in task.operators.iter().zip(&mut roles).zip((0..).map(OperatorId)) {
         match split.origins[operator.schema as usize].half {
@@ -143,8 +145,7 @@ impl Concurrent {
 
     /// How long an instance takes that has just started; none if it takes less than the separation, or a time that does not fit.
     pub(super) fn duration(&self, instance: &Instance, after: &State) -> Option<Int> {
-        let Some(timer) = instance.timer else { return Some(instance.duration) };
-        let factor = self.task.time_scale.checked_div(self.task.number_scale)?;
+        let Some((timer, factor)) = instance.timer else { return Some(instance.duration) };
         let duration = after.numbers[timer.index()].checked_mul(factor)?;
         (self.separation..TIME_LIMIT).contains(&duration).then_some(duration)
     }

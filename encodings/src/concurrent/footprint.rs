@@ -9,13 +9,14 @@ use rustc_hash::FxHashMap;
 
 use crate::error::Error;
 use crate::ground::evaluate::condition::residual;
+use crate::ground::evaluate::expression::ground;
 use crate::ground::evaluate::join::each_binding;
 use crate::ground::evaluate::reads::{Reads, Slot, fits};
 use crate::ground::vocabulary::atom::{AtomId, Binding, arguments};
 use crate::ground::vocabulary::failure::Failure;
 use crate::ground::vocabulary::residual::Residual;
 use crate::ground::vocabulary::world::World;
-use crate::lifted::{Change, Effect, FunctionId, ObjectId, PredicateId};
+use crate::lifted::{Change, Effect, Expression, FunctionId, ObjectId, PredicateId, Rational};
 use crate::number::dense;
 use crate::task::quantity::NumericId;
 use pddl::ast::Assignment;
@@ -104,6 +105,19 @@ impl<'a> Footprints<'a> {
         // The ground operator exists, so its changes of one number go together.
         numbers.dedup();
         Ok(footprint)
+    }
+
+    /// The value of an expression that no action changes; none if it has none.
+    pub(super) fn constant(
+        &mut self,
+        expression: &Expression,
+        binding: &Binding,
+    ) -> Result<Option<Rational>, Error> {
+        match ground(&mut self.world, expression, binding) {
+            Ok(linear) => Ok(linear.coefficients.is_empty().then_some(linear.quantity.constant)),
+            Err(Failure::Undefined) => Ok(None),
+            Err(Failure::Error(error)) => Err(error),
+        }
     }
 
     fn write(&mut self, change: &Change, binding: &Binding, into: &mut Footprint) -> Result<(), Error> {

@@ -50,6 +50,8 @@ pub(super) struct Split {
     pub(super) events: Vec<Event>,
     /// The functions that hold durations.
     pub(super) durations: Vec<FunctionId>,
+    /// By schema of the domain, what such a number is divided by.
+    pub(super) divisors: Vec<Option<Expression>>,
     /// Whether no duration was chosen where another one could be better.
     pub(super) is_exact: bool,
 }
@@ -58,7 +60,7 @@ pub(super) struct Split {
 /// `mentions` says whether the end of the action at a position mentions `?duration`.
 pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) -> bool) -> Split {
     let mut schemas = std::mem::take(&mut lifted.schemas);
-    let mut durations = Vec::new();
+    let (mut durations, mut divisors) = (Vec::new(), Vec::new());
     let events = std::mem::take(&mut lifted.events);
     let (mut origins, mut designs) = (Vec::new(), Vec::new());
     let waited = lifted.time.waited;
@@ -71,7 +73,9 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
     }
     for (index, schema) in schemas.iter_mut().enumerate() {
         let duration = schema.duration.as_ref().filter(|duration| depends_on_state(&lifted, duration));
-        let timer = duration.is_some().then(|| Timer::new(&mut lifted, schema));
+        let duration = duration.cloned();
+        let timer = duration.map(|duration| Timer::new(&mut lifted, schema, &duration));
+        divisors.push(timer.as_ref().and_then(|timer| timer.divisor.clone()));
         if let Some(timer) = &timer {
             durations.push(timer.function);
             if mentions(schema.action) {
@@ -95,7 +99,7 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
         origins.push(Origin { schema: usize::MAX, half: Half::Timed(index) });
         designs.push(Vec::new());
     }
-    Split { lifted, schemas, origins, designs, events, durations, is_exact: true }
+    Split { lifted, schemas, origins, designs, events, durations, divisors, is_exact: true }
 }
 
 fn effect(change: Change) -> Effect {
@@ -152,7 +156,7 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     condition.extend(settled);
     let mut effects = schema.start_effects.clone();
     effects.push(effect(Change::Add(running, parameters.clone())));
-    effects.extend(timer.map(|timer| timer.set(schema, duration.clone())));
+    effects.extend(timer.map(|timer| timer.set(schema)));
     let fixed = schema.duration.clone().filter(|_| timer.is_none());
     all.push((Half::Start, Schema { duration: fixed, ..instantaneous(condition, effects) }));
 

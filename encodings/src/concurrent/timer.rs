@@ -32,22 +32,45 @@ pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool
 pub(super) struct Timer {
     pub(super) function: FunctionId,
     terms: Vec<Term>,
+    /// What the start assigns.
+    numerator: Expression,
+    /// The duration is the number divided by this, which no action changes.
+    pub(super) divisor: Option<Expression>,
 }
 
 impl Timer {
-    pub(super) fn new(lifted: &mut Lifted, schema: &Schema) -> Self {
+    pub(super) fn new(lifted: &mut Lifted, schema: &Schema, duration: &Expression) -> Self {
+        let (numerator, divisor) = match duration {
+            Expression::Quotient(left, right, _) if !depends_on_state(lifted, right) => {
+                ((**left).clone(), Some((**right).clone()))
+            }
+            whole => (whole.clone(), None),
+        };
         let function = FunctionId(dense(lifted.functions.len()));
         let name = Name::new(&format!("duration of {}", schema.name));
         lifted.functions.push(Function { name, fluent: true, partial: true });
-        Self { function, terms: (0..dense(schema.parameters.len())).map(Term::Parameter).collect() }
+        let terms = (0..dense(schema.parameters.len())).map(Term::Parameter).collect();
+        Self { function, terms, numerator, divisor }
     }
 
-    pub(super) fn expression(&self, schema: &Schema) -> Expression {
+    fn number(&self, schema: &Schema) -> Expression {
         Expression::Function(self.function, self.terms.clone(), schema.place)
     }
 
-    /// The timer gets this value.
-    pub(super) fn set(&self, schema: &Schema, expression: Expression) -> Effect {
+    /// The duration.
+    fn expression(&self, schema: &Schema) -> Expression {
+        let number = self.number(schema);
+        match &self.divisor {
+            Some(divisor) => Expression::Quotient(Box::new(number), Box::new(divisor.clone()), schema.place),
+            None => number,
+        }
+    }
+
+    pub(super) fn set(&self, schema: &Schema) -> Effect {
+        self.assign(schema, self.numerator.clone())
+    }
+
+    fn assign(&self, schema: &Schema, expression: Expression) -> Effect {
         let change = Change::Assign {
             assignment: Assignment::Assign,
             function: self.function,
@@ -59,12 +82,12 @@ impl Timer {
     }
 
     pub(super) fn clear(&self, schema: &Schema) -> Effect {
-        self.set(schema, Expression::Number(Rational::from_integer(0)))
+        self.assign(schema, Expression::Number(Rational::from_integer(0)))
     }
 
     pub(super) fn is_set(&self, schema: &Schema) -> Formula {
         let zero = Expression::Number(Rational::from_integer(0));
-        Formula::Compare(Comparison::Greater, self.expression(schema), zero, schema.place)
+        Formula::Compare(Comparison::Greater, self.number(schema), zero, schema.place)
     }
 
     /// The schema whose end takes its duration from the timer.

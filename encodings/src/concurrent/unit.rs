@@ -1,5 +1,8 @@
 //! The unit of all times.
 
+use num_traits::ToPrimitive as _;
+use rustc_hash::FxHashMap;
+
 use crate::concurrent::split::Split;
 use crate::error::Error;
 use crate::lifted::Rational;
@@ -9,17 +12,28 @@ use crate::task::{OperatorId, Task};
 /// Times and durations stay below this.
 pub(super) const LIMIT: Int = 1 << 90;
 
+/// What the numbers are divided by that hold durations, by the starts of actions.
+pub(super) type Divisors = FxHashMap<OperatorId, Rational>;
+
 /// The unit of all times: so many to the unit of the files.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unit(pub(super) Int);
 
 impl Unit {
     /// A unit in which durations, separation and timed initial literals are integers.
-    pub(super) fn new(task: &Task, split: &Split, separation: &Rational) -> Result<Self, Error> {
+    pub(super) fn new(
+        task: &Task,
+        split: &Split,
+        separation: &Rational,
+        divisors: &Divisors,
+    ) -> Result<Self, Error> {
         let mut times = split.events.iter().map(|event| &event.time).chain([separation]);
         // Durations that the state decides are numbers.
         let numbers = if split.durations.is_empty() { 1 } else { task.number_scale };
-        let scale = checked_lcm(task.time_scale, numbers).filter(|scale| *scale < LIMIT);
+        let divided = divisors.values().map(|divisor| divisor.to_big().numer().to_i128());
+        let scale = divided.fold(checked_lcm(task.time_scale, numbers), |scale, divisor| {
+            checked_lcm(scale?, numbers.checked_mul(divisor?)?).filter(|scale| *scale < LIMIT)
+        });
         let scale = scale.ok_or_else(|| Error::Overflow { what: "durations".into() })?;
         let common = times.try_fold(scale, |scale, time| {
             checked_lcm(scale, time.denominator()?).filter(|scale| *scale < LIMIT)
@@ -32,6 +46,12 @@ impl Unit {
         units
             .filter(|units| (-LIMIT..LIMIT).contains(units))
             .ok_or_else(|| Error::Overflow { what: "a time".into() })
+    }
+
+    /// By what a number of the task is multiplied to be a time in this unit, where it is divided by `divisor`.
+    pub(super) fn factor(self, task: &Task, divisor: &Rational) -> Result<Int, Error> {
+        let by = Rational::from_integer(self.0) / Rational::from_integer(task.number_scale);
+        (by / divisor.clone()).to_int().ok_or_else(|| Error::Overflow { what: "a duration".into() })
     }
 
     /// A duration of the task, in this unit.
