@@ -67,7 +67,7 @@ pub(super) fn compile(
             _ => {}
         }
     }
-    let is_exact = split.is_exact && !builder.supposes();
+    let is_exact = split.is_exact && !builder.supposes() && task.objective.rest.is_empty();
     let (happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();
     for (role, id) in roles.iter().zip((0..).map(OperatorId)) {

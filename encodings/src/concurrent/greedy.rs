@@ -235,7 +235,11 @@ impl<'a> Greedy<'a> {
     fn is_new(&mut self, situation: &Situation, makespan: Int) -> bool {
         let Situation { state, clocks, .. } = situation;
         let mut key = state.values[..self.concurrent.task.basic].to_vec();
-        key.extend(state.numbers.iter().flat_map(|number| words(*number)));
+        // What is only measured makes no difference to what can follow.
+        let rest = &self.concurrent.task.objective.rest;
+        let is_read = |variable: u32| rest.iter().all(|(own, _)| own.0 != variable);
+        let numbers = (0..).zip(&state.numbers).filter(|(variable, _)| is_read(*variable));
+        key.extend(numbers.flat_map(|(_, number)| words(*number)));
         key.extend(clocks.opens().iter().map(|open| open.instance));
         key.push(u32::from(clocks.unsettled()));
         match self.seen.entry(hash_of(&key)) {

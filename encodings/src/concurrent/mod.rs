@@ -43,7 +43,7 @@ use crate::limits::Limits;
 use crate::normalize::{normalize, partial};
 use crate::number::Int;
 use crate::plan::solution::{Improvement, Proof, Solution, Statistics, Status};
-use crate::plan::{Plan, Step};
+use crate::plan::{Exact, Plan, Step, measured};
 use crate::task::OperatorId;
 use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Problem, Span};
 
@@ -114,7 +114,8 @@ fn ground_normal(
     split.is_exact = is_fixed(domain);
     let none = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
-    let (task, reached) = ground_lifted(lifted, designs, &none, &Generality::default(), &config.limits)?;
+    let generality = Generality { measures_ends: true, measures_rewards: true, ..Generality::default() };
+    let (task, reached) = ground_lifted(lifted, designs, &none, &generality, &config.limits)?;
     compile::compile(task, &split, &reached, separation, weight, &config.limits)
 }
 
@@ -197,7 +198,12 @@ pub fn optimize_concurrent(
     let bounds = (costs || !task.initial.numbers.is_empty())
         .then(|| Bounds::new(Context::new(task, limits)).ok())
         .flatten();
+    let is_whole = task.objective.rest.is_empty();
     let mut hear = |sequence: &Sequence, lower: Int| {
+        // What is compared is only a part of such a metric.
+        if !is_whole {
+            return;
+        }
         report(Improvement {
             cost: concurrent.measure.metric(sequence.value.0),
             lower_bound: concurrent.measure.metric(lower.min(sequence.value.0)),
@@ -217,7 +223,7 @@ pub fn optimize_concurrent(
     Solution {
         horizon: steps,
         plan,
-        lower_bound: lower.map(|lower| concurrent.measure.metric(lower)),
+        lower_bound: lower.filter(|_| is_whole).map(|lower| concurrent.measure.metric(lower)),
         ..solution(status, proof)
     }
 }
@@ -227,17 +233,26 @@ fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
     let durations = schedule::durations(concurrent, &sequence.happenings);
     let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together, &durations);
     let mut steps: Vec<((Int, OperatorId), Step)> = Vec::new();
-    for ((id, time), duration) in sequence.happenings.iter().zip(times).zip(durations) {
+    let happenings = sequence.happenings.iter().map(|id| (*id, &[][..]));
+    let (measured, rest) = measured(&concurrent.task, happenings);
+    let ends = |position: usize, end: OperatorId| {
+        let later = sequence.happenings.iter().zip(&measured).skip(position);
+        later.filter(|(id, _)| **id == end).map(|(_, added)| added.clone()).next().unwrap_or_default()
+    };
+    for (position, ((id, time), duration)) in sequence.happenings.iter().zip(times).zip(durations).enumerate()
+    {
+        let mut more = measured[position].clone();
         let end = match concurrent.happenings[id.index()].role {
             Role::Start(instance) => {
                 let instance = &concurrent.instances[instance as usize];
+                more += ends(position, instance.end);
                 concurrent.task.operators[instance.end.index()].cost.constant
             }
             Role::Whole => 0,
             _ => continue,
         };
         let operator = &concurrent.task.operators[id.index()];
-        let cost = Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end);
+        let cost = Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end) + &more;
         let cost = if concurrent.task.objective.maximize { -cost } else { cost };
         let [start, duration] = [time, duration].map(Rational::from_integer);
         steps.push(((time, *id), Step::new(&concurrent.task, operator, &[], (start, duration, cost))));
@@ -248,5 +263,7 @@ fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
         step.note_reconfigured(&mut current);
     }
     let steps = steps.into_iter().map(|(_, step)| step).collect();
-    Plan { steps, cost: concurrent.measure.metric(sequence.value.0) }
+    let objective = &concurrent.task.objective;
+    let rest = Exact::scaled(&if objective.maximize { -rest } else { rest }, objective.scale);
+    Plan { steps, cost: concurrent.measure.metric(sequence.value.0).plus(&rest) }
 }

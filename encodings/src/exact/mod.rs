@@ -204,7 +204,7 @@ fn with_costs(
     for operator in &mut task.operators {
         operator.cost = cost(operator);
     }
-    task.objective = Objective { scale: 1, offset: Rational::zero(), maximize: false };
+    task.objective = Objective { scale: 1, offset: Rational::zero(), maximize: false, rest: Vec::new() };
     task
 }
 

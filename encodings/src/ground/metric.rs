@@ -1,7 +1,8 @@
 //! Metrics as costs of each operator.
 //!
-//! A metric is linear in fluents and total time. Every fluent in it must be changed by sums that do not depend on
-//! the state, so that the metric of a plan is an offset plus the sum of its operators' costs. A metric to maximize is
+//! A metric is linear in fluents and total time. Fluents in it that are changed by sums that do not depend on the state make
+//! an offset plus the sum of its operators' costs. Others are only measured: their values in the end are added, and of such a
+//! metric no plan is called the best. A metric to maximize is
 //! negated. Without a metric, plans of durative actions are measured by total time, others by their length.
 
 use std::collections::BTreeMap;
@@ -10,13 +11,14 @@ use std::convert::Infallible;
 use num_traits::{One, Zero};
 
 use crate::error::{Error, Place};
+use crate::ground::config::Generality;
 use crate::ground::evaluate::expression::ground;
 use crate::ground::vocabulary::failure::Failure;
 use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::task::{GroundObjective, GroundTask};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Expression, Metric, Rational};
-use crate::task::quantity::{Linear, Quantity};
+use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::table_map::TableMap;
 use pddl::ast::Direction;
 
@@ -24,7 +26,7 @@ use pddl::ast::Direction;
 ///
 /// # Errors
 /// A metric that is not linear, or over a fluent whose change depends on the state.
-pub(crate) fn attach_costs(task: &mut GroundTask<'_>) -> Result<(), Vec<Error>> {
+pub(crate) fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Vec<Error>> {
     let lifted = task.world.lifted;
     if lifted.metrics.is_empty() {
         let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
@@ -38,41 +40,76 @@ pub(crate) fn attach_costs(task: &mut GroundTask<'_>) -> Result<(), Vec<Error>> 
     }
     let mut errors = Vec::new();
     for metric in &lifted.metrics {
-        attach(task, metric).unwrap_or_else(|error| errors.push(error));
+        attach(task, metric, generality).unwrap_or_else(|error| errors.push(error));
     }
     if errors.is_empty() { Ok(()) } else { Err(errors) }
 }
 
 /// Gives every operator its cost by one metric.
-fn attach(task: &mut GroundTask<'_>, metric: &Metric) -> Result<(), Error> {
-    let (lifted, limits) = (task.world.lifted, task.world.limits);
+fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -> Result<(), Error> {
+    let limits = task.world.limits;
     let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
     let maximize = metric.direction == Direction::Maximize;
     if maximize {
         linear = linear.negated();
         time = -time;
     }
+    let rest = rest(task, &mut linear, (metric, generality))?;
     let initial: Vec<_> = linear
         .coefficients
         .iter()
         .map(|(variable, factor)| task.world.initial_value(*variable) * factor)
         .collect();
     let offset = initial.into_iter().fold(linear.quantity.constant.clone(), |sum, value| sum + value);
-    task.objectives.push(GroundObjective { offset, maximize });
+    task.objectives.push(GroundObjective { offset, maximize, rest });
     let mut scaled = Scaled::default();
     for operator in limits.watch(&mut task.operators) {
         let operator = operator?;
-        let cost = cost(operator, &linear, &time, &mut scaled).ok_or_else(|| Error::Unsupported {
-            construct: format!(
-                "a metric over a fluent that `{}` changes depending on the state",
-                lifted.schemas[operator.schema as usize].name
-            ),
-            instead: "a metric over fluents that are only increased or decreased by constants".into(),
-            place: metric.place,
-        })?;
-        operator.costs.push(cost);
+        operator.costs.push(cost(operator, &linear, &time, &mut scaled));
     }
     Ok(())
+}
+
+/// Takes the fluents out of a metric whose changes depend on the state.
+///
+/// # Errors
+/// There is one, and the task is to be good for more than for plans.
+fn rest(
+    task: &GroundTask<'_>,
+    linear: &mut Linear<Rational>,
+    (metric, generality): (&Metric, &Generality),
+) -> Result<Vec<(NumericId, Rational)>, Error> {
+    let mut dependent: Vec<NumericId> = Vec::new();
+    for operator in &task.operators {
+        for (variable, factor) in &linear.coefficients {
+            let Some(value) = operator.numeric_effects.get(*variable) else { continue };
+            let is_dependent = value.coefficients[..] != [(*variable, Rational::one())];
+            let is_reward = generality.measures_rewards && lowers(value, factor);
+            if is_dependent && !generality.measures_ends {
+                return Err(Error::Unsupported {
+                    construct: format!(
+                        "a metric over a fluent that `{}` changes depending on the state",
+                        task.world.lifted.schemas[operator.schema as usize].name
+                    ),
+                    instead: "a metric over fluents that are only increased or decreased by constants".into(),
+                    place: metric.place,
+                });
+            }
+            if (is_dependent || is_reward) && !dependent.contains(variable) {
+                dependent.push(*variable);
+            }
+        }
+    }
+    let (rest, kept) = linear.coefficients.drain(..).partition(|(variable, _)| dependent.contains(variable));
+    linear.coefficients = kept;
+    Ok(rest)
+}
+
+/// Whether a change of a fluent that counts by a factor may lower the metric.
+fn lowers(value: &Linear<Rational>, factor: &Rational) -> bool {
+    let mut change = value.quantity.clone();
+    change.scale(factor);
+    change.minimum().is_negative()
 }
 
 /// The part of the metric over fluents, and the factor of total time.
@@ -162,20 +199,17 @@ impl Scaled {
     }
 }
 
-/// What one application adds to the metric; none if that depends on the state.
+/// What one application adds to the metric.
 fn cost(
     operator: &GroundOperator,
     metric: &Linear<Rational>,
     time: &Rational,
     scaled: &mut Scaled,
-) -> Option<Quantity<Rational>> {
+) -> Quantity<Rational> {
     let mut total = scaled.times(&operator.duration, time);
     for (variable, factor) in &metric.coefficients {
         let Some(value) = operator.numeric_effects.get(*variable) else { continue };
-        if value.coefficients[..] != [(*variable, Rational::one())] {
-            return None;
-        }
         total.add(&scaled.times(&value.quantity, factor));
     }
-    Some(total)
+    total
 }

@@ -49,7 +49,8 @@ use vocabulary::world::World;
 /// # Errors
 /// Every construct that the planner does not handle, with its place.
 pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Vec<Error>> {
-    ground_for(domain, problem, config, &Generality::default())
+    let measures_ends = config.objectives.len() <= 1;
+    ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
 }
 
 /// Grounds a problem so that other initial states can take the place of its own.
@@ -106,7 +107,7 @@ pub(crate) fn ground_lifted<N: TaskNumber>(
     let world = World::new(lifted, &reached, limits);
     let mut ground = instantiate::instantiate(world, designs, slots)?;
     derived::simplify(&mut ground).map_err(|interrupted| vec![interrupted.into()])?;
-    metric::attach_costs(&mut ground)?;
+    metric::attach_costs(&mut ground, generality)?;
     if limits.reached() {
         return Err(vec![Error::Interrupted]);
     }

@@ -99,7 +99,7 @@ fn derived_atoms_with_one_rule_are_replaced_by_its_body() {
 #[test]
 fn without_a_metric_each_step_costs_one() {
     instantiated(|_, mut task| {
-        metric::attach_costs(&mut task).expect("costs");
+        metric::attach_costs(&mut task, &Generality::default()).expect("costs");
         let one = [Quantity::constant(Rational::from_integer(1))];
         assert!(task.operators.iter().all(|operator| operator.costs == one));
         assert_eq!(task.objectives.len(), 1);
@@ -110,7 +110,7 @@ fn without_a_metric_each_step_costs_one() {
 fn prune_drops_what_numbers_rule_out_and_finish_makes_variables() {
     instantiated(|lifted, mut task| {
         derived::simplify(&mut task).expect("no limit");
-        metric::attach_costs(&mut task).expect("costs");
+        metric::attach_costs(&mut task, &Generality::default()).expect("costs");
         let generality = Generality::default();
         assert_eq!(prune::prune(&mut task, &generality).expect("no limit"), None);
         // Nothing asks for the head of the rule any more.
@@ -130,8 +130,8 @@ fn prune_drops_what_numbers_rule_out_and_finish_makes_variables() {
 fn where_other_numbers_are_to_come_prune_concludes_nothing_from_those_of_the_problem() {
     instantiated(|lifted, mut task| {
         derived::simplify(&mut task).expect("no limit");
-        metric::attach_costs(&mut task).expect("costs");
-        let generality = Generality { numbers: Some(1) };
+        metric::attach_costs(&mut task, &Generality::default()).expect("costs");
+        let generality = Generality { numbers: Some(1), ..Generality::default() };
         assert_eq!(prune::prune(&mut task, &generality).expect("no limit"), None);
         assert_eq!(counts(lifted, &task)[3], ("fly".to_owned(), 4));
     });

@@ -8,7 +8,23 @@ use crate::plan::solution::{Improvement, Proof, Solution, Status};
 use crate::task::Task;
 
 /// Finds a cheapest plan; `report` hears of every improvement.
+///
+/// Of a metric over fluents whose changes depend on the state no plan is called the best, and nothing is reported before the end.
 pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Solution {
+    if task.objective.rest.is_empty() {
+        return cheapest(task, config, report);
+    }
+    let mut solution = cheapest(task, config, &mut |_| {});
+    // What was compared is a part of the metric.
+    (solution.lower_bound, solution.unbounded) = (None, None);
+    solution.statistics.history.clear();
+    if solution.status == Status::Optimal {
+        (solution.status, solution.proof, solution.horizon) = (Status::Feasible, None, 0);
+    }
+    solution
+}
+
+fn cheapest(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Solution {
     let run = Run::new(task, config, report);
     if let Some(reason) = &task.unreachable {
         return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.clone())));

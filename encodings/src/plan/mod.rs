@@ -7,4 +7,4 @@ pub(crate) mod solution;
 pub(crate) mod transitions;
 
 pub use names::{Exact, Plan, Step};
-pub(crate) use names::{decode, metric, resolve};
+pub(crate) use names::{decode, measured, metric, resolve};

@@ -11,7 +11,7 @@ use crate::number::{Int, Rational};
 use crate::plan::earliest::{earliest, starts};
 use crate::plan::ground::GroundPlan;
 use crate::task::number::TaskNumber;
-use crate::task::{Argument, Objective, Operator, Task};
+use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 use pddl::to_decimal;
 
 /// An exact number of any size, in the units of the PDDL files.
@@ -22,6 +22,10 @@ impl Exact {
     /// A number of a ground task that is so many times what the files write.
     pub(crate) fn scaled<N: TaskNumber>(value: &N, scale: Int) -> Self {
         Self(value.to_rational() / Rational::from_integer(scale))
+    }
+
+    pub(crate) fn plus(&self, other: &Self) -> Self {
+        Self(self.0.clone() + &other.0)
     }
 
     /// The numerator of the reduced fraction.
@@ -98,20 +102,51 @@ pub(crate) fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N
     let (task, plan) = (context.task, earliest(context, plan));
     let mut steps = Vec::new();
     let mut current: Vec<(String, String)> = Vec::new();
-    let actions = plan.steps.iter().filter(|step| task.operators[step.operator.index()].wait.is_none());
-    for (step, start) in actions.zip(starts(task, &plan.steps)) {
+    let steps_of = plan.steps.iter().map(|step| (step.operator, &step.choice[..]));
+    let (measured, rest) = measured(task, steps_of);
+    let actions = plan.steps.iter().zip(measured);
+    let actions = actions.filter(|(step, _)| task.operators[step.operator.index()].wait.is_none());
+    for ((step, measured), start) in actions.zip(starts(task, &plan.steps)) {
         let operator = &task.operators[step.operator.index()];
         if is_hidden(&task.schema_names[operator.schema as usize]) {
             continue;
         }
         let sizes = operator.sizes();
         let duration = operator.duration.at(&step.choice, &sizes).to_rational();
-        let cost = task.objective.signed(&operator.cost.at(&step.choice, &sizes));
+        let cost = operator.cost.at(&step.choice, &sizes).to_rational() + measured;
+        let cost = task.objective.signed(&cost);
         let mut step = Step::new(task, operator, &step.choice, (start, duration, cost));
         step.note_reconfigured(&mut current);
         steps.push(step);
     }
-    Plan { steps, cost: metric(task, &plan.cost) }
+    Plan { steps, cost: metric(task, &(plan.cost.to_rational() + rest)) }
+}
+
+/// What each step adds to the fluents that are only measured, and what they come to in the end, in the unit of costs.
+pub(crate) fn measured<'s, N: TaskNumber>(
+    task: &Task<N>,
+    steps: impl Iterator<Item = (OperatorId, &'s [u32])>,
+) -> (Vec<Rational>, Rational) {
+    let rest = &task.objective.rest;
+    if rest.is_empty() {
+        return (steps.map(|_| Rational::zero()).collect(), Rational::zero());
+    }
+    let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
+    let value = |state: &State<N>| {
+        let terms =
+            rest.iter().map(|(variable, factor)| state.numbers[variable.index()].to_rational() * factor);
+        terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
+    };
+    let (mut state, mut added) = (task.initial.clone(), Vec::new());
+    let mut before = value(&state);
+    for (operator, choice) in steps {
+        let next = task.successor(&task.operators[operator.index()], &state, choice);
+        state = next.expect("invariant: the plan was executed when it was found");
+        let after = value(&state);
+        added.push(after.clone() - &before);
+        before = after;
+    }
+    (added, before)
 }
 
 impl Plan {

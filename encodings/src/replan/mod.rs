@@ -71,7 +71,7 @@ impl Replanner {
             return None;
         }
         let full = with_all(domain, problem, available);
-        let generality = Generality { numbers: Some(PRECISION) };
+        let generality = Generality { numbers: Some(PRECISION), ..Generality::default() };
         let task = ground_for(domain, &full, config, &generality).ok()?;
         if task.operators.iter().any(|operator| operator.cost.minimum() < 0 || operator.wait.is_some()) {
             return None;

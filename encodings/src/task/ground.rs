@@ -10,7 +10,7 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use crate::lifted::ObjectId;
-use crate::number::{Int, dense};
+use crate::number::{Int, Rational, dense};
 use crate::task::dense_ids::dense_ids;
 use crate::task::number::{TaskNumber, sum_of_products};
 use crate::task::quantity::{Linear, NumericId, Quantity, SlotSet};
@@ -166,12 +166,14 @@ pub struct Objective<N = Int> {
     pub(crate) offset: N,
     /// Whether the file asks to maximize; operator costs are negated then.
     pub(crate) maximize: bool,
+    /// Numeric variables whose final values count as well, with their factors (negated if to be maximized).
+    pub(crate) rest: Vec<(NumericId, Rational)>,
 }
 
 impl Objective {
     /// The plain sum of costs.
     pub(crate) fn sum() -> Self {
-        Self { scale: 1, offset: 0, maximize: false }
+        Self { scale: 1, offset: 0, maximize: false, rest: Vec::new() }
     }
 }
 

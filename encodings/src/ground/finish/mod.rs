@@ -40,7 +40,7 @@ pub(crate) fn finish<N: TaskNumber>(
     let (lifted, limits) = (task.world.lifted, task.world.limits);
     let atoms = Atoms::new(&task)?;
     let mut numbers = Numbers::<N>::new(&task, generality)?;
-    let (mut objectives, mut costs) = objectives::<N>(&task)?;
+    let (mut objectives, mut costs) = objectives::<N>(&task, &numbers)?;
     let mut durations = Denominator::new("durations");
     for operator in limits.watch(&task.operators) {
         let operator = operator?;
@@ -159,7 +159,10 @@ impl<N: TaskNumber> Distinct<N> {
 
 /// The objectives, and what makes integers of the costs by each.
 #[expect(clippy::type_complexity, reason = "a list for each of two things")]
-fn objectives<N: TaskNumber>(task: &GroundTask<'_>) -> Result<(Vec<Objective<N>>, Vec<Integers<N>>), Error> {
+fn objectives<N: TaskNumber>(
+    task: &GroundTask<'_>,
+    numbers: &Numbers<N>,
+) -> Result<(Vec<Objective<N>>, Vec<Integers<N>>), Error> {
     let (mut objectives, mut conversions) = (Vec::new(), Vec::new());
     for (objective, position) in task.objectives.iter().zip(0..) {
         let mut denominator = Denominator::new("the metric");
@@ -171,7 +174,8 @@ fn objectives<N: TaskNumber>(task: &GroundTask<'_>) -> Result<(Vec<Objective<N>>
         }
         let integers = denominator.integers()?;
         let offset = integers.number(&objective.offset)?;
-        objectives.push(Objective { scale: integers.scale, offset, maximize: objective.maximize });
+        let rest = numbers.rest(&objective.rest);
+        objectives.push(Objective { scale: integers.scale, offset, maximize: objective.maximize, rest });
         conversions.push(integers);
     }
     Ok((objectives, conversions))

@@ -9,7 +9,7 @@ use crate::lifted::Rational;
 use crate::limits::Interrupted;
 use crate::task::quantity::{NumericId, Quantity};
 
-/// Removes effects on numeric variables that no condition depends on; the metric has been made of them already.
+/// Removes effects on numeric variables that no condition depends on, and no metric in the end; costs have been made of the others already.
 pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
     let bodies = task.axioms.iter().map(|axiom| &axiom.body);
@@ -17,6 +17,7 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let mut read: FxHashSet<NumericId> = comparisons
         .flat_map(|(linear, _)| linear.coefficients.iter().map(|(variable, _)| *variable))
         .collect();
+    read.extend(task.objectives.iter().flat_map(|own| own.rest.iter().map(|(variable, _)| *variable)));
     let mut open: Vec<NumericId> = read.iter().copied().collect();
     while let Some(variable) = open.pop() {
         let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));

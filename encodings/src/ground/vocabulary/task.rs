@@ -8,6 +8,7 @@ use crate::ground::vocabulary::condition::GroundCondition;
 use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::Rational;
+use crate::task::quantity::NumericId;
 
 /// The task over atoms.
 pub(crate) struct GroundTask<'a> {
@@ -27,6 +28,8 @@ pub(crate) struct GroundObjective {
     /// The metric of the initial state (negated if to be maximized).
     pub(crate) offset: Rational,
     pub(crate) maximize: bool,
+    /// Fluents whose changes depend on the state, with their factors (negated if to be maximized): they count in the end.
+    pub(crate) rest: Vec<(NumericId, Rational)>,
 }
 
 impl GroundTask<'_> {
