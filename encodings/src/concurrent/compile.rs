@@ -10,13 +10,12 @@ use crate::concurrent::measure::Measure;
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::{LIMIT as TIME_LIMIT, Unit};
 use crate::context::Context;
-use crate::error::{Error, File, Place};
+use crate::error::Error;
 use crate::ground::vocabulary::reached::Reached;
 use crate::lifted::Rational;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
 use crate::task::{OperatorId, State, Task};
-use pddl::ast::Span;
 
 /// A ground task whose actions can overlap.
 #[derive(Debug, Clone)]
@@ -46,7 +45,6 @@ pub(super) fn compile(
     limits: &Limits,
 ) -> Result<Concurrent, Vec<Error>> {
     let one = |error| vec![error];
-    refuse_rewards(&task, split).map_err(one)?;
     // Operators are watched as they are collected, each as a whole.
     let unlimited = Limits::none();
     let mut builder = Builder::new(split, reached, &unlimited);
@@ -87,19 +85,6 @@ pub(super) fn compile(
         Concurrent { task, happenings, instances, events, guards, measure, is_exact, separation };
     concurrent.guard(limits).map_err(|interrupted| vec![interrupted.into()])?;
     Ok(concurrent)
-}
-
-/// A metric that gets better with more actions has no best plan, or none that the search would know.
-fn refuse_rewards(task: &Task, split: &Split) -> Result<(), Error> {
-    if task.operators.iter().all(|operator| operator.cost.minimum() >= 0) {
-        return Ok(());
-    }
-    let nowhere = Place { file: File::Domain, span: Span::default() };
-    Err(Error::Unsupported {
-        construct: "a metric that an action improves, where actions overlap".into(),
-        instead: "a metric to which every action adds, or planning without `--concurrent`".into(),
-        place: split.lifted.metrics.first().map_or(nowhere, |metric| metric.place),
-    })
 }
 
 impl Concurrent {
