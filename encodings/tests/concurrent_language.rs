@@ -89,7 +89,7 @@ fn a_duration_of_the_state_may_be_divided_by_what_no_action_changes() {
         "(at start (q))",
         "(at start (increase (fuel) 5)) (at end (not (q)))",
     );
-    check(&[fill("2"), pour.clone()].concat(), "(q)", "(g)", (Status::Optimal, Some("0.501")));
+    check(&[fill("2"), pour.clone()].concat(), "(q)", "(g)", (Status::Optimal, Some("1")));
     check(&[fill("0.5"), pour].concat(), "(q)", "(g) (>= (fuel) 10)", (Status::Optimal, Some("2.001")));
 }
 

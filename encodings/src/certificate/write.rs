@@ -34,6 +34,10 @@ pub struct Certificate {
 /// Makes the certificate of a solution. Nothing if the solution is not proved for plans of any length, if the task has several
 /// objectives or one that plans improve without bound, or if the search does not end within the limits.
 pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Certificate> {
+    // The format knows one scale for all numbers, and no metric of the end.
+    if !(task.number_multiples.is_empty() && task.objective.rest.is_empty()) {
+        return None;
+    }
     let cost = solution.ground.as_ref().map(|plan| plan.cost);
     let context = Context::new(task, limits);
     let bounds = || Some((Bounds::of_projections(context).ok()?, Scales::one()));

@@ -158,8 +158,9 @@ impl<'a> Builder<'a> {
                 continue;
             }
             let one = Rational::from_integer(1);
-            let factor = || unit.factor(task, divisors.get(&start).unwrap_or(&one));
-            let timer = timer(task, start).map(|timer| Ok::<_, Error>((timer, factor()?))).transpose()?;
+            let divisor = divisors.get(&start).unwrap_or(&one);
+            let factor = |timer| unit.factor(task, timer, divisor).map(|factor| (timer, factor));
+            let timer = timer(task, start).map(factor).transpose()?;
             // One that the state decides is looked at when it starts.
             let duration = if timer.is_some() { self.separation } else { unit.duration(task, start)? };
             if duration < self.separation {

@@ -7,6 +7,7 @@ use crate::concurrent::split::Split;
 use crate::error::Error;
 use crate::lifted::Rational;
 use crate::number::{Int, checked_lcm};
+use crate::task::quantity::NumericId;
 use crate::task::{OperatorId, Task};
 
 /// Times and durations stay below this.
@@ -29,7 +30,10 @@ impl Unit {
     ) -> Result<Self, Error> {
         let mut times = split.events.iter().map(|event| &event.time).chain([separation]);
         // Durations that the state decides are numbers.
-        let numbers = if split.durations.is_empty() { 1 } else { task.number_scale };
+        let multiples = task.number_multiples.iter().try_fold(1, |common, own| checked_lcm(common, *own));
+        let scale = multiples.and_then(|own| own.checked_mul(task.number_scale)).filter(|own| *own < LIMIT);
+        let scale = scale.ok_or_else(|| Error::Overflow { what: "durations".into() })?;
+        let numbers = if split.durations.is_empty() { 1 } else { scale };
         let divided = divisors.values().map(|divisor| divisor.to_big().numer().to_i128());
         let scale = divided.fold(checked_lcm(task.time_scale, numbers), |scale, divisor| {
             checked_lcm(scale?, numbers.checked_mul(divisor?)?).filter(|scale| *scale < LIMIT)
@@ -49,8 +53,10 @@ impl Unit {
     }
 
     /// By what a number of the task is multiplied to be a time in this unit, where it is divided by `divisor`.
-    pub(super) fn factor(self, task: &Task, divisor: &Rational) -> Result<Int, Error> {
-        let by = Rational::from_integer(self.0) / Rational::from_integer(task.number_scale);
+    pub(super) fn factor(self, task: &Task, timer: NumericId, divisor: &Rational) -> Result<Int, Error> {
+        let multiple = task.number_multiples.get(timer.index()).copied().unwrap_or(1);
+        let scale = Rational::from_integer(task.number_scale) * Rational::from_integer(multiple);
+        let by = Rational::from_integer(self.0) / scale;
         (by / divisor.clone()).to_int().ok_or_else(|| Error::Overflow { what: "a duration".into() })
     }
 

@@ -261,6 +261,7 @@ impl RoundedBounds {
             exclusive: task.exclusive.clone(),
             number_names: Vec::new(),
             number_scale: 1,
+            number_multiples: Vec::new(),
             axioms: Vec::new(),
             slots: Vec::new(),
             operators: operators.map(|(operator, cost)| bare_operator(operator, rounded(cost))).collect(),

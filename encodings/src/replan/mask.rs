@@ -53,6 +53,7 @@ pub(super) fn restrict(
         operators,
         object_names: task.object_names.clone(),
         schema_names: task.schema_names.clone(),
+        number_multiples: task.number_multiples.clone(),
         variables: task.variables.clone(),
         exclusive: task.exclusive.clone(),
         axioms: task.axioms.clone(),

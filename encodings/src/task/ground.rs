@@ -193,6 +193,8 @@ pub struct Task<N = Int> {
     pub(crate) number_names: Vec<String>,
     /// Numbers are this many times the values of the files.
     pub(crate) number_scale: Int,
+    /// So many times that the values of numeric variables are, besides; empty where all are as they are.
+    pub(crate) number_multiples: Vec<Int>,
     /// The rules of the derived variables, in the order of their evaluation.
     pub(crate) axioms: Vec<Layer<N>>,
     pub(crate) slots: Vec<Slot>,

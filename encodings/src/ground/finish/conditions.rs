@@ -38,7 +38,7 @@ pub(super) fn condition<N: TaskNumber>(
             list.push(numbers.linear(linear)?);
             continue;
         }
-        let mut linear = linear.clone();
+        let mut linear = numbers.stored(linear, 1).into_owned();
         // A comparison may be scaled at will, so fractional factors do no harm here.
         let mut denominators = linear.coefficients.iter().map(|(_, factor)| factor.denominator());
         let common = denominators.try_fold(1, |common, next| checked_lcm(common, next?));

@@ -78,6 +78,7 @@ pub(crate) fn finish<N: TaskNumber>(
         exclusive: atoms.exclusive,
         number_names: std::mem::take(&mut numbers.names),
         number_scale: numbers.integers.scale,
+        number_multiples: numbers.multiples(),
         axioms,
         initial: State { values: atoms.initial, numbers: std::mem::take(&mut numbers.initial) },
         slots: slots.all,

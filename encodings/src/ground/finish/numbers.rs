@@ -10,7 +10,7 @@ use crate::ground::finish::integers::{Denominator, Integers};
 use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::Rational;
-use crate::number::{Int, LIMIT, checked_lcm};
+use crate::number::{Int, LIMIT};
 use crate::task::NumericEffect;
 use crate::task::number::TaskNumber;
 use crate::task::quantity::{Linear, NumericId};
@@ -20,7 +20,7 @@ pub(super) struct Numbers<N> {
     pub(super) initial: Vec<N>,
     pub(super) names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
-    /// Of fluents that are only measured: by what they are multiplied, so that what adds to them are integers.
+    /// The multiples that some fluents are stored as.
     multiples: FxHashMap<NumericId, Int>,
     pub(super) integers: Integers<N>,
 }
@@ -56,7 +56,8 @@ impl<N: TaskNumber> Numbers<N> {
         }
         let names = used.iter().map(|variable| task.world.numeric_name(*variable)).collect();
         let integers = denominator.integers()?;
-        let multiples = if N::SCALED { multiples(task) } else { FxHashMap::default() };
+        let can_choose = N::SCALED && generality.numbers.is_none();
+        let multiples = if can_choose { multiples(task) } else { FxHashMap::default() };
         let initial = initial.into_iter().zip(&used).map(|(number, variable)| {
             let multiple = Rational::from_integer(multiples.get(variable).copied().unwrap_or(1));
             integers.number(&(number * &multiple))
@@ -78,10 +79,40 @@ impl<N: TaskNumber> Numbers<N> {
     /// Fluents with their factors.
     pub(super) fn rest(&self, rest: &[(NumericId, Rational)]) -> Vec<(NumericId, Rational)> {
         let own = |(variable, factor): &(NumericId, Rational)| {
-            let multiple = self.multiples.get(variable).copied().unwrap_or(1);
-            (self.ids[variable], factor.clone() / Rational::from_integer(multiple))
+            (self.ids[variable], factor.clone() / Rational::from_integer(self.multiple(*variable)))
         };
         rest.iter().map(own).collect()
+    }
+
+    fn multiple(&self, variable: NumericId) -> Int {
+        self.multiples.get(&variable).copied().unwrap_or(1)
+    }
+
+    /// The multiples that fluents are stored as, in their order; nothing if all are stored as they are.
+    pub(super) fn multiples(&self) -> Vec<Int> {
+        if self.multiples.is_empty() {
+            return Vec::new();
+        }
+        let mut multiples = vec![1; self.initial.len()];
+        for (variable, multiple) in &self.multiples {
+            if let Some(own) = self.ids.get(variable) {
+                multiples[own.index()] = *multiple;
+            }
+        }
+        multiples
+    }
+
+    /// So many times an expression, over fluents as they are stored.
+    pub(super) fn stored<'l>(&self, linear: &'l Linear<Rational>, times: Int) -> Cow<'l, Linear<Rational>> {
+        if self.multiples.is_empty() {
+            return Cow::Borrowed(linear);
+        }
+        let mut stored = linear.clone();
+        stored.scale(&Rational::from_integer(times));
+        for (read, factor) in &mut stored.coefficients {
+            *factor = factor.clone() / Rational::from_integer(self.multiple(*read));
+        }
+        Cow::Owned(stored)
     }
 
     pub(super) fn effects(&mut self, operator: &GroundOperator) -> Result<Vec<NumericEffect<N>>, Error> {
@@ -89,14 +120,7 @@ impl<N: TaskNumber> Numbers<N> {
         for (variable, value) in operator.numeric_effects.iter() {
             let own = *variable;
             if let Some(variable) = self.ids.get(variable).copied() {
-                let mut value = Cow::Borrowed(value);
-                if let Some(multiple) = self.multiples.get(&own).filter(|multiple| **multiple != 1) {
-                    let scaled = value.to_mut();
-                    scaled.scale(&Rational::from_integer(*multiple));
-                    for (_, factor) in scaled.coefficients.iter_mut().filter(|(read, _)| *read == own) {
-                        *factor = factor.clone() / Rational::from_integer(*multiple);
-                    }
-                }
+                let value = self.stored(value, self.multiple(own));
                 effects.push(NumericEffect { variable, value: self.linear(&value)? });
             }
         }
@@ -104,31 +128,38 @@ impl<N: TaskNumber> Numbers<N> {
     }
 }
 
-/// By what fluents are multiplied that a metric counts in the end, and that nothing else reads: the denominators of the factors by
-/// which others add to them.
+/// The multiple that each of some fluents is stored as, where that is not the fluent itself, so that what they add to each other by
+/// fractions are integers: if `(increase (x) (* 0.5 (y)))`, twice x is stored. Nothing where no multiples do.
 fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
-    let mut multiples: FxHashMap<NumericId, Option<Int>> = FxHashMap::default();
-    multiples.extend(task.objectives.iter().flat_map(|own| own.rest.iter().map(|(own, _)| (*own, Some(1)))));
-    if multiples.is_empty() {
+    let effects = || task.operators.iter().flat_map(|operator| operator.numeric_effects.iter());
+    let mut factors: Vec<(NumericId, NumericId, &Rational)> = Vec::new();
+    for (variable, value) in effects() {
+        factors.extend(value.coefficients.iter().map(|(read, factor)| (*variable, *read, factor)));
+    }
+    if factors.iter().all(|(.., factor)| factor.is_integer()) {
         return FxHashMap::default();
     }
-    let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
-    let bodies = task.axioms.iter().map(|axiom| &axiom.body);
-    for (linear, _) in conditions.chain(bodies).flat_map(|condition| &condition.comparisons) {
-        for (read, _) in &linear.coefficients {
-            multiples.remove(read);
-        }
-    }
-    for (variable, value) in task.operators.iter().flat_map(|operator| operator.numeric_effects.iter()) {
-        for (read, factor) in &value.coefficients {
-            if read != variable {
-                multiples.remove(read);
-                if let Some(Some(known)) = multiples.get(variable) {
-                    let common = factor.denominator().and_then(|own| checked_lcm(*known, own));
-                    multiples.insert(*variable, common.filter(|common| *common < LIMIT));
-                }
+    factors.sort_unstable();
+    factors.dedup();
+    let mut multiples: FxHashMap<NumericId, Int> = FxHashMap::default();
+    // What is passed on takes no more rounds than there are fluents, if not in a circle.
+    for _ in 0..=factors.len() {
+        let mut is_changed = false;
+        for (variable, read, factor) in &factors {
+            let of = |variable: &NumericId| multiples.get(variable).copied().unwrap_or(1);
+            let stored = Rational::from_integer(of(variable)) * *factor / Rational::from_integer(of(read));
+            if stored.is_integer() {
+                continue;
             }
+            let more = if variable == read { None } else { stored.denominator() };
+            let multiple = more.and_then(|more| of(variable).checked_mul(more)).filter(|own| *own < LIMIT);
+            let Some(multiple) = multiple else { return FxHashMap::default() };
+            multiples.insert(*variable, multiple);
+            is_changed = true;
+        }
+        if !is_changed {
+            return multiples;
         }
     }
-    multiples.into_iter().filter_map(|(variable, multiple)| Some((variable, multiple?))).collect()
+    FxHashMap::default()
 }
