@@ -19,6 +19,7 @@ pub mod manifest;
 pub mod mapek;
 pub mod mission;
 mod number;
+pub mod recording;
 pub mod setup;
 pub mod simulate;
 

@@ -24,6 +24,8 @@ mod plan_text;
 mod reason;
 mod reason_ask;
 mod run;
+mod run_lines;
+mod run_outlet;
 mod simulate;
 mod situation;
 mod validate;

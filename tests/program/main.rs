@@ -21,6 +21,7 @@ mod paper;
 mod probabilistic;
 mod real;
 mod reason;
+mod recording;
 mod reference;
 mod routes;
 mod run;

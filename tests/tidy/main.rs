@@ -24,12 +24,13 @@ const FORBIDDEN: [(&str, &[&str]); 9] = [
 ];
 
 /// Crates that only one file or folder may name.
-const SINGLE_FILE: [(&str, &str); 5] = [
+const SINGLE_FILE: [(&str, &str); 6] = [
     ("horned_owl", "ontology/src/horned/"),
     ("varisat::", "encodings/src/sat/"),
     ("batsat::", "encodings/src/sat/"),
     ("cadical::", "encodings/src/sat/"),
     ("rustsat::", "encodings/src/sat/"),
+    ("mcap::", "src/recording/"),
 ];
 
 fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {

@@ -1,0 +1,113 @@
+//! Where the loop hears from: lines of a file or of standard input, or those in an MCAP file.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read as _};
+use std::path::Path;
+use std::time::Duration;
+
+use metaplan::mapek::LONGEST_LINE;
+use metaplan::message::Message;
+use metaplan::recording::{FIRST_BYTE, Replay};
+
+use crate::cli::common::Common;
+use crate::cli::output;
+
+/// A line, and the time since the start of the mission, if the source knows it.
+pub(super) struct Line {
+    pub(super) text: String,
+    pub(super) now: Option<Duration>,
+}
+
+/// Lines without those that are blank. Of a line that is far too long only the beginning is kept, which is no event.
+pub(super) struct Lines {
+    name: String,
+    source: Source,
+}
+
+enum Source {
+    /// Not looked at: standard input may have nothing yet.
+    Fresh(Option<Box<dyn BufRead>>),
+    Text(Box<dyn BufRead>),
+    Recorded(Box<Replay<Box<dyn BufRead>>>),
+}
+
+/// Opens a file; a pipe is read as it comes, and anything else that is no file is not.
+fn regular(path: &Path) -> io::Result<File> {
+    let kind = std::fs::metadata(path)?.file_type();
+    #[cfg(unix)]
+    let is_pipe = std::os::unix::fs::FileTypeExt::is_fifo(&kind);
+    #[cfg(not(unix))]
+    let is_pipe = false;
+    if kind.is_file() || is_pipe { File::open(path) } else { Err(io::Error::other("it is no file")) }
+}
+
+impl Lines {
+    /// Opens a file, or standard input for `-`.
+    pub(super) fn open(path: &Path) -> Result<Self, Message> {
+        let name = path.display().to_string();
+        let reader: Box<dyn BufRead> = if name == "-" {
+            Box::new(BufReader::new(io::stdin()))
+        } else {
+            let file = regular(path)
+                .map_err(|error| Message::at("M101", &name, None, format!("cannot be read: {error}")))?;
+            Box::new(BufReader::new(file))
+        };
+        Ok(Self { name, source: Source::Fresh(Some(reader)) })
+    }
+
+    /// The next line; none at the end.
+    pub(super) fn next(&mut self, common: &Common) -> Result<Option<Line>, Message> {
+        let line = self.look().and_then(|()| match &mut self.source {
+            Source::Fresh(_) => Ok(None),
+            Source::Text(reader) => next_text(reader),
+            Source::Recorded(replay) => {
+                let line = replay.next_line()?;
+                Ok(line.map(|line| Line { text: line.text, now: Some(line.now) }))
+            }
+        });
+        let line =
+            line.map_err(|error| Message::at("M101", &self.name, None, format!("cannot be read: {error}")))?;
+        if let (None, Source::Recorded(replay)) = (&line, &self.source)
+            && replay.is_unfinished()
+        {
+            let text = format!("{} breaks off: it was not finished; all that is whole was read", self.name);
+            output::warnings(common, [&Message::warning("M330", text)]);
+        }
+        Ok(line)
+    }
+
+    /// Looks at the first byte, which no text and every MCAP file begins with.
+    fn look(&mut self) -> io::Result<()> {
+        let Source::Fresh(reader) = &mut self.source else { return Ok(()) };
+        let Some(mut reader) = reader.take() else { return Ok(()) };
+        let is_recorded = reader.fill_buf()?.first() == Some(&FIRST_BYTE);
+        self.source =
+            if is_recorded { Source::Recorded(Box::new(Replay::new(reader))) } else { Source::Text(reader) };
+        Ok(())
+    }
+}
+
+fn next_text(reader: &mut Box<dyn BufRead>) -> io::Result<Option<Line>> {
+    loop {
+        match read_line(reader)? {
+            Some(bytes) if bytes.trim_ascii().is_empty() => {}
+            Some(bytes) => {
+                let text = String::from_utf8_lossy(bytes.trim_ascii()).into_owned();
+                return Ok(Some(Line { text, now: None }));
+            }
+            None => return Ok(None),
+        }
+    }
+}
+
+fn read_line(reader: &mut Box<dyn BufRead>) -> io::Result<Option<Vec<u8>>> {
+    let mut bytes = Vec::new();
+    let limit = LONGEST_LINE as u64 + 2;
+    if reader.by_ref().take(limit).read_until(b'\n', &mut bytes)? == 0 {
+        return Ok(None);
+    }
+    if bytes.len() as u64 == limit && !bytes.ends_with(b"\n") {
+        reader.skip_until(b'\n')?;
+    }
+    Ok(Some(bytes))
+}

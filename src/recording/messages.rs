@@ -1,0 +1,142 @@
+//! Messages of ROS 2 that recordings have, with their definitions, and what stands for them in bytes (CDR \[1\]).
+//!
+//! - \[1\] OMG: DDS Interoperability Wire Protocol 2.5, 2022, section 10: octets 0 and 1 say the representation.
+
+use byteorder::{BigEndian, LittleEndian};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::mapek::{Event, Observation};
+
+/// The name of the type of diagnostics.
+pub(super) const DIAGNOSTICS: &str = "diagnostic_msgs/msg/DiagnosticArray";
+
+/// The name of the type of a text.
+pub(super) const TEXT: &str = "std_msgs/msg/String";
+
+/// The definition of [`Text`].
+pub(super) const TEXT_DEFINITION: &str = "string data\n";
+
+/// The definition of [`DiagnosticArray`] with those of its parts, as `ros2msg` has them.
+pub(super) const DIAGNOSTICS_DEFINITION: &str = "\
+std_msgs/Header header
+DiagnosticStatus[] status
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: diagnostic_msgs/DiagnosticStatus
+byte OK=0
+byte WARN=1
+byte ERROR=2
+byte STALE=3
+byte level
+string name
+string message
+string hardware_id
+KeyValue[] values
+================================================================================
+MSG: diagnostic_msgs/KeyValue
+string key
+string value
+";
+
+/// `std_msgs/msg/String`.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Text {
+    pub(super) data: String,
+}
+
+/// `builtin_interfaces/msg/Time`.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Time {
+    pub(super) sec: i32,
+    pub(super) nanosec: u32,
+}
+
+/// `std_msgs/msg/Header`.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Header {
+    pub(super) stamp: Time,
+    pub(super) frame_id: String,
+}
+
+/// `diagnostic_msgs/msg/KeyValue`.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct KeyValue {
+    pub(super) key: String,
+    pub(super) value: String,
+}
+
+/// `diagnostic_msgs/msg/DiagnosticStatus`.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct DiagnosticStatus {
+    pub(super) level: u8,
+    pub(super) name: String,
+    pub(super) message: String,
+    pub(super) hardware_id: String,
+    pub(super) values: Vec<KeyValue>,
+}
+
+/// `diagnostic_msgs/msg/DiagnosticArray`. As JSON it is a line of events.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct DiagnosticArray {
+    pub(super) header: Header,
+    pub(super) status: Vec<DiagnosticStatus>,
+}
+
+/// The levels of a status.
+const OK: u8 = 0;
+const ERROR: u8 = 2;
+
+impl DiagnosticArray {
+    /// What an observation says of attributes and components, in the words of MROS's monitors; none where it says nothing of
+    /// them. The time is in nanoseconds of the system's clock.
+    pub(super) fn of(observation: &Observation, time: u64) -> Option<Self> {
+        let status: Vec<_> = observation.events.iter().flatten().filter_map(DiagnosticStatus::of).collect();
+        let stamp = Time {
+            sec: i32::try_from(time / 1_000_000_000).unwrap_or(i32::MAX),
+            nanosec: (time % 1_000_000_000) as u32,
+        };
+        (!status.is_empty()).then(|| Self { header: Header { stamp, frame_id: String::new() }, status })
+    }
+}
+
+impl DiagnosticStatus {
+    fn of(event: &Event) -> Option<Self> {
+        let fields = event.to_json();
+        let (message, key, value) = match event {
+            Event::Measured { attribute, .. } => ("QA status", attribute, fields["value"].to_string()),
+            Event::Component { component, .. } => {
+                ("Component status", component, fields["status"].as_str().unwrap_or_default().to_owned())
+            }
+            _ => return None,
+        };
+        let level = if value == "FALSE" { ERROR } else { OK };
+        let values = vec![KeyValue { key: key.clone(), value }];
+        Some(Self { level, message: message.to_owned(), values, ..Self::default() })
+    }
+}
+
+/// A message in plain CDR with the low byte first.
+pub(super) fn to_cdr(message: &impl Serialize) -> Vec<u8> {
+    let mut bytes = vec![0, 1, 0, 0];
+    // Numbers, texts and lists of them always have bytes.
+    bytes.extend(cdr_encoding::to_vec::<_, LittleEndian>(message).unwrap_or_default());
+    bytes
+}
+
+/// The inverse of [`to_cdr`], with either byte first; why not, in words, where the bytes are none of that type.
+pub(super) fn from_cdr<M: DeserializeOwned>(bytes: &[u8]) -> Result<M, String> {
+    let read = match bytes {
+        [0, 0, _, _, content @ ..] => cdr_encoding::from_bytes::<M, BigEndian>(content),
+        [0, 1, _, _, content @ ..] => cdr_encoding::from_bytes::<M, LittleEndian>(content),
+        _ => return Err("it is not in plain CDR".to_owned()),
+    };
+    read.map(|(message, _)| message).map_err(|error| error.to_string())
+}

@@ -1,0 +1,209 @@
+//! An MCAP file to the lines of events in it, in the order in which they stand there.
+//!
+//! Of a recording of ours these are the lines that the loop has heard, at the times at which it has. Of any other file, as `ros2 bag
+//! record` makes it, they are its diagnostics, at the times since the first of them. A file that was not finished, as a
+//! crash leaves it, is read up to its end.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::io::{self, Read};
+use std::time::Duration;
+
+use mcap::McapError;
+use mcap::records::{MessageHeader, Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use crate::recording::messages::{self, DiagnosticArray, Text, from_cdr};
+use crate::recording::schema;
+use crate::recording::unpack::{LARGEST, records};
+use crate::recording::write::EventMessage;
+
+/// A line out of an MCAP file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Replayed {
+    /// The line.
+    pub text: String,
+    /// The time since the start of the mission.
+    pub now: Duration,
+}
+
+/// An MCAP file that is being read.
+pub struct Replay<R> {
+    source: R,
+    reader: LinearReader,
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, Kind>,
+    lines: VecDeque<Replayed>,
+    /// The time of the first message of diagnostics.
+    first: Option<u64>,
+    state: State,
+}
+
+impl<R> std::fmt::Debug for Replay<R> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_struct("Replay").field("state", &self.state).finish_non_exhaustive()
+    }
+}
+
+/// How far a file was read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Reading,
+    /// To its end.
+    Finished,
+    /// To where it breaks off.
+    Unfinished,
+}
+
+/// What stands on a channel that concerns us.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// What a loop has heard, as JSON.
+    Events,
+    /// The same as text in CDR.
+    EventTexts,
+    /// Diagnostics of ROS 2.
+    Diagnostics,
+}
+
+impl<R: Read> Replay<R> {
+    /// Reads from a source.
+    pub fn new(source: R) -> Self {
+        let options = LinearReaderOptions::default()
+            .with_skip_end_magic(true)
+            .with_emit_chunks(true)
+            .with_record_length_limit(LARGEST);
+        Self {
+            source,
+            reader: LinearReader::new_with_options(options),
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            lines: VecDeque::new(),
+            first: None,
+            state: State::Reading,
+        }
+    }
+
+    /// The next line; none at the end.
+    ///
+    /// # Errors
+    /// The source cannot be read, it is no MCAP file, or damaged, or nothing in it is for a loop.
+    pub fn next_line(&mut self) -> io::Result<Option<Replayed>> {
+        loop {
+            if let Some(line) = self.lines.pop_front() {
+                return Ok(Some(line));
+            }
+            if self.state != State::Reading {
+                return Ok(None);
+            }
+            self.read()?;
+        }
+    }
+
+    /// Whether the file breaks off, as a crash leaves it; known at its end.
+    pub fn is_unfinished(&self) -> bool {
+        self.state == State::Unfinished
+    }
+
+    /// Reads the next record.
+    fn read(&mut self) -> io::Result<()> {
+        let record = match self.reader.next_event() {
+            Some(Ok(LinearReadEvent::ReadRequest(need))) => {
+                let read = self.source.read(self.reader.insert(need))?;
+                self.reader.notify_read(read);
+                return Ok(());
+            }
+            Some(Ok(LinearReadEvent::Record { opcode, data })) => {
+                mcap::parse_record(opcode, data).map_err(damaged)?.into_owned()
+            }
+            None | Some(Err(McapError::UnexpectedEof)) => return self.end(State::Unfinished),
+            Some(Err(error)) => return Err(damaged(error)),
+        };
+        match record {
+            Record::DataEnd(_) => self.end(State::Finished),
+            Record::Chunk { header, data } => {
+                records(&header, &data)?.into_iter().try_for_each(|record| self.take(record))
+            }
+            other => self.take(other),
+        }
+    }
+
+    fn end(&mut self, state: State) -> io::Result<()> {
+        self.state = state;
+        if self.channels.is_empty() && state == State::Finished {
+            let text = format!("there is neither {} nor {} in it", schema::EVENTS, messages::DIAGNOSTICS);
+            return Err(io::Error::other(text));
+        }
+        Ok(())
+    }
+
+    /// Takes a record that is no chunk.
+    fn take(&mut self, record: Record<'static>) -> io::Result<()> {
+        match record {
+            Record::Schema { header, .. } => {
+                self.schemas.insert(header.id, header.name);
+            }
+            Record::Channel(channel) => {
+                let schema = self.schemas.get(&channel.schema_id).map_or("", String::as_str);
+                let kind = match (channel.topic.as_str(), schema, channel.message_encoding.as_str()) {
+                    (schema::EVENTS, schema::EVENT, "json") => Kind::Events,
+                    (schema::EVENTS, messages::TEXT, "cdr") => Kind::EventTexts,
+                    (_, messages::DIAGNOSTICS, "cdr") => Kind::Diagnostics,
+                    _ => return Ok(()),
+                };
+                self.channels.insert(channel.id, kind);
+            }
+            Record::Message { header, data } => self.message(&header, &data)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn message(&mut self, header: &MessageHeader, data: &[u8]) -> io::Result<()> {
+        let wrong = |what: &str, why: String| {
+            let text =
+                format!("message {} of channel {} is no {what}: {why}", header.sequence, header.channel_id);
+            io::Error::other(text)
+        };
+        let heard = |json: &str| -> io::Result<Replayed> {
+            let event: EventMessage =
+                serde_json::from_str(json).map_err(|error| wrong(schema::EVENT, error.to_string()))?;
+            let raw = event.event.map(|raw| raw.get().to_owned());
+            let text = raw.or(event.text.map(Into::into));
+            let text =
+                text.ok_or_else(|| wrong(schema::EVENT, "it has neither `event` nor `text`".to_owned()))?;
+            Ok(Replayed { text, now: Duration::from_nanos(event.nanoseconds) })
+        };
+        let line = match self.channels.get(&header.channel_id) {
+            None => return Ok(()),
+            Some(Kind::Events) => {
+                heard(std::str::from_utf8(data).map_err(|error| wrong(schema::EVENT, error.to_string()))?)?
+            }
+            Some(Kind::EventTexts) => {
+                heard(&from_cdr::<Text>(data).map_err(|why| wrong(messages::TEXT, why))?.data)?
+            }
+            // What stands there was heard by the same loop.
+            Some(Kind::Diagnostics) if self.channels.values().any(|kind| *kind != Kind::Diagnostics) => {
+                return Ok(());
+            }
+            Some(Kind::Diagnostics) => {
+                let array =
+                    from_cdr::<DiagnosticArray>(data).map_err(|why| wrong(messages::DIAGNOSTICS, why))?;
+                let first = *self.first.get_or_insert(header.log_time);
+                let now = Duration::from_nanos(header.log_time.saturating_sub(first));
+                // Texts and numbers are always data.
+                Replayed { text: serde_json::to_string(&array).unwrap_or_default(), now }
+            }
+        };
+        self.lines.push_back(line);
+        Ok(())
+    }
+}
+
+/// What the library says of a file.
+fn damaged(error: McapError) -> io::Error {
+    match error {
+        McapError::Io(error) => error,
+        McapError::BadMagic => io::Error::other("it is no MCAP file"),
+        other => io::Error::other(format!("it is damaged: {other}")),
+    }
+}

@@ -1,0 +1,113 @@
+//! The JSON schemas of the topics of a recording, and which answer belongs to which topic.
+
+use serde_json::{Value, json};
+
+/// The topic of diagnostics.
+pub(super) const DIAGNOSTICS: &str = "/diagnostics";
+
+/// The topic of the lines that were heard.
+pub(super) const EVENTS: &str = "/metaplan/events";
+
+/// The name of the schema of [`EVENTS`].
+pub(super) const EVENT: &str = "metaplan.Event";
+
+/// The name of the schema of the topics of [`ANSWERS`].
+pub(super) const ANSWER: &str = "metaplan.Answer";
+
+/// The topics of answers with the kinds that belong to each; what is not named belongs to the last.
+pub(super) const ANSWERS: [(&str, &[&str]); 4] = [
+    ("/metaplan/inferences", &["inferred", "contradicted", "unconcluded"]),
+    ("/metaplan/plans", &["plan_requested", "planning", "plan_found", "plan_kept", "plan_none"]),
+    (
+        "/metaplan/effects",
+        &[
+            "reconfigure",
+            "request_action",
+            "cancel_action",
+            "suspend_action",
+            "resume_action",
+            "goal_reached",
+        ],
+    ),
+    ("/metaplan/loop", &[]),
+];
+
+/// Where answers of a kind belong: an index of [`ANSWERS`].
+pub(super) fn topic(kind: &str) -> usize {
+    ANSWERS.iter().position(|(_, kinds)| kinds.contains(&kind)).unwrap_or(ANSWERS.len() - 1)
+}
+
+/// The schema of what was heard.
+pub(super) fn event() -> Value {
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": EVENT,
+        "description": "A line that the loop has heard",
+        "type": "object",
+        "properties": {
+            "line": {"type": "integer", "description": "number of the line, from 1"},
+            "nanoseconds": {"type": "integer", "description": "time since the start of the mission, as the loop counts"},
+            "event": {
+                "type": "object",
+                "description": "the line as it was, in the format metaplan-events/1",
+                "properties": {
+                    "event": {"type": "string"},
+                    "seq": {"type": "integer"},
+                    "time": {"type": "number", "description": "seconds since the start of the mission, as the sender counts"}
+                }
+            },
+            "text": {"type": "string", "description": "the line as it was, where it is no JSON object"}
+        },
+        "required": ["line", "nanoseconds"]
+    })
+}
+
+/// The schema of answers.
+pub(super) fn answer() -> Value {
+    let texts = json!({"type": "array", "items": {"type": "string"}});
+    let step = json!({
+        "type": "object",
+        "properties": {
+            "action": {"type": "string"},
+            "arguments": texts,
+            "configuration": {"type": "object", "additionalProperties": {"type": "string"}},
+            "duration": {"type": "number"},
+            "cost": {"type": "number"}
+        }
+    });
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": ANSWER,
+        "description": "An answer of the loop, in the format metaplan-events/1",
+        "type": "object",
+        "properties": {
+            "answer": {"type": "string", "description": "its kind"},
+            "line": {"type": "integer", "description": "number of the line that it answers; 0 before the first"},
+            "designs": {"type": "array", "items": {"type": "object", "properties": {
+                "design": {"type": "string"}, "available": {"type": "boolean"}, "because": texts
+            }}},
+            "objectives": {"type": "array", "items": {"type": "object", "properties": {
+                "objective": {"type": "string"}, "statuses": texts, "because": texts
+            }}},
+            "cost": {"type": ["number", "null"], "description": "what the steps of a plan, or a step, add to the metric"},
+            "lower_bound": {"type": ["number", "null"], "description": "no plan adds less"},
+            "optimal": {"type": "boolean"},
+            "steps": {"type": "array", "items": step},
+            "status": {"type": "string"},
+            "effect": {"type": "integer", "description": "number of an effect"},
+            "action": {"type": "integer", "description": "number of the action that an effect is about"},
+            "name": {"type": "string", "description": "name of a requested action"},
+            "arguments": texts,
+            "configuration": {"type": "object", "additionalProperties": {"type": "string"}},
+            "duration": {"type": "number"},
+            "function": {"type": "string"},
+            "from": {"type": ["string", "null"]},
+            "to": {"type": "string"},
+            "seconds": {"type": "integer"},
+            "microseconds": {"type": "integer"},
+            "code": {"type": ["string", "null"]},
+            "message": {"type": ["string", "null"]}
+        },
+        "required": ["answer"]
+    })
+}
