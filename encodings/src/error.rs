@@ -66,6 +66,8 @@ pub enum Error {
     Overflow {
         /// The quantity.
         what: String,
+        /// The action or the metric, where it is one that is too much.
+        place: Option<Place>,
     },
     /// A limit was reached before the task was ground.
     #[error("a limit was reached while grounding")]
@@ -82,10 +84,17 @@ impl From<Interrupted> for Error {
 }
 
 impl Error {
-    /// The same error, if numbers are too large, with the place where they are.
-    pub(crate) fn within(self, place: &str) -> Self {
+    /// That numbers do not fit, wherever they stand.
+    pub(crate) fn overflow(what: &str) -> Self {
+        Self::Overflow { what: what.to_owned(), place: None }
+    }
+
+    /// The same error, if numbers are too large, with where they are.
+    pub(crate) fn within(self, name: &str, place: Option<Place>) -> Self {
         match self {
-            Self::Overflow { what } => Self::Overflow { what: format!("{what} ({place})") },
+            Self::Overflow { what, place: known } => {
+                Self::Overflow { what: format!("{what} ({name})"), place: known.or(place) }
+            }
             other => other,
         }
     }
@@ -114,7 +123,8 @@ impl Error {
             | Self::NoValue { place, .. }
             | Self::Unknown { place, .. }
             | Self::NonLinear { place } => Some(*place),
-            Self::Overflow { .. } | Self::Rules(_) | Self::Interrupted => None,
+            Self::Overflow { place, .. } => *place,
+            Self::Rules(_) | Self::Interrupted => None,
         }
     }
 }

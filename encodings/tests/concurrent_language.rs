@@ -112,3 +112,21 @@ fn durations_within_bounds() {
     check(&bounded("(and (>= ?duration 4) (<= ?duration 4))"), "", "(g)", (Status::Optimal, Some("4")));
     check(&bounded("(and (>= ?duration 4) (<= ?duration 6))"), "", "(g)", (Status::Feasible, Some("4")));
 }
+
+#[test]
+fn numbers_that_no_scale_makes_integers_are_told_with_their_action() {
+    let domain = "(define (domain d) (:functions (fuel))
+      (:action halve :parameters () :effect (scale-up (fuel) 0.5)))";
+    let problem = "(define (problem p) (:domain d) (:init (= (fuel) 4)) (:goal (<= (fuel) 1)))";
+    let (domain_read, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let separation = BigRational::new(BigInt::from(1), BigInt::from(1000));
+    let errors = ground_concurrent(&domain_read, &problem, &GroundConfig::default(), &separation)
+        .expect_err("no scale makes an integer of it");
+    let [error] = &errors[..] else { panic!("{errors:?}") };
+    assert_eq!(error.code(), "E304");
+    assert!(error.to_string().contains("`halve`"), "{error}");
+    let place = error.place().expect("a place");
+    assert_eq!(place.file, metaplan_encodings::File::Domain);
+    assert!(domain[place.span.start as usize..place.span.end as usize].contains("halve"), "{place:?}");
+}

@@ -159,12 +159,16 @@ impl<'a> Builder<'a> {
             }
             let one = Rational::from_integer(1);
             let divisor = divisors.get(&start).unwrap_or(&one);
+            let schema = &self.split.schemas[key.0];
+            let placed = |error: Error| error.within(&format!("`{}`", schema.name), Some(schema.place));
             let factor = |timer| unit.factor(task, timer, divisor).map(|factor| (timer, factor));
-            let timer = timer(task, start).map(factor).transpose()?;
+            let timer = timer(task, start).map(factor).transpose().map_err(placed)?;
             // One that the state decides is looked at when it starts.
-            let duration = if timer.is_some() { self.separation } else { unit.duration(task, start)? };
+            let duration = match timer {
+                Some(_) => self.separation,
+                None => unit.duration(task, start).map_err(placed)?,
+            };
             if duration < self.separation {
-                let schema = &self.split.schemas[key.0];
                 let construct =
                     format!("an instance of `{}` that takes less time than the separation", schema.name);
                 let instead = "a smaller `--epsilon`".into();

@@ -23,7 +23,7 @@ pub(super) struct Measure {
 impl Measure {
     /// For costs by an objective, and times that are `time_scale` times those of the files.
     pub(super) fn new(objective: &Objective, weight: Rational, time_scale: Int) -> Result<Self, Error> {
-        let overflow = || Error::Overflow { what: "the metric".into() };
+        let overflow = || Error::overflow("the metric");
         let by_time = weight / Rational::from_integer(time_scale);
         let common = by_time.denominator().and_then(|own| checked_lcm(own, objective.scale));
         let scale = common.filter(|scale| *scale < LIMIT).ok_or_else(overflow)?;

@@ -64,7 +64,7 @@ pub fn ground_concurrent(
     config: &GroundConfig,
     separation: &BigRational,
 ) -> Result<Concurrent, Vec<Error>> {
-    let overflow = || vec![Error::Overflow { what: "the separation".into() }];
+    let overflow = || vec![Error::overflow("the separation")];
     if !separation.is_positive() {
         return Err(overflow());
     }

@@ -42,7 +42,7 @@ pub(super) fn condition<N: TaskNumber>(
         // A comparison may be scaled at will, so fractional factors do no harm here.
         let mut denominators = linear.coefficients.iter().map(|(_, factor)| factor.denominator());
         let common = denominators.try_fold(1, |common, next| checked_lcm(common, next?));
-        let common = common.ok_or_else(|| Error::Overflow { what: "a factor of a numeric fluent".into() })?;
+        let common = common.ok_or_else(|| Error::overflow("a factor of a numeric fluent"))?;
         linear.scale(&Rational::from_integer(common));
         let mut integers = numbers.linear(&linear)?;
         if *strict {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::error::Error;
+use crate::error::{Error, Place};
 use crate::lifted::Rational;
 use crate::number::{Int, LIMIT, checked_lcm};
 use crate::task::number::TaskNumber;
@@ -19,7 +19,7 @@ pub(super) struct Denominator {
     /// None if it is too large.
     common: Option<Int>,
     /// Where the number was that made it so.
-    culprit: Option<String>,
+    culprit: Option<(String, Option<Place>)>,
     /// Tables that have been looked at.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
@@ -50,7 +50,7 @@ impl Denominator {
     }
 
     /// Notes where the last number was, if it made the factor too large.
-    pub(super) fn note(&mut self, place: impl FnOnce() -> String) {
+    pub(super) fn note(&mut self, place: impl FnOnce() -> (String, Option<Place>)) {
         if self.common.is_none() && self.culprit.is_none() {
             self.culprit = Some(place());
         }
@@ -63,8 +63,8 @@ impl Denominator {
     pub(super) fn integers<N: TaskNumber>(self) -> Result<Integers<N>, Error> {
         let common = if N::SCALED { self.common } else { Some(1) };
         let overflow = || {
-            let error = Error::Overflow { what: self.what.into() };
-            self.culprit.iter().fold(error, |error, place| error.within(place))
+            let error = Error::overflow(self.what);
+            self.culprit.iter().fold(error, |error, (name, place)| error.within(name, *place))
         };
         let scale = common.ok_or_else(overflow)?;
         Ok(Integers { what: self.what, scale, tables: TableMap::new() })
@@ -87,12 +87,12 @@ impl<N: TaskNumber> Integers<N> {
     pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<N>, Error> {
         let (scale, what) = (self.scale, self.what);
         let scaled = self.tables.map(quantity, &|number| integer(number, scale, what))?;
-        if N::fits(&scaled) { Ok(scaled) } else { Err(Error::Overflow { what: what.into() }) }
+        if N::fits(&scaled) { Ok(scaled) } else { Err(Error::overflow(what)) }
     }
 }
 
 fn integer<N: TaskNumber>(number: &Rational, scale: Int, what: &str) -> Result<N, Error> {
-    N::from_rational(number, scale).ok_or_else(|| Error::Overflow { what: what.into() })
+    N::from_rational(number, scale).ok_or_else(|| Error::overflow(what))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use std::hash::BuildHasher;
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use smallvec::SmallVec;
 
-use crate::error::Error;
+use crate::error::{Error, Place};
 use crate::ground::config::Generality;
 use crate::ground::finish::conditions::{axioms, condition, contradictory};
 use crate::ground::finish::integers::{Denominator, Integers};
@@ -55,9 +55,10 @@ pub(crate) fn finish<N: TaskNumber>(
     let mut operators = Distinct::with_capacity(task.operators.len());
     for ground in limits.watch(std::mem::take(&mut task.operators)) {
         let ground = ground?;
-        let name = schema_name(lifted, &ground);
+        let (name, place) = schema_name(lifted, &ground);
         let kinds = (&mut numbers, &mut costs[..], &mut durations);
-        let finished = operator(ground, &atoms, &mut slots, kinds).map_err(|error| error.within(&name))?;
+        let finished =
+            operator(ground, &atoms, &mut slots, kinds).map_err(|error| error.within(&name, place))?;
         if let Some(operator) = finished {
             operators.insert(operator);
         }
@@ -129,10 +130,11 @@ fn operator<N: TaskNumber>(
     }))
 }
 
-/// The action of an operator, for errors.
-fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> String {
+/// The action of an operator with its place, for errors.
+fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> (String, Option<Place>) {
     let schema = lifted.schemas.get(operator.schema as usize);
-    schema.map_or_else(|| "a wait".to_owned(), |schema| format!("`{}`", schema.name))
+    let named = schema.map(|schema| (format!("`{}`", schema.name), Some(schema.place)));
+    named.unwrap_or_else(|| ("a wait".to_owned(), None))
 }
 
 /// Operators without repetitions, in order.
@@ -168,7 +170,7 @@ fn objectives<N: TaskNumber>(
     for (objective, position) in task.objectives.iter().zip(0..) {
         let mut denominator = Denominator::new("the metric");
         denominator.number(&objective.offset);
-        denominator.note(|| "its value at the start".to_owned());
+        denominator.note(|| ("its value at the start".to_owned(), None));
         for operator in &task.operators {
             denominator.quantity(&operator.costs[position]);
             denominator.note(|| schema_name(task.world.lifted, operator));

@@ -46,10 +46,10 @@ impl<N: TaskNumber> Numbers<N> {
         let mut used: Vec<_> = used.into_iter().collect();
         used.sort_unstable();
         let initial: Vec<_> = used.iter().map(|variable| task.world.initial_value(*variable)).collect();
-        denominator.note(|| "those in conditions and effects".to_owned());
+        denominator.note(|| ("those in conditions and effects".to_owned(), None));
         for (number, variable) in initial.iter().zip(&used) {
             denominator.number(number);
-            denominator.note(|| task.world.numeric_name(*variable));
+            denominator.note(|| (task.world.numeric_name(*variable), None));
         }
         if let Some(precision) = generality.numbers {
             denominator.number(&Rational::new(1, precision));
@@ -68,7 +68,7 @@ impl<N: TaskNumber> Numbers<N> {
     }
 
     pub(super) fn linear(&mut self, linear: &Linear<Rational>) -> Result<Linear<N>, Error> {
-        let overflow = || Error::Overflow { what: "a factor of a numeric fluent".into() };
+        let overflow = || Error::overflow("a factor of a numeric fluent");
         let coefficients = linear.coefficients.iter().map(|(variable, factor)| {
             Ok((self.ids[variable], N::from_rational(factor, 1).ok_or_else(overflow)?))
         });
