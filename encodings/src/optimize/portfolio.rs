@@ -4,7 +4,7 @@
 //! before. Work is counted in what was looked at, and not in time, so that the same task has the same answer. What one of
 //! them finds limits the others.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::bounds::Bounds;
 use crate::number::Int;
@@ -99,7 +99,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         for round in 0..u32::MAX {
             let work = unit.saturating_mul(1_usize.checked_shl(round.min(20)).unwrap_or(1));
             stored = stored.saturating_add(work);
-            let turns = [Self::satisfice, Self::search_to, Self::ask];
+            let turns: [fn(&mut Self, usize, usize) -> Turn; 3] =
+                [Self::satisfice, |own, _, stored| own.search_exactly(stored), Self::ask];
             for turn in turns {
                 if self.run.config.limits.reached() {
                     return Ending::Over;
@@ -114,10 +115,6 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             }
         }
         Ending::Over
-    }
-
-    fn search_to(&mut self, _: usize, stored: usize) -> Turn {
-        self.search_exactly(stored)
     }
 
     fn search_exactly(&mut self, stored: usize) -> Turn {
@@ -245,7 +242,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let statistics = &mut self.run.statistics;
         let sat = statistics.encode.saturating_add(statistics.solve);
         let search = started.elapsed().saturating_sub(sat);
-        statistics.search = statistics.search.saturating_add(search).max(Duration::ZERO);
+        statistics.search = statistics.search.saturating_add(search);
         if let Some(satisficer) = &self.satisficer {
             statistics.restarts = satisficer.restarts();
         }
