@@ -8,6 +8,7 @@
 
 mod advance;
 mod concurrent;
+mod course;
 mod derive;
 mod effects;
 mod evaluate;
@@ -22,17 +23,18 @@ mod running;
 mod sequential;
 mod solve;
 mod step;
+mod targets;
 mod trajectory;
 mod verdict;
 mod world;
 
 use num_rational::BigRational;
 use num_traits::Zero;
-use rustc_hash::FxHashSet;
 
-use crate::ast::{Action, ActionBody, Direction, Domain, Effect, Name, Problem};
+use crate::ast::{Direction, Domain, Name, Problem};
 
 pub use advance::{Advance, ValueChange, advance, advance_each, metric_after};
+pub use course::{Course, CourseMoment, NumberBound, course};
 pub use options::Options;
 pub use plan::{PlanStep, PlanText};
 pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
@@ -41,6 +43,7 @@ use evaluate::{Bindings, Evaluator};
 use execute::Execution;
 use explain::unmet;
 use step::Step;
+use targets::changeable_values;
 use world::{State, World};
 
 /// How many ways to read a plan are tried where schemas share a name.
@@ -126,45 +129,4 @@ fn metric_value(
     let counted = world.counted(violated, state);
     let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, &counted) };
     evaluator.value(&metric.expression, &Bindings::default()).ok()
-}
-
-/// The values of the functions that some action can change, sorted by name.
-fn changeable_values(world: &World<'_>, state: &State) -> Vec<(String, BigRational)> {
-    let mut targets = FxHashSet::default();
-    for action in &world.domain.actions {
-        action_targets(action, &mut targets);
-    }
-    let symbols: FxHashSet<_> = targets.into_iter().map(|name| world.symbol(name)).collect();
-    let changeable = state.values.iter().filter(|((symbol, _), _)| symbols.contains(symbol));
-    let mut values: Vec<_> = changeable
-        .map(|((symbol, arguments), value)| (world.show(*symbol, arguments), value.clone()))
-        .collect();
-    values.sort();
-    values
-}
-
-fn action_targets<'p>(action: &'p Action, targets: &mut FxHashSet<&'p Name>) {
-    match &action.body {
-        ActionBody::Instantaneous { effect, .. } => effect_targets(effect, targets),
-        ActionBody::Durative { effects, .. } => {
-            for (_, effect) in effects {
-                effect_targets(effect, targets);
-            }
-        }
-    }
-}
-
-fn effect_targets<'p>(effect: &'p Effect, targets: &mut FxHashSet<&'p Name>) {
-    match effect {
-        Effect::And(parts) => {
-            for part in parts {
-                effect_targets(part, targets);
-            }
-        }
-        Effect::ForAll(_, body) | Effect::When(_, body) => effect_targets(body, targets),
-        Effect::Assign(_, target, ..) => {
-            targets.insert(&target.predicate.name);
-        }
-        Effect::Add(_) | Effect::Delete(_) => {}
-    }
 }
