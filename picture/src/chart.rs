@@ -1,0 +1,120 @@
+//! Numbers over a plan, with what conditions demand of them; and a search: the cost of its best plan, and the lower bound.
+
+use maud::{Markup, html};
+
+use crate::data::{Curve, Plan, Progress};
+use crate::frame::{Frame, LEFT, RIGHT};
+use crate::scale::{Scale, compact, fit, number, px, range};
+use crate::svg::Picture;
+
+const HEIGHT: f64 = 110.0;
+const TOP: f64 = 10.0;
+
+/// Draws one number over a plan.
+pub(crate) fn curve(plan: &Plan, curve: &Curve, room: f64) -> Picture {
+    let frame = Frame::of(plan, room);
+    let values = curve.points.iter().map(|(_, value)| *value);
+    let scale = vertical(values.chain(curve.bounds.iter().map(|bound| bound.value)));
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for (at, value) in &curve.points {
+        let (x, y) = (frame.scale.at(*at), scale.at(*value));
+        if let Some((_, before)) = points.last().copied() {
+            points.push((x, before));
+        }
+        points.push((x, y));
+    }
+    if let Some((_, last)) = points.last().copied() {
+        points.push((frame.scale.at(frame.end), last));
+    }
+    let corners: Vec<String> = points.iter().map(|(x, y)| format!("{} {}", px(*x), px(*y))).collect();
+    let text = format!("M{}", corners.join("L"));
+    let (first, last) = (curve.points.first(), curve.points.last());
+    let ends = first.zip(last).map(|((_, first), (_, last))| (number(*first), number(*last)));
+    let (first, last) = ends.unwrap_or_default();
+    let title = format!("{}: from {first} to {last}", curve.name);
+    let description =
+        format!("{} values, {} bounds that conditions set", curve.points.len(), curve.bounds.len());
+    let body = html! {
+        (frame.axis(TOP, TOP + HEIGHT))
+        (values_axis(&scale, frame.width))
+        text class="label" x=(px(LEFT - 58.0)) y=(px(TOP + HEIGHT / 2.0 + 4.0)) text-anchor="end" {
+            title { (curve.name) }
+            (fit(&curve.name, LEFT - 60.0))
+        }
+        @for bound in &curve.bounds {
+            @let (from, to, y) = (frame.scale.at(bound.from), frame.scale.at(bound.to), scale.at(bound.value));
+            g class="bound" {
+                title { (bound.text) }
+                line x1=(px(from)) x2=(px(to.max(from + 3.0))) y1=(px(y)) y2=(px(y)) {}
+            }
+        }
+        path class="curve" data-curve=(curve.name) d=(text) {}
+        @for (at, value) in &curve.points {
+            circle class="point" cx=(px(frame.scale.at(*at))) cy=(px(scale.at(*value))) r="2.5" {
+                title { (curve.name) " = " (number(*value)) " at " (number(*at)) }
+            }
+        }
+    };
+    Picture { width: frame.width, height: TOP + HEIGHT + 24.0, title, description, body }
+}
+
+/// Draws how a search went, by its messages: times differ from run to run, and what was found does not.
+pub(crate) fn search(search: &[Progress], room: f64) -> Picture {
+    let width = LEFT + room + RIGHT;
+    let costs = search.iter().filter_map(|moment| moment.cost);
+    let scale = vertical(costs.chain(search.iter().map(|moment| moment.lower_bound)));
+    let last = search.len().saturating_sub(1).max(1);
+    let along = Scale::new((0.0, last as f64), (LEFT, LEFT + room));
+    let line = |value: &dyn Fn(&Progress) -> Option<f64>| {
+        let mut text = String::new();
+        let mut before = None;
+        for (index, moment) in search.iter().enumerate() {
+            let Some(value) = value(moment) else { continue };
+            let (x, y) = (px(along.at(index as f64)), px(scale.at(value)));
+            text += &before.map_or_else(|| format!("M{x} {y}"), |before| format!("L{x} {before}L{x} {y}"));
+            before = Some(y);
+        }
+        text
+    };
+    let title = format!("how the search went, in {} messages", search.len());
+    let description =
+        "The cost of the best plan falls, the lower bound rises; where they meet, the plan is optimal."
+            .to_owned();
+    let body = html! {
+        (values_axis(&scale, width))
+        path class="cost" d=(line(&|moment| moment.cost)) {}
+        path class="least" d=(line(&|moment| Some(moment.lower_bound))) {}
+        @for (index, moment) in search.iter().enumerate() {
+            @let x = px(along.at(index as f64));
+            g data-progress=(index + 1) {
+                title { (moment.text) }
+                circle class="least" cx=(x) cy=(px(scale.at(moment.lower_bound))) r="3" {}
+                @if let Some(cost) = moment.cost {
+                    circle class="cost" cx=(x) cy=(px(scale.at(cost))) r="3" {}
+                }
+            }
+        }
+        text class="label cost" x=(px(LEFT)) y=(px(TOP + HEIGHT + 19.0)) { "● cost of the best plan" }
+        text class="label least" x=(px(LEFT + 240.0)) y=(px(TOP + HEIGHT + 19.0)) { "● lower bound" }
+    };
+    Picture { width, height: TOP + HEIGHT + 26.0, title, description, body }
+}
+
+/// A scale for these values, larger ones higher.
+fn vertical(values: impl Iterator<Item = f64>) -> Scale {
+    let (low, high) = range(values);
+    let margin = (high - low) * 0.05;
+    Scale::new((low - margin, high + margin), (TOP + HEIGHT, TOP))
+}
+
+fn values_axis(scale: &Scale, width: f64) -> Markup {
+    html! {
+        g class="axis" {
+            @for tick in scale.ticks(4) {
+                @let y = scale.at(tick);
+                line class="grid" x1=(px(LEFT)) x2=(px(width - RIGHT)) y1=(px(y)) y2=(px(y)) {}
+                text x=(px(LEFT - 6.0)) y=(px(y + 4.0)) text-anchor="end" { (compact(tick)) }
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Places without coordinates to coordinates, so that places lie as far apart as the shortest way between them is long.
+//!
+//! Stress majorization (E. Gansner, Y. Koren, S. North: Graph drawing by stress majorization, GD 2004) from a start that depends on
+//! nothing but the ways: distances from two places that lie far apart, and from a third one.
+
+use std::collections::VecDeque;
+
+/// Distances are as many as this at most; a larger map keeps the start.
+const DISTANCES: usize = 4_000_000;
+/// Updates of a place by another one.
+const WORK: usize = 30_000_000;
+/// Rounds at most; hardly anything moves any more.
+const ROUNDS: usize = 300;
+
+/// Coordinates for so many places, with an edge of about 1.
+pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> {
+    let mut neighbours = vec![Vec::new(); places];
+    for &(one, other) in ways.iter().filter(|(one, other)| one != other && *one.max(other) < places) {
+        neighbours[one].push(other);
+        neighbours[other].push(one);
+    }
+    let mut points = vec![(0.0, 0.0); places];
+    let mut right = 0.0_f64;
+    for component in components(&neighbours) {
+        let own = placed(&component, &neighbours);
+        let (low, high) =
+            own.iter().fold((f64::MAX, f64::MIN), |(low, high), (x, _)| (low.min(*x), high.max(*x)));
+        for (place, (x, y)) in component.iter().zip(&own) {
+            points[*place] = (right + x - low, *y);
+        }
+        right += high - low + 1.0;
+    }
+    points
+}
+
+/// Places that are joined, each group in its order.
+fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
+    let mut seen = vec![false; neighbours.len()];
+    let mut groups = Vec::new();
+    for first in 0..neighbours.len() {
+        if !seen[first] {
+            let reached = distances(first, neighbours);
+            let group: Vec<usize> = (0..neighbours.len()).filter(|place| reached[*place].is_some()).collect();
+            for place in &group {
+                seen[*place] = true;
+            }
+            groups.push(group);
+        }
+    }
+    groups
+}
+
+/// How many ways it takes from a place to each other one.
+fn distances(from: usize, neighbours: &[Vec<usize>]) -> Vec<Option<u32>> {
+    let mut distances = vec![None; neighbours.len()];
+    let mut queue = VecDeque::from([(from, 0)]);
+    distances[from] = Some(0);
+    while let Some((place, distance)) = queue.pop_front() {
+        for &next in &neighbours[place] {
+            if distances[next].is_none() {
+                distances[next] = Some(distance + 1);
+                queue.push_back((next, distance + 1));
+            }
+        }
+    }
+    distances
+}
+
+/// Coordinates for places that are joined.
+fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
+    let of = |from: usize| -> Vec<f64> {
+        let all = distances(from, neighbours);
+        group.iter().map(|place| f64::from(all[*place].unwrap_or(0))).collect()
+    };
+    let farthest = |distances: &[f64]| {
+        let order = (0..distances.len())
+            .max_by(|left, right| distances[*left].total_cmp(&distances[*right]).then(right.cmp(left)));
+        order.unwrap_or(0)
+    };
+    let first = farthest(&of(group[0]));
+    let from_first = of(group[first]);
+    let from_last = of(group[farthest(&from_first)]);
+    let least: Vec<f64> = from_first.iter().zip(&from_last).map(|(one, other)| one.min(*other)).collect();
+    let from_side = of(group[farthest(&least)]);
+    let start = (0..group.len()).map(|place| {
+        // What would lie at one point is pulled apart, by a little.
+        let little = 0.05 * (place as f64 * 0.754_877_666).fract();
+        (
+            from_first[place] - from_last[place] + little,
+            from_side[place] + 0.05 * (place as f64 * 0.569_840_291).fract(),
+        )
+    });
+    let mut points: Vec<(f64, f64)> = start.collect();
+    let count = group.len();
+    if count * count <= DISTANCES {
+        let all: Vec<Vec<f64>> = group.iter().map(|place| of(*place)).collect();
+        for _ in 0..ROUNDS.min(WORK / (count * count).max(1)) {
+            points = majorized(&points, &all);
+        }
+    }
+    turned(&points)
+}
+
+/// One round: each place to the mean of where the others want it, near ones more than far ones.
+fn majorized(points: &[(f64, f64)], distances: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    let place = |own: usize| {
+        let (mut x, mut y, mut weights) = (0.0, 0.0, 0.0);
+        for (other, distance) in distances[own].iter().enumerate().filter(|(other, _)| *other != own) {
+            let (dx, dy) = (points[own].0 - points[other].0, points[own].1 - points[other].1);
+            let (weight, pull) = (1.0 / (distance * distance), distance / dx.hypot(dy).max(1e-6));
+            x += weight * (points[other].0 + dx * pull);
+            y += weight * (points[other].1 + dy * pull);
+            weights += weight;
+        }
+        if weights > 0.0 { (x / weights, y / weights) } else { points[own] }
+    };
+    (0..points.len()).map(place).collect()
+}
+
+/// The same places with the longest extent from left to right, and the first place at the left and above.
+fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let count = points.len() as f64;
+    let sum = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0, y + point.1));
+    let (x, y) = (sum.0 / count, sum.1 / count);
+    let moments = points.iter().fold((0.0, 0.0, 0.0), |(xx, xy, yy), point| {
+        let (dx, dy) = (point.0 - x, point.1 - y);
+        (xx + dx * dx, xy + dx * dy, yy + dy * dy)
+    });
+    // Of what extends as far one way as the other, as a square does, every direction is as good.
+    let angle = 0.5 * (2.0 * moments.1).atan2(moments.0 - moments.2);
+    let (sin, cos) = angle.sin_cos();
+    let mut turned: Vec<(f64, f64)> = points
+        .iter()
+        .map(|point| {
+            let (dx, dy) = (point.0 - x, point.1 - y);
+            (dx * cos + dy * sin, dy * cos - dx * sin)
+        })
+        .collect();
+    let (flip_x, flip_y) = (turned[0].0 > 1e-9, turned[0].1 < -1e-9);
+    for point in &mut turned {
+        *point = (if flip_x { -point.0 } else { point.0 }, if flip_y { -point.1 } else { point.1 });
+    }
+    turned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::layout;
+
+    /// The ways of a grid.
+    fn grid(side: usize) -> Vec<(usize, usize)> {
+        let at = |row: usize, column: usize| row * side + column;
+        let rows =
+            (0..side).flat_map(|row| (1..side).map(move |column| (at(row, column - 1), at(row, column))));
+        let columns =
+            (1..side).flat_map(|row| (0..side).map(move |column| (at(row - 1, column), at(row, column))));
+        rows.chain(columns).collect()
+    }
+
+    #[test]
+    fn neighbours_lie_near_and_others_far() {
+        for side in [2, 3, 5] {
+            let points = layout(side * side, &grid(side));
+            let between = |one: usize, other: usize| {
+                let (one, other): ((f64, f64), (f64, f64)) = (points[one], points[other]);
+                (one.0 - other.0).hypot(one.1 - other.1)
+            };
+            for (one, other) in grid(side) {
+                assert!((0.5..1.6).contains(&between(one, other)), "{side}: {one} {other} {points:?}");
+            }
+            for one in 0..side * side {
+                for other in 0..one {
+                    assert!(between(one, other) > 0.5, "{side}: {one} {other} {points:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn places_without_ways_are_placed_too() {
+        let points = layout(3, &[]);
+        assert_eq!(points.len(), 3);
+        assert!(points[0].0 < points[1].0 && points[1].0 < points[2].0);
+        assert!(layout(0, &[]).is_empty());
+    }
+}

@@ -1,0 +1,140 @@
+//! A page about what a loop did: what it heard, concluded, planned and asked for, on one axis of time.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use crate::data::{Happening, Kind, Log};
+use crate::frame::{LEFT, RIGHT};
+use crate::page::{page, reasons, shown, table};
+use crate::scale::{Scale, number, px, width};
+use crate::svg::Picture;
+
+/// How wide the axis is, in pixels.
+const ACROSS: f64 = 960.0;
+/// The height of a lane.
+const LANE: f64 = 24.0;
+const TOP: f64 = 6.0;
+/// What happens within so many pixels is one mark.
+const MARK: f64 = 4.0;
+/// A mark names so many of its happenings.
+const NAMED: usize = 5;
+/// So many happenings stand in the list; a page with all of a long journal would not open.
+const LISTED: usize = 1000;
+
+impl Log {
+    /// The page as HTML.
+    pub fn html(&self) -> String {
+        let marked = self.happenings.iter().filter(|own| own.kind != Kind::Event).count();
+        let body = html! {
+            p class="verdict" { (self.verdict) }
+            ul { @for part in &self.parts { li { (part) } } }
+            @for message in &self.messages { p class="bad" { (message) } }
+            h2 { "What happened" }
+            (shown(&self.picture(), "log"))
+            p class="dim" { "A mark may stand for several happenings that lie close together; the list has each of them." }
+            h2 { "One after another" }
+            @let listed: Vec<&Happening> = self.listed();
+            @if listed.len() < self.happenings.len() {
+                p class="dim" {
+                    "The journal has " (self.happenings.len()) " happenings, " (marked) " of them more than a report of the robot. Here are "
+                    (listed.len()) ": the first, and of these what the loop concluded, planned and did before what it only heard."
+                }
+            }
+            (list(&listed))
+        };
+        page(&self.name, "What a loop heard, concluded, planned and asked for.", &body)
+    }
+
+    /// The picture of the page as a file.
+    pub fn svg(&self) -> String {
+        self.picture().file()
+    }
+
+    /// What stands in the list, in the order of time.
+    fn listed(&self) -> Vec<&Happening> {
+        if self.happenings.len() <= LISTED {
+            return self.happenings.iter().collect();
+        }
+        let mut chosen: Vec<usize> = (0..self.happenings.len()).collect();
+        chosen.sort_by_key(|index| (self.happenings[*index].kind == Kind::Event, *index));
+        chosen.truncate(LISTED);
+        chosen.sort_unstable();
+        chosen.into_iter().map(|index| &self.happenings[index]).collect()
+    }
+
+    fn picture(&self) -> Picture {
+        let last = self.happenings.last().map_or(0.0, |own| own.time);
+        let scale = Scale::new((0.0, last), (LEFT, LEFT + ACROSS));
+        let lanes = Kind::ALL.map(|kind| (kind, self.marks(kind, &scale)));
+        let bottom = TOP + LANE * lanes.len() as f64;
+        let ticks = scale.ticks((ACROSS / (width(&number(last)) + 24.0).max(60.0)) as usize);
+        let body = html! {
+            g class="axis" {
+                @for tick in ticks {
+                    @let x = px(scale.at(tick));
+                    line class="grid" x1=(x) x2=(x) y1=(px(TOP)) y2=(px(bottom)) {}
+                    text x=(x) y=(px(bottom + 15.0)) text-anchor="middle" { (number(tick)) }
+                }
+                text x=(px(LEFT - 20.0)) y=(px(bottom + 15.0)) text-anchor="end" { "seconds" }
+            }
+            @for ((kind, marks), lane) in lanes.iter().zip(0..) {
+                (draw(*kind, marks, TOP + LANE * f64::from(lane)))
+            }
+        };
+        let title = format!("{} happenings in {} seconds", self.happenings.len(), number(last));
+        let description = "A lane for each kind of happening. The list says the same.".to_owned();
+        Picture { width: LEFT + ACROSS + RIGHT, height: bottom + 24.0, title, description, body }
+    }
+
+    /// The happenings of a kind by where they are drawn.
+    fn marks(&self, kind: Kind, scale: &Scale) -> BTreeMap<i64, Vec<&Happening>> {
+        let mut marks: BTreeMap<i64, Vec<&Happening>> = BTreeMap::new();
+        for own in self.happenings.iter().filter(|own| own.kind == kind) {
+            marks.entry((scale.at(own.time) / MARK).floor() as i64).or_default().push(own);
+        }
+        marks
+    }
+}
+
+fn draw(kind: Kind, marks: &BTreeMap<i64, Vec<&Happening>>, top: f64) -> Markup {
+    html! {
+        g class="lane" data-lane=(kind.name()) {
+            rect class="track" x=(px(LEFT)) y=(px(top + 1.0)) width=(px(ACROSS)) height=(px(LANE - 2.0)) {}
+            text class="label" x=(px(LEFT - 10.0)) y=(px(top + 16.0)) text-anchor="end" { (kind.name()) }
+            @for (place, own) in marks {
+                g class="bar" {
+                    title { (titled(own)) }
+                    rect class={ "c" (kind as usize) } data-count=(own.len()) x=(px(*place as f64 * MARK)) y=(px(top + 4.0)) width=(px(MARK - 0.5)) height=(px(LANE - 8.0)) {}
+                }
+            }
+        }
+    }
+}
+
+/// What a mark stands for.
+fn titled(own: &[&Happening]) -> String {
+    let named = own.iter().take(NAMED).map(|own| format!("{} s: {}", number(own.time), own.text));
+    let more = (own.len() > NAMED).then(|| format!("and {} more", own.len() - NAMED));
+    named.chain(more).collect::<Vec<_>>().join("\n")
+}
+
+fn list(listed: &[&Happening]) -> Markup {
+    let rows = html! {
+        @for own in listed {
+            tr data-record=(own.record) {
+                td class="number" { (own.record) }
+                td class="number" { (number(own.time)) }
+                td { (own.kind.name()) }
+                td {
+                    @if own.because.is_empty() {
+                        (own.text)
+                    } @else {
+                        details { summary { (own.text) } (reasons(&own.because)) }
+                    }
+                }
+            }
+        }
+    };
+    table("happenings", &["record", "seconds", "kind", "what"], &rows)
+}

@@ -1,0 +1,231 @@
+//! A page about a plan, or about two: without and with what is different.
+
+use maud::{Markup, html};
+
+use crate::chart::{curve, search};
+use crate::data::{Checked, Design, Plan, Report, Step};
+use crate::frame::{FILE, HALF, PAGE};
+use crate::map::map;
+use crate::page::{page, reasons, shown, table};
+use crate::palette::{Palette, configuration};
+use crate::timeline::timeline;
+
+impl Report {
+    /// The page as HTML.
+    pub fn html(&self) -> String {
+        let palette = self.palette();
+        let body = html! {
+            @if !self.situation.is_empty() {
+                p { "Here: " (self.situation.join("; ")) "." }
+            }
+            p class="verdict" { (self.plan.verdict) }
+            @if let Some(before) = &self.before {
+                (changes(self))
+                div class="pair" {
+                    section data-plan="before" aria-label="before" { h2 { "Before" } p { (before.verdict) } (plan(before, "before", &palette, HALF)) }
+                    section data-plan="after" aria-label="after" { h2 { "After" } p { (self.plan.verdict) } (plan(&self.plan, "after", &palette, HALF)) }
+                }
+            } @else {
+                section data-plan="plan" aria-label="plan" { h2 { "Plan" } (plan(&self.plan, "plan", &palette, PAGE)) }
+            }
+            (designs(&self.plan.designs))
+            @if let Some(checked) = &self.checked { (verified(checked)) }
+        };
+        page(&self.name, &self.description, &body)
+    }
+
+    /// The pictures of the page as files: their names, and the SVG texts.
+    pub fn pictures(&self) -> Vec<(String, String)> {
+        let palette = self.palette();
+        let before = self.before.iter().map(|plan| ("before-", plan));
+        let own = std::iter::once(("", &self.plan));
+        own.chain(before).flat_map(|(prefix, plan)| plan_pictures(plan, prefix, &palette)).collect()
+    }
+
+    fn palette(&self) -> Palette {
+        let plans: Vec<&Plan> = self.before.iter().chain([&self.plan]).collect();
+        Palette::of(&plans)
+    }
+}
+
+impl Plan {
+    /// The timeline as a file.
+    pub fn svg(&self) -> String {
+        timeline(self, &Palette::of(&[self]), FILE).file()
+    }
+}
+
+fn plan_pictures(plan: &Plan, prefix: &str, palette: &Palette) -> Vec<(String, String)> {
+    let mut files = vec![(format!("{prefix}timeline.svg"), timeline(plan, palette, FILE).file())];
+    for (own, number) in plan.curves.iter().zip(1..) {
+        files.push((format!("{prefix}number-{number}.svg"), curve(plan, own, FILE).file()));
+    }
+    files.extend(plan.map.iter().map(|own| (format!("{prefix}map.svg"), map(plan, own, palette).file())));
+    if plan.search.len() > 1 {
+        files.push((format!("{prefix}search.svg"), search(&plan.search, FILE).file()));
+    }
+    files
+}
+
+/// All about a plan; `name` tells it from the other one on the page.
+pub(crate) fn plan(plan: &Plan, name: &str, palette: &Palette, room: f64) -> Markup {
+    html! {
+        @if plan.steps.is_empty() {
+            p { "There is no action to show." }
+        } @else {
+            h3 { "Timeline" }
+            (shown(&timeline(plan, palette, room), &format!("{name}-timeline")))
+            (legend(plan, palette))
+            details {
+                summary { "Steps as a table" }
+                (steps(plan))
+            }
+            @if !plan.curves.is_empty() {
+                h3 { "Numbers" }
+                p class="dim" { "Dashes are what conditions demand." }
+                @for (own, number) in plan.curves.iter().zip(1..) {
+                    (shown(&curve(plan, own, room), &format!("{name}-number-{number}")))
+                }
+            }
+            @if let Some(own) = &plan.map {
+                h3 { "Map" }
+                (shown(&map(plan, own, palette), &format!("{name}-map")))
+                @if own.places.iter().any(|place| place.position.is_none()) {
+                    p class="dim" { "The mission has no coordinates: places are laid out by the ways between them." }
+                }
+            }
+        }
+        @if !plan.search.is_empty() {
+            h3 { "Search" }
+            @if let [only] = &plan.search[..] {
+                p { "The planner knew at once: " (only.text) "." }
+            } @else {
+                (shown(&search(&plan.search, room), &format!("{name}-search")))
+                details {
+                    summary { "Search as a list" }
+                    ol { @for moment in &plan.search { li { (moment.text) } } }
+                }
+            }
+        }
+    }
+}
+
+/// Which colour is which configuration.
+fn legend(plan: &Plan, palette: &Palette) -> Markup {
+    let mut names: Vec<String> =
+        plan.steps.iter().flat_map(|step| &step.configuration).map(|(_, design)| design.clone()).collect();
+    if plan.map.is_some() {
+        names.extend(plan.steps.iter().filter(|step| step.way.is_some()).map(configuration));
+    }
+    let mut seen = std::collections::BTreeSet::new();
+    names.retain(|name| !name.is_empty() && seen.insert(name.clone()));
+    html! {
+        ul class="legend" {
+            @for name in &names {
+                li {
+                    svg class="picture" width="14" height="14" aria-hidden="true" style="display:inline" {
+                        rect class=(palette.class(name)) x="1" y="1" width="12" height="12" rx="2" {}
+                    }
+                    span class="name" { (name) }
+                }
+            }
+            @if plan.steps.iter().any(|step| !step.reconfigured.is_empty()) {
+                li {
+                    svg class="picture" width="14" height="14" aria-hidden="true" style="display:inline" {
+                        path class="mark" d="M1 7L7 1L13 7L7 13Z" {}
+                    }
+                    "reconfiguration"
+                }
+            }
+        }
+    }
+}
+
+fn steps(plan: &Plan) -> Markup {
+    let row = |number: usize, step: &Step| {
+        let designs = step.configuration.iter().map(|(function, design)| {
+            let changed = step.reconfigured.iter().any(|(name, _)| name == function);
+            format!("{function} = {design}{}", if changed { " (changed)" } else { "" })
+        });
+        let designs: Vec<String> = designs.collect();
+        html! {
+            tr data-step=(number) {
+                td class="number" { (number) }
+                td class="number" { (step.start_text) }
+                td class="number" { (step.duration_text) }
+                td class="name" { (step.label) }
+                td class="name" { (designs.join(", ")) }
+                td class="number" { (step.cost_text) }
+            }
+        }
+    };
+    let rows = html! { @for (number, step) in (1..).zip(&plan.steps) { (row(number, step)) } };
+    table("steps", &["step", "start", "duration", "action", "configuration", "cost"], &rows)
+}
+
+fn changes(report: &Report) -> Markup {
+    html! {
+        section aria-labelledby="changes" {
+            h2 id="changes" { "What changed, and why" }
+            @if report.changes.is_empty() { p { "Nothing that the plan depends on." } }
+            @for change in &report.changes {
+                @if change.because.is_empty() {
+                    p { (change.text) }
+                } @else {
+                    details { summary { (change.text) } (reasons(&change.because)) }
+                }
+            }
+        }
+    }
+}
+
+fn designs(designs: &[Design]) -> Markup {
+    let row = |design: &Design| {
+        let used: Vec<String> = design.steps.iter().map(ToString::to_string).collect();
+        html! {
+            tr data-design=(design.name) {
+                td class="name" { (design.name) }
+                td class="name" { (design.functions.join(", ")) }
+                td {
+                    details {
+                        summary class=(if design.available { "good" } else { "bad" }) {
+                            (if design.available { "available" } else { "not available" })
+                        }
+                        (reasons(&design.because))
+                    }
+                }
+                td { (if used.is_empty() { "–".to_owned() } else { used.join(", ") }) }
+                td class="name" { @for text in &design.estimations { div { (text) } } }
+                td class="name" { @for text in &design.needs { div { (text) } } }
+            }
+        }
+    };
+    html! {
+        @if !designs.is_empty() {
+            section aria-labelledby="designs" {
+                h2 id="designs" { "Designs" }
+                (table("designs", &["design", "function", "availability, and why", "steps", "estimates", "needs"],
+                    &html! { @for design in designs { (row(design)) } }))
+            }
+        }
+    }
+}
+
+fn verified(checked: &Checked) -> Markup {
+    let rows = html! {
+        @for (part, holds, message) in &checked.parts {
+            tr {
+                td { (part) }
+                td class=(if *holds { "good" } else { "bad" }) { (if *holds { "verified" } else { "failed" }) }
+                td { (message) }
+            }
+        }
+    };
+    html! {
+        section aria-labelledby="verified" {
+            h2 id="verified" { "What was verified" }
+            p class={ "verdict " (if checked.verified { "good" } else { "bad" }) } { (checked.verdict) }
+            (table("verification", &["part", "result", "what was found"], &rows))
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! A plan as a timeline: a lane for the actions, one for the design of each function, and marks where a function changes its design.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use crate::data::{Plan, Step};
+use crate::frame::{Frame, LEFT};
+use crate::lanes::rows;
+use crate::palette::Palette;
+use crate::scale::{fit, px};
+use crate::svg::{Picture, alternative};
+
+/// The height of a row, and of the bars in it.
+const ROW: f64 = 26.0;
+const BAR: f64 = 20.0;
+/// Between lanes.
+const GAP: f64 = 8.0;
+/// What stands above the lanes.
+const TOP: f64 = 6.0;
+/// What takes no time is drawn so wide.
+const LEAST: f64 = 3.0;
+
+/// A bar of a lane.
+struct Bar<'p> {
+    step: usize,
+    from: f64,
+    to: f64,
+    text: &'p str,
+    is_changed: bool,
+}
+
+/// A lane: its name, its bars, and for each of these its row.
+struct Lane<'p> {
+    name: &'p str,
+    bars: Vec<Bar<'p>>,
+    rows: Vec<usize>,
+}
+
+impl<'p> Lane<'p> {
+    fn new(name: &'p str, bars: Vec<Bar<'p>>) -> Self {
+        let intervals: Vec<(f64, f64)> = bars.iter().map(|bar| (bar.from, bar.to)).collect();
+        Self { name, rows: rows(&intervals), bars }
+    }
+
+    fn height(&self) -> f64 {
+        ROW * (self.rows.iter().max().map_or(0, |last| *last) + 1) as f64
+    }
+}
+
+/// Draws a plan.
+pub(crate) fn timeline(plan: &Plan, palette: &Palette, room: f64) -> Picture {
+    let frame = Frame::of(plan, room);
+    let lanes = lanes(plan, &frame);
+    let mut tops = Vec::new();
+    let mut bottom = TOP;
+    for lane in &lanes {
+        tops.push(bottom);
+        bottom += lane.height() + GAP;
+    }
+    let changes = plan.steps.iter().map(|step| step.reconfigured.len()).sum::<usize>();
+    let title = format!("{} steps, {changes} reconfigurations", plan.steps.len());
+    let description = lanes.iter().map(|lane| lane.name).collect::<Vec<_>>().join(", ");
+    let description = format!("A lane for each of: {description}. The table of steps says the same.");
+    let body = html! {
+        (frame.axis(TOP, bottom))
+        @for (lane, top) in lanes.iter().zip(&tops) {
+            (draw_lane(lane, *top, (plan, palette), &frame))
+        }
+        @for (index, step) in plan.steps.iter().enumerate().filter(|(_, step)| !step.reconfigured.is_empty()) {
+            @let x = px(frame.scale.at(step.start));
+            line class="change" x1=(x) x2=(x) y1=(px(TOP)) y2=(px(bottom)) data-step=(index + 1) {}
+        }
+    };
+    Picture { width: frame.width, height: bottom + 24.0, title, description, body }
+}
+
+/// The actions, and each function in the order of its name.
+fn lanes<'p>(plan: &'p Plan, frame: &Frame) -> Vec<Lane<'p>> {
+    let place = |step: &Step| {
+        let from = frame.scale.at(step.start);
+        (from, frame.scale.at(step.end).max(from + LEAST))
+    };
+    let mut functions: BTreeMap<&str, Vec<Bar<'p>>> = BTreeMap::new();
+    let mut actions = Vec::new();
+    for (number, step) in plan.steps.iter().enumerate() {
+        let (from, to) = place(step);
+        actions.push(Bar { step: number, from, to, text: &step.label, is_changed: false });
+        for (function, design) in &step.configuration {
+            let is_changed = step.reconfigured.iter().any(|(changed, _)| changed == function);
+            let bar = Bar { step: number, from, to, text: design, is_changed };
+            functions.entry(function).or_default().push(bar);
+        }
+    }
+    let functions = functions.into_iter().map(|(name, bars)| Lane::new(name, bars));
+    std::iter::once(Lane::new("actions", actions)).chain(functions).collect()
+}
+
+fn draw_lane(lane: &Lane<'_>, top: f64, (plan, palette): (&Plan, &Palette), frame: &Frame) -> Markup {
+    let is_action = lane.name == "actions" && top <= TOP;
+    let middle = top + lane.height() / 2.0 + 4.0;
+    html! {
+        g class="lane" data-lane=(lane.name) {
+            rect class="track" x=(px(LEFT)) y=(px(top)) width=(px(frame.scale.at(frame.end) - LEFT)) height=(px(lane.height())) {}
+            text class="label" x=(px(LEFT - 10.0)) y=(px(middle)) text-anchor="end" {
+                title { (lane.name) }
+                (fit(lane.name, LEFT - 14.0))
+            }
+            @for (bar, row) in lane.bars.iter().zip(&lane.rows) {
+                @let step = &plan.steps[bar.step];
+                @let class = if is_action { "action".to_owned() } else { palette.class(bar.text) };
+                (draw_bar(bar, top + ROW * *row as f64, &class, &about(bar, step, lane.name, is_action)))
+            }
+        }
+    }
+}
+
+fn draw_bar(bar: &Bar<'_>, top: f64, class: &str, about: &str) -> Markup {
+    let y = top + (ROW - BAR) / 2.0;
+    let margin = if bar.is_changed { 14.0 } else { 5.0 };
+    let room = bar.to - bar.from - margin - 3.0;
+    let text = fit(bar.text, room);
+    html! {
+        g class="bar" data-step=(bar.step + 1) {
+            title { (about) }
+            rect class=(class) x=(px(bar.from + 0.5)) y=(px(y)) width=(px((bar.to - bar.from - 1.0).max(1.0))) height=(px(BAR)) rx="3" {}
+            @if !text.is_empty() {
+                text x=(px(bar.from + margin)) y=(px(y + 14.0)) { (text) }
+            }
+            @if bar.is_changed {
+                @let (x, y) = (bar.from, y + BAR / 2.0);
+                path class="mark" data-mark=(bar.step + 1)
+                    d={ "M" (px(x - 6.0)) " " (px(y)) "L" (px(x)) " " (px(y - 6.0)) "L" (px(x + 6.0)) " " (px(y)) "L" (px(x)) " " (px(y + 6.0)) "Z" } {}
+            }
+        }
+    }
+}
+
+/// What a bar stands for, in words.
+fn about(bar: &Bar<'_>, step: &Step, lane: &str, is_action: bool) -> String {
+    let number = bar.step + 1;
+    if is_action {
+        return format!(
+            "step {number}: {}; from {}, takes {}, costs {}",
+            step.label, step.start_text, step.duration_text, step.cost_text
+        );
+    }
+    let changed = step.reconfigured.iter().find(|(function, _)| function == lane);
+    let before = changed.map(|(_, before)| alternative(before)).unwrap_or_default();
+    format!("step {number}: {lane} = {}{before}", bar.text)
+}

@@ -1,0 +1,289 @@
+//! What is drawn: everything that the data have, whatever names they have, and the same bytes each time.
+
+use std::time::Instant;
+
+use metaplan_picture::{
+    Axis, Bound, Change, Checked, Curve, Design, Group, Happening, Kind, Log, Map, Part, Place, Plan, Points,
+    Progress, Reason, Report, Rows, Sheet, Step,
+};
+use roxmltree::Document;
+
+const HOSTILE: &str = "</title></text><script>alert(1)</script>\"'&\u{1}\u{202e}";
+
+/// A plan of so many steps around a ring of places, with names that begin as given.
+fn plan(steps: usize, name: &str) -> Plan {
+    let count = steps.max(3);
+    let step = |index: usize| Step {
+        label: format!("{name}move p{index}"),
+        start: index as f64,
+        end: index as f64 + 1.0,
+        start_text: index.to_string(),
+        duration_text: "1".to_owned(),
+        cost_text: "2".to_owned(),
+        configuration: vec![
+            (format!("{name}f_1"), format!("{name}fd_{}", index / 3 % 4)),
+            (format!("{name}f_2"), format!("{name}fd_x")),
+        ],
+        reconfigured: if index > 0 && index.is_multiple_of(3) {
+            vec![(format!("{name}f_1"), format!("{name}fd_old"))]
+        } else {
+            Vec::new()
+        },
+        way: Some((index % count, (index + 1) % count)),
+    };
+    let place = |index: usize| Place {
+        name: format!("{name}p{index}"),
+        position: None,
+        is_start: index == 0,
+        is_goal: index == 1,
+    };
+    let reason = Reason {
+        text: name.to_owned() + "why",
+        supports: vec![Reason { text: name.to_owned(), supports: Vec::new() }],
+    };
+    Plan {
+        verdict: format!("{name}Cost 8: optimal."),
+        steps: (0..steps).map(step).collect(),
+        axis: Axis::Time,
+        curves: vec![Curve {
+            name: format!("{name}battery"),
+            points: (0..=steps).map(|index| (index as f64, 100.0 - index as f64)).collect(),
+            bounds: vec![Bound { from: 0.0, to: 1.0, value: 2.0, text: format!("{name}needs") }],
+        }],
+        map: Some(Map {
+            places: (0..count).map(place).collect(),
+            ways: (0..count).map(|index| (index, (index + 1) % count)).collect(),
+        }),
+        search: vec![
+            Progress { cost: None, lower_bound: 1.0, text: name.to_owned() },
+            Progress { cost: Some(8.0), lower_bound: 8.0, text: name.to_owned() },
+        ],
+        designs: vec![Design {
+            name: format!("{name}fd_x"),
+            functions: vec![name.to_owned()],
+            available: false,
+            estimations: vec![name.to_owned()],
+            needs: vec![name.to_owned()],
+            steps: vec![1],
+            because: vec![reason],
+        }],
+    }
+}
+
+fn report(steps: usize, name: &str) -> Report {
+    Report {
+        name: name.to_owned() + "mission",
+        description: name.to_owned(),
+        situation: vec![name.to_owned()],
+        before: Some(plan(2, name)),
+        plan: plan(steps, name),
+        changes: vec![Change { text: name.to_owned(), because: vec![Reason::default()] }],
+        checked: Some(Checked {
+            verified: true,
+            verdict: name.to_owned(),
+            parts: vec![(name.to_owned(), true, name.to_owned())],
+        }),
+    }
+}
+
+/// The values of an attribute in a document, in its order.
+fn values<'a>(document: &'a Document<'_>, attribute: &str) -> Vec<&'a str> {
+    document.descendants().filter_map(|node| node.attribute(attribute)).collect()
+}
+
+#[test]
+fn everything_is_in_the_pictures() {
+    let report = report(10, "");
+    let pictures = report.pictures();
+    let find = |name: &str| &pictures.iter().find(|(file, _)| file == name).expect(name).1;
+    let timeline = Document::parse(find("timeline.svg")).expect("XML");
+    assert_eq!(values(&timeline, "data-lane"), ["actions", "f_1", "f_2"]);
+    assert_eq!(values(&timeline, "data-mark"), ["4", "7", "10"]);
+    let bars = timeline.descendants().filter(|node| node.attribute("class") == Some("bar")).count();
+    assert_eq!(bars, 30);
+    let map = Document::parse(find("map.svg")).expect("XML");
+    let places: Vec<String> = (0..10).map(|index| format!("p{index}")).collect();
+    assert_eq!(values(&map, "data-place"), places);
+    assert_eq!(values(&map, "data-way").len(), 10);
+    for (name, text) in &pictures {
+        assert!(!text.contains("<script"), "{name}");
+        assert!(text.contains("<text"), "{name}: texts are texts");
+    }
+    let names: Vec<&str> = pictures.iter().map(|(name, _)| name.as_str()).collect();
+    let parts = ["timeline.svg", "number-1.svg", "map.svg", "search.svg"];
+    let expected: Vec<String> = parts
+        .iter()
+        .map(|name| (*name).to_owned())
+        .chain(parts.iter().map(|name| format!("before-{name}")))
+        .collect();
+    assert_eq!(names, expected);
+    let page = report.html();
+    for text in [
+        "data-lane=\"f_2\"",
+        "data-mark=\"10\"",
+        "data-place=\"p9\"",
+        "data-design=\"fd_x\"",
+        "data-curve=\"battery\"",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn names_are_escaped_whatever_they_are() {
+    let report = report(4, HOSTILE);
+    for (name, text) in report.pictures() {
+        let document = Document::parse(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(document.descendants().all(|node| node.tag_name().name() != "script"), "{name}");
+    }
+    let page = report.html();
+    assert_eq!(page.matches("<script").count(), 1, "the page's own");
+    assert_eq!(page.matches("</script").count(), 1);
+    assert!(!page.contains('\u{1}'));
+    assert!(page.contains("&lt;script&gt;alert(1)"));
+}
+
+#[test]
+fn the_same_data_give_the_same_bytes() {
+    let (one, other) = (report(30, ""), report(30, ""));
+    assert_eq!(one.html(), other.html());
+    assert_eq!(one.pictures(), other.pictures());
+}
+
+#[test]
+fn a_thousand_steps_are_drawn_at_once() {
+    let report = report(1000, "");
+    let begun = Instant::now();
+    let page = report.html();
+    assert!(page.contains("data-step=\"1000\""));
+    // Debug builds are several times slower than what users have.
+    assert!(begun.elapsed().as_secs_f64() < 10.0, "{:?}", begun.elapsed());
+}
+
+/// Actions that overlap lie in rows of their own.
+#[test]
+fn overlapping_actions_do_not_cover_each_other() {
+    let mut plan = plan(3, "");
+    for step in &mut plan.steps {
+        (step.start, step.end) = (0.0, 3.0);
+    }
+    let text = plan.svg();
+    let document = Document::parse(&text).expect("XML");
+    let bars = document.descendants().filter(|node| node.attribute("class") == Some("bar"));
+    let places = bars.filter_map(|bar| {
+        let shape = bar.children().find(|node| node.has_tag_name(("http://www.w3.org/2000/svg", "rect")))?;
+        Some((shape.attribute("x")?, shape.attribute("y")?))
+    });
+    let mut places: Vec<_> = places.collect();
+    places.sort_unstable();
+    let count = places.len();
+    places.dedup();
+    assert_eq!((places.len(), count), (9, 9));
+    assert_eq!(plan.text(100), None, "lines cannot show that");
+}
+
+#[test]
+fn a_terminal_shows_the_lanes() {
+    let mut plan = plan(4, "");
+    plan.steps.iter_mut().for_each(|step| step.configuration.truncate(1));
+    let expected = "\
+actions  ▕move p0············▕move p1············▕move p2···········▕move p3············
+    f_1  ▕fd_0···············▕fd_0···············▕fd_0··············◆fd_1···············
+   time  0                   1                   2                  3                   4
+";
+    assert_eq!(plan.text(88).as_deref(), Some(expected));
+    assert_eq!(plan.text(59), None);
+    assert_eq!(Plan::default().text(100), None);
+}
+
+/// A journal of so many events, each tenth with a decision.
+fn log(events: u64, name: &str) -> Log {
+    let happening = |record: u64| Happening {
+        record,
+        time: record as f64 / 10.0,
+        kind: if record.is_multiple_of(10) { Kind::ALL[(record / 10 % 4 + 1) as usize] } else { Kind::Event },
+        text: format!("{name}{record}"),
+        because: if record.is_multiple_of(10) {
+            vec![Reason { text: name.to_owned(), supports: Vec::new() }]
+        } else {
+            Vec::new()
+        },
+    };
+    Log {
+        name: name.to_owned(),
+        verdict: name.to_owned(),
+        parts: vec![name.to_owned()],
+        messages: vec![name.to_owned()],
+        happenings: (0..events).map(happening).collect(),
+    }
+}
+
+#[test]
+fn a_long_journal_is_a_page_that_opens() {
+    let log = log(100_000, "event ");
+    let begun = Instant::now();
+    let page = log.html();
+    assert!(begun.elapsed().as_secs_f64() < 5.0, "{:?}", begun.elapsed());
+    assert!(page.len() < 1_000_000, "{} bytes", page.len());
+    assert_eq!(page.matches("data-record=").count(), 1000);
+    let picture = log.svg();
+    let document = Document::parse(&picture).expect("XML");
+    let counts = values(&document, "data-count");
+    let all: u64 = counts.iter().map(|count| count.parse::<u64>().expect("a number")).sum();
+    assert_eq!(all, 100_000, "each happening is in a mark");
+    assert_eq!(values(&document, "data-lane"), ["events", "inferences", "plans", "effects", "refusals"]);
+}
+
+/// A page with all kinds of parts.
+fn sheet(name: &str) -> Sheet {
+    let points = Points {
+        title: name.to_owned(),
+        axes: [name.to_owned(), name.to_owned()],
+        line: vec![(1.0, 2.0), (2.0, 1.0)],
+        points: (1..4).map(|own| (format!("{name}{own}"), name.to_owned(), f64::from(own), 2.0)).collect(),
+    };
+    let group = Group {
+        name: format!("{name}group"),
+        values: vec![(1.0, name.to_owned()); 40],
+        mean: Some((1.0, 0.5)),
+    };
+    Sheet {
+        name: name.to_owned(),
+        description: name.to_owned(),
+        verdict: name.to_owned(),
+        parts: vec![
+            Part::Heading(name.to_owned()),
+            Part::Sentences(vec![Change { text: name.to_owned(), because: vec![Reason::default()] }]),
+            Part::Points(points),
+            Part::Rows(Rows { title: name.to_owned(), axis: name.to_owned(), groups: vec![group] }),
+            Part::Table(name.to_owned(), vec![name.to_owned()], vec![vec![name.to_owned()]]),
+            Part::Plans(vec![(name.to_owned(), plan(3, name))]),
+        ],
+    }
+}
+
+#[test]
+fn all_pages_escape_names() {
+    for page in [log(30, HOSTILE).html(), sheet(HOSTILE).html()] {
+        assert_eq!(page.matches("<script").count(), 1, "the page's own");
+        assert!(page.contains("&lt;script&gt;alert(1)") && !page.contains('\u{1}'));
+    }
+    let pictures = sheet(HOSTILE).pictures().into_iter().map(|(_, text)| text);
+    for picture in pictures.chain([log(30, HOSTILE).svg()]) {
+        let document = Document::parse(&picture).expect("XML");
+        assert!(document.descendants().all(|node| node.tag_name().name() != "script"));
+    }
+}
+
+#[test]
+fn fronts_and_distributions_have_all_values() {
+    let sheet = sheet("x");
+    let pictures = sheet.pictures();
+    let [(_, points), (_, rows)] = &pictures[..] else { panic!("{}", pictures.len()) };
+    let document = Document::parse(points).expect("XML");
+    assert_eq!(values(&document, "data-point"), ["x1", "x2", "x3"]);
+    let document = Document::parse(rows).expect("XML");
+    assert_eq!(values(&document, "data-group"), ["xgroup"]);
+    assert_eq!(values(&document, "class").iter().filter(|class| **class == "point").count(), 40);
+    assert_eq!(sheet.html().matches("data-plan=").count(), 1);
+}
