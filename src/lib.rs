@@ -7,7 +7,7 @@
 
 pub use ::mission::{file, knowledge, message, visible};
 pub use ::verify::measure;
-pub use {encodings, ontology, pddl, rules};
+pub use {encodings, ontology, pddl, picture, rules};
 
 pub mod answers;
 pub mod certificate;
@@ -20,6 +20,7 @@ pub mod mapek;
 pub mod mission;
 mod number;
 pub mod recording;
+pub mod report;
 pub mod setup;
 pub mod simulate;
 

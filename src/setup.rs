@@ -14,6 +14,7 @@ use crate::manifest::{self, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::Message;
 use crate::mission::{BindingsSection, KnowledgeSection, Mission, PlanningSection, Scenario};
+use crate::report::{Positions, ReportSection};
 use crate::simulate::Simulation;
 
 /// All sections of a manifest.
@@ -32,6 +33,8 @@ struct Sections {
     #[serde(default)]
     probabilistic: Roles,
     #[serde(default)]
+    report: ReportSection,
+    #[serde(default)]
     scenarios: BTreeMap<String, Scenario<Simulation>>,
 }
 
@@ -48,6 +51,7 @@ pub struct Setup {
     pub roles: Roles,
     /// Situations by name.
     pub scenarios: BTreeMap<String, Scenario<Simulation>>,
+    report: ReportSection,
     origin: ManifestPath,
 }
 
@@ -71,8 +75,16 @@ impl Setup {
         let text = domain.as_ref().map_or("", |domain| domain.text());
         let knowledge = Knowledge::read_for(&sections.knowledge.sources(&origin), text);
         let mission = Mission::new(&sections.name, Some(knowledge), bindings, domain, problem)?;
-        let Sections { description, probabilistic: roles, scenarios, .. } = sections;
-        Ok(Self { mission, description, settings, roles, scenarios, origin })
+        let Sections { description, probabilistic: roles, report, scenarios, .. } = sections;
+        Ok(Self { mission, description, settings, roles, scenarios, report, origin })
+    }
+
+    /// Where the places lie, which only pictures ask for.
+    ///
+    /// # Errors
+    /// The file of positions cannot be read, or what is wrong with it.
+    pub fn positions(&self) -> Result<Positions, Vec<Message>> {
+        self.report.positions(&self.origin)
     }
 
     /// The manifest's own name; empty for a mission without.
@@ -90,6 +102,7 @@ impl From<Mission> for Setup {
             settings: Settings::default(),
             roles: Roles::default(),
             scenarios: BTreeMap::new(),
+            report: ReportSection::default(),
             origin: ManifestPath::default(),
         }
     }

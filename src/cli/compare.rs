@@ -61,6 +61,9 @@ pub struct Arguments {
     /// Write the table as CSV, too.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write the comparison as a page to look at, too: the front, prices with their reasons, all measures.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// Rows to add to the table, as JSON: a list of objects with `name` and any of the table's measures.
     #[arg(long, value_name = "FILE")]
     published: Option<PathBuf>,
@@ -124,6 +127,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let missions = missions(arguments, &mission, coadaptation, &roles)?;
     so_far.change(|own| {
         (own.of, own.added, own.csv) = (Some(missions.len()), added, arguments.csv.clone());
+        own.report = arguments.report.clone().map(|file| (mission.name.clone(), file));
     });
     let progress = Progress::new(missions.len(), common);
     for (number, (pair, mission, coadaptation)) in missions.into_iter().enumerate() {

@@ -12,6 +12,7 @@ use encodings::Limits;
 use metaplan::answers::{CompareAnswer, ComparisonAnswer, Pair, Row, begun_rows, rows};
 use metaplan::comparison::{Candidate, Comparison, Costs};
 use metaplan::message::Message;
+use metaplan::report::comparison_sheet;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::compare_table::{as_text, costs_text, csv};
@@ -31,6 +32,8 @@ pub(super) struct SoFar {
     pub added: Vec<Row>,
     /// Where the table is to go as CSV.
     pub csv: Option<PathBuf>,
+    /// The mission's name, and where the page is to go.
+    pub report: Option<(String, PathBuf)>,
 }
 
 /// A comparison that is not done.
@@ -121,6 +124,9 @@ impl SoFar {
         let rows: Vec<Row> = measured.into_iter().chain(added.iter().cloned()).collect();
         if let Some(path) = self.csv.as_ref().filter(|_| !is_empty) {
             output::write_file(path, &csv(&rows))?;
+        }
+        if let Some((mission, path)) = self.report.as_ref().filter(|_| !is_empty) {
+            output::write_file(path, &comparison_sheet(mission, &self.done, &rows).html())?;
         }
         if common.format == Format::Json {
             let done =

@@ -121,6 +121,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         (format!("{}.ttl", map.name), &files.knowledge),
         ("domain.pddl".to_owned(), &files.domain),
         ("problem.pddl".to_owned(), &files.problem),
+        ("positions.csv".to_owned(), &files.positions),
     ];
     for (name, text) in &written {
         output::write_file(&map.output.join(name), text)?;

@@ -10,6 +10,7 @@ mod concurrent;
 mod configure;
 mod confirm;
 mod convert;
+mod drawn;
 mod explain;
 mod export;
 mod import;
@@ -23,6 +24,7 @@ mod plan_exact;
 mod plan_text;
 mod reason;
 mod reason_ask;
+mod report;
 mod run;
 mod run_lines;
 mod run_outlet;
@@ -69,6 +71,8 @@ enum Subcommands {
     Explain(explain::Arguments),
     /// A mission for other planners, with what the knowledge base has contributed.
     Export(export::Arguments),
+    /// An answer as a page to look at: plan, numbers, map, search, designs with reasons; before and after.
+    Report(report::Arguments),
     /// The adaptation loop: events in, adaptations out, one JSON object a line.
     Run(run::Arguments),
     /// What is in the journal of a loop, and whether it can be used; nothing is changed.
@@ -118,6 +122,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Subcommands::Import(arguments) => import::run(arguments, &cli.common),
         Subcommands::Explain(arguments) => explain::run(arguments, &cli.common),
         Subcommands::Export(arguments) => export::run(arguments, &cli.common),
+        Subcommands::Report(arguments) => report::run(arguments, &cli.common),
         Subcommands::Run(arguments) => run::run(arguments, &cli.common),
         Subcommands::Journal(arguments) => journal::run(arguments, &cli.common),
         Subcommands::Simulate(arguments) => simulate::run(arguments, &cli.common),

@@ -51,6 +51,11 @@ impl Objectives {
         if messages.is_empty() { Ok(Self { texts, metrics }) } else { Err(messages.into()) }
     }
 
+    /// As the user has written them.
+    pub(super) fn texts(&self) -> &[String] {
+        &self.texts
+    }
+
     /// Has the validator execute the plan, and check its value by every objective.
     pub(super) fn confirm(
         &self,

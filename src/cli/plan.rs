@@ -5,22 +5,23 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use encodings::{
-    Alternatives, Backend, BackendError, Config, Front, Improvement, Limits, Plan, Point, Semantics,
-    Solution, Status, Task,
+    Alternatives, Backend, Config, Front, Improvement, Limits, Plan, Point, Semantics, Solution, Status, Task,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::answers::{PlanAnswer, Preparation};
 use metaplan::certificate::{self, Ground};
 use metaplan::message::Message;
 use metaplan::mission::{
-    Blocking, Mission, Planning as _, Reading, blocking, blocking_text, spaced, verdict,
+    Blocking, Mission, Planning as _, Reading, blocking, blocking_text, btcpp_text, spaced, verdict,
 };
+use metaplan::report::{Positions, Seen, front_sheet};
 use pddl::ast::Problem;
 
 use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::concurrent::{self, Overlap};
 use crate::cli::confirm::fault;
+use crate::cli::drawn::Drawing;
 use crate::cli::limits::Guard;
 use crate::cli::objectives::Objectives;
 use crate::cli::output;
@@ -83,6 +84,11 @@ pub struct Arguments {
     /// Only the plan, in a format that other tools read.
     #[arg(long, value_enum)]
     plan_format: Option<PlanFormat>,
+    #[command(flatten)]
+    drawing: Drawing,
+    /// Write the front as a page to look at, too, whose points unfold to plans.
+    #[arg(long, value_name = "FILE", requires = "pareto")]
+    report: Option<PathBuf>,
     /// Write the answer to a file.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -164,14 +170,30 @@ impl Arguments {
     fn asks_for_more(&self) -> bool {
         self.pareto.is_some() || self.alternatives.is_some()
     }
+
+    /// Refuses what no parser of options sees.
+    fn check(&self) -> Result<(), Failure> {
+        let usage = |code: &str, text: String| Failure::usage(Message::error(code, text));
+        self.solver.check().map_err(|error| usage("M113", error.to_string()))?;
+        if self.plan_format == Some(PlanFormat::Btcpp) && self.overlap.separation().is_some() {
+            let text =
+                "`--plan-format btcpp` writes a sequence of actions, and with `--concurrent` they overlap";
+            return Err(usage("M107", text.to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Whether people read the answer where it is.
+    fn is_text(&self, common: &Common) -> bool {
+        self.plan_format.is_none() && self.output.is_none() && common.format == Format::Text
+    }
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let started = Instant::now();
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
-    let usage = |error: &BackendError| Failure::usage(Message::error("M113", error.to_string()));
-    arguments.solver.check().map_err(|error| usage(&error))?;
+    arguments.check()?;
 
     let mission = arguments.situation.mission(&arguments.inputs)?;
     let (problem, warnings) = mission.filled()?;
@@ -290,20 +312,18 @@ fn finish(
     if arguments.plan_format == Some(PlanFormat::Plansys2) {
         point.solution.plan = point.solution.plan.take().map(|plan| spaced(mission, problem, plan, reading));
     }
+    let drawn = arguments.drawing.draw(mission, &point.solution, arguments.is_text(common))?;
     // What `validate` executes has the designs, what the user's own domain has no place for them has not.
     if arguments.plan_format != Some(PlanFormat::Ipc) {
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let status = point.solution.status;
-    match (
-        show(&point, beside, &mission.name, objectives, preparation, (arguments, common)),
-        &arguments.output,
-    ) {
+    match (show(&point, beside, mission, objectives, preparation, (arguments, common)), &arguments.output) {
         (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
             output::note(&verdict(&point.solution));
         }
-        (Some(text), None) => output::answer(&text),
+        (Some(text), None) => output::answer(&(drawn + &text)),
         // There is nothing to write, and readers of plans would stumble over anything else.
         (None, _) => output::note(&verdict(&point.solution)),
     }
@@ -321,12 +341,12 @@ struct Beside {
 fn show(
     point: &Point,
     beside: &Beside,
-    name: &str,
+    mission: &Mission,
     objectives: &Objectives,
     preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Option<String> {
-    let solution = &point.solution;
+    let (solution, name) = (&point.solution, mission.name.as_str());
     match (arguments.plan_format, common.format) {
         (Some(PlanFormat::Json), _) | (None, Format::Json) => {
             let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
@@ -345,6 +365,7 @@ fn show(
             let makespan = concurrent::makespan_text(overlaps);
             Some(plan + &objectives.values_text(point) + &makespan + &others.or(blocking).unwrap_or_default())
         }
+        (Some(PlanFormat::Btcpp), _) => solution.plan.as_ref().map(|plan| btcpp_text(mission, plan)),
         (Some(format), _) => solution.plan.as_ref().map(|plan| plan_text(plan, format)),
     }
 }
@@ -375,8 +396,14 @@ fn show_front(
     preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
-    for point in &mut front.points {
+    for point in &front.points {
         objectives.confirm(mission, problem, point, &Reading::sequential(task.is_timed()))?;
+    }
+    if let Some(file) = &arguments.report {
+        let seen = Seen { mission, problem, positions: &Positions::Unknown };
+        output::write_file(file, &front_sheet(seen, objectives.texts(), &front).html())?;
+    }
+    for point in &mut front.points {
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
     }
     let text = match common.format {
@@ -390,7 +417,8 @@ fn show_front(
     Ok(exit(front.status))
 }
 
-fn exit(status: Status) -> Exit {
+/// How the program ends with a solution of this status.
+pub(super) fn exit(status: Status) -> Exit {
     match status {
         Status::Optimal => Exit::Done,
         Status::Feasible => Exit::NotProved,

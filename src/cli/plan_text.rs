@@ -14,6 +14,8 @@ pub(super) enum PlanFormat {
     Ipc,
     /// What the POPF plugin of `PlanSys2` parses.
     Plansys2,
+    /// XML of BehaviorTree.CPP 4: a sequence of actions, with changes of modes between them.
+    Btcpp,
     /// As `--format json`.
     Json,
 }

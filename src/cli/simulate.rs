@@ -9,6 +9,7 @@ use metaplan::answers::{LogLine, SimulateAnswer, accomplished_cost, beside_joint
 use metaplan::mapek::{Answer, Observation, Settings};
 use metaplan::message::Message;
 use metaplan::mission::Mission;
+use metaplan::report::simulation_sheet;
 use metaplan::setup::Setup;
 use metaplan::simulate::{Run, SUAVE_COLUMNS, Sample, Simulation, Strategy, simulate};
 use serde_json::Value;
@@ -41,6 +42,9 @@ pub struct Arguments {
     /// Write one line for each mission, with the columns of SUAVE among others.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write a page to look at, too: how costs, reactions and reconfigurations are distributed over the seeds.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -112,6 +116,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     if let Some(file) = &arguments.csv {
         output::write_file(file, &csv(&runs))?;
+    }
+    if let Some(file) = &arguments.report {
+        let sheet = simulation_sheet(&mission.name, &arguments.scenario, &strategies, &runs);
+        output::write_file(file, &sheet.html())?;
     }
     match common.format {
         Format::Json => {

@@ -14,7 +14,7 @@ use crate::cli::common::{Exit, Failure};
 use crate::cli::values::{existing_directory, setting};
 
 /// A mission, or a domain and a problem, and the situation to plan for.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(super) struct Situation {
     /// A knowledge base for DOMAIN and PROBLEM (OWL; repeatable).
     #[arg(long = "kb", value_name = "FILE")]
@@ -40,7 +40,7 @@ pub(super) struct Situation {
 }
 
 /// Where imports are looked for; never the network.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(super) struct Imports {
     /// An OASIS XML catalog that says where imports lie (repeatable).
     #[arg(long, value_name = "FILE")]
@@ -75,6 +75,21 @@ impl Situation {
         let imports = Imports { catalog: Vec::new(), directory: Vec::new(), ignore_missing_imports: false };
         let (knowledge, rules, names) = (Vec::new(), Vec::new(), Vec::new());
         Self { knowledge, rules, imports, names, scenario, set, fail }
+    }
+
+    /// The same mission as its files have it; none if that is this situation.
+    pub(super) fn before(&self) -> Option<Self> {
+        let (scenario, set, fail) = (None, Vec::new(), Vec::new());
+        let differs = self.scenario.is_some() || !self.set.is_empty() || !self.fail.is_empty();
+        differs.then(|| Self { scenario, set, fail, ..self.clone() })
+    }
+
+    /// What is different from the mission's files, each in a few words.
+    pub(super) fn words(&self) -> Vec<String> {
+        let scenario = self.scenario.iter().map(|name| format!("scenario {name}"));
+        let fail = self.fail.iter().map(|component| format!("{component} has failed"));
+        let set = self.set.iter().map(|(name, value)| format!("{name} = {value}"));
+        scenario.chain(fail).chain(set).collect()
     }
 
     /// The knowledge of documents in this situation, without a mission.

@@ -62,6 +62,8 @@ pub struct Files {
     pub domain: String,
     /// `problem.pddl`.
     pub problem: String,
+    /// `positions.csv`.
+    pub positions: String,
     /// What is not taken over from the map, or taken for granted.
     pub warnings: Vec<Message>,
 }
@@ -225,6 +227,7 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
         knowledge: knowledge(options),
         domain: domain(options),
         problem: problem(&map, options),
+        positions: positions(&map),
         warnings: map.warnings(file),
     })
 }
@@ -233,9 +236,16 @@ fn manifest(name: &str) -> String {
     format!(
         "name = \"{name}\"\ndescription = \"A robot crosses a map; one of its configurations moves it along each arc.\"\n\n\
          [knowledge]\nfiles = [\"{name}.ttl\"]\n\n[planning]\ndomain = \"domain.pddl\"\nproblem = \"problem.pddl\"\n\n\
-         [probabilistic]\n# One level of the battery in the process; 1 is exact, and the process as much larger.\nbattery_unit = 100\n\n\
+         [report]\npositions = \"positions.csv\"\n\n[probabilistic]\n# One level of the battery in the process; 1 is exact, and the process as much larger.\nbattery_unit = 100\n\n\
          [scenarios.kinect_failure]\ndescription = \"The Kinect fails.\"\nfail = [\"c_kinect\"]\n"
     )
+}
+
+/// Where the places lie, in metres.
+fn positions(map: &Map<'_>) -> String {
+    map.nodes.iter().fold("place,x,y\n".to_owned(), |text, node| {
+        text + &format!("{},{},{}\n", object(&node.id.text), node.coords.x, node.coords.y)
+    })
 }
 
 fn knowledge(options: &MapOptions) -> String {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rules::{Fact, Literal, Reason, Symbols, Value};
+use rules::{Derivation, Fact, Literal, Reason, Symbols, Value};
 
 use crate::knowledge::{Fault, Knowledge};
 use crate::mapek::answer::{Answer, DesignChange, ObjectiveChange};
@@ -135,6 +135,11 @@ fn statuses(knowledge: &Knowledge) -> BTreeMap<String, Vec<String>> {
 
 /// The rules and stated facts by which a design is ruled out.
 pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
+    unavailable(knowledge, design).iter().flat_map(|derivation| reasons(knowledge, derivation)).collect()
+}
+
+/// How it follows that a design cannot be used; empty where nothing says so.
+pub(crate) fn unavailable(knowledge: &Knowledge, design: &str) -> Vec<Derivation> {
     let engine = knowledge.engine();
     let symbols = engine.symbols();
     let designs = knowledge.catalogue().members(&knowledge.view(), "FunctionDesign");
@@ -151,13 +156,7 @@ pub(crate) fn ruled_out(knowledge: &Knowledge, design: &str) -> Vec<String> {
             .map(|space| format!("{space}{name}"))
     });
     let predicates = names.iter().flatten().filter_map(|name| symbols.find_name(name));
-    let mut because = Vec::new();
-    for predicate in predicates {
-        if let Some(derivation) = engine.why(&Fact::new(predicate, [subject, falsehood])) {
-            because.extend(reasons(knowledge, &derivation));
-        }
-    }
-    because
+    predicates.filter_map(|predicate| engine.why(&Fact::new(predicate, [subject, falsehood]))).collect()
 }
 
 fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
@@ -166,7 +165,7 @@ fn why_objective(knowledge: &Knowledge, objective: &str) -> Vec<String> {
 }
 
 /// A derivation as lines: the labels of its rules, then the stated facts that it rests on.
-fn reasons(knowledge: &Knowledge, derivation: &rules::Derivation) -> Vec<String> {
+fn reasons(knowledge: &Knowledge, derivation: &Derivation) -> Vec<String> {
     let symbols = knowledge.engine().symbols();
     let mut lines = Vec::new();
     for step in &derivation.steps {
@@ -184,7 +183,7 @@ fn reasons(knowledge: &Knowledge, derivation: &rules::Derivation) -> Vec<String>
 }
 
 /// A fact as text with local names in place of IRIs.
-fn said(fact: &Fact, symbols: &Symbols) -> String {
+pub(crate) fn said(fact: &Fact, symbols: &Symbols) -> String {
     let mut text = String::with_capacity(64);
     for (position, &symbol) in std::iter::once(&fact.predicate).chain(&fact.arguments).enumerate() {
         text += ["", "(", ", "][position.min(2)];

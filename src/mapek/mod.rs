@@ -37,7 +37,7 @@ mod settings;
 mod step;
 mod watch;
 
-pub(crate) use analyze::{available, changes, doubts, inferred, ruled_out};
+pub(crate) use analyze::{available, changes, doubts, inferred, ruled_out, said, unavailable};
 pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange};
 pub use beliefs::Beliefs;
 pub use control::Loop;

@@ -3,6 +3,7 @@
 //! The only room that sees both OWL and the planner.
 
 mod blocking;
+mod btcpp;
 mod confirm;
 mod planning;
 mod plansys2;
@@ -12,6 +13,7 @@ mod verdict;
 
 pub use ::mission::{Bindings, CoAdaptation, Mission, Names};
 pub use blocking::{Blocking, blocking};
+pub use btcpp::btcpp_text;
 pub use confirm::{Reading, confirm};
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};

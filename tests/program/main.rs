@@ -1,5 +1,6 @@
 //! The whole, end to end: the program run as its users run it.
 
+mod browser;
 mod certificate;
 mod certificate_numbers;
 mod check;
@@ -23,6 +24,7 @@ mod real;
 mod reason;
 mod recording;
 mod reference;
+mod report;
 mod routes;
 mod run;
 mod simulate;

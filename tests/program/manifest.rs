@@ -31,7 +31,7 @@ fn a_section_is_refused_whoever_uses_it() {
     check(
         "[scenaros.s]",
         "9:2: error[M104]: unknown field `scenaros`, expected one of `name`, `description`, `knowledge`, `planning`, \
-         `bindings`, `adaptation`, `probabilistic`, `scenarios`; did you mean `scenarios`?",
+         `bindings`, `adaptation`, `probabilistic`, `report`, `scenarios`; did you mean `scenarios`?",
     );
     check(
         "[adaptation]\nsetle = 1",
@@ -66,7 +66,7 @@ fn all_mistakes_of_a_manifest_are_told() {
         "[probabilistic]\nbattery_unit = \"x\"\n[scenaros.s]\nfail = [\"c_kinect\"]\n[adaptation]\nsetle = 1\nsettle = \"x\"\nmin = 2",
         "10:16: error[M104]: invalid type: string \"x\", expected u32\n\
          m.toml:11:2: error[M104]: unknown field `scenaros`, expected one of `name`, `description`, `knowledge`, `planning`, \
-         `bindings`, `adaptation`, `probabilistic`, `scenarios`; did you mean `scenarios`?\n\
+         `bindings`, `adaptation`, `probabilistic`, `report`, `scenarios`; did you mean `scenarios`?\n\
          m.toml:14:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
          `stay_close`; did you mean `settle`?\n\
          m.toml:16:1: error[M104]: unknown field `min`, expected one of `minimum_benefit`, `settle`, `time_limit`, \

@@ -1,0 +1,201 @@
+//! `metaplan report`: an answer as a page to look at.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use encodings::{Config, Limits, Point, Solution};
+use metaplan::certificate::{Verification, verify};
+use metaplan::journal::JournalReport;
+use metaplan::message::Message;
+use metaplan::mission::{Mission, Planning as _, Reading, verdict};
+use metaplan::picture::{Checked, Plan, Report};
+use metaplan::report::{Positions, Seen, changes, log_picture, plan_picture};
+use metaplan::setup::Setup;
+use metaplan::visible::visible;
+
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::confirm::fault;
+use crate::cli::limits::Guard;
+use crate::cli::objectives::Objectives;
+use crate::cli::output;
+use crate::cli::plan::exit;
+use crate::cli::plan_exact;
+use crate::cli::situation::Situation;
+use crate::cli::values::seconds;
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission's manifest, or a PDDL domain and a PDDL problem; `-` is standard input.
+    #[arg(required_unless_present = "journal", num_args = 1..=2, value_name = "MISSION | DOMAIN PROBLEM")]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    situation: Situation,
+    /// Stop after this many seconds with the best plan so far.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    time_limit: Option<Duration>,
+    /// Stop when the program takes more than this much memory, in megabytes, with the best plan so far.
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
+    memory_limit: Option<u64>,
+    /// Also what was verified of the certificate in a directory, which `metaplan plan --certificate` has written.
+    #[arg(long, value_name = "DIR")]
+    certificate: Option<PathBuf>,
+    /// In place of a plan, what the loop did whose journal is in a directory: events, inferences, plans and effects.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["inputs", "certificate", "scenario", "set", "fail"])]
+    journal: Option<PathBuf>,
+    /// Also each picture as an SVG file in a directory, which is made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    svg: Option<PathBuf>,
+    /// Write the page to a file.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    if common.format != Format::Text {
+        let text = "`report` writes HTML; the same data come as JSON from `plan --format json`";
+        return Err(Failure::usage(Message::error("M107", text)));
+    }
+    if let Some(directory) = &arguments.journal {
+        return journal(arguments, directory);
+    }
+    let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
+    let setup = arguments.situation.setup(&arguments.inputs)?;
+    let before = arguments.situation.before();
+    let before = before.map(|situation| situation.setup(&arguments.inputs)).transpose()?;
+    let positions = setup.positions()?;
+    output::warnings(common, setup.mission.warnings());
+    let limits = guard.plan();
+    let answer = Answer::of(&setup.mission, &positions, &limits)?;
+    let before = match &before {
+        Some(before) => Some((before, Answer::of(&before.mission, &positions, &limits)?)),
+        None => None,
+    };
+    let checked = arguments
+        .certificate
+        .as_deref()
+        .map(|directory| checked(&verify(directory, Some(&setup.mission), &|| limits.reached())));
+    let (status, said) = (answer.solution.status, verdict(&answer.solution));
+    let report = page(arguments, &setup, before, answer, checked);
+    if let Some(directory) = &arguments.svg {
+        write_pictures(directory, &report.pictures())?;
+    }
+    write(arguments, &report.html(), &said)?;
+    Ok(exit(status))
+}
+
+/// The page of a journal.
+fn journal(arguments: &Arguments, directory: &Path) -> Result<Exit, Failure> {
+    let report = JournalReport::read(directory)?;
+    let log = log_picture(&directory.display().to_string(), &report);
+    if let Some(directory) = &arguments.svg {
+        write_pictures(directory, &[("log.svg".to_owned(), log.svg())])?;
+    }
+    write(arguments, &log.html(), &format!("{}\n", log.verdict))?;
+    Ok(if report.is_sound() { Exit::Done } else { Exit::BadInput })
+}
+
+/// Writes a page where it is wanted, with nothing that is not seen; what is to be said of it goes beside a file.
+fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
+    let page = &*visible(page);
+    match &arguments.output {
+        Some(file) => {
+            output::write_file(file, page)?;
+            output::note(said);
+        }
+        None => output::document(page),
+    }
+    Ok(())
+}
+
+/// A plan, and what is drawn of it.
+struct Answer {
+    solution: Solution,
+    plan: Plan,
+}
+
+impl Answer {
+    /// Plans for a mission; the plan is one that the validator has executed.
+    fn of(mission: &Mission, positions: &Positions, limits: &Limits) -> Result<Self, Failure> {
+        let (problem, _) = mission.filled()?;
+        let config = Config { limits: limits.clone(), ..Config::default() };
+        let objectives = Objectives::read(mission, &problem, &[], None)?;
+        let failed = |messages| {
+            let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
+            Failure { exit, messages }
+        };
+        let (point, reading): (Point, Reading) = match mission.ground(&problem, &[], limits) {
+            Ok(task) => {
+                let point = encodings::lexicographic(&task, &config, &mut |_| {});
+                (point, Reading::sequential(task.is_timed()))
+            }
+            Err(refused) if plan_exact::is_too_large(&refused) => {
+                let found = plan_exact::solve(mission, &problem, &objectives, &config, refused);
+                let (_, point, reading) = found.map_err(failed)?;
+                (point, reading)
+            }
+            Err(messages) => return Err(failed(messages)),
+        };
+        if let Some(reason) = &point.solution.statistics.contradiction {
+            return Err(fault(reason));
+        }
+        objectives.confirm(mission, &problem, &point, &reading)?;
+        let plan = plan_picture(Seen { mission, problem: &problem, positions }, &point.solution);
+        Ok(Self { solution: point.solution, plan })
+    }
+
+    fn cost(&self) -> String {
+        self.solution
+            .plan
+            .as_ref()
+            .map_or_else(|| "nothing: there is none".to_owned(), |plan| plan.cost.to_string())
+    }
+}
+
+fn page(
+    arguments: &Arguments,
+    setup: &Setup,
+    before: Option<(&Setup, Answer)>,
+    answer: Answer,
+    checked: Option<Checked>,
+) -> Report {
+    let name = match (setup.mission.name.as_str(), arguments.inputs.last()) {
+        ("", Some(problem)) => problem.display().to_string(),
+        (name, _) => name.to_owned(),
+    };
+    let compared = before.as_ref().map(|(old, was)| {
+        let costs = [was.cost(), answer.cost()];
+        let costs = [costs[0].as_str(), costs[1].as_str()];
+        changes((&old.mission, &was.plan), (&setup.mission, &answer.plan), costs)
+    });
+    Report {
+        name,
+        description: setup.description.clone(),
+        situation: arguments.situation.words(),
+        before: before.map(|(_, answer)| answer.plan),
+        plan: answer.plan,
+        changes: compared.unwrap_or_default(),
+        checked,
+    }
+}
+
+fn checked(report: &Verification) -> Checked {
+    let parts = report.parts.iter().map(|part| {
+        let (Ok(said) | Err(said)) = &part.result;
+        (part.part.to_owned(), part.result.is_ok(), said.clone())
+    });
+    let text = ::verify::text(report);
+    let verdict = text.lines().last().unwrap_or_default().to_owned();
+    Checked { verified: report.verified(), verdict, parts: parts.collect() }
+}
+
+/// Writes pictures into a directory.
+fn write_pictures(directory: &Path, pictures: &[(String, String)]) -> Result<(), Failure> {
+    std::fs::create_dir_all(directory).map_err(|error| {
+        let text = format!("cannot be made: {}", error.kind());
+        Message::at("M109", &directory.display().to_string(), None, text)
+    })?;
+    pictures.iter().try_for_each(|(name, text)| output::write_file(&directory.join(name), &visible(text)))
+}

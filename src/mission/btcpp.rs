@@ -1,0 +1,116 @@
+//! A plan as a behaviour tree of BehaviorTree.CPP 4: a sequence of actions, with the changes of designs between them.
+//!
+//! An action is a node with the name of its schema and a port for each parameter. A design is put to work before the first action that
+//! needs it, by a node `ChangeMode` with the ports `service_name` and `mode_name`: the service of `system_modes` for
+//! the function. `TreeNodesModel` declares all of them, as Groot2 wants it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+
+use ::mission::Mission;
+use encodings::{Plan, Step};
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, Event};
+
+/// The node that changes the design of a function.
+const CHANGE: &str = "ChangeMode";
+/// Attributes that BehaviorTree.CPP keeps to itself.
+const RESERVED: [&str; 2] = ["name", "ID"];
+
+/// A node: what it is, what this one is called, and its ports with their values.
+struct Node {
+    id: String,
+    name: String,
+    ports: Vec<(String, String)>,
+}
+
+/// The plan, whose arguments are as the domain's file writes them and whose actions follow each other, as XML.
+pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
+    let mut text = Vec::new();
+    // Writing to memory does not fail.
+    let _ = write(&mut Writer::new_with_indent(&mut text, b' ', 2), &mission.name, &nodes(mission, plan));
+    String::from_utf8(text).unwrap_or_default() + "\n"
+}
+
+/// The nodes in their order.
+fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    let mut at_work: BTreeMap<&str, &str> = BTreeMap::new();
+    for (step, number) in plan.steps.iter().zip(1..) {
+        for (function, design) in &step.configuration {
+            if at_work.insert(function, design) != Some(design) {
+                let service = ("service_name".to_owned(), format!("/{function}/change_mode"));
+                let ports = vec![service, ("mode_name".to_owned(), design.clone())];
+                nodes.push(Node { id: CHANGE.to_owned(), name: format!("{function} = {design}"), ports });
+            }
+        }
+        let words: Vec<&str> =
+            std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
+        let name = format!("{number}: {}", words.join(" "));
+        nodes.push(Node { id: step.action.clone(), name, ports: ports(mission, step) });
+    }
+    nodes
+}
+
+/// The parameters of the schema with the objects of a step.
+fn ports(mission: &Mission, step: &Step) -> Vec<(String, String)> {
+    let named = |action: &&pddl::ast::Action| {
+        action.identifier.name.as_str().eq_ignore_ascii_case(&step.action)
+            && action.parameters.len() >= step.arguments.len()
+    };
+    let schema = mission.domain().actions.iter().find(named);
+    let parameters = schema.map(|action| action.parameters.as_slice()).unwrap_or_default();
+    let names = parameters.iter().map(|parameter| port(parameter.identifier.name.as_str()));
+    names.zip(step.arguments.iter().cloned()).collect()
+}
+
+/// A name for a port: it begins with a letter, and is none that is taken.
+fn port(parameter: &str) -> String {
+    let is_taken = RESERVED.iter().any(|reserved| reserved.eq_ignore_ascii_case(parameter));
+    let begins = parameter.starts_with(|first: char| first.is_ascii_alphabetic());
+    if begins && !is_taken { parameter.to_owned() } else { format!("p_{parameter}") }
+}
+
+fn write<W: io::Write>(writer: &mut Writer<W>, mission: &str, nodes: &[Node]) -> io::Result<()> {
+    let tree = if mission.is_empty() { "plan" } else { mission };
+    writer.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+    let root = writer.create_element("root").with_attribute(("BTCPP_format", "4"));
+    root.with_attribute(("main_tree_to_execute", tree)).write_inner_content(|writer| {
+        let behaviour = writer.create_element("BehaviorTree").with_attribute(("ID", tree));
+        behaviour.write_inner_content(|writer| {
+            writer.create_element("Sequence").with_attribute(("name", tree)).write_inner_content(
+                |writer| {
+                    nodes.iter().try_for_each(|node| {
+                        let element =
+                            writer.create_element("Action").with_attribute(("ID", node.id.as_str()));
+                        let element = element.with_attribute(("name", node.name.as_str()));
+                        let ports = node.ports.iter().map(|(port, value)| (port.as_str(), value.as_str()));
+                        element.with_attributes(ports).write_empty().map(drop)
+                    })
+                },
+            )?;
+            Ok(())
+        })?;
+        writer.create_element("TreeNodesModel").write_inner_content(|writer| declare(writer, nodes))?;
+        Ok(())
+    })?;
+    Ok(())
+}
+
+/// Declares each kind of node with all ports that a node of that kind has.
+fn declare<W: io::Write>(writer: &mut Writer<W>, nodes: &[Node]) -> io::Result<()> {
+    let mut kinds: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for node in nodes {
+        kinds.entry(&node.id).or_default().extend(node.ports.iter().map(|(port, _)| port.as_str()));
+    }
+    kinds.iter().try_for_each(|(id, ports)| {
+        let kind = writer.create_element("Action").with_attribute(("ID", *id));
+        let written = kind.write_inner_content(|writer| {
+            ports.iter().try_for_each(|port| {
+                let element = writer.create_element("input_port").with_attribute(("name", *port));
+                element.with_attribute(("type", "std::string")).write_empty().map(drop)
+            })
+        });
+        written.map(drop)
+    })
+}

@@ -1,0 +1,165 @@
+//! Plans beside probabilistic policies, and ways of control beside the loop, to what is drawn of them.
+
+use picture::{Change, Group, Part, Points, Reason, Rows, Sheet};
+
+use crate::answers::{MEASURES, Pair, Row};
+use crate::comparison::Comparison;
+use crate::simulate::{Run, Sample, Strategy};
+
+/// What is drawn of comparisons; `rows` are those of the table, added ones among them. How long they took is not drawn.
+pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)], rows: &[Row]) -> Sheet {
+    let mut parts = Vec::new();
+    for (pair, comparison) in comparisons {
+        let name = pair.as_ref().map(|(start, goal)| format!("From {start} to {goal}"));
+        parts.push(Part::Heading(name.unwrap_or_else(|| "Time and safety".to_owned())));
+        parts.push(Part::Points(front(comparison)));
+        parts.push(Part::Sentences(prices(comparison)));
+    }
+    parts.push(Part::Heading("All measures".to_owned()));
+    parts.push(table(rows));
+    let front: usize = comparisons.iter().map(|(_, own)| own.front.len()).sum();
+    Sheet {
+        name: format!("{mission}: plans beside policies"),
+        description: "All candidates are measured in one decision process, exactly.".to_owned(),
+        verdict: format!("{} rows, {front} vertices of fronts.", rows.len()),
+        parts,
+    }
+}
+
+/// Time and the probability of a success without collision: the front, and each candidate with a finite time.
+fn front(comparison: &Comparison) -> Points {
+    let points = comparison.candidates.iter().filter_map(|own| {
+        let (time, success) = (own.measures.time?, own.measures.no_collision);
+        let about =
+            format!("{} {}: time {}, probability {}", own.kind, own.name, shown(time), shown(success));
+        Some((own.kind.to_string(), about, time, success))
+    });
+    Points {
+        title: "time, and the probability of success without collision".to_owned(),
+        axes: ["time".to_owned(), "probability of success without collision".to_owned()],
+        line: comparison.front.iter().map(|[time, probability]| (*time, *probability)).collect(),
+        points: points.collect(),
+    }
+}
+
+/// What it costs to decide otherwise than the best policy, with the reasons.
+fn prices(comparison: &Comparison) -> Vec<Change> {
+    let leaf = |text: String| Reason { text, supports: Vec::new() };
+    let price = |name: &str, value: Option<f64>, because: Vec<Reason>| Change {
+        text: format!("{name}: {}", value.map_or_else(|| "not finite".to_owned(), shown)),
+        because,
+    };
+    let of = |kind: char| {
+        let own = comparison.candidates.iter().find(|own| own.kind == kind);
+        own.map(|own| {
+            let time = own.measures.penalised_time.map_or_else(|| "not finite".to_owned(), shown);
+            leaf(format!("{}: penalised time {time}", own.name))
+        })
+    };
+    let penalty = leaf(format!("a mission that fails costs {}", shown(comparison.penalty)));
+    let between =
+        |one: char, other: char| of(one).into_iter().chain(of(other)).chain([penalty.clone()]).collect();
+    let mut determinism: Vec<Reason> = between('c', 'a');
+    determinism.extend(comparison.no_price.map(|why| leaf(format!("provably zero: {why}"))));
+    let mut prices = vec![
+        price("Price of determinism", comparison.price_of_determinism(), determinism),
+        price("Price of the open loop", comparison.price_of_open_loop(), between('b', 'a')),
+        price("Value of re-planning", comparison.value_of_replanning(), between('b', 'c')),
+    ];
+    if let Some(loss) = &comparison.loss {
+        let after = |moves: usize, times: [Option<f64>; 4]| {
+            let names = ["plan carried on", "new plan", "solved again", "anticipating"];
+            let times =
+                names.iter().zip(times).filter_map(|(name, time)| Some(format!("{name} {}", shown(time?))));
+            leaf(format!("after {moves} moves: {}", times.collect::<Vec<_>>().join(", ")))
+        };
+        let steps = loss.steps.iter();
+        let steps = steps
+            .map(|own| after(own.moves, [own.open_loop, own.replanned, own.solved_again, own.anticipated]));
+        let text =
+            format!("What the loss of {} costs, at a rate of {} for each move", loss.component, loss.rate);
+        prices.push(Change { text, because: steps.collect() });
+    }
+    prices
+}
+
+fn table(rows: &[Row]) -> Part {
+    let header = ["kind", "candidate"].into_iter().chain(MEASURES).map(|name| name.replace('_', " "));
+    let line = |row: &Row| {
+        let name = match &row.pair {
+            Some((start, goal)) => format!("{start}-{goal}: {}", row.name),
+            None => row.name.clone(),
+        };
+        let values = row.values.iter().map(|value| value.map_or_else(|| "–".to_owned(), shown));
+        [row.kind.clone(), name].into_iter().chain(values).collect()
+    };
+    Part::Table("measures".to_owned(), header.collect(), rows.iter().map(line).collect())
+}
+
+/// What is drawn of simulated missions: how costs, reactions and reconfigurations are distributed over the seeds.
+pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], runs: &[Run]) -> Sheet {
+    let cost = |run: &Run| run.accomplished.then_some(run.cost);
+    let changes = |run: &Run| Some(run.reconfigurations as f64);
+    let parts = vec![
+        Part::Heading("Cost of accomplished missions".to_owned()),
+        distribution(strategies, runs, "cost", &cost),
+        Part::Heading("Reaction".to_owned()),
+        distribution(strategies, runs, "reaction, in the domain's time unit", &Run::mean_reaction),
+        Part::Heading("Reconfigurations".to_owned()),
+        distribution(strategies, runs, "reconfigurations", &changes),
+        Part::Heading("Figures".to_owned()),
+        figures(strategies, runs),
+    ];
+    let done = runs.iter().filter(|run| run.accomplished).count();
+    Sheet {
+        name: format!("{mission}: {scenario}, simulated"),
+        description: "A dot is a mission, the diamond the mean with its interval of 95 percent.".to_owned(),
+        verdict: format!("{done} of {} missions were accomplished.", runs.len()),
+        parts,
+    }
+}
+
+fn own(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> {
+    runs.iter().filter(move |run| run.strategy == strategy)
+}
+
+fn distribution(
+    strategies: &[Strategy],
+    runs: &[Run],
+    name: &str,
+    figure: &dyn Fn(&Run) -> Option<f64>,
+) -> Part {
+    let group = |strategy: &Strategy| {
+        let values = own(runs, *strategy).filter_map(|run| {
+            let value = figure(run)?;
+            Some((value, format!("{}, seed {}: {}", strategy.name(), run.seed, shown(value))))
+        });
+        let values: Vec<(f64, String)> = values.collect();
+        let all: Vec<f64> = values.iter().map(|(value, _)| *value).collect();
+        let mean = Sample::of(&all)
+            .map(|sample| (sample.mean, if sample.count > 1 { sample.half_width } else { 0.0 }));
+        Group { name: strategy.name().to_owned(), values, mean }
+    };
+    let groups = strategies.iter().map(group).collect();
+    Part::Rows(Rows { title: format!("{name} by strategy"), axis: name.to_owned(), groups })
+}
+
+fn figures(strategies: &[Strategy], runs: &[Run]) -> Part {
+    let header = ["strategy", "missions", "accomplished", "cost, if accomplished", "failed actions"];
+    let line = |strategy: &Strategy| {
+        let costs: Vec<f64> =
+            own(runs, *strategy).filter(|run| run.accomplished).map(|run| run.cost).collect();
+        let cost = Sample::of(&costs).map_or_else(|| "–".to_owned(), |sample| shown(sample.mean));
+        let failed: usize = own(runs, *strategy).map(|run| run.failed).sum();
+        let counts = [own(runs, *strategy).count(), costs.len()].map(|count| count.to_string());
+        let [missions, accomplished] = counts;
+        vec![strategy.name().to_owned(), missions, accomplished, cost, failed.to_string()]
+    };
+    let header = header.map(str::to_owned).to_vec();
+    Part::Table("figures".to_owned(), header, strategies.iter().map(line).collect())
+}
+
+/// Six decimals at most.
+fn shown(value: f64) -> String {
+    ((value * 1e6).round() / 1e6).to_string()
+}

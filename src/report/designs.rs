@@ -1,0 +1,109 @@
+//! The designs of a knowledge base, and why each of them can be selected or not.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use ontology::tomasys::{Component, FunctionDesign, Measurement, Requirement};
+use picture::{Design, Reason, Step};
+use rules::{Derivation, Reason as Why, Symbols};
+
+use crate::knowledge::Knowledge;
+use crate::mapek::{said, unavailable};
+use crate::mission::Mission;
+use crate::number::decimal;
+
+/// All designs, with the steps that use them.
+pub fn designs(mission: &Mission, steps: &[Step]) -> Vec<Design> {
+    let Some(knowledge) = mission.knowledge() else { return Vec::new() };
+    let (components, measurements) = (knowledge.view().components(), knowledge.view().measurements());
+    let each = knowledge.catalogue().designs().iter();
+    each.map(|design| one(knowledge, design, (&components, &measurements), steps)).collect()
+}
+
+fn one(
+    knowledge: &Knowledge,
+    design: &FunctionDesign,
+    (components, measurements): (&[Component], &[Measurement]),
+    steps: &[Step],
+) -> Design {
+    let name = design.individual.name.clone();
+    let uses = |step: &Step| step.configuration.iter().any(|(_, own)| *own == name);
+    let components = design.components.iter().map(|own| {
+        let known = components.iter().find(|component| component.individual == *own);
+        match known.and_then(|component| component.status.as_deref()) {
+            Some(status) => format!("{} ({status})", own.name),
+            None => own.name.clone(),
+        }
+    });
+    let requirements = design.requirements.iter().map(|requirement| required(requirement, measurements));
+    Design {
+        functions: design.solves.iter().map(|function| function.name.clone()).collect(),
+        available: design.available,
+        estimations: design
+            .estimations
+            .iter()
+            .map(|(name, value)| format!("{name} {}", decimal(value)))
+            .collect(),
+        needs: components.chain(requirements).collect(),
+        steps: (1..).zip(steps).filter(|(_, step)| uses(step)).map(|(number, _)| number).collect(),
+        because: because(knowledge, &name, design.available),
+        name,
+    }
+}
+
+fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
+    let mut text = requirement.attribute.clone();
+    for (word, bound) in [("at least", &requirement.minimum), ("at most", &requirement.maximum)] {
+        if let Some(bound) = bound {
+            // Writing to a string does not fail.
+            let _ = write!(text, " {word} {}", decimal(bound));
+        }
+    }
+    let measured = measurements.iter().find(|own| own.attribute == requirement.attribute);
+    match measured.and_then(|measured| measured.value.as_ref()) {
+        Some(value) => format!("{text} (now {})", decimal(value)),
+        None => text,
+    }
+}
+
+/// Why a design can be selected or not.
+pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
+    if available {
+        let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();
+        return vec![Reason { text, supports: Vec::new() }];
+    }
+    if let Some(fault) = knowledge.fault() {
+        let text = format!("it is not known what follows: {}", fault.message);
+        return vec![Reason { text, supports: Vec::new() }];
+    }
+    let symbols = knowledge.engine().symbols();
+    let derivations = unavailable(knowledge, design);
+    derivations.iter().map(|derivation| tree(derivation, 0, symbols, &mut BTreeSet::new())).collect()
+}
+
+/// A derivation as a tree; what was explained already is only named.
+fn tree(derivation: &Derivation, at: usize, symbols: &Symbols, told: &mut BTreeSet<usize>) -> Reason {
+    let step = &derivation.steps[at];
+    let fact = said(&step.fact, symbols);
+    let leaf = |text: String| Reason { text, supports: Vec::new() };
+    if matches!(step.reason, Why::Asserted) {
+        return leaf(format!("{fact} is stated"));
+    }
+    if !told.insert(at) {
+        return leaf(format!("{fact}, as above"));
+    }
+    let mut under = Vec::new();
+    let (by, supports) = match &step.reason {
+        Why::Asserted => return leaf(fact),
+        Why::Equality { supports } => ("equality of names".to_owned(), supports.clone()),
+        Why::Rule { identity, supports, absent, aggregates, .. } => {
+            under.extend(absent.iter().map(|fact| leaf(format!("{} does not hold", said(fact, symbols)))));
+            let counted = aggregates.iter().flat_map(|aggregate| aggregate.matches.iter().flatten());
+            let label = identity.label.as_ref().map(ToString::to_string);
+            let label = label.unwrap_or_else(|| identity.to_string());
+            (format!("the rule “{label}”"), supports.iter().chain(counted).copied().collect())
+        }
+    };
+    under.extend(supports.iter().map(|support| tree(derivation, *support, symbols, told)));
+    Reason { text: format!("{fact} follows by {by}"), supports: under }
+}

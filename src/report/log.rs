@@ -1,0 +1,124 @@
+//! A journal to what is drawn of it.
+
+use picture::{Happening, Kind, Log, Reason};
+use serde_json::Value;
+
+use crate::journal::JournalReport;
+
+/// What is drawn of a journal; `name` is what it is called.
+pub fn log_picture(name: &str, journal: &JournalReport) -> Log {
+    let mut happenings = Vec::new();
+    let mut time = 0.0;
+    for entry in &journal.entries {
+        let record = entry.record;
+        if let Some(microseconds) = entry.time {
+            time = microseconds as f64 / 1e6;
+        }
+        match &entry.content {
+            Value::String(line) => {
+                let text = line.clone();
+                happenings.push(Happening { record, time, kind: Kind::Event, text, because: Vec::new() });
+            }
+            Value::Array(answers) => happenings.extend(answers.iter().map(|answer| {
+                let (kind, text, because) = told(answer);
+                Happening { record, time, kind, text, because }
+            })),
+            _ => {}
+        }
+    }
+    let verdict = if journal.is_sound() { "The journal can be used." } else { "The journal cannot be used." };
+    let messages = journal.messages.iter().map(|message| message.text().trim_end().to_owned());
+    Log {
+        name: name.to_owned(),
+        verdict: verdict.to_owned(),
+        parts: journal.parts.clone(),
+        messages: messages.collect(),
+        happenings,
+    }
+}
+
+/// An answer of the loop: its kind, a sentence, and what belongs to it.
+fn told(answer: &Value) -> (Kind, String, Vec<Reason>) {
+    let word = |field: &str| plain(&answer[field]);
+    match answer["answer"].as_str().unwrap_or_default() {
+        "inferred" => inferred(answer),
+        "contradicted" => (
+            Kind::Inference,
+            "what is known contradicts itself, or no more".to_owned(),
+            lines(&answer["contradictions"]),
+        ),
+        "unconcluded" => (Kind::Inference, format!("not concluded: {}", word("message")), Vec::new()),
+        "plan_requested" => (Kind::Plan, "a plan is looked for".to_owned(), lines(&answer["because"])),
+        "plan_found" => {
+            let steps: Vec<Reason> =
+                list(&answer["steps"]).iter().map(|step| leaf(action(step, "action"))).collect();
+            let proved = if answer["optimal"] == Value::Bool(true) { ", optimal" } else { "" };
+            (Kind::Plan, format!("a plan of {} steps, cost {}{proved}", steps.len(), word("cost")), steps)
+        }
+        "plan_kept" => (Kind::Plan, format!("the plan stays: {}", word("because")), Vec::new()),
+        "plan_none" => (
+            Kind::Plan,
+            format!("no plan ({}): {}", word("status"), word("because")),
+            lines(&answer["blocking"]),
+        ),
+        "goal_reached" => (Kind::Plan, "the goal is reached".to_owned(), Vec::new()),
+        "request_action" => (Kind::Effect, format!("begin {}", action(answer, "name")), Vec::new()),
+        "reconfigure" => {
+            let from = answer["from"].as_str().map(|from| format!(" in place of {from}")).unwrap_or_default();
+            (Kind::Effect, format!("{} gets {}{from}", word("function"), word("to")), Vec::new())
+        }
+        "cancel_action" => (Kind::Effect, format!("cancel: {}", word("because")), Vec::new()),
+        "suspend_action" => (Kind::Effect, format!("suspend: {}", word("because")), Vec::new()),
+        "resume_action" => (Kind::Effect, "resume".to_owned(), Vec::new()),
+        "error" => (Kind::Refusal, format!("{}: {}", word("code"), word("message")), Vec::new()),
+        other => (Kind::Refusal, other.to_owned(), Vec::new()),
+    }
+}
+
+/// Designs and objectives that have changed, with the reasons.
+fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
+    let designs = list(&answer["designs"]).iter().map(|own| {
+        let is = if own["available"] == Value::Bool(true) { "is available" } else { "is not available" };
+        Reason { text: format!("{} {is}", plain(&own["design"])), supports: lines(&own["because"]) }
+    });
+    let objectives = list(&answer["objectives"]).iter().map(|own| {
+        let statuses: Vec<String> = list(&own["statuses"]).iter().map(plain).collect();
+        let statuses = if statuses.is_empty() { "all is well".to_owned() } else { statuses.join(", ") };
+        Reason { text: format!("{}: {statuses}", plain(&own["objective"])), supports: lines(&own["because"]) }
+    });
+    let all: Vec<Reason> = designs.chain(objectives).collect();
+    let text: Vec<&str> = all.iter().map(|reason| reason.text.as_str()).collect();
+    (Kind::Inference, text.join("; "), all)
+}
+
+/// An action with its arguments and designs; its name stands in a field.
+fn action(step: &Value, name: &str) -> String {
+    let arguments = list(&step["arguments"]).iter().map(plain);
+    let words: Vec<String> = std::iter::once(plain(&step[name])).chain(arguments).collect();
+    let designs = step["configuration"].as_object().into_iter().flatten();
+    let designs: Vec<String> =
+        designs.map(|(function, design)| format!("{function} = {}", plain(design))).collect();
+    if designs.is_empty() { words.join(" ") } else { format!("{} ({})", words.join(" "), designs.join(", ")) }
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().map(Vec::as_slice).unwrap_or_default()
+}
+
+/// A list of sentences, or one.
+fn lines(value: &Value) -> Vec<Reason> {
+    match value {
+        Value::Array(all) => all.iter().map(|own| leaf(plain(own))).collect(),
+        Value::String(text) => vec![leaf(text.clone())],
+        _ => Vec::new(),
+    }
+}
+
+fn leaf(text: String) -> Reason {
+    Reason { text, supports: Vec::new() }
+}
+
+/// A text as it is, and everything else as JSON.
+fn plain(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned)
+}

@@ -1,0 +1,201 @@
+//! What places a mission has, which of them are neighbours, and which way a plan takes.
+//!
+//! A domain does not say what a place is. Here something moves if an action deletes `(p … a)` and adds `(p … b)` with parameters `a` and
+//! `b` of one type; the objects of that type are places, and those are neighbours that a fact or a value of the problem
+//! has as its only two places.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use encodings::Plan;
+use pddl::ast::{
+    Action, ActionBody, Atom, Condition, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
+    TypedName,
+};
+use picture::{Map, Place, Step};
+
+use crate::report::seen::Seen;
+
+/// How an action moves something.
+struct Movement<'d> {
+    action: &'d Name,
+    predicate: &'d Name,
+    /// Which parameters say from where and to where.
+    parameters: (usize, usize),
+    r#type: &'d TypeExpression,
+}
+
+/// The map, if there is one; each step of the plan gets its way on it.
+pub(super) fn map(seen: Seen<'_>, plan: &Plan, steps: &mut [Step]) -> Option<Map> {
+    let domain = seen.mission.domain();
+    let movements = movements(domain);
+    let moving = places_of_most(seen, plan, &movements)?;
+    let places = moving.places;
+    let number: BTreeMap<&Name, usize> = places.iter().zip(0..).collect();
+    for (own, step) in plan.steps.iter().zip(steps) {
+        let mut ways = moving.movements.iter().filter(|movement| *movement.action == Name::new(&own.action));
+        step.way = ways.find_map(|movement| {
+            let at = |parameter: usize| number.get(&Name::new(own.arguments.get(parameter)?)).copied();
+            Some((at(movement.parameters.0)?, at(movement.parameters.1)?)).filter(|(from, to)| from != to)
+        });
+    }
+    let predicates: BTreeSet<&Name> = moving.movements.iter().map(|movement| movement.predicate).collect();
+    let starts = seen.problem.init.iter().filter_map(|element| match element {
+        InitialElement::Fact(atom) => Some(atom),
+        _ => None,
+    });
+    let (starts, goals) = (ends(starts, &predicates), ends(goals(&seen.problem.goal), &predicates));
+    let positions = seen.positions.of(seen.problem, &places);
+    let place = |name: &Name| Place {
+        name: name.to_string(),
+        position: positions.as_ref().and_then(|positions| positions.get(name).copied()),
+        is_start: starts.contains(name),
+        is_goal: goals.contains(name),
+    };
+    Some(Map { places: places.iter().map(place).collect(), ways: ways(seen.problem, &number, &predicates) })
+}
+
+/// What moves between the places that a plan uses most.
+struct Moving<'d> {
+    movements: Vec<&'d Movement<'d>>,
+    places: Vec<Name>,
+}
+
+/// Of several kinds of places, those that the plan has most moves between, and then those that most actions know. Designs are no places.
+fn places_of_most<'d>(seen: Seen<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
+    let designs = seen.mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+    let designs: BTreeSet<Name> = designs.map(|design| Name::new(&design.individual.name)).collect();
+    let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();
+    for movement in movements {
+        let objects = objects(seen.mission.domain(), seen.problem, movement.r#type);
+        if objects.len() > 1 && !objects.iter().any(|object| designs.contains(object)) {
+            kinds.entry(objects).or_default().push(movement);
+        }
+    }
+    let uses = |kind: &[&Movement<'_>]| {
+        let own = |name: &str| kind.iter().any(|movement| *movement.action == Name::new(name));
+        plan.steps.iter().filter(|step| own(&step.action)).count()
+    };
+    let most = kinds.into_iter().max_by_key(|(_, kind)| (uses(kind), kind.len()));
+    most.map(|(places, movements)| Moving { movements, places })
+}
+
+fn movements(domain: &Domain) -> Vec<Movement<'_>> {
+    domain.actions.iter().flat_map(moves).collect()
+}
+
+/// How one action moves something.
+fn moves(action: &Action) -> Vec<Movement<'_>> {
+    let (mut added, mut deleted) = (Vec::new(), Vec::new());
+    let mut parts: Vec<&Effect> = match &action.body {
+        ActionBody::Instantaneous { effect, .. } => vec![effect],
+        ActionBody::Durative { effects, .. } => effects.iter().map(|(_, effect)| effect).collect(),
+    };
+    while let Some(part) = parts.pop() {
+        match part {
+            Effect::And(more) => parts.extend(more),
+            Effect::Add(atom) => added.push(atom),
+            Effect::Delete(atom) => deleted.push(atom),
+            _ => {}
+        }
+    }
+    let parameter = |term: Option<&Term>| match term {
+        Some(Term::Variable(variable)) => {
+            action.parameters.iter().position(|own| own.identifier.name == variable.name)
+        }
+        _ => None,
+    };
+    let mut found = Vec::new();
+    for (from, to) in deleted.iter().flat_map(|from| added.iter().map(move |to| (*from, *to))) {
+        let (Some(left), Some(right)) = (parameter(from.arguments.last()), parameter(to.arguments.last()))
+        else {
+            continue;
+        };
+        let types = [left, right].map(|own| &action.parameters[own].r#type);
+        if left != right && same_but_last(from, to) && names(types[0]).eq(names(types[1])) {
+            let (action, predicate) = (&action.identifier.name, &from.predicate.name);
+            found.push(Movement { action, predicate, parameters: (left, right), r#type: types[1] });
+        }
+    }
+    found
+}
+
+fn names(r#type: &TypeExpression) -> impl Iterator<Item = &Name> {
+    r#type.alternatives.iter().map(|own| &own.name)
+}
+
+fn same_but_last(left: &Atom, right: &Atom) -> bool {
+    let but_last = |atom: &Atom| {
+        let terms = atom.arguments.iter().map(|term| name_of(term).clone());
+        terms.take(atom.arguments.len().saturating_sub(1)).collect::<Vec<_>>()
+    };
+    left.predicate.name == right.predicate.name
+        && left.arguments.len() == right.arguments.len()
+        && but_last(left) == but_last(right)
+}
+
+fn name_of(term: &Term) -> &Name {
+    match term {
+        Term::Variable(identifier) | Term::Constant(identifier) => &identifier.name,
+    }
+}
+
+/// The objects of a type, and of types below it; in the order of the files.
+fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<Name> {
+    let object = Name::new("object");
+    let mut below: BTreeSet<&Name> = names(r#type).collect();
+    let is_everything = below.is_empty() || below.contains(&object);
+    loop {
+        let is_below = |own: &&TypedName| names(&own.r#type).any(|above| below.contains(above));
+        let more: Vec<&Name> = domain.types.iter().filter(is_below).map(|own| &own.identifier.name).collect();
+        let count = below.len();
+        below.extend(more);
+        if below.len() == count {
+            break;
+        }
+    }
+    let own = |entry: &&TypedName| is_everything || names(&entry.r#type).any(|name| below.contains(name));
+    let all = domain.constants.iter().chain(&problem.objects).filter(own);
+    let mut seen = BTreeSet::new();
+    all.map(|entry| entry.identifier.name.clone()).filter(|name| seen.insert(name.clone())).collect()
+}
+
+/// The last arguments of facts with these predicates.
+fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>) -> BTreeSet<Name> {
+    let own = atoms.filter(|atom| predicates.contains(&atom.predicate.name));
+    own.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
+}
+
+/// The facts that a goal asks for.
+fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
+    let mut parts = vec![goal];
+    std::iter::from_fn(move || {
+        loop {
+            match parts.pop()? {
+                Condition::And(more) => parts.extend(more.iter().rev()),
+                Condition::Atom(atom) => return Some(atom),
+                _ => {}
+            }
+        }
+    })
+}
+
+/// Pairs of neighbours: by facts, or where there is no such fact, by values.
+fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&Name>) -> Vec<(usize, usize)> {
+    let (mut facts, mut values) = (BTreeSet::new(), BTreeSet::new());
+    for element in &problem.init {
+        let (atom, found) = match element {
+            InitialElement::Fact(atom) => (atom, &mut facts),
+            InitialElement::Value(atom, ..) => (atom, &mut values),
+            _ => continue,
+        };
+        let places: Vec<usize> =
+            atom.arguments.iter().filter_map(|term| number.get(name_of(term)).copied()).collect();
+        if let [one, other] = places[..]
+            && one != other
+            && !moving.contains(&atom.predicate.name)
+        {
+            found.insert((one.min(other), one.max(other)));
+        }
+    }
+    if facts.is_empty() { values } else { facts }.into_iter().collect()
+}

@@ -1,0 +1,23 @@
+//! What there is to be seen of an answer: a plan with its configuration, its numbers, its way on the map, and the reasons.
+//!
+//! Pictures are made from what the JSON answers say; how they are drawn is known to `picture` alone.
+
+mod changes;
+mod compared;
+mod designs;
+mod front;
+mod log;
+mod map;
+mod numbers;
+mod plan;
+mod positions;
+mod seen;
+
+pub use changes::changes;
+pub use compared::{comparison_sheet, simulation_sheet};
+pub use designs::designs;
+pub use front::front_sheet;
+pub use log::log_picture;
+pub use plan::{plan_picture, timeline_picture};
+pub use positions::{Positions, ReportSection};
+pub use seen::Seen;

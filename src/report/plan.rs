@@ -1,0 +1,125 @@
+//! A solution to what is drawn of it.
+
+use std::collections::BTreeMap;
+
+use encodings::{Exact, Plan, Solution, Status, Step};
+use picture::Axis;
+
+use crate::mission::{Mission, times, verdict};
+use crate::report::designs::designs;
+use crate::report::map::map;
+use crate::report::numbers::curves;
+use crate::report::seen::Seen;
+
+/// What is drawn of a solution, whose steps have all arguments of the mission's domain.
+pub fn plan_picture(seen: Seen<'_>, solution: &Solution) -> picture::Plan {
+    let mut picture = timeline_picture(seen.mission, solution);
+    if let Some(plan) = &solution.plan {
+        picture.map = map(seen, plan, &mut picture.steps);
+        picture.curves = curves(seen, plan, &picture.steps, picture.axis);
+    }
+    picture.designs = designs(seen.mission, &picture.steps);
+    picture
+}
+
+/// The verdict, the steps and the search of a solution, and nothing else.
+pub fn timeline_picture(mission: &Mission, solution: &Solution) -> picture::Plan {
+    let axis = solution.plan.as_ref().map(axis).unwrap_or_default();
+    let steps = solution.plan.as_ref().map(|plan| steps(mission, plan, axis)).unwrap_or_default();
+    let (verdict, search) = (sentence(solution), search(solution));
+    picture::Plan { verdict, steps, axis, search, ..picture::Plan::default() }
+}
+
+/// The cost, and what proves it.
+fn sentence(solution: &Solution) -> String {
+    let cost = solution.plan.as_ref().map(|plan| format!("Cost {}", plan.cost));
+    let bound = solution.lower_bound.as_ref().filter(|_| solution.status != Status::Optimal);
+    let bound = bound.filter(|_| cost.is_some()).map(|bound| format!(", lower bound {bound}"));
+    let said = verdict(solution);
+    let said = said.trim_end();
+    match cost {
+        Some(cost) => format!("{cost}{}: {said}.", bound.unwrap_or_default()),
+        None => format!("No plan is shown: {said}."),
+    }
+}
+
+/// Time, unless actions that take none follow each other.
+fn axis(plan: &Plan) -> Axis {
+    let ends = plan.steps.iter().map(|step| step.start.to_rational() + step.duration.to_rational());
+    let is_sequence = plan.steps.iter().skip(1).zip(ends).all(|(next, end)| end <= next.start.to_rational());
+    let takes_none = plan.steps.iter().any(|step| step.duration.is_zero());
+    if is_sequence && takes_none { Axis::Steps } else { Axis::Time }
+}
+
+fn steps(mission: &Mission, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
+    let known = known_designs(mission);
+    let mut before: BTreeMap<String, String> = BTreeMap::new();
+    let mut drawn = Vec::new();
+    for (index, step) in plan.steps.iter().enumerate() {
+        let configuration = configuration(step, &known);
+        let changed = configuration.iter().filter_map(|(function, design)| {
+            let old = before.get(function).filter(|old| *old != design)?;
+            Some((function.clone(), old.clone()))
+        });
+        let reconfigured = changed.collect();
+        before.extend(configuration.iter().cloned());
+        let (start, duration) = times(step);
+        let (from, to) = match axis {
+            Axis::Steps => (index as f64, index as f64 + 1.0),
+            Axis::Time => (step.start.to_f64(), step.start.to_f64() + step.duration.to_f64()),
+        };
+        drawn.push(picture::Step {
+            label: label(step, &configuration),
+            start: from,
+            end: to,
+            start_text: start.to_string(),
+            duration_text: duration.to_string(),
+            cost_text: step.cost.to_string(),
+            configuration,
+            reconfigured,
+            way: None,
+        });
+    }
+    drawn
+}
+
+/// Designs of the knowledge base, and the first function that each of them solves.
+fn known_designs(mission: &Mission) -> BTreeMap<String, String> {
+    let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+    let solved = designs.filter_map(|design| {
+        let function = design.solves.first()?;
+        Some((design.individual.name.clone(), function.name.clone()))
+    });
+    solved.collect()
+}
+
+/// The configuration of a step; where a domain does not say which function a design is for, the knowledge base does. Of several designs
+/// of one function the last counts.
+fn configuration(step: &Step, known: &BTreeMap<String, String>) -> Vec<(String, String)> {
+    if !step.configuration.is_empty() {
+        return step.configuration.clone();
+    }
+    let own = step.arguments.iter().filter_map(|name| Some((known.get(name)?.clone(), name.clone())));
+    own.collect::<BTreeMap<String, String>>().into_iter().collect()
+}
+
+/// The action with its arguments, without functions and designs.
+fn label(step: &Step, configuration: &[(String, String)]) -> String {
+    let configured = |word: &&String| configuration.iter().any(|(f, design)| f == *word || design == *word);
+    let words = step.arguments.iter().filter(|word| !configured(word)).map(String::as_str);
+    std::iter::once(step.action.as_str()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// How the search went; when, differs from run to run, and is not drawn.
+fn search(solution: &Solution) -> Vec<picture::Progress> {
+    let moments = solution.statistics.history.iter().map(|moment| {
+        let cost =
+            moment.cost.as_ref().map_or_else(|| "no plan yet".to_owned(), |cost| format!("cost {cost}"));
+        picture::Progress {
+            cost: moment.cost.as_ref().map(Exact::to_f64),
+            lower_bound: moment.lower_bound.to_f64(),
+            text: format!("{cost}, lower bound {}", moment.lower_bound),
+        }
+    });
+    moments.collect()
+}

@@ -1,0 +1,119 @@
+//! Where places lie: the section `report` of a manifest.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use num_traits::ToPrimitive as _;
+use pddl::ast::{InitialElement, Name, Problem, Term};
+use serde::Deserialize;
+
+use crate::file::source;
+use crate::manifest::ManifestPath;
+use crate::message::Message;
+
+/// The section `report`.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReportSection {
+    positions: Option<Written>,
+}
+
+/// How a manifest says where places lie.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "the name of a CSV file (place,x,y), or two functions of places: [\"x\", \"y\"]"
+)]
+enum Written {
+    File(PathBuf),
+    Functions([String; 2]),
+}
+
+/// Where the places of a mission lie.
+#[derive(Debug, Clone, Default)]
+pub enum Positions {
+    /// Nobody says it.
+    #[default]
+    Unknown,
+    /// Two functions of the problem: to the right and upwards.
+    Functions([String; 2]),
+    /// Each place by name, to the right and upwards.
+    Known(BTreeMap<Name, (f64, f64)>),
+}
+
+impl ReportSection {
+    /// Reads where places lie.
+    ///
+    /// # Errors
+    /// The file cannot be read, or has lines that are no positions: all of them.
+    pub fn positions(&self, origin: &ManifestPath) -> Result<Positions, Vec<Message>> {
+        match &self.positions {
+            None => Ok(Positions::Unknown),
+            Some(Written::Functions(functions)) => Ok(Positions::Functions(functions.clone())),
+            Some(Written::File(file)) => read(&origin.path(file)).map(Positions::Known),
+        }
+    }
+}
+
+impl Positions {
+    /// The positions of these places; none unless all of them are known.
+    pub(super) fn of(&self, problem: &Problem, places: &[Name]) -> Option<BTreeMap<Name, (f64, f64)>> {
+        let known = match self {
+            Self::Unknown => return None,
+            Self::Known(known) => known.clone(),
+            Self::Functions([x, y]) => {
+                let (x, y) = (values(problem, x), values(problem, y));
+                x.into_iter().filter_map(|(place, x)| Some((place.clone(), (x, *y.get(&place)?)))).collect()
+            }
+        };
+        places.iter().all(|place| known.contains_key(place)).then_some(known)
+    }
+}
+
+/// The values of a function of one object.
+fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
+    let function = Name::new(function);
+    let value = |element: &InitialElement| match element {
+        InitialElement::Value(atom, value, _) if atom.predicate.name == function => match &atom.arguments[..]
+        {
+            [Term::Constant(place) | Term::Variable(place)] => Some((place.name.clone(), value.to_f64()?)),
+            _ => None,
+        },
+        _ => None,
+    };
+    problem.init.iter().filter_map(value).collect()
+}
+
+/// Reads lines `place,x,y`; a first line without numbers is a heading.
+fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Vec<Message>> {
+    let source = source(file).map_err(|message| vec![message])?;
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(source.text().as_bytes());
+    let (mut positions, mut wrong) = (BTreeMap::new(), Vec::new());
+    for record in reader.records() {
+        let record =
+            record.map_err(|error| vec![Message::at("M140", source.name(), None, error.to_string())])?;
+        let line = record.position().map_or(1, |position| position.line() as usize);
+        let coordinate =
+            |field: usize| record.get(field)?.parse::<f64>().ok().filter(|value| value.is_finite());
+        let is_heading = line == 1 && coordinate(1).is_none() && coordinate(2).is_none();
+        match (record.get(0), coordinate(1), coordinate(2), record.len()) {
+            (Some(place), Some(x), Some(y), 3) => {
+                if positions.insert(Name::new(place), (x, y)).is_some() {
+                    let text = format!("`{place}` has a position already");
+                    wrong.push(Message::at("M140", source.name(), Some((line, 1)), text));
+                }
+            }
+            _ if is_heading => {}
+            _ => {
+                let text = "a position is `place,x,y`, the last two numbers";
+                wrong.push(Message::at("M140", source.name(), Some((line, 1)), text));
+            }
+        }
+    }
+    if wrong.is_empty() { Ok(positions) } else { Err(wrong) }
+}

@@ -1,0 +1,159 @@
+//! Pages in a browser: nothing is wrong by its console, everything unfolds, and nothing lies on top of anything else.
+#![expect(clippy::print_stdout, reason = "what is skipped says so")]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::common::{metaplan, metaplan_in, root};
+
+/// Names of a Chromium, in the order of preference.
+const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+/// A desktop, and a telephone.
+const WIDTHS: [u32; 2] = [1280, 400];
+
+/// What a page is asked in the browser, from a page around it that is as wide as the screen should be.
+const QUESTIONS: &str = include_str!("browser.js");
+
+/// The browser, or why there is none.
+pub fn browser() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    let found = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    let found = found.into_iter().find(|program| program.is_file());
+    if found.is_none() {
+        println!("skipped: there is no Chromium in PATH (on Debian: apt-get install chromium)");
+    }
+    found
+}
+
+/// Opens a page; what is written to the console, and the document afterwards.
+fn open(browser: &Path, page: &Path, profile: &Path) -> (Vec<String>, String) {
+    let output = Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"])
+        .args([
+            "--enable-logging=stderr",
+            "--virtual-time-budget=10000",
+            "--window-size=1400,1000",
+            "--dump-dom",
+        ])
+        .arg(format!("--user-data-dir={}", profile.display()))
+        .arg(format!("file://{}", page.display()))
+        .output()
+        .expect("the browser starts");
+    let log = String::from_utf8_lossy(&output.stderr);
+    let console = log.lines().filter(|line| line.contains("CONSOLE")).map(str::to_owned).collect();
+    (console, String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// The text as the value of an attribute.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('"', "&quot;")
+}
+
+/// Opens a page by itself and at each width, and asks what is wrong with it.
+fn check(browser: &Path, name: &str, page: &str) -> Value {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = folder.path().join("page.html");
+    std::fs::write(&own, page).expect("the page is written");
+    let (console, _) = open(browser, &own, folder.path());
+    assert!(console.is_empty(), "{name}: {console:#?}");
+    let mut last = Value::Null;
+    for width in WIDTHS {
+        let around = format!(
+            "<!DOCTYPE html><html><body style=\"margin:0\"><iframe id=\"page\" style=\"border:0;width:{width}px;height:900px\" \
+             srcdoc=\"{}\"></iframe><pre id=\"found\"></pre><script>{QUESTIONS}</script></body></html>",
+            escaped(page)
+        );
+        let outer = folder.path().join("around.html");
+        std::fs::write(&outer, around).expect("the page is written");
+        let (console, document) = open(browser, &outer, folder.path());
+        assert!(console.is_empty(), "{name} at {width}: {console:#?}");
+        let found = document.rsplit("<pre id=\"found\">").next().and_then(|rest| rest.split("</pre>").next());
+        let found = found.expect("an answer").replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
+        last = serde_json::from_str(&found).unwrap_or_else(|error| panic!("{name}: {error}: {found}"));
+        assert_eq!(last["wrong"], Value::Array(Vec::new()), "{name} at {width} pixels");
+    }
+    last
+}
+
+fn page(arguments: &[&str]) -> String {
+    let all: Vec<&str> = ["report"].iter().chain(arguments).copied().collect();
+    let outcome = metaplan(&all);
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    outcome.stdout
+}
+
+#[test]
+fn pages_of_plans_work_in_a_browser() {
+    let Some(browser) = browser() else { return };
+    let missions: [&[&str]; 5] = [
+        &["missions/ugv.toml"],
+        &["missions/ugv.toml", "--scenario", "kinect_failure"],
+        &["missions/ugv_plain.toml", "--scenario", "bright_sun"],
+        &["missions/uuv.toml", "--scenario", "murky_water"],
+        &["missions/camara_like.toml", "--scenario", "kinect_failure"],
+    ];
+    for arguments in missions {
+        let found = check(&browser, &arguments.join(" "), &page(arguments));
+        assert!(found["unfolding"].as_u64() > Some(1), "{arguments:?}: {found}");
+        assert!(found["pictures"].as_u64() > Some(1), "{arguments:?}: {found}");
+    }
+}
+
+/// Pages of fronts, comparisons, simulations and journals.
+#[test]
+fn other_pages_work_in_a_browser() {
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("page.html").display().to_string();
+    let commands: [&[&str]; 3] = [
+        &["plan", "missions/camara_like.toml", "--pareto", "total_time,total_energy"],
+        &["compare", "missions/camara_like.toml", "--battery-unit", "1000"],
+        &["simulate", "missions/ugv.toml", "--scenario", "kinect_comes_and_goes", "--runs", "3"],
+    ];
+    for arguments in commands {
+        let all: Vec<&str> = arguments.iter().copied().chain(["--report", &file, "-q"]).collect();
+        let outcome = metaplan(&all);
+        assert_eq!(outcome.status, 0, "{outcome:?}");
+        let text = std::fs::read_to_string(&file).expect("a page");
+        let found = check(&browser, &arguments.join(" "), &text);
+        assert!(found["pictures"].as_u64() > Some(0), "{arguments:?}: {found}");
+    }
+    let journal = folder.path().join("journal").display().to_string();
+    let events = "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\n{\"event\":\"none\"}\n";
+    let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml", "--journal", &journal, "-q"], events);
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    let text = page(&["--journal", &journal]);
+    for kind in ["events", "inferences", "plans", "effects", "refusals"] {
+        assert!(text.contains(&format!("<td>{kind}</td>")), "{kind}");
+    }
+    let found = check(&browser, "journal", &text);
+    assert!(found["unfolding"].as_u64() > Some(1), "{found}");
+}
+
+/// What is wrong is found.
+#[test]
+fn questions_have_answers() {
+    let Some(browser) = browser() else { return };
+    let good = page(&["missions/ugv.toml"]);
+    let around = |page: &str| {
+        let page = page.to_owned();
+        let browser = browser.clone();
+        std::panic::catch_unwind(move || check(&browser, "made wrong", &page)).is_err()
+    };
+    assert!(around(&good.replace("<main>", "<main><script>alert(1)</script>")), "a script that is not ours");
+    assert!(
+        around(&good.replace("<main>", "<main><p style=\"margin-bottom:-3rem\">on top</p>")),
+        "an overlap"
+    );
+    assert!(
+        around(&good.replace("<main>", "<main><p style=\"width:2000px;max-width:none\">wide</p>")),
+        "too wide"
+    );
+    assert!(
+        around(&good.replace("<main>", "<main><img src=\"https://example.org/x.png\" alt=\"\">")),
+        "the network"
+    );
+}

@@ -1,0 +1,279 @@
+//! `metaplan report`, and pictures of plans: all that the answer has is in them, whatever it is called.
+
+use std::time::Instant;
+
+use roxmltree::Document;
+use serde_json::Value;
+
+use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
+
+/// What a page may take, in bytes.
+const LARGEST: usize = 500_000;
+
+fn page(arguments: &[&str]) -> String {
+    let all: Vec<&str> = ["report"].iter().chain(arguments).copied().collect();
+    let outcome = metaplan(&all);
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    outcome.stdout
+}
+
+/// How often the page has an attribute with this value.
+fn count(page: &str, attribute: &str, value: &str) -> usize {
+    page.matches(&format!("{attribute}=\"{value}\"")).count()
+}
+
+#[test]
+fn the_page_has_all_that_the_answer_has() {
+    for (mission, places) in [("ugv", 9), ("ugv_plain", 9), ("uuv", 0), ("uuv_plain", 0), ("camara_like", 24)]
+    {
+        let file = format!("missions/{mission}.toml");
+        let page = page(&[&file]);
+        assert!(page.len() <= LARGEST, "{mission}: {} bytes", page.len());
+        assert_eq!(page.matches("data-place=").count(), places, "{mission}");
+        let answer = metaplan(&["plan", &file, "--format", "json"]).json();
+        let steps = answer["steps"].as_array().expect("steps");
+        let mut marks = 0;
+        for (step, number) in steps.iter().zip(1..) {
+            assert!(count(&page, "data-step", &number.to_string()) >= 2, "{mission}: step {number}");
+            for (function, design) in step["configuration"].as_object().expect("a configuration") {
+                assert_eq!(count(&page, "data-lane", function), 1, "{mission}: {function}");
+                assert!(page.contains(design.as_str().expect("a name")), "{mission}: {design}");
+            }
+            marks += step["reconfigured"].as_array().map_or(0, Vec::len);
+        }
+        assert_eq!(page.matches("data-mark=").count(), marks, "{mission}");
+        let reason = metaplan(&[
+            "reason",
+            &format!("ontology/kb/{}.ttl", mission.trim_end_matches("_plain")),
+            "--format",
+            "json",
+        ]);
+        for design in reason.json()["designs"].as_array().expect("designs") {
+            assert_eq!(count(&page, "data-design", design["name"].as_str().expect("a name")), 1, "{mission}");
+        }
+    }
+}
+
+#[test]
+fn the_same_mission_gives_the_same_bytes() {
+    for arguments in [&["missions/uuv.toml"][..], &["missions/ugv.toml", "--scenario", "kinect_failure"]] {
+        assert_eq!(page(arguments), page(arguments), "{arguments:?}");
+    }
+}
+
+#[test]
+fn before_and_after_stand_side_by_side_with_the_reasons() {
+    let page = page(&["missions/ugv.toml", "--fail", "c_kinect", "--set", "robot_at=wp2"]);
+    for text in [
+        "The status of c_kinect: not said before, FALSE now.",
+        "The task: (robot_at wp1) before, (robot_at wp2) now.",
+        "fd_amcl_kinect is not available any more",
+        "c_status(c_kinect, &quot;FALSE&quot;) is stated",
+        "The plan costs 412 now, 408 before.",
+        "Designs of f_localization: fd_amcl_kinect before, fd_amcl_lidar now.",
+        "data-plan=\"before\"",
+        "data-plan=\"after\"",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+}
+
+/// The battery needs at least what the next move takes.
+#[test]
+fn numbers_come_with_the_bounds_that_constrain_them() {
+    let page = page(&["missions/uuv.toml"]);
+    assert!(page.contains("data-curve=\"battery\""));
+    assert!(page.contains("needs battery &gt;= "), "bounds have a reserve in them");
+    assert!(page.contains("data-curve=\"cost\""));
+}
+
+#[test]
+fn a_certificate_is_checked_and_shown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let certificate = folder.path().join("certificate").display().to_string();
+    assert_eq!(metaplan(&["plan", "missions/ugv.toml", "--certificate", &certificate]).status, 0);
+    let good = page(&["missions/ugv.toml", "--certificate", &certificate]);
+    assert!(good.contains("What was verified") && good.contains("verified: the plan is optimal, metric 408"));
+    let other = page(&["missions/ugv.toml", "--scenario", "bright_sun", "--certificate", &certificate]);
+    assert!(other.contains("NOT verified"), "it is about another situation");
+}
+
+#[test]
+fn hostile_names_stay_text() {
+    let hostile = "</script><script>alert(1)</script>\u{202e}";
+    let mission = copy_of_mission("ugv");
+    edit(mission.path(), "missions/ugv.toml", "An unmanned ground vehicle", hostile);
+    edit(mission.path(), "missions/ugv.toml", "name = \"ugv\"", &format!("name = \"{hostile}\""));
+    let files = "files = [\"../ontology/kb/ugv.ttl\"]";
+    let with_rules = format!("{files}\nrules = [\"coadaptation\", \"hostile.swrl\"]");
+    edit(mission.path(), "missions/ugv.toml", files, &with_rules);
+    let rule = format!(
+        "@prefix t: <http://metacontrol.org/tomasys#> .\n[{hostile}]\nt:requiresC(?fd, <http://metacontrol.org/metaplan/ugv#c_camera>) \
+         -> t:fd_realisability(?fd, false) .\n"
+    );
+    std::fs::write(mission.path().join("missions/hostile.swrl"), rule).expect("a file");
+    let outcome = metaplan_in(mission.path(), &["report", "missions/ugv.toml", "--svg", "pictures"], "");
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    assert_eq!(outcome.stdout.matches("<script").count(), 1, "the page's own");
+    assert!(outcome.stdout.matches("&lt;/script&gt;&lt;script&gt;alert(1)").count() >= 3);
+    assert!(!outcome.stdout.contains('\u{202e}'), "nothing turns the text around");
+    for file in std::fs::read_dir(mission.path().join("pictures")).expect("pictures") {
+        let text = std::fs::read_to_string(file.expect("a file").path()).expect("text");
+        assert!(Document::parse(&text).is_ok() && !text.contains("<script"));
+    }
+}
+
+#[test]
+fn places_lie_where_the_manifest_says() {
+    let mission = copy_of_mission("ugv");
+    let lines: Vec<String> =
+        (0..9).map(|index| format!("wp{},{},{}", index + 1, index % 3, -(index / 3))).collect();
+    let heading = "place,x,y\n".to_owned();
+    std::fs::write(mission.path().join("missions/places.csv"), heading.clone() + &lines.join("\n"))
+        .expect("a file");
+    edit(
+        mission.path(),
+        "missions/ugv.toml",
+        "[planning]",
+        "[report]\npositions = \"places.csv\"\n\n[planning]",
+    );
+    let report = || metaplan_in(mission.path(), &["report", "missions/ugv.toml", "--svg", "pictures"], "");
+    let outcome = report();
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    assert!(!outcome.stdout.contains("laid out by the ways"));
+    let map = std::fs::read_to_string(mission.path().join("pictures/map.svg")).expect("a map");
+    let document = Document::parse(&map).expect("XML");
+    let place = |name: &str| {
+        let own =
+            document.descendants().find(|node| node.attribute("data-place") == Some(name)).expect("a place");
+        let circle = own.children().find(|node| node.tag_name().name() == "circle").expect("a circle");
+        let number = |attribute| {
+            circle.attribute(attribute).and_then(|text| text.parse::<f64>().ok()).expect("a number")
+        };
+        (number("cx"), number("cy"))
+    };
+    let (one, three, seven) = (place("wp1"), place("wp3"), place("wp7"));
+    assert!(
+        one.0 < three.0 && one.1 < seven.1 && (one.1 - three.1).abs() < 0.2 && (one.0 - seven.0).abs() < 0.2
+    );
+    std::fs::write(mission.path().join("missions/places.csv"), heading + "wp1,0\nwp2,0,1\nwp2,1,1\n")
+        .expect("a file");
+    let outcome = report();
+    assert_eq!(outcome.status, 3, "{outcome:?}");
+    assert!(outcome.stderr.contains("places.csv:2:1"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("places.csv:4:1"), "{}", outcome.stderr);
+}
+
+/// A corridor of a thousand places.
+#[test]
+fn a_thousand_steps_are_a_page_soon() {
+    let mission = copy_of_mission("ugv");
+    let places: Vec<String> = (0..=1000).map(|index| format!("w{index}")).collect();
+    let ways = places.windows(2).map(|pair| {
+        let [from, to] = [&pair[0], &pair[1]];
+        format!("(corridor {from} {to}) (= (travel_time {from} {to}) 1)\n")
+    });
+    let problem = format!(
+        "(define (problem long) (:domain ugv) (:objects {} - waypoint)\n(:init (robot_at w0) (= (battery) 9000) (= (battery_used) 0)\n{})\n\
+         (:goal (robot_at w1000)) (:metric minimize (+ (* 100 (total-time)) (battery_used))))",
+        places.join(" "),
+        ways.collect::<Vec<_>>().concat()
+    );
+    std::fs::write(mission.path().join("encodings/ugv/problem.pddl"), problem).expect("a file");
+    let begun = Instant::now();
+    let plain = metaplan_in(mission.path(), &["plan", "missions/ugv.toml", "-q"], "");
+    let planned = begun.elapsed();
+    assert_eq!(plain.status, 0, "{}", plain.stderr);
+    let begun = Instant::now();
+    let outcome = metaplan_in(mission.path(), &["report", "missions/ugv.toml", "-q"], "");
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+    assert!(count(&outcome.stdout, "data-step", "1000") >= 2);
+    let drawn = begun.elapsed().saturating_sub(planned);
+    // This is a debug build; a release build takes a tenth.
+    assert!(drawn.as_secs_f64() < 20.0, "{drawn:?} beside {planned:?} for the plan");
+}
+
+#[test]
+fn plans_are_drawn_for_papers_and_terminals() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("plan.svg");
+    let arguments =
+        ["plan", "missions/ugv.toml", "--svg", &file.display().to_string(), "--picture", "always"];
+    let outcome = metaplan(&arguments);
+    let text = std::fs::read_to_string(file).expect("a picture");
+    let document = Document::parse(&text).expect("XML");
+    let lanes: Vec<&str> = document.descendants().filter_map(|node| node.attribute("data-lane")).collect();
+    assert_eq!(lanes, ["actions", "f_localization"]);
+    let expected = "       actions  ▕move wp1 wp2········▕move_with_obstacles…▕move wp5 wp8········▕move wp8 wp9········\n\
+                    f_localization  ▕fd_amcl_kinect······▕fd_amcl_kinect······▕fd_amcl_kinect······▕fd_amcl_kinect······\n          \
+                    time  0                    1                    2                    3                    4\n";
+    assert!(outcome.stdout.starts_with(expected), "{}", outcome.stdout);
+    let plain = metaplan(&arguments[..2]);
+    assert!(
+        outcome.stdout.ends_with(&plain.stdout),
+        "the table is the same, and without a terminal there is no more"
+    );
+}
+
+#[test]
+fn a_plan_is_a_behaviour_tree() {
+    let outcome =
+        metaplan(&["plan", "missions/ugv.toml", "--scenario", "kinect_failure", "--plan-format", "btcpp"]);
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    let document = Document::parse(&outcome.stdout).expect("XML");
+    assert_eq!(document.root_element().attribute("BTCPP_format"), Some("4"));
+    let sequence = document.descendants().find(|node| node.has_tag_name("Sequence")).expect("a sequence");
+    let nodes = sequence.children().filter(roxmltree::Node::is_element);
+    let nodes: Vec<String> = nodes
+        .map(|node| {
+            let attributes = node.attributes().filter(|own| !["ID", "name"].contains(&own.name()));
+            let ports: Vec<String> =
+                attributes.map(|own| format!("{}={}", own.name(), own.value())).collect();
+            format!("{} {}", node.attribute("ID").unwrap_or_default(), ports.join(" "))
+        })
+        .collect();
+    let move_ports = "f=f_localization fd=fd_amcl_lidar";
+    assert_eq!(
+        nodes,
+        [
+            "ChangeMode service_name=/f_localization/change_mode mode_name=fd_amcl_lidar".to_owned(),
+            format!("move {move_ports} from=wp2 to=wp3"),
+            format!("move {move_ports} from=wp3 to=wp6"),
+            format!("move_in_the_dark {move_ports} from=wp6 to=wp9"),
+        ]
+    );
+    let model = document.descendants().find(|node| node.has_tag_name("TreeNodesModel")).expect("a model");
+    let kinds: Vec<&str> = model.children().filter_map(|node| node.attribute("ID")).collect();
+    assert_eq!(kinds, ["ChangeMode", "move", "move_in_the_dark"]);
+    let refused = metaplan(&["plan", "missions/ugv.toml", "--plan-format", "btcpp", "--concurrent"]);
+    assert_eq!(refused.status, 2, "{refused:?}");
+}
+
+#[test]
+fn a_report_is_a_page() {
+    let refused = metaplan(&["report", "missions/ugv.toml", "--format", "json"]);
+    assert_eq!(refused.status, 2);
+    let error: Value = serde_json::from_str(&refused.stdout).expect("JSON");
+    assert_eq!(error["messages"][0]["code"], "M107");
+}
+
+/// The pictures of the README are those that the program draws.
+#[test]
+fn pictures_of_the_readme_are_made_by_the_program() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let directory = folder.path().display().to_string();
+    let missions = [
+        ("ugv", "kinect_failure", [("timeline", "timeline"), ("map", "map")]),
+        ("uuv", "murky_water", [("timeline", "timeline"), ("number-2", "battery")]),
+    ];
+    for (mission, scenario, pictures) in missions {
+        page(&[&format!("missions/{mission}.toml"), "--scenario", scenario, "--svg", &directory]);
+        for (drawn, shown) in pictures {
+            let drawn =
+                std::fs::read_to_string(folder.path().join(format!("{drawn}.svg"))).expect("a picture");
+            let file = format!("docs/pictures/{mission}-{shown}.svg");
+            let shown = std::fs::read_to_string(root().join(&file)).expect("a picture");
+            assert!(drawn == shown, "{file} is another picture than `metaplan report --svg` draws");
+        }
+    }
+}
