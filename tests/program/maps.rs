@@ -145,3 +145,30 @@ fn all_that_is_wrong_with_a_map_is_said() {
         assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
     }
 }
+
+/// Pictures have the places where the map has them, upwards as there.
+#[test]
+fn places_are_drawn_where_the_map_has_them() {
+    let directory = tempfile::tempdir().expect("a directory");
+    assert_eq!(import(directory.path(), &map(), &["--speeds", "full", "--battery", "1000000"]).status, 0);
+    let outcome =
+        metaplan_in(directory.path(), &["report", "out/camara.toml", "--svg", "pictures", "-q"], "");
+    assert_eq!(outcome.status, 0, "{outcome:#?}");
+    assert!(!outcome.stdout.contains("laid out by the ways"));
+    let picture = std::fs::read_to_string(directory.path().join("pictures/map.svg")).expect("a map");
+    let document = roxmltree::Document::parse(&picture).expect("XML");
+    let at = |name: &str| {
+        let mut nodes = document.descendants();
+        let place = nodes.find(|node| node.attribute("data-place") == Some(name)).expect("a place");
+        let circle = place.children().find(|node| node.tag_name().name() == "circle").expect("a circle");
+        ["cx", "cy"]
+            .map(|own| circle.attribute(own).and_then(|text| text.parse::<f64>().ok()).expect("a number"))
+    };
+    let scale = (at("h2")[0] - at("h1")[0]) / 6.8;
+    assert!(scale > 0.0);
+    for (name, x, y, _) in PLACES.iter().filter(|place| place.0 != "hs") {
+        let [drawn_x, drawn_y] = at(name);
+        let (right, up) = (drawn_x - at("h1")[0], at("h1")[1] - drawn_y);
+        assert!((right - x * scale).abs() < 0.3 && (up - y * scale).abs() < 0.3, "{name}: {right} {up}");
+    }
+}
