@@ -15,6 +15,7 @@ pub mod comparison;
 pub mod configure;
 pub mod explain;
 pub mod journal;
+pub mod live;
 pub mod manifest;
 pub mod mapek;
 pub mod mission;

@@ -1,11 +1,12 @@
-//! Where what the loop hears and answers goes: its answers to standard output, and both to a recording, if there is one.
+//! Where what the loop hears and answers goes: its answers to standard output, and both to a recording and to a page, if there are.
 
 use std::io::{self, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use metaplan::answers::{HandledLine, NumberedAnswer};
+use metaplan::live::{Address, Live, Token};
 use metaplan::message::Message;
 use metaplan::recording::{Form, Recorder};
 use metaplan::visible::visible_json;
@@ -22,6 +23,12 @@ pub(super) struct Outlets {
     /// How events and answers are recorded; diagnostics are always messages of ROS 2.
     #[arg(long, value_name = "FORM", value_enum, default_value_t = Recorded::Json, requires = "mcap")]
     mcap_events: Recorded,
+    /// Show the run as a page of the Web: PORT, HOST or HOST:PORT; without one only this machine can look at it.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    serve: Option<String>,
+    /// The file with the token that the page asks for; needed where other machines can reach it.
+    #[arg(long, value_name = "FILE", requires = "serve")]
+    serve_token: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -36,40 +43,33 @@ enum Recorded {
 #[derive(Debug, Clone)]
 pub(super) struct Outlet {
     recorder: Option<(Recorder, String)>,
+    live: Option<Live>,
 }
 
 impl Outlet {
-    /// Opens what is wanted.
+    /// Opens what is wanted, and says on standard error where the page is.
     pub(super) fn open(wanted: &Outlets, mission: &str) -> Result<Self, Message> {
-        let Some(path) = &wanted.mcap else { return Ok(Self { recorder: None }) };
-        let form = match wanted.mcap_events {
-            Recorded::Json => Form::Json,
-            Recorded::String => Form::Text,
+        let live = match &wanted.serve {
+            None => None,
+            Some(address) => {
+                let token = wanted.serve_token.as_deref().map(Token::read).transpose()?;
+                let live = Live::open(Address::read(address)?, token)?;
+                output::note(&format!("the run can be seen at http://{}/\n", live.address()));
+                Some(live)
+            }
         };
-        let name = path.display().to_string();
-        let recorder = Recorder::create(path, mission, form).map_err(|error| {
-            let exists = error.kind() == io::ErrorKind::AlreadyExists;
-            let text = if exists {
-                "is there already, and no recording is overwritten: name another file, or remove it"
-                    .to_owned()
-            } else {
-                format!("cannot be written: {error}")
-            };
-            Message::at("M331", &name, None, text)
-        })?;
-        let copy = recorder.clone();
-        // Who ends the program by a signal wants a file that is whole. If the platform refuses a handler, it can be recovered.
-        let _ = ctrlc::set_handler(move || {
-            let _ = copy.finish();
-            std::process::exit(130);
-        });
-        Ok(Self { recorder: Some((recorder, name)) })
+        let recorder =
+            wanted.mcap.as_deref().map(|path| record(path, wanted.mcap_events, mission)).transpose()?;
+        Ok(Self { recorder, live })
     }
 
     /// A line that is about to be handled, with its number and the time since the start of the mission.
     pub(super) fn heard(&self, line: u64, now: Duration, text: &str) {
         if let Some((recorder, _)) = &self.recorder {
             recorder.event(line, now, text);
+        }
+        if let Some(live) = &self.live {
+            live.heard(line, text);
         }
     }
 
@@ -82,6 +82,9 @@ impl Outlet {
         drop(stdout);
         if let Some((recorder, _)) = &self.recorder {
             lines.lines().for_each(|line| recorder.answer(line));
+        }
+        if let Some(live) = &self.live {
+            lines.lines().for_each(|line| live.said(line));
         }
         Ok(())
     }
@@ -98,10 +101,37 @@ impl Outlet {
 
     /// Ends what was opened.
     pub(super) fn close(&self) -> Result<(), Message> {
+        if let Some(live) = &self.live {
+            live.end();
+        }
         let Some((recorder, name)) = &self.recorder else { return Ok(()) };
         recorder.finish().map_err(|error| {
             let text = format!("cannot be written: {error}; what was recorded before can be recovered");
             Message::at("M331", name, None, text)
         })
     }
+}
+
+/// Begins a recording, which a signal ends as a whole.
+fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, String), Message> {
+    let form = match events {
+        Recorded::Json => Form::Json,
+        Recorded::String => Form::Text,
+    };
+    let name = path.display().to_string();
+    let recorder = Recorder::create(path, mission, form).map_err(|error| {
+        let text = if error.kind() == io::ErrorKind::AlreadyExists {
+            "is there already, and no recording is overwritten: name another file, or remove it".to_owned()
+        } else {
+            format!("cannot be written: {error}")
+        };
+        Message::at("M331", &name, None, text)
+    })?;
+    let copy = recorder.clone();
+    // If the platform refuses a handler, the file can be recovered.
+    let _ = ctrlc::set_handler(move || {
+        let _ = copy.finish();
+        std::process::exit(130);
+    });
+    Ok((recorder, name))
 }

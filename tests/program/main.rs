@@ -14,6 +14,7 @@ mod explain;
 mod export;
 mod journal;
 mod limits;
+mod live;
 mod manifest;
 mod maps;
 mod mutation;

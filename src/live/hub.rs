@@ -1,0 +1,194 @@
+//! What is known of a run, for those who look at it: the last lines, and the last word on each thing.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::live::keep::keys;
+
+/// So many lines may wait to be taken; what comes then is left out.
+const WAITING: usize = 4096;
+
+/// So many lines are kept.
+const LINES: usize = 2000;
+
+/// So many bytes of lines are kept, unless a single line has more.
+const BYTES: usize = 4 << 20;
+
+/// On so many things the last word is kept; beyond, the oldest words are forgotten.
+const WORDS: usize = 10_000;
+
+/// So many lines are handed out at once.
+const BATCH: usize = 100;
+
+/// What is known, and who waits for more.
+#[derive(Debug, Default)]
+pub(super) struct Hub {
+    known: Mutex<Known>,
+    more: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Known {
+    lines: VecDeque<Arc<str>>,
+    bytes: usize,
+    /// The number of the first of these lines.
+    first: u64,
+    /// The last word on each thing, with its number.
+    words: BTreeMap<String, (u64, Arc<str>)>,
+    ended: bool,
+}
+
+/// What there is for somebody who has read up to a line.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum News {
+    /// The next lines.
+    Lines(Vec<Arc<str>>),
+    /// Nothing for now.
+    Nothing,
+    /// Lines that were not read are gone.
+    Missed,
+    /// There will be no more.
+    Ended,
+}
+
+impl Hub {
+    /// The state of things, as lines in their order, and the number of the line that follows.
+    pub(super) fn state(&self) -> (Vec<Arc<str>>, u64) {
+        let known = self.lock();
+        let mut seen = BTreeSet::new();
+        let words = known.words.values().filter(|(number, _)| *number < known.first && seen.insert(*number));
+        let mut words: Vec<_> = words.cloned().collect();
+        words.sort_unstable_by_key(|(number, _)| *number);
+        (words.into_iter().map(|(_, line)| line).collect(), known.first)
+    }
+
+    /// What follows from a line on; waits for a while if there is nothing yet.
+    pub(super) fn news(&self, from: u64, wait: Duration) -> News {
+        let is_waiting = |known: &mut Known| !known.ended && from == known.end();
+        let known = self.more.wait_timeout_while(self.lock(), wait, is_waiting);
+        let (known, _) = known.unwrap_or_else(PoisonError::into_inner);
+        if from < known.first {
+            return News::Missed;
+        }
+        let skipped = (from - known.first) as usize;
+        let lines: Vec<_> = known.lines.iter().skip(skipped).take(BATCH).cloned().collect();
+        match lines.is_empty() {
+            false => News::Lines(lines),
+            true if known.ended => News::Ended,
+            true => News::Nothing,
+        }
+    }
+
+    /// Takes a line, with what it is the last word on.
+    fn take(&self, line: Arc<str>, keys: Vec<String>) {
+        let mut known = self.lock();
+        let number = known.end();
+        for key in keys {
+            known.words.insert(key, (number, Arc::clone(&line)));
+        }
+        while known.words.len() > WORDS {
+            let oldest =
+                known.words.iter().min_by_key(|(_, (number, _))| *number).map(|(key, _)| key.clone());
+            oldest.and_then(|key| known.words.remove(&key));
+        }
+        known.bytes += line.len();
+        known.lines.push_back(line);
+        while known.lines.len() > 1 && (known.lines.len() > LINES || known.bytes > BYTES) {
+            let gone = known.lines.pop_front();
+            known.bytes -= gone.map_or(0, |line| line.len());
+            known.first += 1;
+        }
+        drop(known);
+        self.more.notify_all();
+    }
+
+    fn end(&self) {
+        self.lock().ended = true;
+        self.more.notify_all();
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Known {
+    /// The number of the line that follows.
+    fn end(&self) -> u64 {
+        self.first + self.lines.len() as u64
+    }
+}
+
+/// The loop's end of a hub: nothing here ever waits. Copies lead to the same hub.
+#[derive(Debug, Clone)]
+pub(super) struct Mouth {
+    said: SyncSender<Option<(f64, Said)>>,
+    left_out: Arc<AtomicU64>,
+    begun: Instant,
+}
+
+#[derive(Debug)]
+enum Said {
+    Heard(u64, String),
+    Answer(String),
+}
+
+impl Mouth {
+    /// A way to speak to a hub, and a thread that listens.
+    pub(super) fn of(hub: Arc<Hub>) -> Self {
+        let (said, received) = sync_channel(WAITING);
+        let left_out = Arc::new(AtomicU64::new(0));
+        let counted = Arc::clone(&left_out);
+        std::thread::spawn(move || listen(&hub, &received, &counted));
+        Self { said, left_out, begun: Instant::now() }
+    }
+
+    /// A line that the loop has heard, with its number.
+    pub(super) fn heard(&self, number: u64, text: &str) {
+        self.say(Said::Heard(number, text.to_owned()));
+    }
+
+    /// An answer, which is an object of the format as JSON.
+    pub(super) fn answer(&self, answer: &str) {
+        self.say(Said::Answer(answer.to_owned()));
+    }
+
+    /// That there will be no more. This waits until what was said before is known.
+    pub(super) fn end(&self) {
+        let _ = self.said.send(None);
+    }
+
+    fn say(&self, said: Said) {
+        let at = self.begun.elapsed().as_secs_f64();
+        if let Err(TrySendError::Full(_)) = self.said.try_send(Some((at, said))) {
+            self.left_out.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+fn listen(hub: &Hub, received: &Receiver<Option<(f64, Said)>>, left_out: &AtomicU64) {
+    while let Ok(Some((at, said))) = received.recv() {
+        let at = (at * 1000.0).round() / 1000.0;
+        let missing = left_out.swap(0, Ordering::Relaxed);
+        if missing > 0 {
+            hub.take(json!({"at": at, "left_out": missing}).to_string().into(), Vec::new());
+        }
+        match said {
+            Said::Heard(number, text) => {
+                let line = json!({"at": at, "line": number, "heard": text});
+                hub.take(line.to_string().into(), Vec::new());
+            }
+            Said::Answer(answer) => {
+                // An answer is JSON already.
+                let line = format!("{{\"at\":{},\"said\":{answer}}}", Value::from(at));
+                hub.take(line.into(), keys(&answer));
+            }
+        }
+    }
+    hub.end();
+}

@@ -1,0 +1,66 @@
+//! Which lines say how things are, until another says otherwise.
+
+use std::borrow::Cow;
+
+use serde::Deserialize;
+
+/// What of an answer says what it is about.
+#[derive(Deserialize)]
+struct About<'a> {
+    #[serde(borrow, default)]
+    answer: Cow<'a, str>,
+    #[serde(borrow, default)]
+    function: Option<Cow<'a, str>>,
+    #[serde(default)]
+    designs: Vec<Design>,
+    #[serde(default)]
+    objectives: Vec<Objective>,
+}
+
+#[derive(Deserialize)]
+struct Design {
+    design: String,
+}
+
+#[derive(Deserialize)]
+struct Objective {
+    objective: String,
+}
+
+/// What an answer is the last word on, for now.
+pub(super) fn keys(answer: &str) -> Vec<String> {
+    let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
+    match about.answer.as_ref() {
+        "plan_found" | "plan_none" => vec!["plan".to_owned()],
+        "request_action" | "goal_reached" => vec!["action".to_owned()],
+        kind @ ("ready" | "contradicted" | "unconcluded") => vec![kind.to_owned()],
+        "reconfigure" => about.function.map(|function| format!("function {function}")).into_iter().collect(),
+        "inferred" => {
+            let designs = about.designs.into_iter().map(|own| format!("design {}", own.design));
+            designs
+                .chain(about.objectives.into_iter().map(|own| format!("objective {}", own.objective)))
+                .collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::keys;
+
+    #[test]
+    fn answers_are_the_last_word_on_something() {
+        let check = |answer: &str, expected: &[&str]| assert_eq!(keys(answer), expected, "{answer}");
+        check(r#"{"answer":"ready"}"#, &["ready"]);
+        check(r#"{"answer":"plan_found","cost":1,"steps":[]}"#, &["plan"]);
+        check(r#"{"answer":"plan_none","status":"unsolvable"}"#, &["plan"]);
+        check(r#"{"answer":"reconfigure","function":"f \"x\"","from":null,"to":"d"}"#, &["function f \"x\""]);
+        check(
+            r#"{"answer":"inferred","designs":[{"design":"a","available":true}],"objectives":[{"objective":"o"}]}"#,
+            &["design a", "objective o"],
+        );
+        check(r#"{"answer":"handled"}"#, &[]);
+        check("nonsense", &[]);
+    }
+}

@@ -1,0 +1,158 @@
+// The lines of /events to tables. Whatever comes from outside becomes text, never markup.
+"use strict";
+
+const SHOWN = 500; // lines of what happens
+const QUIET = new Set(["handled", "ready", "planning", "plan_kept"]);
+const BAD = new Set(["error", "plan_none", "contradicted", "unconcluded", "suspend_action", "cancel_action"]);
+const $ = (id) => document.getElementById(id);
+let state;
+
+function element(name, text, attributes = {}) {
+  const made = document.createElement(name);
+  if (text !== undefined && text !== null) made.textContent = String(text);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  return made;
+}
+
+function row(cells, attributes = {}) {
+  const made = element("tr", undefined, attributes);
+  for (const cell of cells) {
+    if (cell instanceof Node) made.append(cell);
+    else made.append(element("td", cell, typeof cell === "number" ? { class: "number" } : {}));
+  }
+  return made;
+}
+
+const pairs = (object) => Object.entries(object ?? {}).map(([key, value]) => `${key}: ${value}`).join(", ");
+const reasons = (list) => (list ?? []).join("; ");
+
+// Arguments without the functions and designs, which have a column of their own.
+function context(step) {
+  const known = new Set(Object.entries(step.configuration ?? {}).flat());
+  return (step.arguments ?? []).filter((word) => !known.has(word)).join(" ");
+}
+
+function status(text, kind) {
+  $("status").textContent = text;
+  $("status").dataset.state = kind;
+}
+
+function reset() {
+  state = { steps: [], step: -1, configuration: new Map(), designs: new Map() };
+  for (const id of ["plan", "configuration", "lines"]) $(id).tBodies[0].replaceChildren();
+  $("designs").replaceChildren();
+  $("plan-about").textContent = "There is no plan yet.";
+}
+
+function showPlan() {
+  const rows = state.steps.map((step, index) => {
+    const attributes = index < state.step ? { class: "done" } : index === state.step ? { "aria-current": "step" } : {};
+    return row([index + 1, `${step.action} ${context(step)}`, pairs(step.configuration), step.duration, step.cost], attributes);
+  });
+  $("plan").tBodies[0].replaceChildren(...rows);
+}
+
+function showConfiguration() {
+  const rows = [...state.configuration].sort().map(([name, design]) => row([element("th", name, { scope: "row" }), design]));
+  $("configuration").tBodies[0].replaceChildren(...rows);
+}
+
+function showDesigns() {
+  const items = [...state.designs].sort().map(([name, { text, because }]) => {
+    const item = element("li");
+    if (because.length === 0) {
+      item.textContent = `${name} ${text}`;
+      return item;
+    }
+    const details = element("details");
+    details.append(element("summary", `${name} ${text}`), element("p", reasons(because)));
+    item.append(details);
+    return item;
+  });
+  $("designs").replaceChildren(...items);
+  $("designs-about").hidden = items.length > 0;
+}
+
+// What an answer says, in words.
+const WORDS = {
+  inferred: (it) => [
+    ...it.designs.map((own) => `${own.design} is ${own.available ? "available" : "not available"}`),
+    ...it.objectives.map((own) => `${own.objective}: ${own.statuses.join(", ") || "all is well"}`),
+  ].join("; "),
+  plan_requested: (it) => reasons(it.because),
+  plan_found: (it) => `${it.steps.length} steps, cost ${it.cost}${it.optimal ? ", proved optimal" : ""}`,
+  plan_kept: (it) => it.because,
+  plan_none: (it) => `${it.status}: ${it.because}`,
+  planning: (it) => `for ${it.seconds} s; cost ${it.cost ?? "not known"}, at least ${it.lower_bound ?? "not known"}`,
+  reconfigure: (it) => `${it.function}: ${it.from ?? "nothing"} → ${it.to}`,
+  request_action: (it) => `${it.action}: ${it.name} ${context(it)} (${pairs(it.configuration)})`,
+  cancel_action: (it) => `${it.action}: ${it.because}`,
+  suspend_action: (it) => `${it.action}: ${it.because}`,
+  resume_action: (it) => `${it.action}`,
+  error: (it) => `${it.code}: ${it.message}`,
+  unconcluded: (it) => it.message ?? "it is known again what follows",
+  contradicted: (it) => it.contradictions.map((own) => own.violated).join("; ") || "consistent again",
+};
+
+// What an answer changes.
+const CHANGES = {
+  ready: (it) => ($("mission").textContent = it.mission ?? ""),
+  planning: (it) => status(`Planning for ${it.seconds} s`, "works"),
+  plan_found(it) {
+    Object.assign(state, { steps: it.steps, step: -1 });
+    $("plan-about").textContent = `Cost ${it.cost}${it.optimal ? ", proved optimal" : ", not proved optimal"}.`;
+    showPlan();
+  },
+  plan_none(it) {
+    Object.assign(state, { steps: [], step: -1 });
+    $("plan-about").textContent = `There is no plan: ${it.because}`;
+    status("There is no plan", "stuck");
+    showPlan();
+  },
+  request_action(it) {
+    state.step = Math.min(state.step + 1, state.steps.length - 1);
+    status(`Action ${it.action}: ${it.name} ${context(it)}`, "works");
+    showPlan();
+  },
+  suspend_action: (it) => status(`Action ${it.action} is suspended: ${it.because}`, "stuck"),
+  goal_reached() {
+    state.step = state.steps.length;
+    status("The goal is reached", "works");
+    showPlan();
+  },
+  reconfigure(it) {
+    state.configuration.set(it.function, it.to);
+    showConfiguration();
+  },
+  inferred(it) {
+    for (const own of it.designs) state.designs.set(own.design, { text: own.available ? "is available" : "is not available", because: own.because });
+    for (const own of it.objectives) state.designs.set(own.objective, { text: own.statuses.join(", ") || "is well", because: own.because });
+    showDesigns();
+  },
+};
+
+function show(at, line, kind, text) {
+  const sort = BAD.has(kind) ? "bad" : kind === "event" ? "event" : "effect";
+  const body = $("lines").tBodies[0];
+  body.prepend(row([`${at.toFixed(3)} s`, line ?? "", kind, text], { class: sort }));
+  while (body.rows.length > SHOWN) body.lastElementChild.remove();
+}
+
+function take(message) {
+  const news = JSON.parse(message.data);
+  if (news.left_out) return show(news.at, undefined, "left out", `${news.left_out} lines that came too fast`);
+  if (news.heard !== undefined) return show(news.at, news.line, "event", news.heard);
+  const said = news.said;
+  CHANGES[said.answer]?.(said);
+  if (!QUIET.has(said.answer)) show(news.at, said.line, said.answer, WORDS[said.answer]?.(said) ?? "");
+}
+
+reset();
+const source = new EventSource("/events");
+source.addEventListener("begin", () => (reset(), status("Connected", "works")));
+source.addEventListener("message", take);
+source.addEventListener("error", () => status("The connection is lost; what was last seen stays here", "stuck"));
+source.addEventListener("end", () => {
+  source.close();
+  status(`${$("status").textContent} (the run has ended)`, $("status").dataset.state);
+});
