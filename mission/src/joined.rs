@@ -279,7 +279,10 @@ fn joined_names(
 
 fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Vec<Message>> {
     let (domain_tree, mut diagnostics) = pddl::parse_domain(domain);
-    let (problem_tree, more) = pddl::parse_problem(problem);
+    let (problem_tree, more) = match &domain_tree {
+        Some(tree) => pddl::parse_problem_of(tree, problem),
+        None => pddl::parse_problem(problem),
+    };
     diagnostics.extend(more);
     let messages = Message::from_pddl(&diagnostics, &[domain, problem]);
     match (domain_tree, problem_tree) {

@@ -147,7 +147,7 @@ impl Mission {
     pub fn goal(&self, text: &str) -> Result<Condition, Vec<Message>> {
         let text = format!("(define (problem goal) (:domain {}) (:goal {text}))", self.domain.name.name);
         let source = Source::new("goal", text);
-        let (tree, diagnostics) = pddl::parse_problem(&source);
+        let (tree, diagnostics) = pddl::parse_problem_of(&self.domain, &source);
         let errors = Message::from_pddl(&diagnostics, &[&source]);
         let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else { return Err(errors) };
         let mut problem = self.problem.clone();

@@ -122,8 +122,10 @@ pub struct Domain {
     pub constants: Vec<TypedName>,
     /// `:predicates`.
     pub predicates: Vec<Declaration>,
-    /// `:functions`, all of them numeric.
+    /// The numeric ones of `:functions`.
     pub functions: Vec<Declaration>,
+    /// Those of the predicates that stand for functions with objects as values: the value is their last argument.
+    pub object_fluents: Vec<Name>,
     /// `:derived` axioms, in the order of the file.
     pub derived: Vec<Derived>,
     /// `:constraints`.

@@ -189,6 +189,8 @@ impl<'s> Sink<'s> {
             );
         }
         self.diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.code));
+        // What is compiled to several forms is checked in each.
+        self.diagnostics.dedup();
         self.diagnostics
     }
 }

@@ -30,7 +30,7 @@ pub mod validate;
 pub use check::{check, check_domain};
 pub use diagnostic::{Diagnostic, Severity, has_errors, render};
 pub use number::to_decimal;
-pub use parse::{parse_domain, parse_problem};
+pub use parse::{parse_domain, parse_problem, parse_problem_of};
 pub use portable::portable;
 pub use print::{print_domain, print_problem};
 pub use source::{Position, Source};
@@ -71,7 +71,10 @@ pub fn read(
     problem: &Source,
 ) -> Result<(Domain, Problem, Vec<Diagnostic>), Vec<Diagnostic>> {
     let parsed_domain = parse::domain(domain);
-    let parsed_problem = parse::problem(problem);
+    let parsed_problem = match &parsed_domain.tree {
+        Some(tree) => parse::problem_of(tree, problem),
+        None => parse::problem(problem),
+    };
     let mut found = Vec::new();
     // Names are checked where what declares them was read; otherwise each error would be followed by many.
     if parsed_domain.declarations_intact {

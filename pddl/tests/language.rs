@@ -185,7 +185,11 @@ fn every_construct_is_read_and_printed_as_written() {
 
 /// What is not supported, and the words that say so.
 const REFUSED: [(&str, &str, &str); 11] = [
-    ("section", "(:functions (place-of ?t - tool) - place)", "object fluents"),
+    (
+        "section",
+        "(:functions (place-of ?t - tool) - place) (:durative-action a :parameters (?t - tool) :duration (= ?duration (distance home (place-of ?t))) :condition (and) :effect (and))",
+        "object fluents in durations",
+    ),
     (
         "section",
         "(:process drain :parameters () :effect (decrease (battery) (* #t 1)))",

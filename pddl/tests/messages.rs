@@ -232,14 +232,14 @@ says!(time_in_an_instantaneous_action, "(and (at ?x) (link" => "(and (at start (
       │
       = help: `at start`, `over all` and `at end` are the outermost parts of conditions and effects of durative actions
 ");
-says!(object_fluent, "(:functions (battery)" => "(:functions (place-of ?t - tool) - place (battery)", @r"
-    error[P113]: functions with values of type `place` (object fluents) are not supported
-      ┌─ domain.pddl:5:38
+says!(object_fluent_without_its_type, "(at a)" => "(= (place-of drill) a)", @r"
+    error[P106]: expected a number, found `a`
+      ┌─ problem.pddl:4:30
       │
-    5 │   (:functions (place-of ?t - tool) - place (battery) (distance ?x ?y - place))
-      │                                      ^^^^^
+    4 │   (:init (= (place-of drill) a) (link a b) (= (battery) 10) (= (distance a b) 2))
+      │                              ^
       │
-      = help: use a predicate with one more argument; numeric functions are `- number`
+      = help: a function with objects as values is declared with their type in `:functions`: `(place-of ?x - tool) - place`
 ");
 says!(misplaced_preference, "(:goal (at b))" => "(:goal (or (at a) (preference p (at b))))", @r"
     error[P106]: a preference cannot stand here

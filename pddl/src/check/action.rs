@@ -119,6 +119,11 @@ impl<'a> Checker<'a> {
             Effect::Add(atom) | Effect::Delete(atom) => {
                 self.atom(atom, Kind::Predicate, scope);
                 self.is_basic(atom);
+                if matches!(effect, Effect::Add(_))
+                    && self.symbols.object_fluents.contains(&atom.predicate.name)
+                {
+                    self.assigned_value(atom, scope);
+                }
             }
             Effect::ForAll(variables, body) => {
                 self.quantified(variables, scope, |checker, scope| checker.effect(body, scope));

@@ -160,6 +160,35 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// A variable that becomes the value of a function is of its type: there is nothing that would narrow it.
+    pub(super) fn assigned_value(&mut self, atom: &'a Atom, scope: &Scope<'a>) {
+        let symbols = self.symbols;
+        let declaration = symbols.predicates.get(&atom.predicate.name);
+        let (Some(value), Some(parameter)) =
+            (atom.arguments.last(), declaration.and_then(|own| own.parameters.last()))
+        else {
+            return;
+        };
+        let Term::Variable(identifier) = value else { return };
+        let Some(variable) = scope.iter().rev().find(|own| own.identifier.name == identifier.name) else {
+            return;
+        };
+        let is_known = |own: &Identifier| symbols.types.contains(&own.name);
+        let (given, wanted) = (&variable.r#type, &parameter.r#type);
+        let is_wider = |own: &Identifier| {
+            !wanted.alternatives.iter().any(|upper| symbols.types.is_a(&own.name, &upper.name))
+        };
+        if symbols.types.overlap(given, wanted)
+            && wanted.alternatives.iter().all(is_known)
+            && !wanted.alternatives.is_empty()
+            && (given.alternatives.is_empty() || given.alternatives.iter().any(is_wider))
+        {
+            let (name, wanted, given) = (&atom.predicate.name, describe(wanted), describe(given));
+            let message = format!("the value of `{name}` is {wanted}, but what is assigned is {given}");
+            self.sink.error("P126", identifier.span, message).help("give the variable the narrower type");
+        }
+    }
+
     fn argument_fits(&self, given: &Given<'a>, wanted: &TypeExpression) -> bool {
         // A variable of a wider type is only narrowed; an object has exactly its types.
         match given {
@@ -187,8 +216,11 @@ impl<'a> Checker<'a> {
             Given::Object(types) => types.first().map_or_else(String::new, |r#type| describe(r#type)),
         };
         let (name, wanted) = (&atom.predicate.name, describe(&wanted.r#type));
-        let message = format!("argument {} of `{name}` is {wanted}, but `{shown}` is {given}", index + 1);
-        if is_untyped {
+        let is_value = index + 1 == atom.arguments.len() && self.symbols.object_fluents.contains(name);
+        let what = if is_value { "the value".to_owned() } else { format!("argument {}", index + 1) };
+        let message = format!("{what} of `{name}` is {wanted}, but `{shown}` is {given}");
+        // An object that is no value of its type would be a second one that no quantifier finds.
+        if is_untyped && !is_value {
             self.sink.warning("P126", span, message).help("give it a type in `:objects` or `:constants`");
         } else {
             self.sink.error("P126", span, message);

@@ -20,6 +20,8 @@ pub(super) struct Symbols<'a> {
     pub(super) types: TypeHierarchy,
     pub(super) predicates: FxHashMap<&'a Name, &'a Declaration>,
     pub(super) functions: FxHashMap<&'a Name, &'a Declaration>,
+    /// The predicates that stand for functions with objects as values.
+    pub(super) object_fluents: FxHashSet<&'a Name>,
     pub(super) derived: FxHashSet<&'a Name>,
     pub(super) objects: FxHashMap<&'a Name, Object<'a>>,
     pub(super) preferences: FxHashSet<&'a Name>,
@@ -41,6 +43,7 @@ impl<'a> Symbols<'a> {
             types: TypeHierarchy::of(domain),
             predicates: by_name(&domain.predicates),
             functions: by_name(&domain.functions),
+            object_fluents: domain.object_fluents.iter().collect(),
             derived: domain.derived.iter().map(|axiom| &axiom.head.identifier.name).collect(),
             objects,
         }

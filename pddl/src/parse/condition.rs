@@ -34,10 +34,10 @@ impl Parser<'_> {
                     .help("preferences are parts of goals, preconditions and `:constraints`, below `and` and `forall` only");
                 None
             }
-            symbol => match comparison(symbol) {
-                Some(operator) => self.comparison_condition(item, operator),
-                None => self.atomic_condition(item),
-            },
+            symbol => self.with_values(|parser| match comparison(symbol) {
+                Some(operator) => parser.comparison_condition(item, operator),
+                None => parser.atomic_condition(item),
+            }),
         }
     }
 
@@ -83,6 +83,9 @@ impl Parser<'_> {
     fn comparison_condition(&mut self, item: Item<'_>, operator: Comparison) -> Option<Condition> {
         let head = item.head().unwrap_or_default();
         let [left, right] = self.operands(item, &format!("({head} a b)"))?;
+        if operator == Comparison::Equal && (self.is_object_fluent(left) || self.is_object_fluent(right)) {
+            return self.equal_objects(left, right);
+        }
         if operator == Comparison::Equal && is_term_pair(left, right) {
             let (left, right) = (self.term(left), self.term(right));
             return Some(Condition::Equal(left?, right?, item.span()));

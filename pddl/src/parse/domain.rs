@@ -4,9 +4,11 @@ use crate::ast::{Action, ActionBody, Condition, Derived, Domain, Effect, Identif
 use crate::names::nearest;
 use crate::sexp::{Item, SECTIONS};
 
+use super::object::with_needs;
 use super::typed::Entries;
 use super::{Parser, at_start, list_start};
 
+const DECLARATIONS: [&str; 5] = [":requirements", ":types", ":constants", ":predicates", ":functions"];
 const ACTION_KEYS: [&str; 4] = [":parameters", ":vars", ":precondition", ":effect"];
 const DURATIVE_KEYS: [&str; 4] = [":parameters", ":duration", ":condition", ":effect"];
 
@@ -21,13 +23,18 @@ impl Parser<'_> {
             constants: Vec::new(),
             predicates: Vec::new(),
             functions: Vec::new(),
+            object_fluents: Vec::new(),
             derived: Vec::new(),
             constraints: Vec::new(),
             actions: Vec::new(),
         };
-        for section in sections {
+        // What an action says depends on which functions have objects as values.
+        let (declarations, others): (Vec<_>, Vec<_>) =
+            sections.partition(|section| DECLARATIONS.iter().any(|keyword| section.is_headed(keyword)));
+        for section in declarations.into_iter().chain(others) {
             self.domain_section(section, &mut domain);
         }
+        self.object_fluents_clash(&domain);
         Some(domain)
     }
 
@@ -65,13 +72,16 @@ impl Parser<'_> {
         let keyword = section.head().unwrap_or_default().to_ascii_lowercase();
         match keyword.as_str() {
             ":requirements" => self.requirements(section, &mut domain.requirements),
-            ":types" => domain.types.extend(self.typed_list(section.rest(), Entries::Names)),
+            ":types" => {
+                domain.types.extend(self.typed_list(section.rest(), Entries::Names));
+                self.objects.set_types(domain);
+            }
             ":constants" => domain.constants.extend(self.typed_list(section.rest(), Entries::Names)),
             ":predicates" => {
                 let declarations = section.rest().filter_map(|item| self.declaration(item, "a predicate"));
                 domain.predicates.extend(declarations);
             }
-            ":functions" => domain.functions.extend(self.function_list(section.rest())),
+            ":functions" => self.function_list(section.rest(), domain),
             ":constraints" => return self.constraints(section, &mut domain.constraints),
             ":derived" => return domain.derived.extend(self.derived(section)),
             ":action" => return domain.actions.extend(self.action(section)),
@@ -142,6 +152,7 @@ impl Parser<'_> {
 
     fn action(&mut self, section: Item<'_>) -> Option<Action> {
         let (identifier, fields) = self.action_fields(section, &ACTION_KEYS)?;
+        self.begin_effects();
         let (mut parameters, mut precondition, mut effect) = (Vec::new(), None, None);
         let (mut variables, mut preferences) = (Vec::new(), Vec::new());
         for (keyword, value) in fields {
@@ -159,8 +170,9 @@ impl Parser<'_> {
             }
         }
         parameters.append(&mut variables);
+        let needs = self.needs_of_effects().into_iter().map(|(_, need)| need).collect();
         let body = ActionBody::Instantaneous {
-            precondition: precondition.unwrap_or(Condition::And(Vec::new())),
+            precondition: with_needs(precondition.unwrap_or(Condition::And(Vec::new())), needs),
             effect: effect.unwrap_or(Effect::And(Vec::new())),
         };
         Some(Action { identifier, parameters, body, preferences, span: section.span() })
@@ -168,6 +180,7 @@ impl Parser<'_> {
 
     fn durative_action(&mut self, section: Item<'_>) -> Option<Action> {
         let (identifier, fields) = self.action_fields(section, &DURATIVE_KEYS)?;
+        self.begin_effects();
         if !fields.iter().any(|(keyword, _)| *keyword == ":duration") {
             self.sink
                 .error(
@@ -188,6 +201,7 @@ impl Parser<'_> {
                 _ => self.timed_effects(value, &mut effects),
             }
         }
+        conditions.extend(self.needs_of_effects());
         let body = ActionBody::Durative { duration, conditions, effects };
         Some(Action { identifier, parameters, body, preferences, span: section.span() })
     }

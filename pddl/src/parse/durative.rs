@@ -109,7 +109,9 @@ impl Parser<'_> {
             };
             let variables = self.parameters(variables);
             let mut inner = Vec::new();
+            let mark = self.mark_effects();
             self.timed_effects(body, &mut inner);
+            self.effects_below(mark, &variables);
             let quantify = |(time, part)| (time, Effect::ForAll(variables.clone(), Box::new(part)));
             found.extend(inner.into_iter().map(quantify));
         } else if item.is_headed("when") {
@@ -128,6 +130,7 @@ impl Parser<'_> {
                 .help("write `(at start (…))` or `(at end (…))`");
             return;
         };
+        self.objects.time = Some(time);
         if let Some(effect) = self.effect(inner) {
             spread_effect(time, effect, found);
         }
@@ -140,15 +143,17 @@ impl Parser<'_> {
         };
         let (mut conditions, mut effects) = (Vec::new(), Vec::new());
         self.timed_conditions(condition, &mut conditions);
+        let mark = self.mark_effects();
         self.timed_effects(effect, &mut effects);
+        let all = Condition::And(conditions.iter().map(|(_, part)| part.clone()).collect());
+        self.effects_when(mark, &all);
         for (time, effect) in effects {
             if conditions.iter().any(|(condition_time, _)| effect_time(*condition_time) != Some(time)) {
                 self.refuse(item, "conditional effects that take place at another time than their condition")
                     .help("remember the condition in an atom: `(when (at start (p)) (at start (q)))` and `(when (at end (q)) …)`");
                 return;
             }
-            let condition = Condition::And(conditions.iter().map(|(_, part)| part.clone()).collect());
-            found.push((time, Effect::When(condition, Box::new(effect))));
+            found.push((time, Effect::When(all.clone(), Box::new(effect))));
         }
     }
 

@@ -35,7 +35,7 @@ impl Parser<'_> {
         };
         match head.to_ascii_lowercase().as_str() {
             "and" => Some(Effect::And(item.rest().filter_map(|item| self.effect(item)).collect())),
-            "not" => self.delete(item),
+            "not" => self.for_values(|parser| parser.delete(item)),
             "forall" => self.universal_effect(item),
             "when" => self.conditional_effect(item),
             "probabilistic" | "oneof" => {
@@ -43,10 +43,10 @@ impl Parser<'_> {
                     .help("a plan here is one sequence, and an action has one outcome in each state");
                 None
             }
-            symbol => match assignment(symbol) {
-                Some(kind) => self.assignment(item, kind),
-                None => self.add(item),
-            },
+            symbol => self.for_values(|parser| match assignment(symbol) {
+                Some(kind) => parser.assignment(item, kind),
+                None => parser.add(item),
+            }),
         }
     }
 
@@ -85,18 +85,28 @@ impl Parser<'_> {
     fn universal_effect(&mut self, item: Item<'_>) -> Option<Effect> {
         let [variables, body] = self.operands(item, "(forall (?x - type) (p ?x))")?;
         let variables = self.parameters(variables);
-        Some(Effect::ForAll(variables, Box::new(self.effect(body)?)))
+        let mark = self.mark_effects();
+        let body = self.effect(body);
+        self.effects_below(mark, &variables);
+        Some(Effect::ForAll(variables, Box::new(body?)))
     }
 
     fn conditional_effect(&mut self, item: Item<'_>) -> Option<Effect> {
         let [condition, effect] = self.operands(item, "(when (p) (q))")?;
-        let (condition, effect) = (self.condition(condition), self.effect(effect));
-        Some(Effect::When(condition?, Box::new(effect?)))
+        let condition = self.condition(condition);
+        let mark = self.mark_effects();
+        let effect = self.effect(effect);
+        let condition = condition?;
+        self.effects_when(mark, &condition);
+        Some(Effect::When(condition, Box::new(effect?)))
     }
 
     fn assignment(&mut self, item: Item<'_>, kind: Assignment) -> Option<Effect> {
         let head = item.head().unwrap_or_default();
         let [target, value] = self.operands(item, &format!("({head} (function ?x) 1)"))?;
+        if kind == Assignment::Assign && self.is_object_fluent(target) {
+            return self.object_assignment(target, value);
+        }
         let (target, value) = (self.fluent(target), self.expression(value));
         Some(Effect::Assign(kind, target?, value?, item.span()))
     }

@@ -37,11 +37,7 @@ pub(super) const CONTINUOUS: &str = "numbers change at the start and the end of 
 impl Parser<'_> {
     /// `?x` or `name`.
     pub(super) fn term(&mut self, item: Item<'_>) -> Option<Term> {
-        let Some(symbol) = item.symbol() else {
-            self.expected(item, "a variable or an object")
-                .help("functions as arguments (object fluents) are not supported");
-            return None;
-        };
+        let Some(symbol) = item.symbol() else { return self.value_of(item) };
         match symbol.strip_prefix('?') {
             Some("") => {
                 self.sink.error("P106", item.span(), "a variable has a name behind its question mark");
@@ -59,6 +55,9 @@ impl Parser<'_> {
             return None;
         };
         let predicate = self.name_item(first, what)?;
+        if self.objects.contains(&predicate.name) {
+            return self.misplaced_object_fluent(item, &predicate.name);
+        }
         let before = self.sink.len();
         let arguments = item.rest().filter_map(|item| self.term(item)).collect();
         // A term that cannot be read is not to be reported again as a wrong number of arguments.
@@ -80,6 +79,9 @@ impl Parser<'_> {
             return None;
         }
         let predicate = self.name_item(item, "a function")?;
+        if self.objects.contains(&predicate.name) {
+            return self.misplaced_object_fluent(item, &predicate.name);
+        }
         Some(Atom { predicate, arguments: Vec::new(), span: item.span() })
     }
 

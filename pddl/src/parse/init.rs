@@ -50,10 +50,14 @@ impl Parser<'_> {
 
     fn initial_value(&mut self, item: Item<'_>) -> Option<InitialElement> {
         let [left, right] = self.operands(item, "(= (function object) 1)")?;
+        if self.is_object_fluent(left) || self.is_object_fluent(right) {
+            return self.initial_object(left, right);
+        }
         let is_number = |item: Item<'_>| item.symbol().is_some_and(|symbol| literal(symbol) != Literal::Name);
         let (function, value) = if is_number(left) { (right, left) } else { (left, right) };
         if value.symbol().is_some_and(|symbol| literal(symbol) == Literal::Name) {
-            self.expected(value, "a number").help("functions with objects as values are not supported");
+            self.expected(value, "a number")
+                .help("a function with objects as values is declared with their type in `:functions`: `(place-of ?x - tool) - place`");
             return None;
         }
         let (function, value) = (self.fluent(function), self.constant(value));

@@ -2,12 +2,15 @@
 //!
 //! A part that cannot be read is left out, so the tree that comes back together with errors is incomplete.
 
+mod assigned;
 mod condition;
 mod domain;
 mod durative;
 mod effect;
 mod expression;
+mod fluents;
 mod init;
+mod object;
 mod problem;
 mod soft;
 mod trajectory;
@@ -20,6 +23,7 @@ use super::diagnostic::{Diagnostic, Sink};
 use super::number::{Literal, literal};
 use super::sexp::{self, Item};
 use super::source::Source;
+use fluents::Objects;
 
 /// Reads a domain. With errors the tree lacks what could not be read; it is absent where the text has no
 /// `(define (domain …) …)`.
@@ -31,6 +35,12 @@ pub fn parse_domain(source: &Source) -> (Option<Domain>, Vec<Diagnostic>) {
 /// Reads a problem, as [`parse_domain`] does a domain.
 pub fn parse_problem(source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
     let parsed = problem(source);
+    (parsed.tree, parsed.diagnostics)
+}
+
+/// Reads a problem, as [`parse_problem`] does, of a domain that may have functions with objects as values.
+pub fn parse_problem_of(domain: &Domain, source: &Source) -> (Option<Problem>, Vec<Diagnostic>) {
+    let parsed = problem_of(domain, source);
     (parsed.tree, parsed.diagnostics)
 }
 
@@ -66,6 +76,13 @@ pub(super) fn problem(source: &Source) -> Parsed<Problem> {
     parse(source, Parser::problem)
 }
 
+pub(super) fn problem_of(domain: &Domain, source: &Source) -> Parsed<Problem> {
+    parse(source, |parser, define| {
+        parser.objects = Objects::of(domain);
+        parser.problem(define)
+    })
+}
+
 fn parse<'s, T>(source: &'s Source, build: impl FnOnce(&mut Parser<'s>, Item<'_>) -> Option<T>) -> Parsed<T> {
     parse_top(source, |parser, top| {
         let define = parser.define(top)?;
@@ -85,6 +102,7 @@ fn parse_top<'s, T>(
         names: FxHashMap::default(),
         declarations_intact: well_formed,
         has_unknown_section: false,
+        objects: Objects::default(),
     };
     let tree = tree.and_then(|tree| build(&mut parser, tree.top()));
     Parsed { tree, declarations_intact: parser.declarations_intact, diagnostics: parser.sink.finish() }
@@ -98,6 +116,7 @@ struct Parser<'s> {
     declarations_intact: bool,
     /// Whether a section was reported as unknown, so that a missing one may be just that.
     has_unknown_section: bool,
+    objects: Objects,
 }
 
 impl Parser<'_> {

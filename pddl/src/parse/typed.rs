@@ -1,9 +1,9 @@
 //! Typed lists: `?x ?y - place ?z`, objects, types, and the declarations made of them.
 
-use crate::ast::{Declaration, Identifier, Span, TypeExpression, TypedName};
+use crate::ast::{Declaration, Domain, Identifier, Span, TypeExpression, TypedName};
 use crate::sexp::{Item, Items};
 
-use super::{Parser, at_start};
+use super::Parser;
 
 /// What a typed list introduces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,35 +128,33 @@ impl Parser<'_> {
         Some(Declaration { identifier, parameters })
     }
 
-    /// The declarations of `:functions`, with their result types: `(f ?x) - number`, `(g)`.
-    pub(super) fn function_list(&mut self, items: Items<'_>) -> Vec<Declaration> {
-        let mut list = Vec::new();
+    /// The declarations of `:functions`, with the types of their values: `(f ?x) - number`, `(place-of ?x) - place`, `(g)`.
+    pub(super) fn function_list(&mut self, items: Items<'_>, domain: &mut Domain) {
+        let mut untyped = Vec::new();
         let mut items = items;
         while let Some(item) = items.next() {
-            match item.symbol() {
-                None => list.extend(self.declaration(item, "a function")),
-                Some("-") => self.result_type(items.next()),
-                Some("-number") => {}
-                Some(_) => {
-                    self.expected(item, "a function").help("write `(name ?x - type)`");
+            let Some(symbol) = item.symbol() else {
+                untyped.extend(self.declaration(item, "a function"));
+                continue;
+            };
+            let Some(glued) = symbol.strip_prefix('-') else {
+                self.expected(item, "a function").help("write `(name ?x - type)`");
+                continue;
+            };
+            let written =
+                if glued.is_empty() { items.clone().next().and_then(Item::symbol) } else { Some(glued) };
+            if written.is_some_and(|name| name.eq_ignore_ascii_case("number")) {
+                if glued.is_empty() {
+                    items.next();
                 }
+                domain.functions.append(&mut untyped);
+                continue;
+            }
+            let r#type = self.type_after_dash(item, glued, &mut items);
+            for declaration in untyped.drain(..) {
+                self.object_fluent(declaration, r#type.clone(), domain);
             }
         }
-        list
-    }
-
-    fn result_type(&mut self, item: Option<Item<'_>>) {
-        let Some(item) = item else { return };
-        if item.symbol().is_some_and(|name| name.eq_ignore_ascii_case("number")) {
-            return;
-        }
-        let r#type = item.symbol().unwrap_or("either …");
-        self.sink
-            .error(
-                "P113",
-                at_start(item),
-                format!("functions with values of type `{type}` (object fluents) are not supported"),
-            )
-            .help("use a predicate with one more argument; numeric functions are `- number`");
+        domain.functions.append(&mut untyped);
     }
 }

@@ -1,0 +1,227 @@
+//! Functions with objects as values: random tasks against a search through all states, executed with functions as they are defined.
+//! Planner and validator have to agree with that, though they only see what the functions are compiled to.
+
+#![expect(clippy::print_stdout, reason = "a skipped test says so")]
+
+mod model;
+#[path = "../random/mod.rs"]
+mod random;
+
+use std::time::Duration;
+
+use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, ground, optimize};
+use model::{Action, Change, Effect, Formula, OBJECTS, State, Step, Task, Term};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, print_domain, print_problem, read};
+use random::Random;
+
+struct Generator(Random);
+
+impl Generator {
+    fn below(&mut self, limit: u64) -> usize {
+        self.0.below(limit).unsigned_abs() as usize
+    }
+
+    fn term(&mut self, bound: usize, depth: u64) -> Term {
+        match self.below(if depth == 0 { 3 } else { 6 }) {
+            0 => Term::Object(self.below(OBJECTS as u64)),
+            1 | 2 if bound > 0 => Term::Variable(self.below(bound as u64)),
+            1 | 2 => Term::Object(self.below(2)),
+            _ => Term::Function(self.below(2), Box::new(self.term(bound, depth - 1))),
+        }
+    }
+
+    fn formula(&mut self, bound: usize, depth: u64) -> Formula {
+        let inner = |own: &mut Self, bound| Box::new(own.formula(bound, depth - 1));
+        match if depth == 0 { self.below(5) } else { self.below(11) } {
+            0 | 1 => match (self.term(bound, 2), self.term(bound, 1)) {
+                // That could not be, and is an error.
+                (Term::Function(1, inner), Term::Object(2)) => Formula::Marked(Term::Function(1, inner)),
+                (Term::Object(2), Term::Function(1, inner)) => Formula::Heavy(Term::Function(1, inner)),
+                (left, right) => Formula::Equal(left, right),
+            },
+            2 => Formula::Undefined(Term::Function(self.below(2), Box::new(self.term(bound, 1)))),
+            3 => Formula::Marked(self.term(bound, 1)),
+            4 => Formula::Heavy(self.term(bound, 1)),
+            5 => Formula::Not(inner(self, bound)),
+            6 | 7 => Formula::And(inner(self, bound), inner(self, bound)),
+            8 => Formula::Or(inner(self, bound), inner(self, bound)),
+            9 => Formula::Exists(inner(self, bound + 1)),
+            _ => Formula::ForAll(inner(self, bound + 1)),
+        }
+    }
+
+    fn effect(&mut self, parameters: usize) -> Effect {
+        let is_universal = self.below(4) == 0;
+        let bound = parameters + usize::from(is_universal);
+        let condition = (self.below(3) == 0).then(|| self.formula(bound, 1));
+        let change = match self.below(8) {
+            0 => Change::Mark(self.term(bound, 1), true),
+            1 => Change::Mark(self.term(bound, 1), false),
+            2 if !is_universal && condition.is_none() => Change::Pay(self.term(bound, 1)),
+            number => {
+                let function = number % 2;
+                let value = match (self.below(6), function) {
+                    (0, _) => None,
+                    (_, 0) => Some(self.term(bound, 1)),
+                    (1 | 2, _) => Some(Term::Function(1, Box::new(self.term(bound, 1)))),
+                    _ => Some(Term::Object(self.below(2))),
+                };
+                Change::Assign(function, self.term(bound, 1), value)
+            }
+        };
+        Effect { is_universal, condition, change }
+    }
+
+    fn effects(&mut self, parameters: usize) -> Vec<Effect> {
+        (0..=self.below(3)).map(|_| self.effect(parameters)).collect()
+    }
+
+    fn task(&mut self) -> Task {
+        let actions = (0..2 + self.below(2)).map(|_| {
+            let parameters = self.below(3);
+            let start = (self.below(5) == 0).then(|| self.effects(parameters));
+            Action {
+                parameters,
+                condition: self.formula(parameters, 1),
+                start,
+                end: self.effects(parameters),
+            }
+        });
+        let actions = actions.collect();
+        let mut init = State { values: [[None; OBJECTS]; 2], marked: [false; OBJECTS] };
+        for object in 0..OBJECTS {
+            init.marked[object] = self.below(2) == 0;
+            init.values[0][object] = (self.below(3) > 0).then(|| self.below(OBJECTS as u64));
+            init.values[1][object] = (self.below(3) > 0).then(|| self.below(2));
+        }
+        let mut task = Task { actions, init, goal: Formula::Equal(Term::Object(0), Term::Object(0)) };
+        task.goal = self.goal(&task);
+        task
+    }
+
+    /// What holds after some random steps and not before them, if that is found soon.
+    fn goal(&mut self, task: &Task) -> Formula {
+        let (steps, mut end) = (task.steps(), task.init);
+        for _ in 0..20 {
+            let step = &steps[self.below(steps.len() as u64)];
+            end = task.execute(&end, step).map_or(end, |(next, _)| next);
+        }
+        let goals: Vec<_> = (0..20).map(|_| self.formula(0, 2)).collect();
+        let is_good = |goal: &&Formula| goal.holds(&end, &[]) && !goal.holds(&task.init, &[]);
+        goals.iter().find(is_good).unwrap_or(&goals[0]).clone()
+    }
+}
+
+/// The domain and the problem as they are compiled, which are read back as they are printed.
+fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Problem) {
+    let read_both = |domain: &str, problem: &str| {
+        let (tree, task, found) = read(&Source::new("domain", domain), &Source::new("problem", problem))
+            .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
+        assert!(found.is_empty(), "{found:?}");
+        (tree, task)
+    };
+    let (tree, task) = read_both(domain, problem);
+    let printed = (print_domain(&tree), print_problem(&task));
+    let (again, task_again) = read_both(&printed.0, &printed.1);
+    assert!(again.object_fluents.is_empty());
+    assert_eq!((print_domain(&again), print_problem(&task_again)), printed);
+    (tree, task)
+}
+
+/// None where an effect at start or on a number depends on too many values.
+fn solve(domain: &str, problem: &str) -> Option<Solution> {
+    let (tree, task) = compiled(domain, problem);
+    let task = match ground(&tree, &task, &GroundConfig::default()) {
+        Ok(task) => task,
+        Err(errors) => {
+            let are_cases = errors.iter().all(|error| error.to_string().contains("with more than 64 cases"));
+            assert!(are_cases, "{errors:?}\n{domain}\n{problem}");
+            return None;
+        }
+    };
+    let limits = Limits::none().with_time(Duration::from_secs(2));
+    Some(optimize(&task, &Config { limits, ..Config::default() }, &mut |_| {}))
+}
+
+#[test]
+fn plans_are_those_of_functions_with_objects_as_values() {
+    let seeds: u64 =
+        std::env::var("METAPLAN_SEEDS").map_or(300, |text| text.parse().expect("a number of seeds"));
+    let (mut proved, mut unsolvable) = (0, 0);
+    for seed in 0..seeds {
+        let task = Generator(Random(seed)).task();
+        let (domain, problem) = (task.domain(), task.problem());
+        let Some(solution) = solve(&domain, &problem) else { continue };
+        let about = || format!("seed {seed}\n{domain}\n{problem}\n{solution:?}");
+        let best = task.best();
+        let Some(plan) = &solution.plan else {
+            assert!(best.is_none(), "{best:?} {}", about());
+            unsolvable += u64::from(solution.status == Status::Unsolvable);
+            continue;
+        };
+        let number = |name: &str| name[1..].parse().expect("a number");
+        let step = |step: &metaplan_encodings::Step| -> Step {
+            (number(&step.action), step.arguments.iter().map(|name| number(name)).collect())
+        };
+        let steps: Vec<Step> = plan.steps.iter().map(step).collect();
+        let cost = task.cost(&steps);
+        assert!(cost.is_some(), "{}", about());
+        if solution.status == Status::Optimal {
+            assert!(best.is_none_or(|best| cost == Some(best)), "{best:?} {}", about());
+            proved += 1;
+        }
+    }
+    assert!(proved * 4 > seeds && unsolvable * 4 > seeds, "{proved} proved, {unsolvable} unsolvable");
+}
+
+#[test]
+fn the_validator_executes_functions_with_objects_as_values() {
+    let mut valid = 0;
+    for seed in 0..2_000 {
+        let mut generator = Generator(Random(1_000_000 + seed));
+        let mut task = generator.task();
+        if seed % 2 == 0 {
+            task.goal = Formula::Equal(Term::Object(0), Term::Object(0));
+        }
+        let all = task.steps();
+        let plan: Vec<Step> =
+            (0..generator.below(4)).map(|_| all[generator.below(all.len() as u64)].clone()).collect();
+        let (domain, problem) = compiled(&task.domain(), &task.problem());
+        let line = |(action, arguments): &Step| {
+            let names = arguments.iter().map(|object| format!(" o{object}"));
+            format!("(a{action}{})\n", names.collect::<Vec<_>>().concat())
+        };
+        let text: String = plan.iter().map(line).collect::<Vec<_>>().concat();
+        let parsed = PlanText::parse(&Source::new("plan", text.as_str())).expect("it is a plan");
+        let verdict = validate(&domain, &problem, &parsed, &Options::default());
+        let about = || format!("{}\n{}\n{text}\n{verdict:?}", task.domain(), task.problem());
+        assert_eq!(verdict.valid, task.cost(&plan).is_some(), "{}", about());
+        valid += u32::from(verdict.valid);
+    }
+    assert!(valid > 100, "{valid} valid plans");
+}
+
+#[test]
+fn the_public_file_is_planned() {
+    let directory = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../shared/real/ipc/numeric/up-unified_planning-test-pddl-object_fluents-domain.pddl"
+    );
+    let text = |name: &str| std::fs::read_to_string(format!("{directory}/{name}"));
+    let (Ok(domain), Ok(problem)) = (text("domain.pddl"), text("problem.pddl")) else {
+        println!("skipped: {directory} is not there");
+        return;
+    };
+    // Nothing assigns the place of a package.
+    let solved = |problem: &str| solve(&domain, problem).expect("it is ground");
+    assert_eq!(solved(&problem).status, Status::Unsolvable);
+    let goal = "(= (package_at pkg1) loc3)";
+    assert!(problem.contains(goal));
+    let solution = solved(&problem.replace(goal, "(= (cargo truck1) pkg1)"));
+    assert_eq!(solution.status, Status::Optimal);
+    let steps = solution.plan.expect("a plan").steps;
+    let steps: Vec<_> =
+        steps.iter().map(|step| format!("{} {}", step.action, step.arguments.join(" "))).collect();
+    assert_eq!(steps, ["drive truck1 loc1 loc2", "load truck1 pkg1 loc2"]);
+}
