@@ -52,13 +52,17 @@ pub fn source(path: &Path) -> Result<Source, Message> {
     }
 }
 
-/// Writes a text file so that it is either whole or untouched.
+/// Writes a text file so that it is either whole or untouched, with the permissions that files are made with.
 ///
 /// # Errors
 /// It cannot be written.
 pub fn write(path: &Path, text: &str) -> Result<(), Message> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let written = tempfile::NamedTempFile::new_in(directory).and_then(|mut file| {
+    let mut temporary = tempfile::Builder::new();
+    // Temporary files are for their owner alone; the process's mask applies to these, too.
+    #[cfg(unix)]
+    temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let written = temporary.tempfile_in(directory).and_then(|mut file| {
         file.write_all(text.as_bytes())?;
         file.as_file().sync_all()?;
         file.persist(path).map_err(|error| error.error)
@@ -205,6 +209,19 @@ mod tests {
 
     fn check(text: &str, expected: Option<Kind>) {
         assert_eq!(Kind::of(text), expected, "{text}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn files_can_be_read_by_those_who_can_read_others() {
+        use std::os::unix::fs::PermissionsExt;
+
+        let directory = tempfile::tempdir().expect("a directory");
+        let [own, other] = ["own", "other"].map(|name| directory.path().join(name));
+        super::write(&own, "text").expect("written");
+        std::fs::write(&other, "text").expect("written");
+        let mode = |path| std::fs::metadata(path).expect("a file").permissions().mode();
+        assert_eq!(mode(&own), mode(&other));
     }
 
     #[test]

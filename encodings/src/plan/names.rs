@@ -122,27 +122,30 @@ pub(crate) fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N
     Plan { steps, cost: metric(task, &(plan.cost.to_rational() + rest)) }
 }
 
+/// What the fluents that are only measured come to in a state, in the unit of costs.
+pub(crate) fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
+    let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
+    let terms = task.objective.rest.iter();
+    let terms = terms.map(|(variable, factor)| state.numbers[variable.index()].to_rational() * factor);
+    terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
+}
+
 /// What each step adds to the fluents that are only measured, and what they come to in the end, in the unit of costs.
 pub(crate) fn measured<'s, N: TaskNumber>(
     task: &Task<N>,
     steps: impl Iterator<Item = (OperatorId, &'s [u32])>,
 ) -> (Vec<Rational>, Rational) {
-    let rest = &task.objective.rest;
-    if rest.is_empty() {
+    if task.objective.rest.is_empty() {
         return (steps.map(|_| Rational::zero()).collect(), Rational::zero());
     }
-    let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
-    let value = |state: &State<N>| {
-        let terms =
-            rest.iter().map(|(variable, factor)| state.numbers[variable.index()].to_rational() * factor);
-        terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
-    };
     let (mut state, mut added) = (task.initial.clone(), Vec::new());
-    let mut before = value(&state);
+    let mut before = rest(task, &state);
     for (operator, choice) in steps {
-        let next = task.successor(&task.operators[operator.index()], &state, choice);
-        state = next.expect("invariant: the plan was executed when it was found");
-        let after = value(&state);
+        // What stands for one step alone may be out of reach here.
+        if let Some(next) = task.successor(&task.operators[operator.index()], &state, choice) {
+            state = next;
+        }
+        let after = rest(task, &state);
         added.push(after.clone() - &before);
         before = after;
     }

@@ -6,7 +6,8 @@ use crate::context::Context;
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::plan::ground::{GroundPlan, GroundStep};
-use crate::plan::names::{Exact, Step, decode, metric};
+use crate::plan::names::{Exact, Step, decode, metric, rest};
+use crate::task::number::TaskNumber as _;
 use crate::task::{OperatorId, State, Task};
 
 /// A state of a task, with what was paid on the way to it.
@@ -99,7 +100,7 @@ impl Task {
 
     /// The metric of a plan that leads here.
     pub fn metric(&self, situation: &Situation) -> Exact {
-        metric(self, &situation.cost)
+        metric(self, &(situation.cost.to_rational() + rest(self, &situation.state)))
     }
 
     /// Everything that can be done; none if numbers grow too large for it.
