@@ -2,7 +2,7 @@
 //! the best.
 
 use metaplan_encodings::{
-    Config, GroundConfig, Limits, Plan, Solution, Status, ground, ground_concurrent, optimize,
+    Config, GroundConfig, Limits, Plan, Solution, Status, ground, ground_concurrent, lexicographic, optimize,
     optimize_concurrent,
 };
 use num_bigint::BigInt;
@@ -78,6 +78,9 @@ fn plans_one_after_another_have_the_metric_of_their_end() {
         };
         assert_eq!(at_first, at_first_expected, "{metric}");
         assert_eq!((solution.status, solution.lower_bound.is_none()), (Status::Feasible, true));
+        let point = lexicographic(&task, &Config::default(), &mut |_| {});
+        assert_eq!(point.values[0].to_string(), expected, "{metric}");
+        assert_eq!(point.solution.plan.expect("a plan").cost.to_string(), expected, "{metric}");
     }
     let (domain, problem) = market("minimize (spent)");
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
