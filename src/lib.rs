@@ -11,10 +11,12 @@ pub use {encodings, ontology, pddl, picture, rules};
 
 pub mod answers;
 pub mod certificate;
+pub mod codes;
 pub mod comparison;
 pub mod configure;
 pub mod explain;
 pub mod journal;
+pub mod lint;
 pub mod live;
 pub mod manifest;
 pub mod mapek;
@@ -24,6 +26,7 @@ pub mod recording;
 pub mod report;
 pub mod setup;
 pub mod simulate;
+pub mod templates;
 
 /// The example of the README is compiled and run with the tests.
 #[cfg(doctest)]

@@ -63,18 +63,28 @@ impl Setup {
     pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
         let (sections, origin): (Sections, ManifestPath) = manifest::read(manifest)?;
         let (settings, bindings) =
-            match (sections.adaptation.settings(&origin), sections.bindings.bindings(&origin)) {
-                (Ok(settings), Ok(bindings)) => (settings, bindings),
-                (settings, bindings) => {
-                    return Err(settings.err().into_iter().chain(bindings.err()).collect());
-                }
-            };
+            (sections.adaptation.settings(&origin), sections.bindings.bindings(&origin));
+        let mut wrong: Vec<Message> =
+            [settings.as_ref().err(), bindings.as_ref().err()].into_iter().flatten().cloned().collect();
         let (domain, problem) =
             (origin.path(&sections.planning.domain), origin.path(&sections.planning.problem));
         let (domain, problem) = (source(&domain), source(&problem));
         let text = domain.as_ref().map_or("", |domain| domain.text());
         let knowledge = Knowledge::read_for(&sections.knowledge.sources(&origin), text);
-        let mission = Mission::new(&sections.name, Some(knowledge), bindings, domain, problem)?;
+        let mission = match (settings, bindings) {
+            (Ok(settings), Ok(bindings)) => {
+                Mission::new(&sections.name, Some(knowledge), bindings, domain, problem)
+                    .map(|mission| (mission, settings))
+            }
+            // What the bindings were meant to be is not known.
+            _ => {
+                Err(knowledge.err().into_iter().flatten().chain(domain.err()).chain(problem.err()).collect())
+            }
+        };
+        let (mission, settings) = mission.map_err(|more| {
+            wrong.extend(more);
+            wrong
+        })?;
         let Sections { description, probabilistic: roles, report, scenarios, .. } = sections;
         Ok(Self { mission, description, settings, roles, scenarios, report, origin })
     }
@@ -85,6 +95,12 @@ impl Setup {
     /// The file of positions cannot be read, or what is wrong with it.
     pub fn positions(&self) -> Result<Positions, Vec<Message>> {
         self.report.positions(&self.origin)
+    }
+
+    /// What is wrong with a scenario, as a message about the manifest.
+    pub fn in_scenario(&self, name: &str, message: &Message) -> Message {
+        let text = format!("scenario `{name}`: {}", message.message);
+        Message::at(&message.code, self.file(), None, text)
     }
 
     /// The manifest's own name; empty for a mission without.

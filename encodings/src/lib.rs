@@ -21,6 +21,7 @@
     )
 )]
 
+mod codes;
 mod error;
 mod limits;
 mod number;
@@ -51,11 +52,14 @@ mod replan;
 
 mod certificate;
 
+pub mod shipped;
+
 #[cfg(test)]
 mod tests;
 
 pub use self::certificate::{Certificate, Outputs as RefutationOutputs, certify, certify_exact, refute};
 pub use alternatives::{Alternatives, Forced, alternatives};
+pub use codes::CODES;
 pub use concurrent::{Concurrent, ground_concurrent, optimize_concurrent};
 pub use configuration::{Chosen, DesignChoice, configure};
 pub use encode::Semantics;

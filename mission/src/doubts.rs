@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use ontology::tomasys::FunctionDesign;
 use ontology::vocab::local_name;
 use pddl::ast::{ActionBody, Assignment, Effect, InitialElement, Name};
 use pddl::{Diagnostic, Severity, print_domain};
@@ -10,12 +11,12 @@ use rules::{Engine, Fact};
 
 use crate::joined::Mission;
 use crate::knowledge::Knowledge;
-use crate::message::{Message, nearest};
+use crate::message::{Message, did_you_mean, nearest};
 
 impl Mission {
     /// Warnings about names of the knowledge base that nothing stands for, and about values that nothing gives.
     pub fn doubts(&self) -> Vec<Message> {
-        let Some(knowledge) = &self.knowledge else { return Vec::new() };
+        let Some(knowledge) = &self.knowledge else { return self.functions_without_value() };
         let mut doubts = Vec::new();
         // In PLANTA's form conditions name the actions of the knowledge base.
         if self.planta.is_none() {
@@ -26,7 +27,40 @@ impl Mission {
         doubts.extend(components(knowledge));
         doubts.extend(self.functions_without_value());
         doubts.extend(attributes(knowledge));
+        doubts.extend(self.idle_bindings(knowledge));
         doubts
+    }
+
+    /// Bindings to what the knowledge base does not have.
+    fn idle_bindings(&self, knowledge: &Knowledge) -> Vec<Message> {
+        let (view, known) = (knowledge.view(), knowledge.catalogue());
+        let estimated: BTreeSet<&str> = known.designs().iter().flat_map(estimates).collect();
+        let measured: BTreeSet<&str> =
+            known.measurements().iter().map(|own| own.attribute.as_str()).collect();
+        let actions: BTreeSet<&str> =
+            known.actions().iter().map(|action| local_name(&action.individual.iri)).collect();
+        let doubt = |symbol: &str, query: &str, lacks: &str, name: &str, names: &BTreeSet<&str>| {
+            let meant = did_you_mean(name, names.iter().copied());
+            let text = format!("`{symbol}` is bound to `{query}`, but {lacks} `{name}`{meant}");
+            Message::warning("M227", text)
+        };
+        let idle = |(symbol, query): (&String, &String)| {
+            let (kind, name) = query.split_once(':')?;
+            let none = BTreeSet::new();
+            let (lacks, names) = match kind {
+                "estimation" | "chosen" | "reconfigured" => ("no design has an estimation of", &estimated),
+                "measured" => ("nothing has been measured of", &measured),
+                "action" | "requires" => ("the knowledge base has no action", &actions),
+                "class" if known.members(&view, name).is_empty() => {
+                    ("the knowledge base has no individuals of", &none)
+                }
+                _ => return None,
+            };
+            let plain = name.strip_prefix("fd_").unwrap_or(name);
+            let is_there = [name, plain, &format!("a_{name}")].iter().any(|own| names.contains(*own));
+            (!is_there).then(|| doubt(symbol, query, lacks, name, names))
+        };
+        self.bindings.written().iter().filter_map(idle).collect()
     }
 
     /// Actions of the knowledge base that no schema of the domain stands for.
@@ -94,16 +128,22 @@ impl Mission {
                 && !effects.iter().any(|effect| assigns(effect, name))
         });
         let warning = |identifier: &pddl::ast::Identifier| {
-            let text = format!(
-                "nothing gives `{}` a value: neither the problem nor the knowledge base, by its name or a binding",
-                identifier.name
-            );
+            let who = match self.knowledge {
+                Some(_) => "neither the problem nor the knowledge base, by its name or a binding",
+                None => "the problem does not, and there is no knowledge base",
+            };
+            let text = format!("nothing gives `{}` a value: {who}", identifier.name);
             let found =
                 Diagnostic::new(&self.domain_source, identifier.span, Severity::Warning, "M206", text);
             Message::from_pddl(&[found], &[&self.domain_source])
         };
         silent.flat_map(warning).collect()
     }
+}
+
+/// The attributes of which a design has an estimation.
+fn estimates(design: &FunctionDesign) -> impl Iterator<Item = &str> {
+    design.estimations.keys().map(String::as_str)
 }
 
 fn assigns(effect: &Effect, name: &Name) -> bool {
@@ -167,8 +207,7 @@ fn is_plain(engine: &Engine, fact: &Fact) -> bool {
 fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     let (engine, view) = (knowledge.engine(), knowledge.view());
     let designs = view.function_designs();
-    let estimated: BTreeSet<&str> =
-        designs.iter().flat_map(|design| design.estimations.keys()).map(String::as_str).collect();
+    let estimated: BTreeSet<&str> = designs.iter().flat_map(estimates).collect();
     let bounded: BTreeSet<&str> =
         designs.iter().flat_map(|design| &design.requirements).map(|own| own.attribute.as_str()).collect();
     let mut doubts = Vec::new();

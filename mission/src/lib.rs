@@ -7,6 +7,7 @@
 
 mod binding;
 mod called;
+mod codes;
 mod doubts;
 pub mod file;
 mod joined;
@@ -21,5 +22,6 @@ pub mod visible;
 
 pub use binding::{Bindings, atom};
 pub use called::{Names, Place};
+pub use codes::CODES;
 pub use joined::Mission;
 pub use native::CoAdaptation;

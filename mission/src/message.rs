@@ -139,10 +139,10 @@ impl Message {
 
     /// An error in rules.
     pub fn from_rules(error: &rules::Error) -> Self {
-        let text = error.to_string();
-        let is_code = |word: &&str| word.len() == 4 && word.starts_with('R');
-        let code = text.split_whitespace().find(is_code).unwrap_or("R100").to_owned();
-        Self::from_text("error", &code, &text)
+        let (text, code) = (error.to_string(), error.code());
+        let sentence = text.split_once(&format!("{code} ")).map_or(text.as_str(), |(_, sentence)| sentence);
+        let place = error.place().map(|(file, line, column)| (file.to_owned(), Some((line, column))));
+        Self::plain("error", code, sentence.to_owned(), place)
     }
 
     /// A message from `[FILE:[LINE:COLUMN:]] [SEVERITY[CODE]:] SENTENCE`, the form in which libraries print theirs.

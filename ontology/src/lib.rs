@@ -10,6 +10,7 @@ pub mod vocab;
 
 mod owl;
 
+mod codes;
 mod contents;
 mod error;
 mod functional;
@@ -28,6 +29,7 @@ pub mod kb;
 pub mod runtime;
 pub mod tomasys;
 
+pub use codes::CODES;
 pub use error::{Error, Position, Warning};
 pub use lower::{AXIOM_SOURCE, Equality, INTERNAL, Lowered, lower, lower_together, lower_with};
 pub use ntriples::ntriples;

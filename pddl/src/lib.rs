@@ -15,6 +15,7 @@
 
 pub mod ast;
 pub mod check;
+mod codes;
 pub mod diagnostic;
 mod names;
 mod number;
@@ -28,6 +29,7 @@ mod types;
 pub mod validate;
 
 pub use check::{check, check_domain};
+pub use codes::CODES;
 pub use diagnostic::{Diagnostic, Severity, has_errors, render};
 pub use number::to_decimal;
 pub use parse::{parse_domain, parse_problem, parse_problem_of};

@@ -26,6 +26,7 @@
 )]
 
 pub mod check;
+mod codes;
 pub mod error;
 pub mod explore;
 pub mod graph;
@@ -39,6 +40,7 @@ pub mod property;
 pub mod solve;
 pub mod states;
 
+pub use codes::CODES;
 pub use error::{Diagnostic, Error, Place};
 pub use mdp::Mdp;
 pub use number::Number;

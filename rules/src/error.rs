@@ -199,6 +199,47 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// The stable code of the cause.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Syntax { .. } => "R101",
+            Self::UndeclaredPrefix { .. } => "R102",
+            Self::UnknownBuiltIn { .. }
+            | Self::RefusedBuiltIn { .. }
+            | Self::ForeignBuiltIn { .. }
+            | Self::UnknownRelation { .. } => "R104",
+            Self::NotSwrl { .. } => "R105",
+            Self::UnsafeHead { .. } => "R202",
+            Self::UnsafeBody { .. } => "R203",
+            Self::BuiltInArity { .. } => "R204",
+            Self::HeadAtom { .. } => "R205",
+            Self::Unstratified { .. } => "R206",
+            Self::Arity { .. } => "R207",
+            Self::UnstratifiedAggregate { .. } => "R208",
+            Self::NestedAggregate { .. } => "R209",
+            Self::BudgetExhausted { .. } => "R301",
+            Self::UnknownSymbol { .. } => "R302",
+            Self::FactArity { .. } => "R303",
+            Self::Interrupted { .. } => "R304",
+        }
+    }
+
+    /// The file, line and column, counted from 1, where the error has a place in a text.
+    pub fn place(&self) -> Option<(&str, usize, usize)> {
+        match self {
+            Self::Syntax { file, line, column, .. }
+            | Self::UndeclaredPrefix { file, line, column, .. }
+            | Self::UnknownBuiltIn { file, line, column, .. }
+            | Self::RefusedBuiltIn { file, line, column, .. }
+            | Self::ForeignBuiltIn { file, line, column, .. }
+            | Self::UnknownRelation { file, line, column, .. }
+            | Self::NotSwrl { file, line, column, .. } => Some((file, *line as usize, *column as usize)),
+            _ => None,
+        }
+    }
+}
+
 /// The built-in that the author of an unknown one may have meant.
 fn did_you_mean(iri: &str) -> String {
     BuiltIn::similar(iri).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))

@@ -4,6 +4,7 @@
 mod aggregate;
 mod apply;
 mod builtin;
+mod codes;
 mod cost;
 mod derivation;
 mod engine;
@@ -35,6 +36,7 @@ mod vocabulary;
 mod why_not;
 
 pub use builtin::{BuiltIn, CustomBuiltIn, Definition, SWRLB};
+pub use codes::CODES;
 pub use derivation::{Aggregated, Cause, Derivation, DerivationStep, Reason, Violation};
 pub use engine::{Delta, Engine};
 pub use error::Error;

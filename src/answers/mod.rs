@@ -4,11 +4,14 @@
 //! An answer is built from what the library has found. The command line only writes it.
 
 mod check;
+mod code;
 mod compare;
 mod configure;
 mod explain;
 mod export;
+mod init;
 mod journal;
+mod lint;
 mod plan;
 mod reason;
 mod run;
@@ -18,11 +21,14 @@ mod validate;
 pub use ::mission::message::ErrorAnswer;
 pub use ::verify::VerificationAnswer;
 pub use check::CheckAnswer;
+pub use code::CodeAnswer;
 pub use compare::{CompareAnswer, ComparisonAnswer, MEASURES, Pair, Row, begun_rows, rows};
 pub use configure::{ConfigureAnswer, KeeperReadyLine};
 pub use explain::{ChangesAnswer, DesignAnswer};
 pub use export::{ImportAnswer, MissionExport, ModelExport};
+pub use init::InitAnswer;
 pub use journal::JournalAnswer;
+pub use lint::LintAnswer;
 pub use plan::{Objective, ParetoAnswer, PlanAnswer, Preparation, milliseconds};
 pub use reason::{AssertionAnswer, EntailmentAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, statuses};
 pub use run::{HandledLine, LogLine, NumberedAnswer, PlanningLine, ReadyLine};

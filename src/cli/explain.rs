@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use encodings::Limits;
-use metaplan::answers::{ChangesAnswer, DesignAnswer};
+use metaplan::answers::{ChangesAnswer, CodeAnswer, DesignAnswer};
+use metaplan::codes::{self, Code};
 use metaplan::explain::{BestPlan, Change, DesignExplanation, Target, best, design, smallest_changes};
+use metaplan::message::{Message, did_you_mean};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output::{self, decimal};
@@ -15,8 +17,8 @@ use crate::cli::situation::Situation;
 /// Arguments of `explain`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission's manifest.
-    #[arg(value_name = "MISSION")]
+    /// A mission's manifest; or the code of a message, such as M118: what it means, what causes it, what to do.
+    #[arg(value_name = "MISSION | CODE")]
     mission: PathBuf,
     /// A function design; without one, what would change the plan.
     #[arg(value_name = "DESIGN")]
@@ -27,6 +29,11 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    if let Some(name) = arguments.mission.to_str().filter(|name| codes::is_code(name))
+        && !arguments.mission.exists()
+    {
+        return code(name, common);
+    }
     let mission = arguments.situation.mission(std::slice::from_ref(&arguments.mission))?;
     output::warnings(common, mission.warnings());
     let limits = Limits::none();
@@ -47,6 +54,23 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             Format::Json => output::json_answer(&ChangesAnswer::new(name, &answer, &changes)),
             _ => output::answer(&changes_text(&answer, &changes)),
         }
+    }
+    Ok(Exit::Done)
+}
+
+/// What a code means.
+fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
+    let Some(found) = codes::find(name) else {
+        let all = codes::all();
+        let meant = did_you_mean(name, all.iter().map(|code| code.code));
+        let text = format!("there is no code `{name}`, and no file of that name{meant}");
+        return Err(Failure::usage(Message::error("M138", text)));
+    };
+    if common.format == Format::Json {
+        output::json_answer(&CodeAnswer::from(found));
+    } else {
+        let Code { code, meaning, cause, remedy } = found;
+        output::answer(&format!("{code}: {meaning}\ncause: {cause}\nremedy: {remedy}\n"));
     }
     Ok(Exit::Done)
 }

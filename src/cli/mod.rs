@@ -6,6 +6,7 @@ mod common;
 mod compare;
 mod compare_so_far;
 mod compare_table;
+mod completions;
 mod concurrent;
 mod configure;
 mod confirm;
@@ -14,8 +15,10 @@ mod drawn;
 mod explain;
 mod export;
 mod import;
+mod init;
 mod journal;
 mod limits;
+mod lint;
 mod objectives;
 mod output;
 mod plan;
@@ -36,7 +39,7 @@ mod verify;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use metaplan::message::Message;
 
 use common::{Common, Exit, Failure, Format};
@@ -53,8 +56,12 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Subcommands {
+    /// A new directory with a mission that plans at once, to start from.
+    Init(init::Arguments),
     /// A jointly optimal task plan and configuration.
     Plan(plan::Arguments),
+    /// All errors and warnings of a mission: knowledge base, rules, PDDL and manifest; without planning.
+    Lint(lint::Arguments),
     /// What follows from knowledge bases and rules: assertions, availability, objectives in error.
     Reason(reason::Arguments),
     /// A knowledge base with its imports as one document in another syntax.
@@ -67,7 +74,7 @@ enum Subcommands {
     Configure(configure::Arguments),
     /// A mission from the files of another tool.
     Import(import::Arguments),
-    /// Why a design is available or not, why it is chosen or not, and what would change the answer.
+    /// Why a design is available or not, why it is chosen or not, what would change the answer; or what a code means.
     Explain(explain::Arguments),
     /// A mission for other planners, with what the knowledge base has contributed.
     Export(export::Arguments),
@@ -83,6 +90,10 @@ enum Subcommands {
     Validate(validate::Arguments),
     /// Checks a certificate without trusting the planner.
     Verify(verify::Arguments),
+    /// A script that completes commands and options in a shell.
+    Completions(completions::Arguments),
+    /// Pages for `man`, one for each command.
+    Man(completions::ManArguments),
 }
 
 /// Runs the program.
@@ -113,7 +124,9 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         return Err(Failure::usage(Message::error("M107", text)));
     }
     match &cli.command {
+        Subcommands::Init(arguments) => init::run(arguments, &cli.common),
         Subcommands::Plan(arguments) => plan::run(arguments, &cli.common),
+        Subcommands::Lint(arguments) => lint::run(arguments, &cli.common),
         Subcommands::Reason(arguments) => reason::run(arguments, &cli.common),
         Subcommands::Convert(arguments) => convert::run(arguments, &cli.common),
         Subcommands::Check(arguments) => check::run(arguments, &cli.common),
@@ -128,5 +141,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Subcommands::Simulate(arguments) => simulate::run(arguments, &cli.common),
         Subcommands::Validate(arguments) => validate::run(arguments, &cli.common),
         Subcommands::Verify(arguments) => verify::run(arguments, &cli.common),
+        Subcommands::Completions(arguments) => Ok(completions::run(arguments, Cli::command())),
+        Subcommands::Man(arguments) => completions::man(arguments, Cli::command()),
     }
 }

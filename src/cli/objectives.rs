@@ -34,7 +34,7 @@ impl Objectives {
                         "`--pareto {pair}` names {} objectives; it takes two, with a comma between",
                         parts.len()
                     );
-                    return Err(Failure::usage(Message::error("M109", text)));
+                    return Err(Failure::usage(Message::error("M107", text)));
                 }
                 parts
             }

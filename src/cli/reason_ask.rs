@@ -164,7 +164,7 @@ fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
     let words = words(assertion.trim().trim_end_matches(" ."));
     let [subject, predicate, object] = words[..] else {
         let text = format!("`{assertion}` is not of the form SUBJECT PROPERTY VALUE, or SUBJECT a CLASS");
-        return Err(Message::error("M102", text));
+        return Err(Message::error("M134", text));
     };
     let names = names(knowledge.engine());
     let subject = name(subject, &names)?;
@@ -218,10 +218,10 @@ fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
     let found: Vec<&String> = names.iter().filter(|iri| local_name(iri) == local).collect();
     match found[..] {
         [iri] => Ok(iri.clone()),
-        [] => Err(Message::error("M102", format!("nothing is called `{word}`; write an IRI as <IRI>"))),
+        [] => Err(Message::error("M134", format!("nothing is called `{word}`; write an IRI as <IRI>"))),
         _ => {
             let all: Vec<String> = found.iter().map(|iri| format!("<{iri}>")).collect();
-            Err(Message::error("M102", format!("`{word}` may be {}; write one of them", all.join(" or "))))
+            Err(Message::error("M134", format!("`{word}` may be {}; write one of them", all.join(" or "))))
         }
     }
 }

@@ -129,10 +129,8 @@ impl Situation {
                         );
                         Failure::usage(Message::error("M108", text))
                     })?;
-                    scenario.apply(&mut setup.mission).map_err(|message| {
-                        let text = format!("scenario `{name}`: {}", message.message);
-                        Message::at(&message.code, setup.file(), None, text)
-                    })?;
+                    let applied = scenario.apply(&mut setup.mission);
+                    applied.map_err(|message| setup.in_scenario(name, &message))?;
                 }
                 setup
             }

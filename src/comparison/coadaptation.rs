@@ -173,7 +173,7 @@ impl Coadaptation {
             found.unwrap_or_else(|| {
                 let text =
                     format!("the problem has no fact `({what} …)` at the start, which the process needs");
-                problems.push(Message::error("M120", text));
+                problems.push(Message::error("M136", text));
                 String::new()
             })
         };
@@ -389,7 +389,7 @@ impl Facts {
             let value = |role: &str| self.value(role, &[from, to, name]);
             let Some(time) = value(&roles.time) else {
                 let text = format!("`({} {from} {to} {name})` has no value", roles.time);
-                problems.push(Message::error("M121", text));
+                problems.push(Message::error("M137", text));
                 continue;
             };
             let traversal = Traversal {

@@ -96,7 +96,7 @@ fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Vec<Message>> {
     let (mut positions, mut wrong) = (BTreeMap::new(), Vec::new());
     for record in reader.records() {
         let record =
-            record.map_err(|error| vec![Message::at("M140", source.name(), None, error.to_string())])?;
+            record.map_err(|error| vec![Message::at("M141", source.name(), None, error.to_string())])?;
         let line = record.position().map_or(1, |position| position.line() as usize);
         let coordinate =
             |field: usize| record.get(field)?.parse::<f64>().ok().filter(|value| value.is_finite());
@@ -105,13 +105,13 @@ fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Vec<Message>> {
             (Some(place), Some(x), Some(y), 3) => {
                 if positions.insert(Name::new(place), (x, y)).is_some() {
                     let text = format!("`{place}` has a position already");
-                    wrong.push(Message::at("M140", source.name(), Some((line, 1)), text));
+                    wrong.push(Message::at("M141", source.name(), Some((line, 1)), text));
                 }
             }
             _ if is_heading => {}
             _ => {
                 let text = "a position is `place,x,y`, the last two numbers";
-                wrong.push(Message::at("M140", source.name(), Some((line, 1)), text));
+                wrong.push(Message::at("M141", source.name(), Some((line, 1)), text));
             }
         }
     }

@@ -43,7 +43,7 @@ pub fn simulate(
     log: &mut dyn FnMut(&Observation, &[Answer]),
 ) -> Result<Run, Vec<Message>> {
     if let Some(mistake) = settings.mistake() {
-        return Err(vec![Message::error("M111", format!("the simulation cannot be run: {mistake}"))]);
+        return Err(vec![Message::error("M135", format!("the simulation cannot be run: {mistake}"))]);
     }
     let control = Loop::new(mission.clone(), control.clone())?;
     let mut stage = Stage {

@@ -138,7 +138,7 @@ fn objectives_take_the_place_of_the_metric() {
     check(&in_order("used", "(+ (distance) 1)"), 0, &["cost 2", "used = 2, (+ (distance) 1) = 3"]);
     let front = plan(&domain, &problem, &["--pareto", "used,distance"]);
     check(&front, 0, &["used = 2, distance = 2", "used = 5, distance = 1", "2 on the front, proved"]);
-    check(&plan(&domain, &problem, &["--pareto", "used"]), 2, &["M109", "takes two"]);
+    check(&plan(&domain, &problem, &["--pareto", "used"]), 2, &["M107", "takes two"]);
     check(&plan(&domain, &problem, &["--minimize", "usd"]), 3, &["P122", "did you mean `used`"]);
 }
 

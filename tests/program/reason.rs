@@ -153,7 +153,7 @@ fn limits_and_missing_imports_are_options() {
     check(
         &metaplan_in(directory.path(), &arguments, ""),
         3,
-        &["R301 step budget of 1000000", "count.swrl#0"],
+        &["error[R301]: step budget of 1000000", "count.swrl#0"],
     );
     let unknown = "<http://x#n>(?x, ?n) ^ <http://my#add>(?m, ?n, 1) -> <http://x#n>(?x, ?m) .\n";
     std::fs::write(directory.path().join("unknown.swrl"), unknown).expect("a file");

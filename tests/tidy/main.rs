@@ -2,6 +2,7 @@
 
 mod believed;
 mod circles;
+mod codes;
 mod packages;
 mod rooms;
 

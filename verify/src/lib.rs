@@ -21,6 +21,7 @@
 mod about;
 mod answer;
 mod check;
+mod codes;
 pub mod derivations;
 pub mod digest;
 pub mod files;
@@ -34,5 +35,6 @@ pub mod watch;
 
 pub use answer::{VerificationAnswer, json, text};
 pub use check::{conditions, verify};
+pub use codes::CODES;
 pub use manifest::{Claim, Verification, VerifiedPart};
 pub use watch::{Watch, seconds};

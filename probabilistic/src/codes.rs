@@ -1,0 +1,168 @@
+//! What the codes of messages mean that this crate gives.
+
+/// Codes in their order, each with what it means, what causes it, and what to do.
+pub const CODES: &[[&str; 4]] = &[
+    [
+        "Q101",
+        "A character is not part of the PRISM language.",
+        "The text has a character or an unfinished word that the language does not have.",
+        "Correct it at the place that the message shows.",
+    ],
+    [
+        "Q102",
+        "Something else is expected.",
+        "The grammar of the PRISM language is broken at the place that the message shows.",
+        "The message says what is expected there.",
+    ],
+    [
+        "Q103",
+        "A word of the language is used as a name.",
+        "Names must not be keywords such as `module` or `max`.",
+        "Take another name.",
+    ],
+    [
+        "Q104",
+        "An expression is too long or nested too deeply.",
+        "With formulas written out, it exceeds what is read.",
+        "Split it, or give a part a variable of its own.",
+    ],
+    ["Q105", "A number cannot be read.", "It is too long or too large.", "Write fewer digits."],
+    [
+        "Q106",
+        "A function has the wrong number of arguments.",
+        "For example `mod` takes two, `floor` one.",
+        "Give the right number.",
+    ],
+    [
+        "Q107",
+        "The model is incomplete.",
+        "It does not begin with `mdp` or `dtmc`, says so twice, or has no module.",
+        "Begin with the kind of model, and write at least one `module … endmodule`.",
+    ],
+    [
+        "Q201",
+        "A name is not known.",
+        "No constant, formula, variable or module has it.",
+        "Correct or declare it.",
+    ],
+    [
+        "Q202",
+        "A label or reward structure is not known.",
+        "The property names one that the model does not have.",
+        "Take one of those that the message lists.",
+    ],
+    [
+        "Q203",
+        "The type of an expression is wrong.",
+        "For example a number stands where a truth value is needed.",
+        "Write an expression of the type that the message names.",
+    ],
+    [
+        "Q204",
+        "A definition depends on itself.",
+        "A constant or formula stands for something with itself in it.",
+        "Break the circle.",
+    ],
+    [
+        "Q205",
+        "A value depends on variables.",
+        "Constants, ranges and first values must not.",
+        "Use constants only.",
+    ],
+    [
+        "Q206",
+        "Something is given twice.",
+        "A name is declared a second time.",
+        "Remove or rename one of the two.",
+    ],
+    [
+        "Q207",
+        "A range is empty, or does not contain the first value.",
+        "The bounds are in the wrong order, or `init` lies outside.",
+        "Correct the bounds or the first value.",
+    ],
+    [
+        "Q208",
+        "A command cannot change a variable.",
+        "It belongs to another module, or is changed twice in one update.",
+        "Move the update to the variable's module, or remove one of the two.",
+    ],
+    [
+        "Q301",
+        "The probabilities of a command do not sum to 1.",
+        "Their sum differs from 1 in a state that can be reached.",
+        "Correct the probabilities; with constants, check their values.",
+    ],
+    [
+        "Q302",
+        "A probability is negative.",
+        "An expression is below 0 in a state that can be reached.",
+        "Correct the expression, or restrict the guard.",
+    ],
+    [
+        "Q303",
+        "An expression has no value.",
+        "For example a division by zero, or a number that is too large.",
+        "Restrict the guard so that this cannot happen.",
+    ],
+    [
+        "Q304",
+        "A reward is negative.",
+        "Expected rewards are defined for rewards that are at least 0.",
+        "Shift or split the rewards.",
+    ],
+    [
+        "Q305",
+        "A variable leaves its range.",
+        "An update gives it a value outside of its declaration.",
+        "Widen the range, or restrict the guard.",
+    ],
+    [
+        "Q306",
+        "Modules have too many common moves.",
+        "The combinations of synchronised commands in one state exceed the limit.",
+        "Use fewer modules with the same action, or fewer alternatives in each.",
+    ],
+    [
+        "Q401",
+        "A kind of model or declaration is not handled.",
+        "Models are `mdp` or `dtmc`; `system`, `init … endinit`, `invariant` and others are not read.",
+        "Write the model without it.",
+    ],
+    [
+        "Q402",
+        "A variable has no finite range.",
+        "Values are explored one by one, so ranges are needed.",
+        "Write `[least..greatest]` or `bool`.",
+    ],
+    [
+        "Q403",
+        "A kind of property is not handled.",
+        "Handled are `P`, `R` with `F` and `C<=k`, `U`, `G`, and `multi` of two objectives.",
+        "Ask for it in another form.",
+    ],
+    [
+        "Q404",
+        "The model cannot be written as JANI.",
+        "JANI has no rewards for commands without an action.",
+        "Name the action of the commands.",
+    ],
+    [
+        "Q501",
+        "`multi` is nested.",
+        "A `multi` property stands within another.",
+        "Write one `multi` with all parts.",
+    ],
+    [
+        "Q502",
+        "The property does not say for which policy.",
+        "A decision process has many policies.",
+        "Ask for `Pmin`, `Pmax`, `Rmin` or `Rmax`.",
+    ],
+    [
+        "Q503",
+        "A number of steps is wrong.",
+        "A bound on steps must be a whole number that is at least 0.",
+        "Correct it.",
+    ],
+];

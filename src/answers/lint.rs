@@ -1,0 +1,27 @@
+//! What `metaplan lint` answers.
+
+use serde::Serialize;
+
+use crate::message::Message;
+
+/// All that is wrong or questionable about a mission.
+#[derive(Debug, Clone, Serialize)]
+pub struct LintAnswer<'a> {
+    format: &'static str,
+    errors: usize,
+    warnings: usize,
+    messages: &'a [Message],
+}
+
+impl<'a> LintAnswer<'a> {
+    /// With all messages.
+    pub fn new(messages: &'a [Message]) -> Self {
+        let errors = messages.iter().filter(|message| message.is_error()).count();
+        Self { format: "metaplan-lint/1", errors, warnings: messages.len() - errors, messages }
+    }
+
+    /// How many errors and how many warnings.
+    pub fn counts(&self) -> (usize, usize) {
+        (self.errors, self.warnings)
+    }
+}

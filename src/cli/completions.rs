@@ -1,0 +1,47 @@
+//! `metaplan completions` and `metaplan man`: what shells and `man` know of the command line, from its own description.
+
+use std::path::PathBuf;
+
+use clap::{Args, Command};
+use clap_complete::Shell;
+use metaplan::message::Message;
+
+use crate::cli::common::{Exit, Failure};
+use crate::cli::output;
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The shell.
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+pub struct ManArguments {
+    /// Where the pages are written, one for each command.
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+}
+
+/// Writes the completions of a shell.
+pub fn run(arguments: &Arguments, mut command: Command) -> Exit {
+    let name = command.get_name().to_owned();
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut command, name, &mut script);
+    output::document(&String::from_utf8_lossy(&script));
+    Exit::Done
+}
+
+/// Writes all pages.
+pub fn man(arguments: &ManArguments, command: Command) -> Result<Exit, Failure> {
+    let directory = &arguments.output;
+    let written =
+        std::fs::create_dir_all(directory).and_then(|()| clap_mangen::generate_to(command, directory));
+    written.map_err(|error| {
+        let text = format!("cannot be written: {}", error.kind());
+        Message::at("M109", &directory.display().to_string(), None, text)
+    })?;
+    Ok(Exit::Done)
+}

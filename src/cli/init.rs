@@ -1,0 +1,79 @@
+//! `metaplan init`.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use metaplan::answers::InitAnswer;
+use metaplan::message::Message;
+use metaplan::templates::{MANIFEST, Template};
+
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+
+/// Arguments of `init`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The new directory; its last part is the mission's name.
+    #[arg(value_name = "NAME")]
+    directory: PathBuf,
+    /// The mission to start from.
+    #[arg(long, value_enum, default_value_t, value_name = "TEMPLATE")]
+    from: Start,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum Start {
+    /// One function with two designs, and one action.
+    #[default]
+    Blank,
+    /// The ground vehicle of the Metaplan paper: six designs for one function.
+    Ugv,
+    /// A warehouse robot with an arm: two functions with three designs each, a battery, a charger, a dark aisle.
+    Warehouse,
+}
+
+impl From<Start> for Template {
+    fn from(start: Start) -> Self {
+        match start {
+            Start::Blank => Self::Blank,
+            Start::Ugv => Self::Ugv,
+            Start::Warehouse => Self::Warehouse,
+        }
+    }
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let (directory, template) = (arguments.directory.as_path(), Template::from(arguments.from));
+    let shown = directory.display().to_string();
+    let Some(name) = directory.file_name().and_then(|name| name.to_str()) else {
+        let text = format!("`{shown}` does not name a new directory; give a name, such as `my-robot`");
+        return Err(Failure::usage(Message::error("M107", text)));
+    };
+    template.write(directory, name).map_err(|error| refused(directory, &shown, error.kind()))?;
+    let files: Vec<&str> = template.files(name).into_iter().map(|(file, _)| file).collect();
+    if common.format == Format::Json {
+        output::json_answer(&InitAnswer::new(&shown, template.name(), files));
+    } else {
+        let manifest = directory.join(MANIFEST);
+        let next = format!("metaplan plan {}", manifest.display());
+        output::answer(&format!("{shown}: {}\nnext: {next}\n", files.join(", ")));
+    }
+    Ok(Exit::Done)
+}
+
+fn refused(directory: &Path, shown: &str, error: ErrorKind) -> Message {
+    let above = directory.parent().filter(|above| !above.as_os_str().is_empty());
+    match (error, above) {
+        (ErrorKind::AlreadyExists | ErrorKind::DirectoryNotEmpty, _) => {
+            let text = "is there already, and nothing is overwritten; choose another name";
+            Message::at("M133", shown, None, text)
+        }
+        (ErrorKind::NotFound, Some(above)) => {
+            let text = format!("cannot be written: there is no directory `{}`", above.display());
+            Message::at("M109", shown, None, text)
+        }
+        (error, _) => Message::at("M109", shown, None, format!("cannot be written: {error}")),
+    }
+}

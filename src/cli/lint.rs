@@ -1,0 +1,55 @@
+//! `metaplan lint`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use metaplan::answers::LintAnswer;
+use metaplan::lint::{in_order, lint};
+use metaplan::message::Message;
+
+use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::output;
+use crate::cli::situation::Situation;
+
+/// Arguments of `lint`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// A mission's manifest, or a PDDL domain and a PDDL problem; `-` is standard input.
+    #[arg(required = true, num_args = 1..=2, value_name = "MISSION | DOMAIN PROBLEM")]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    situation: Situation,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let messages = match arguments.situation.setup(&arguments.inputs) {
+        Ok(setup) => lint(&setup),
+        Err(failure) if failure.exit == Exit::Usage => return Err(failure),
+        Err(failure) => in_order(failure.messages),
+    };
+    let answer = LintAnswer::new(&messages);
+    let (errors, warnings) = answer.counts();
+    if common.format == Format::Json {
+        output::json_answer(&answer);
+    } else {
+        let texts: String = messages.iter().map(Message::text).collect();
+        output::answer(&(texts + &summary(errors, warnings)));
+    }
+    Ok(match (errors, warnings) {
+        (0, 0) => Exit::Done,
+        (0, _) => Exit::NotProved,
+        _ => Exit::BadInput,
+    })
+}
+
+fn summary(errors: usize, warnings: usize) -> String {
+    let count = |count: usize, what: &str| {
+        let plural = if count == 1 { "" } else { "s" };
+        format!("{count} {what}{plural}")
+    };
+    match (errors, warnings) {
+        (0, 0) => "nothing to complain about\n".to_owned(),
+        _ => format!("{}, {}\n", count(errors, "error"), count(warnings, "warning")),
+    }
+}

@@ -1,0 +1,99 @@
+//! Missions to start from: small, commented, and planned as they are.
+
+use std::io;
+use std::path::Path;
+
+use encodings::shipped;
+use ontology::kb;
+
+/// The manifest's file in every template.
+pub const MANIFEST: &str = "mission.toml";
+
+/// A mission to start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Template {
+    /// One function, two designs, one action.
+    Blank,
+    /// The ground vehicle of the Metaplan paper, with a plain domain.
+    Ugv,
+    /// A robot with an arm in a warehouse: two functions with three designs each, a battery, a charger, a dark aisle.
+    Warehouse,
+}
+
+impl Template {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Blank, Self::Ugv, Self::Warehouse];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Blank => "blank",
+            Self::Ugv => "ugv",
+            Self::Warehouse => "warehouse",
+        }
+    }
+
+    /// Its files, each a name and a text, for a mission with a name.
+    pub fn files(self, mission: &str) -> Vec<(&'static str, String)> {
+        let texts: &[(&str, &str)] = match self {
+            Self::Blank => &[
+                (MANIFEST, include_str!("../missions/templates/blank/mission.toml")),
+                ("domain.pddl", include_str!("../missions/templates/blank/domain.pddl")),
+                ("problem.pddl", include_str!("../missions/templates/blank/problem.pddl")),
+                ("robot.ttl", include_str!("../missions/templates/blank/robot.ttl")),
+            ],
+            Self::Ugv => &[
+                (MANIFEST, include_str!("../missions/templates/ugv/mission.toml")),
+                ("domain.pddl", shipped::UGV_PLAIN),
+                ("problem.pddl", shipped::UGV_PROBLEM),
+                ("robot.ttl", kb::UGV),
+            ],
+            Self::Warehouse => &[
+                (MANIFEST, include_str!("../missions/templates/warehouse/mission.toml")),
+                ("domain.pddl", include_str!("../missions/templates/warehouse/domain.pddl")),
+                ("problem.pddl", include_str!("../missions/templates/warehouse/problem.pddl")),
+                ("robot.ttl", include_str!("../missions/templates/warehouse/robot.ttl")),
+                ("places.csv", include_str!("../missions/templates/warehouse/places.csv")),
+            ],
+        };
+        let named = |(file, text): &(&'static str, &str)| match *file {
+            MANIFEST => (*file, named(text, mission)),
+            _ => (*file, (*text).to_owned()),
+        };
+        texts.iter().map(named).collect()
+    }
+
+    /// Writes the files into a new directory, which is there with all of them afterwards or not at all.
+    ///
+    /// # Errors
+    /// There is something of that name already, the directory above it is not there, or it cannot be written.
+    pub fn write(self, directory: &Path, mission: &str) -> io::Result<()> {
+        if directory.symlink_metadata().is_ok() {
+            return Err(io::ErrorKind::AlreadyExists.into());
+        }
+        let above = directory.parent().filter(|above| !above.as_os_str().is_empty());
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".metaplan-");
+        // Temporary directories are for their owner alone; the process's mask applies to this one, too.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+        let whole = builder.tempdir_in(above.unwrap_or(Path::new(".")))?;
+        for (file, text) in self.files(mission) {
+            std::fs::write(whole.path().join(file), text)?;
+        }
+        std::fs::rename(whole.path(), directory)?;
+        // What it was called before is not there any more.
+        let _ = whole.keep();
+        Ok(())
+    }
+}
+
+/// A manifest with another name of the mission.
+fn named(manifest: &str, mission: &str) -> String {
+    let name = toml::Value::String(mission.to_owned());
+    let line = |line: &str| match line.strip_prefix("name = ") {
+        Some(_) => format!("name = {name}\n"),
+        None => format!("{line}\n"),
+    };
+    manifest.lines().map(line).collect()
+}

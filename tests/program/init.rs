@@ -1,0 +1,112 @@
+//! Missions to start from: each plans at once without a word of doubt, and what is written is whole.
+
+use std::path::Path;
+
+use crate::common::{metaplan_in, root};
+
+/// A template in a new directory: what plans of it cost, as its files have it and in each scenario.
+fn check(template: &str, cost: &str, scenarios: &[(&str, &str)]) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let here = directory.path();
+    let outcome = metaplan_in(here, &["init", "my-robot", "--from", template], "");
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (0, ""), "{outcome:#?}");
+    assert!(outcome.stdout.ends_with("next: metaplan plan my-robot/mission.toml\n"), "{outcome:#?}");
+
+    let manifest = "my-robot/mission.toml";
+    let mut situations = vec![(vec![], cost)];
+    situations.extend(scenarios.iter().map(|(name, cost)| (vec!["--scenario", name], *cost)));
+    let text = std::fs::read_to_string(here.join(manifest)).expect("a manifest");
+    let plannable = text.matches("\n[scenarios.").count() - text.matches(".simulation]").count() * 2;
+    assert_eq!(scenarios.len(), plannable, "every scenario that is planned is listed");
+    for (situation, cost) in situations {
+        let planned =
+            metaplan_in(here, &[&["plan", manifest, "--format", "json"], &situation[..]].concat(), "");
+        assert_eq!((planned.status, planned.stderr.as_str()), (0, ""), "{situation:?}: {planned:#?}");
+        let answer = planned.json();
+        assert_eq!(answer["mission"], "my-robot");
+        assert_eq!(answer["cost"].to_string(), cost, "{situation:?}: {answer:#}");
+        let plan =
+            metaplan_in(here, &[&["plan", manifest, "--plan-format", "ipc"], &situation[..]].concat(), "");
+        let validated =
+            metaplan_in(here, &[&["validate", manifest, "-"], &situation[..]].concat(), &plan.stdout);
+        assert_eq!(validated.status, 0, "{situation:?}: {validated:#?}");
+        assert!(validated.stdout.starts_with(&format!("valid, metric {cost},")), "{validated:#?}");
+    }
+    if template == "warehouse" {
+        let simulated = metaplan_in(
+            here,
+            &["simulate", manifest, "--scenario", "lidar_under_way", "--strategy", "joint"],
+            "",
+        );
+        assert_eq!((simulated.status, simulated.stderr.as_str()), (0, ""), "{simulated:#?}");
+        assert!(simulated.stdout.contains("1 of 1"), "{simulated:#?}");
+    }
+}
+
+#[test]
+fn blank_plans_at_once() {
+    check("blank", "1", &[("first_fails", "2")]);
+}
+
+#[test]
+fn the_ground_vehicle_plans_at_once() {
+    check("ugv", "408", &[("kinect_failure", "412"), ("bright_sun", "516")]);
+}
+
+#[test]
+fn the_warehouse_plans_at_once() {
+    let scenarios =
+        [("lidar_fails", "113.2"), ("suction_fails", "118.8"), ("dusty", "118.8"), ("more_battery", "54.8")];
+    check("warehouse", "110.8", &scenarios);
+}
+
+/// The names of what lies in a directory.
+fn names(directory: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(directory).expect("a directory");
+    entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
+}
+
+#[test]
+fn nothing_is_overwritten() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let here = directory.path();
+    std::fs::create_dir(here.join("empty")).expect("a directory");
+    std::fs::write(here.join("file"), "mine").expect("a file");
+    for name in ["empty", "file"] {
+        let outcome = metaplan_in(here, &["init", name], "");
+        assert_eq!(outcome.status, 3, "{outcome:#?}");
+        assert!(
+            outcome.stderr.starts_with(&format!("{name}: error[M133]: is there already")),
+            "{outcome:#?}"
+        );
+    }
+    assert!(names(&here.join("empty")).is_empty());
+    assert_eq!(std::fs::read_to_string(here.join("file")).expect("text"), "mine");
+    let outcome = metaplan_in(here, &["init", "no/such/place"], "");
+    assert_eq!(outcome.status, 3);
+    assert!(outcome.stderr.contains("there is no directory `no/such`"), "{outcome:#?}");
+    for name in [".", "..", "/"] {
+        assert_eq!(metaplan_in(here, &["init", name], "").status, 2, "{name}");
+    }
+    assert_eq!(names(here).len(), 2, "{:?}", names(here));
+}
+
+/// A name of any form becomes the name in the manifest, and the answer names the files.
+#[test]
+fn names_are_taken_as_they_are() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let name = "robot \"7\" of the 2nd \u{e9}tage";
+    let outcome =
+        metaplan_in(directory.path(), &["init", name, "--from", "warehouse", "--format", "json"], "");
+    let answer = outcome.json();
+    assert_eq!(answer["format"], "metaplan-init/1");
+    let mut files = names(&directory.path().join(name));
+    files.sort();
+    let mut said: Vec<_> =
+        answer["files"].as_array().expect("files").iter().map(|file| file.as_str()).collect();
+    said.sort_unstable();
+    assert_eq!(said, files.iter().map(|file| Some(file.as_str())).collect::<Vec<_>>());
+    let manifest = directory.path().join(name).join("mission.toml").display().to_string();
+    let planned = metaplan_in(&root(), &["plan", &manifest, "--format", "json"], "");
+    assert_eq!(planned.json()["mission"], name);
+}
