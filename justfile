@@ -32,6 +32,10 @@ bench:
     cargo bench --bench ugv
     cargo bench -p metaplan-rules --bench engine
 
+# Show the book, anew whenever a page changes; needs mdbook.
+book:
+    mdbook serve docs
+
 # Build the documentation; warnings are errors.
 doc:
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps

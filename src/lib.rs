@@ -28,7 +28,12 @@ pub mod setup;
 pub mod simulate;
 pub mod templates;
 
-/// The example of the README is compiled and run with the tests.
+/// The examples of the book are compiled and run with the tests.
 #[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod book {
+    #[doc = include_str!("../docs/how-to/built-ins.md")]
+    struct BuiltIns;
+
+    #[doc = include_str!("../docs/how-to/library.md")]
+    struct Library;
+}

@@ -1,4 +1,4 @@
-//! What each command answers in JSON: a type for each answer, with the fields of its format in their order. The README lists
+//! What each command answers in JSON: a type for each answer, with the fields of its format in their order. `docs/reference/json.md` lists
 //! them.
 //!
 //! An answer is built from what the library has found. The command line only writes it.

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use metaplan::message::Message;
 use probabilistic::{Diagnostic, Error};
 
-/// Exit statuses; the README lists them.
+/// Exit statuses; `docs/reference/statuses.md` lists them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Exit {
     Done = 0,
@@ -62,7 +62,7 @@ pub(super) struct Common {
 pub(super) enum Format {
     /// For people.
     Text,
-    /// For programs; versioned, see the README.
+    /// For programs; versioned, see the book.
     Json,
     /// `reason` only: the inferred assertions, sorted.
     Ntriples,

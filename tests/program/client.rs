@@ -1,32 +1,10 @@
-//! The protocol of `metaplan run`: the client of the README, and what is said while planning takes long.
-#![expect(clippy::print_stdout, reason = "what is skipped says so")]
+//! The protocol of `metaplan run`: what is said while planning takes long.
 
 use std::fmt::Write as _;
-use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::common::{metaplan_in, root};
-
-#[test]
-fn the_client_of_the_readme_brings_a_mission_to_its_end() {
-    let readme = std::fs::read_to_string(root().join("README.md")).expect("the README");
-    let (_, rest) = readme.split_once("<!-- test client:").expect("the mark");
-    let (_, rest) = rest.split_once("```python\n").expect("a block");
-    let (client, _) = rest.split_once("```\n").expect("its end");
-    assert!(client.lines().filter(|line| !line.trim().is_empty()).count() <= 32);
-    let mut python = Command::new("python3");
-    python.args(["-c", client, env!("CARGO_BIN_EXE_metaplan"), "run", "missions/ugv.toml"]);
-    let output = match python.current_dir(root()).stdin(Stdio::null()).output() {
-        Ok(output) => output,
-        Err(error) => {
-            println!("skipped: there is no python3: {error}");
-            return;
-        }
-    };
-    let text = String::from_utf8_lossy(&output.stdout);
-    assert_eq!(text, "doing 1\ndoing 2\ndoing 3\ndoing 4\ndone 0\n", "{output:?}");
-}
+use crate::common::metaplan_in;
 
 const DOMAIN: &str = "(define (domain d) (:requirements :typing) (:types place item)
   (:predicates (at ?p - place) (way ?a ?b - place) (lies ?i - item ?p - place) (has ?i - item) (free))

@@ -47,7 +47,7 @@ pub fn verify_in(directory: &Path, arguments: &[&str]) -> Outcome {
 
 /// The program `metaplan-verify`. It belongs to another package, which has a test so that cargo makes it with all tests; where only
 /// these are made, it is asked for in the same way, so that nothing else is compiled anew.
-fn verifier() -> &'static Path {
+pub fn verifier() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
         let own = Path::new(env!("CARGO_BIN_EXE_metaplan"));

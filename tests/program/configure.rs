@@ -1,22 +1,8 @@
-//! `metaplan configure` and `metaplan run --configure`: what README shows, SUAVE's knowledge base, and what is refused.
+//! `metaplan configure` and `metaplan run --configure`: SUAVE's knowledge base, and what is refused.
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
 use crate::common::{metaplan, metaplan_in, root};
-
-#[test]
-fn the_readme_shows_a_choice() {
-    let readme = std::fs::read_to_string(root().join("README.md")).expect("the README");
-    let mut shown = 0;
-    for block in readme.split("```console\n$ metaplan configure ").skip(1) {
-        let (arguments, answer) = block.split_once('\n').expect("an answer");
-        let arguments: Vec<&str> = std::iter::once("configure").chain(arguments.split(' ')).collect();
-        let outcome = metaplan(&arguments);
-        assert_eq!(outcome.stdout.trim_end(), answer.split("```").next().expect("an end").trim_end());
-        shown += 1;
-    }
-    assert!(shown > 0, "README shows none");
-}
 
 #[test]
 fn suave_is_configured() {

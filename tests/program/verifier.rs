@@ -1,26 +1,7 @@
 //! `metaplan verify` and `metaplan-verify` side by side. All tests of certificates run both, see [`verify_in`].
 
-use crate::certificate::{certificate, verify};
+use crate::certificate::certificate;
 use crate::common::{root, verify_in};
-
-/// What the pages show is what the programs say; the size of the files depends on where they lie.
-#[test]
-fn the_pages_show_a_verification() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let said = verify(&certificate(directory.path(), &["plan", "missions/ugv.toml"])).stdout;
-    let masked = |text: &str| {
-        let (before, rest) = text.split_once("13 files, ").expect("a number of files");
-        let (_, rest) = rest.split_once(" bytes").expect("a size");
-        format!("{before}{rest}")
-    };
-    for (page, command) in
-        [("README.md", "$ metaplan verify proof\n"), ("verify/README.md", "$ metaplan-verify proof\n")]
-    {
-        let text = std::fs::read_to_string(root().join(page)).expect("a page");
-        let shown = text.split(command).nth(1).and_then(|rest| rest.split("```").next());
-        assert_eq!(masked(shown.expect("an example")), masked(&said), "{page}");
-    }
-}
 
 /// What is no certificate at all, what cannot be written, and what takes too long.
 #[test]

@@ -4,6 +4,7 @@ mod believed;
 mod circles;
 mod codes;
 mod packages;
+mod pages;
 mod rooms;
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,5 @@
+(define (problem two-ways)
+  (:domain go)
+  (:objects a b c - place)
+  (:init (at a) (way a b) (way b c))
+  (:goal (at c)))

@@ -1,0 +1,5 @@
+(define (problem two-fuses)
+  (:domain match)
+  (:objects m1 - match f1 f2 - fuse)
+  (:init (handfree) (unused m1))
+  (:goal (and (mended f1) (mended f2))))
