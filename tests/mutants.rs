@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 17] = [
+const PARTS: [&str; 19] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -30,6 +30,8 @@ const PARTS: [&str; 17] = [
     "mission",
     "verify",
     "probabilistic",
+    "picture",
+    "ros",
     "tests",
     "benches",
     "missions",
@@ -208,6 +210,17 @@ fn is_content(program: &Path, home: &Path, fault: usize, (test, tasks): (&str, u
 #[test]
 fn every_fault_has_its_place() {
     assert!(faulty(&mutants()).len() > 10);
+}
+
+/// Cargo reads no workspace that a member is missing from.
+#[test]
+fn every_member_is_copied() {
+    let manifest: toml::Table = original("Cargo.toml").parse().expect("TOML");
+    let members = manifest["workspace"]["members"].as_array().expect("members");
+    for member in members {
+        let name = member.as_str().expect("a name");
+        assert!(PARTS.contains(&name), "`{name}` is a member of the workspace, and not copied");
+    }
 }
 
 #[test]
