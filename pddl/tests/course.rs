@@ -1,7 +1,6 @@
 //! The course of numbers through a plan: what they are after each happening, and what conditions demand of them.
 
 use metaplan_pddl::Source;
-use metaplan_pddl::ast::Comparison;
 use metaplan_pddl::validate::{NumberBound, PlanText, course};
 use metaplan_pddl::{parse_domain, parse_problem};
 
@@ -25,16 +24,7 @@ fn told(plan: &str) -> Vec<String> {
         (parse_domain(&domain).0.expect("a domain"), parse_problem(&problem).0.expect("a problem"));
     let plan = PlanText::parse(&Source::new("plan", plan)).expect("a plan");
     let course = course(&domain, &problem, &plan).expect("a course");
-    let bound = |bound: &NumberBound| {
-        let relation = match bound.relation {
-            Comparison::Less => "<",
-            Comparison::LessOrEqual => "<=",
-            Comparison::Equal => "=",
-            Comparison::GreaterOrEqual => ">=",
-            Comparison::Greater => ">",
-        };
-        format!(" {}{relation}{}", bound.number, bound.bound)
-    };
+    let bound = |bound: &NumberBound| format!(" {}{}{}", bound.number, bound.relation.symbol(), bound.bound);
     let values = |values: &[(String, _)]| {
         values.iter().map(|(name, value)| format!(" {name}:={value}")).collect::<Vec<_>>().concat()
     };

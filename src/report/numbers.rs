@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 
 use encodings::Plan;
-use pddl::ast::{Comparison, Name};
+use pddl::ast::Name;
 use pddl::validate::{Course, CourseMoment, NumberBound, PlanStep, PlanText, course};
 use picture::{Axis, Bound, Curve, Step};
 
 use crate::number;
-use crate::report::seen::Seen;
+use crate::report::seen::Scene;
 
 /// One curve for the cost, and one for each number that the plan changes or that something is demanded of.
-pub(super) fn curves(seen: Seen<'_>, plan: &Plan, steps: &[Step], axis: Axis) -> Vec<Curve> {
+pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) -> Vec<Curve> {
     if steps.is_empty() {
         return Vec::new();
     }
@@ -24,7 +24,7 @@ pub(super) fn curves(seen: Seen<'_>, plan: &Plan, steps: &[Step], axis: Axis) ->
     });
     let text = PlanText { steps: text.collect() };
     // The validator has executed the plan.
-    let course = course(seen.mission.domain(), seen.problem, &text).unwrap_or_default();
+    let course = course(scene.domain, scene.problem, &text).unwrap_or_default();
     std::iter::once(cost(plan, steps)).chain(numbers(&course, steps, axis)).collect()
 }
 
@@ -75,13 +75,7 @@ fn numbers(course: &Course, steps: &[Step], axis: Axis) -> Vec<Curve> {
 fn add<'c>(curves: &mut BTreeMap<&'c str, Curve>, bound: &'c NumberBound, (from, to): (f64, f64), who: &str) {
     let curve = curves.entry(&bound.number);
     let curve = curve.or_insert_with(|| Curve { name: bare(&bound.number), ..Curve::default() });
-    let relation = match bound.relation {
-        Comparison::Less => "<",
-        Comparison::LessOrEqual => "<=",
-        Comparison::Equal => "=",
-        Comparison::GreaterOrEqual => ">=",
-        Comparison::Greater => ">",
-    };
+    let relation = bound.relation.symbol();
     let text = format!("{who} {} {relation} {}", curve.name, number::decimal(&bound.bound));
     curve.bounds.push(Bound { from, to, value: number::to_f64(&bound.bound), text });
 }

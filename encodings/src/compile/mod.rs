@@ -63,17 +63,14 @@ pub(crate) fn compile<'t>(
     let mut monitors = Monitors::new(domain, problem, &objects);
     let mut errors = Vec::new();
     for (file, constraint) in constraints(domain, problem) {
-        let is_asked = constraint.preference.as_ref().is_none_or(|name| asked.contains(&name.name));
-        if let Err(error) = if is_asked { monitors.watch(file, constraint) } else { Ok(()) } {
-            errors.push(error);
+        if constraint.preference.as_ref().is_none_or(|name| asked.contains(&name.name)) {
+            errors.extend(monitors.watch(file, constraint).err());
         }
     }
     for preference in domain.actions.iter().flat_map(|action| &action.preferences) {
-        let is_asked = asked.contains(&preference.name.name);
-        let place = (File::Domain, preference.span);
-        if let Err(error) = if is_asked { monitors.is_defined(&preference.condition, place) } else { Ok(()) }
-        {
-            errors.push(error);
+        if asked.contains(&preference.name.name) {
+            let place = (File::Domain, preference.span);
+            errors.extend(monitors.is_defined(&preference.condition, place).err());
         }
     }
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));

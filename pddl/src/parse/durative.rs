@@ -1,6 +1,6 @@
 //! Durative actions: time specifiers are moved outwards until each condition and effect stands at one time.
 
-use crate::ast::{Comparison, Condition, ConditionTime, DurationConstraint, Effect, EffectTime, Expression};
+use crate::ast::{Condition, ConditionTime, DurationConstraint, Effect, EffectTime, Expression};
 use crate::sexp::Item;
 
 use super::condition::is_timed;
@@ -178,7 +178,7 @@ impl Parser<'_> {
         let (left, right) = (self.expression(left), self.expression(right));
         let (operator, expression) = match (left, right) {
             (Some(Expression::Duration(_)), Some(bound)) => (operator, bound),
-            (Some(bound), Some(Expression::Duration(_))) => (mirrored(operator), bound),
+            (Some(bound), Some(Expression::Duration(_))) => (operator.mirrored(), bound),
             (Some(_), Some(_)) => {
                 self.sink.error("P106", list_start(constraint), "this does not constrain `?duration`");
                 return;
@@ -186,17 +186,6 @@ impl Parser<'_> {
             _ => return,
         };
         found.push(DurationConstraint { time, operator, expression, span: constraint.span() });
-    }
-}
-
-/// The comparison with its sides exchanged.
-fn mirrored(operator: Comparison) -> Comparison {
-    match operator {
-        Comparison::Less => Comparison::Greater,
-        Comparison::LessOrEqual => Comparison::GreaterOrEqual,
-        Comparison::Equal => Comparison::Equal,
-        Comparison::GreaterOrEqual => Comparison::LessOrEqual,
-        Comparison::Greater => Comparison::Less,
     }
 }
 

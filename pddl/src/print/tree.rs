@@ -3,8 +3,8 @@
 use num_rational::BigRational;
 
 use crate::ast::{
-    Arithmetic, Assignment, Atom, Comparison, Condition, ConditionTime, DurationConstraint, Effect,
-    EffectTime, Expression, Term, TypeExpression, TypedName,
+    Arithmetic, Assignment, Atom, Condition, ConditionTime, DurationConstraint, Effect, EffectTime,
+    Expression, Term, TypeExpression, TypedName,
 };
 use crate::number::to_decimal;
 
@@ -47,16 +47,6 @@ pub(super) fn expression(value: &Expression) -> Doc {
     }
 }
 
-fn comparison(operator: Comparison) -> &'static str {
-    match operator {
-        Comparison::Less => "<",
-        Comparison::LessOrEqual => "<=",
-        Comparison::Equal => "=",
-        Comparison::GreaterOrEqual => ">=",
-        Comparison::Greater => ">",
-    }
-}
-
 pub(super) fn variables(entries: &[TypedName]) -> Doc {
     text(format!("({})", typed("?", entries).join(" ")))
 }
@@ -74,7 +64,7 @@ pub(super) fn condition(tree: &Condition) -> Doc {
         Condition::Atom(fact) => atom(fact),
         Condition::Equal(left, right, _) => list("=", 1, [term(left), term(right)]),
         Condition::Compare(operator, left, right, _) => {
-            list(comparison(*operator), 1, [expression(left), expression(right)])
+            list(operator.symbol(), 1, [expression(left), expression(right)])
         }
     }
 }
@@ -123,7 +113,7 @@ fn when(time: EffectTime) -> &'static str {
 pub(super) fn duration(constraints: &[DurationConstraint]) -> Doc {
     let constraint = |constraint: &DurationConstraint| {
         let bound = [text("?duration"), expression(&constraint.expression)];
-        let bound = list(comparison(constraint.operator), 1, bound);
+        let bound = list(constraint.operator.symbol(), 1, bound);
         match constraint.time {
             EffectTime::AtStart => bound,
             EffectTime::AtEnd => list("at", 2, [text(when(EffectTime::AtEnd)), bound]),

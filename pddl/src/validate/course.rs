@@ -188,7 +188,7 @@ impl<'e, 'p> Follower<'e, 'p> {
                 Condition::Compare(relation, left, right, _) => {
                     let own = self.demand(evaluator, left, *relation, right, bindings);
                     found.extend(
-                        own.or_else(|| self.demand(evaluator, right, mirrored(*relation), left, bindings)),
+                        own.or_else(|| self.demand(evaluator, right, relation.mirrored(), left, bindings)),
                     );
                 }
                 _ => {}
@@ -209,16 +209,5 @@ impl<'e, 'p> Follower<'e, 'p> {
         let arguments = evaluator.arguments(atom, bindings).filter(|_| self.changeable.contains(&symbol))?;
         let bound = evaluator.value(bound, bindings).ok()?;
         Some(NumberBound { number: self.execution.world.show(symbol, &arguments), relation, bound })
-    }
-}
-
-/// The relation with its sides exchanged.
-fn mirrored(relation: Comparison) -> Comparison {
-    match relation {
-        Comparison::Less => Comparison::Greater,
-        Comparison::LessOrEqual => Comparison::GreaterOrEqual,
-        Comparison::Equal => Comparison::Equal,
-        Comparison::GreaterOrEqual => Comparison::LessOrEqual,
-        Comparison::Greater => Comparison::Less,
     }
 }

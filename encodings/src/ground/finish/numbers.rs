@@ -131,9 +131,8 @@ impl<N: TaskNumber> Numbers<N> {
 /// The multiple that each of some fluents is stored as, where that is not the fluent itself, so that what they add to each other by
 /// fractions are integers: if `(increase (x) (* 0.5 (y)))`, twice x is stored. Nothing where no multiples do.
 fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
-    let effects = || task.operators.iter().flat_map(|operator| operator.numeric_effects.iter());
     let mut factors: Vec<(NumericId, NumericId, &Rational)> = Vec::new();
-    for (variable, value) in effects() {
+    for (variable, value) in task.operators.iter().flat_map(|operator| operator.numeric_effects.iter()) {
         factors.extend(value.coefficients.iter().map(|(read, factor)| (*variable, *read, factor)));
     }
     if factors.iter().all(|(.., factor)| factor.is_integer()) {
