@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use crate::data::{Curve, Plan, Progress};
-use crate::frame::{Frame, LEFT, RIGHT};
+use crate::frame::{Frame, LEFT, RIGHT, Room};
 use crate::scale::{Scale, compact, fit, number, px, range};
 use crate::svg::Picture;
 
@@ -11,7 +11,7 @@ const HEIGHT: f64 = 110.0;
 const TOP: f64 = 10.0;
 
 /// Draws one number over a plan.
-pub(crate) fn curve(plan: &Plan, curve: &Curve, room: f64) -> Picture {
+pub(crate) fn curve(plan: &Plan, curve: &Curve, room: &Room) -> Picture {
     let frame = Frame::of(plan, room);
     let values = curve.points.iter().map(|(_, value)| *value);
     let scale = vertical(values.chain(curve.bounds.iter().map(|bound| bound.value)));

@@ -18,31 +18,51 @@ pub(crate) const HALF: f64 = 380.0;
 /// So many pixels for a step, if there is room.
 const STEP: f64 = 60.0;
 
+/// What plans that stand beside each other share: how wide they are drawn, and what their axes run to.
+pub(crate) struct Room {
+    inner: f64,
+    until: f64,
+}
+
+impl Room {
+    /// Room for some plans, at least so wide.
+    pub(crate) fn of(plans: &[&Plan], least: f64) -> Self {
+        let steps = plans.iter().map(|plan| plan.steps.len()).max().unwrap_or_default();
+        let inner = (steps as f64 * STEP).max(least).min(WIDEST.max(least));
+        Self { inner, until: plans.iter().map(|plan| end(plan)).fold(0.0, f64::max) }
+    }
+}
+
+/// Where a plan ends on its axis.
+fn end(plan: &Plan) -> f64 {
+    plan.steps.iter().map(|step| step.end).fold(0.0, f64::max)
+}
+
 /// The axis of a plan.
 pub(crate) struct Frame {
     pub(crate) scale: Scale,
+    /// Where the plan ends.
     pub(crate) end: f64,
+    /// Where the axis does.
+    until: f64,
     /// Of the whole picture.
     pub(crate) width: f64,
     label: &'static str,
 }
 
 impl Frame {
-    pub(crate) fn of(plan: &Plan, room: f64) -> Self {
-        let ends = plan.steps.iter().map(|step| step.end);
-        let end = ends.fold(0.0, f64::max);
-        let inner = (plan.steps.len() as f64 * STEP).max(room).min(WIDEST.max(room));
+    pub(crate) fn of(plan: &Plan, room: &Room) -> Self {
         let label = match plan.axis {
             Axis::Time => "time",
             Axis::Steps => "step",
         };
-        let scale = Scale::new((0.0, end), (LEFT, LEFT + inner));
-        Self { scale, end, width: LEFT + inner + RIGHT, label }
+        let scale = Scale::new((0.0, room.until), (LEFT, LEFT + room.inner));
+        Self { scale, end: end(plan), until: room.until, width: LEFT + room.inner + RIGHT, label }
     }
 
     /// The axis below everything, with lines up to `top`.
     pub(crate) fn axis(&self, top: f64, bottom: f64) -> Markup {
-        let widest = width(&number(self.end)) + 24.0;
+        let widest = width(&number(self.until)) + 24.0;
         let most = ((self.width - LEFT - RIGHT) / widest.max(60.0)) as usize;
         html! {
             g class="axis" {

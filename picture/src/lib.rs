@@ -23,3 +23,4 @@ pub use data::{
     Axis, Bound, Change, Checked, Curve, Design, Group, Happening, Kind, Log, Map, Part, Place, Plan, Points,
     Progress, Reason, Report, Rows, Sheet, Step,
 };
+pub use page::STYLE;

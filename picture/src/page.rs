@@ -3,10 +3,10 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::data::Reason;
-use crate::svg::{Picture, clean, style};
+use crate::svg::{Picture, clean};
 
-/// The style of pages beside that of pictures.
-const STYLE: &str = include_str!("page.css");
+/// The style of pages and of the pictures in them.
+pub const STYLE: &str = concat!(include_str!("picture.css"), include_str!("page.css"));
 /// The only script; a page is whole without it.
 const SCRIPT: &str = include_str!("page.js");
 /// Its digest: browsers run no other script in a page.
@@ -28,7 +28,7 @@ pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 link rel="icon" href="data:,";
                 title { (title) }
-                style { (PreEscaped(style())) (PreEscaped(STYLE)) }
+                style { (PreEscaped(STYLE)) }
             }
             body {
                 header {
@@ -51,14 +51,14 @@ pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
 /// A picture that may be wider than the screen: it is scrolled by itself, also by keyboard.
 pub(crate) fn shown(picture: &Picture, name: &str) -> Markup {
     html! {
-        div class="scroll" tabindex="0" role="region" aria-label=(picture.title) { (picture.inline(name)) }
+        div class="scroll" tabindex="0" role="group" aria-label=(picture.title) { (picture.inline(name)) }
     }
 }
 
 /// A table that may be wider than the screen.
 pub(crate) fn table(name: &str, header: &[&str], rows: &Markup) -> Markup {
     html! {
-        div class="scroll" tabindex="0" role="region" aria-label=(name) {
+        div class="scroll" tabindex="0" role="group" aria-label=(name) {
             table {
                 thead { tr { @for cell in header { th scope="col" { (cell) } } } }
                 tbody { (rows) }

@@ -4,10 +4,11 @@ use maud::{Markup, html};
 
 use crate::chart::{curve, search};
 use crate::data::{Checked, Design, Plan, Report, Step};
-use crate::frame::{FILE, HALF, PAGE};
+use crate::frame::{FILE, HALF, PAGE, Room};
 use crate::map::map;
 use crate::page::{page, reasons, shown, table};
 use crate::palette::{Palette, configuration};
+use crate::svg::clean;
 use crate::timeline::timeline;
 
 impl Report {
@@ -21,12 +22,13 @@ impl Report {
             p class="verdict" { (self.plan.verdict) }
             @if let Some(before) = &self.before {
                 (changes(self))
+                @let rooms = rooms(before, &self.plan);
                 div class="pair" {
-                    section data-plan="before" aria-label="before" { h2 { "Before" } p { (before.verdict) } (plan(before, "before", &palette, HALF)) }
-                    section data-plan="after" aria-label="after" { h2 { "After" } p { (self.plan.verdict) } (plan(&self.plan, "after", &palette, HALF)) }
+                    section data-plan="before" aria-label="before" { h2 { "Before" } p { (before.verdict) } (plan(before, "before", &palette, (&rooms[0], HALF))) }
+                    section data-plan="after" aria-label="after" { h2 { "After" } p { (self.plan.verdict) } (plan(&self.plan, "after", &palette, (&rooms[1], HALF))) }
                 }
             } @else {
-                section data-plan="plan" aria-label="plan" { h2 { "Plan" } (plan(&self.plan, "plan", &palette, PAGE)) }
+                section data-plan="plan" aria-label="plan" { h2 { "Plan" } (alone(&self.plan, "plan", &palette)) }
             }
             (designs(&self.plan.designs))
             @if let Some(checked) = &self.checked { (verified(checked)) }
@@ -51,14 +53,24 @@ impl Report {
 impl Plan {
     /// The timeline as a file.
     pub fn svg(&self) -> String {
-        timeline(self, &Palette::of(&[self]), FILE).file()
+        timeline(self, &Palette::of(&[self]), &Room::of(&[self], FILE)).file()
+    }
+
+    /// The plan as a part of somebody else's page, which has the style [`crate::STYLE`].
+    pub fn part(&self) -> String {
+        let body = html! {
+            @if !self.verdict.is_empty() { p { (self.verdict) } }
+            (alone(self, "plan", &Palette::of(&[self])))
+        };
+        clean(&body.into_string())
     }
 }
 
 fn plan_pictures(plan: &Plan, prefix: &str, palette: &Palette) -> Vec<(String, String)> {
-    let mut files = vec![(format!("{prefix}timeline.svg"), timeline(plan, palette, FILE).file())];
+    let room = Room::of(&[plan], FILE);
+    let mut files = vec![(format!("{prefix}timeline.svg"), timeline(plan, palette, &room).file())];
     for (own, number) in plan.curves.iter().zip(1..) {
-        files.push((format!("{prefix}number-{number}.svg"), curve(plan, own, FILE).file()));
+        files.push((format!("{prefix}number-{number}.svg"), curve(plan, own, &room).file()));
     }
     files.extend(plan.map.iter().map(|own| (format!("{prefix}map.svg"), map(plan, own, palette).file())));
     if plan.search.len() > 1 {
@@ -67,8 +79,19 @@ fn plan_pictures(plan: &Plan, prefix: &str, palette: &Palette) -> Vec<(String, S
     files
 }
 
-/// All about a plan; `name` tells it from the other one on the page.
-pub(crate) fn plan(plan: &Plan, name: &str, palette: &Palette, room: f64) -> Markup {
+/// Room for two plans beside each other, with one scale where they have the same axis.
+fn rooms(before: &Plan, after: &Plan) -> [Room; 2] {
+    let both = [before, after];
+    both.map(|own| if before.axis == after.axis { Room::of(&both, HALF) } else { Room::of(&[own], HALF) })
+}
+
+/// All about a plan that has the page for itself; `name` tells it from others there.
+pub(crate) fn alone(own: &Plan, name: &str, palette: &Palette) -> Markup {
+    plan(own, name, palette, (&Room::of(&[own], PAGE), PAGE))
+}
+
+/// All about a plan; the search takes the width `least`.
+fn plan(plan: &Plan, name: &str, palette: &Palette, (room, least): (&Room, f64)) -> Markup {
     html! {
         @if plan.steps.is_empty() {
             p { "There is no action to show." }
@@ -100,7 +123,7 @@ pub(crate) fn plan(plan: &Plan, name: &str, palette: &Palette, room: f64) -> Mar
             @if let [only] = &plan.search[..] {
                 p { "The planner knew at once: " (only.text) "." }
             } @else {
-                (shown(&search(&plan.search, room), &format!("{name}-search")))
+                (shown(&search(&plan.search, least), &format!("{name}-search")))
                 details {
                     summary { "Search as a list" }
                     ol { @for moment in &plan.search { li { (moment.text) } } }
@@ -123,7 +146,7 @@ fn legend(plan: &Plan, palette: &Palette) -> Markup {
         ul class="legend" {
             @for name in &names {
                 li {
-                    svg class="picture" width="14" height="14" aria-hidden="true" style="display:inline" {
+                    svg class="picture" width="14" height="14" aria-hidden="true" {
                         rect class=(palette.class(name)) x="1" y="1" width="12" height="12" rx="2" {}
                     }
                     span class="name" { (name) }
@@ -131,7 +154,7 @@ fn legend(plan: &Plan, palette: &Palette) -> Markup {
             }
             @if plan.steps.iter().any(|step| !step.reconfigured.is_empty()) {
                 li {
-                    svg class="picture" width="14" height="14" aria-hidden="true" style="display:inline" {
+                    svg class="picture" width="14" height="14" aria-hidden="true" {
                         path class="mark" d="M1 7L7 1L13 7L7 13Z" {}
                     }
                     "reconfiguration"

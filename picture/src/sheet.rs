@@ -8,7 +8,7 @@ use crate::data::{Group, Part, Plan, Points, Rows, Sheet};
 use crate::frame::{FILE, LEFT, PAGE, RIGHT};
 use crate::page::{page, reasons, shown, table};
 use crate::palette::Palette;
-use crate::report::plan;
+use crate::report::alone;
 use crate::scale::{Scale, compact, fit, number, px, range};
 use crate::svg::Picture;
 
@@ -79,7 +79,7 @@ fn drawn(part: &Part, number: i32, palette: &Palette) -> Markup {
                 @for ((title, own), number) in plans.iter().zip(1..) {
                     details data-plan=(number) {
                         summary { (title) }
-                        (plan(own, &format!("{name}-{number}"), palette, PAGE))
+                        (alone(own, &format!("{name}-{number}"), palette))
                     }
                 }
             },

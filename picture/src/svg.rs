@@ -4,7 +4,7 @@ use maud::{Markup, PreEscaped, html};
 
 use crate::scale::px;
 
-/// The colours of pictures on white paper; pages add those for dark screens.
+/// The style of pictures on white paper; pages add that for dark screens.
 const STYLE: &str = include_str!("picture.css");
 
 /// What is drawn, in pixels.
@@ -46,11 +46,6 @@ impl Picture {
         };
         clean(&format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n", picture.into_string()))
     }
-}
-
-/// The style that files and pages share.
-pub(crate) fn style() -> &'static str {
-    STYLE
 }
 
 /// Text without the characters that XML does not have.

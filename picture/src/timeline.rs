@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 
 use crate::data::{Plan, Step};
-use crate::frame::{Frame, LEFT};
+use crate::frame::{Frame, LEFT, Room};
 use crate::lanes::rows;
 use crate::palette::Palette;
 use crate::scale::{fit, px};
@@ -49,7 +49,7 @@ impl<'p> Lane<'p> {
 }
 
 /// Draws a plan.
-pub(crate) fn timeline(plan: &Plan, palette: &Palette, room: f64) -> Picture {
+pub(crate) fn timeline(plan: &Plan, palette: &Palette, room: &Room) -> Picture {
     let frame = Frame::of(plan, room);
     let lanes = lanes(plan, &frame);
     let mut tops = Vec::new();

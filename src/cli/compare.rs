@@ -22,6 +22,7 @@ use pddl::ast::Problem;
 use crate::cli::common::{Common, Exit, Failure, process_failure};
 use crate::cli::compare_so_far::{Begun, Shared};
 use crate::cli::compare_table::{memory_since, published_rows};
+use crate::cli::drawn::Pages;
 use crate::cli::output;
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
@@ -61,9 +62,8 @@ pub struct Arguments {
     /// Write the table as CSV, too.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the comparison as a page to look at, too: the front, prices with their reasons, all measures.
-    #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    pages: Pages,
     /// Rows to add to the table, as JSON: a list of objects with `name` and any of the table's measures.
     #[arg(long, value_name = "FILE")]
     published: Option<PathBuf>,
@@ -127,7 +127,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let missions = missions(arguments, &mission, coadaptation, &roles)?;
     so_far.change(|own| {
         (own.of, own.added, own.csv) = (Some(missions.len()), added, arguments.csv.clone());
-        own.report = arguments.report.clone().map(|file| (mission.name.clone(), file));
+        (own.mission, own.pages) = (mission.name.clone(), arguments.pages.clone());
     });
     let progress = Progress::new(missions.len(), common);
     for (number, (pair, mission, coadaptation)) in missions.into_iter().enumerate() {

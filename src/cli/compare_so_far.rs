@@ -16,6 +16,7 @@ use metaplan::report::comparison_sheet;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::compare_table::{as_text, costs_text, csv};
+use crate::cli::drawn::Pages;
 use crate::cli::output;
 
 /// How often the clock is looked at.
@@ -32,8 +33,10 @@ pub(super) struct SoFar {
     pub added: Vec<Row>,
     /// Where the table is to go as CSV.
     pub csv: Option<PathBuf>,
-    /// The mission's name, and where the page is to go.
-    pub report: Option<(String, PathBuf)>,
+    /// The mission's name.
+    pub mission: String,
+    /// Where pictures are to go.
+    pub pages: Pages,
 }
 
 /// A comparison that is not done.
@@ -125,8 +128,8 @@ impl SoFar {
         if let Some(path) = self.csv.as_ref().filter(|_| !is_empty) {
             output::write_file(path, &csv(&rows))?;
         }
-        if let Some((mission, path)) = self.report.as_ref().filter(|_| !is_empty) {
-            output::write_file(path, &comparison_sheet(mission, &self.done, &rows).html())?;
+        if self.pages.are_wanted() && !is_empty {
+            self.pages.write(&comparison_sheet(&self.mission, &self.done, &rows))?;
         }
         if common.format == Format::Json {
             let done =

@@ -1,4 +1,4 @@
-//! `metaplan plan --concurrent`: plans whose actions overlap.
+//! `--concurrent` of `plan` and `report`: plans whose actions overlap.
 
 use clap::Args;
 use encodings::{Improvement, Limits, Plan, Point, optimize_concurrent};
@@ -15,7 +15,7 @@ use crate::cli::values::time;
 pub(super) struct Overlap {
     /// Actions may overlap, by the rules of PDDL 2.1: `total-time` is the makespan, which is minimised where the problem has no
     /// metric.
-    #[arg(long, conflicts_with_all = ["horizon", "engine", "solver", "strategy", "encoding", "pareto", "certificate", "alternatives"])]
+    #[arg(long)]
     concurrent: bool,
     /// With `--concurrent`: how far apart actions that interfere begin and end, in the domain's time unit.
     #[arg(long, value_name = "TIME", default_value = "0.001", value_parser = positive, requires = "concurrent")]

@@ -1,12 +1,14 @@
-//! `metaplan plan --svg` and `--picture`: the plan as a timeline, in a file and in the terminal.
+//! Answers as pictures: `metaplan plan --svg` and `--picture`, and the pages and files of answers with several pictures.
 
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use console::Term;
 use encodings::Solution;
+use metaplan::message::Message;
 use metaplan::mission::Mission;
+use metaplan::picture::Sheet;
 use metaplan::report::timeline_picture;
 use metaplan::visible::visible;
 
@@ -19,8 +21,8 @@ const COLUMNS: u16 = 100;
 /// Where a plan is drawn.
 #[derive(Debug, Args)]
 pub(super) struct Drawing {
-    /// Write the plan as a timeline into an SVG file, too.
-    #[arg(long, value_name = "FILE", conflicts_with = "pareto")]
+    /// Write the plan as a timeline into an SVG file, too; with `--pareto` the front.
+    #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Whether text shows the plan as a timeline above the table of its steps.
     #[arg(long, value_enum, default_value_t)]
@@ -38,7 +40,56 @@ enum When {
     Never,
 }
 
+/// Where the pictures of an answer go.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct Pages {
+    /// Write the answer as a page to look at, too.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Write each picture of that page as an SVG file into a directory, which is made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    svg: Option<PathBuf>,
+}
+
+impl Pages {
+    /// Whether any picture is wanted.
+    pub(super) fn are_wanted(&self) -> bool {
+        self.report.is_some() || self.svg.is_some()
+    }
+
+    /// Writes what is wanted.
+    pub(super) fn write(&self, sheet: &Sheet) -> Result<(), Failure> {
+        if let Some(directory) = &self.svg {
+            write_pictures(directory, &sheet.pictures())?;
+        }
+        match &self.report {
+            Some(file) => output::write_file(file, &visible(&sheet.html())),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Writes pictures into a directory.
+pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) -> Result<(), Failure> {
+    std::fs::create_dir_all(directory).map_err(|error| {
+        let text = format!("cannot be made: {}", error.kind());
+        Message::at("M109", &directory.display().to_string(), None, text)
+    })?;
+    pictures.iter().try_for_each(|(name, text)| output::write_file(&directory.join(name), &visible(text)))
+}
+
 impl Drawing {
+    /// Whether a file is wanted.
+    pub(super) fn is_file_wanted(&self) -> bool {
+        self.svg.is_some()
+    }
+
+    /// Writes the pictures of a front: it has one.
+    pub(super) fn draw_front(&self, sheet: &Sheet) -> Result<(), Failure> {
+        let (Some(file), [(_, picture)]) = (&self.svg, &sheet.pictures()[..]) else { return Ok(()) };
+        output::write_file(file, &visible(picture))
+    }
+
     /// Writes the file, and returns the picture for a terminal: nothing where it is not wanted, or where there is too little room.
     pub(super) fn draw(
         &self,

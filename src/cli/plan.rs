@@ -15,6 +15,7 @@ use metaplan::mission::{
     Blocking, Mission, Planning as _, Reading, blocking, blocking_text, btcpp_text, spaced, verdict,
 };
 use metaplan::report::{Positions, Seen, front_sheet};
+use metaplan::visible::visible;
 use pddl::ast::Problem;
 
 use crate::cli::alternatives;
@@ -40,7 +41,7 @@ pub struct Arguments {
     #[command(flatten)]
     situation: Situation,
     /// Only plans with at most this many steps.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "concurrent")]
     horizon: Option<usize>,
     /// Stop after this many seconds with the best plan so far.
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
@@ -49,35 +50,35 @@ pub struct Arguments {
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     memory_limit: Option<u64>,
     /// What finds plans, and proves that there is none better: search and then the SAT solver, or one of them alone.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, conflicts_with = "concurrent")]
     engine: EngineName,
     /// Have the SAT solver confirm what is proved without it, however long that takes.
     #[arg(long, conflicts_with = "concurrent")]
     confirm: bool,
     /// The SAT solver: `varisat`, `batsat`, or a program with its arguments that reads DIMACS on its standard input.
-    #[arg(long, value_name = "NAME", default_value = Backend::BUILT_IN[0])]
+    #[arg(long, value_name = "NAME", default_value = Backend::BUILT_IN[0], conflicts_with = "concurrent")]
     solver: Backend,
     /// How the SAT solver finds a cheapest plan: cheaper and cheaper plans until there is none, or a lower bound that rises until a
     /// plan costs as much. The cost of the answer is the same.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, conflicts_with = "concurrent")]
     strategy: StrategyName,
     /// How many actions stand at one step of the SAT solver's formulas; if not given, several while a first plan is looked
     /// for, and one from then on. The answer is the same.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, conflicts_with = "concurrent")]
     encoding: Option<Encoding>,
     /// What to minimize in place of the problem's metric: an expression as in a metric, or a function's name. Repeated,
     /// earlier objectives come first, and later ones decide among plans that are equal by them.
     #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true)]
     minimize: Vec<String>,
     /// All plans that are best by one of two objectives without being worse by the other.
-    #[arg(long, value_name = "EXPRESSION,EXPRESSION", conflicts_with_all = ["minimize", "plan_format"])]
+    #[arg(long, value_name = "EXPRESSION,EXPRESSION", conflicts_with_all = ["minimize", "plan_format", "concurrent"])]
     pareto: Option<String>,
     /// Write all that is needed to check that the answer is optimal, or that there is no plan, into a new directory;
     /// `metaplan verify` checks it.
-    #[arg(long, value_name = "DIR", conflicts_with = "pareto")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["pareto", "concurrent"])]
     certificate: Option<PathBuf>,
     /// Up to so many further plans that are as good as the best one, and which choices all such plans share.
-    #[arg(long, value_name = "N", conflicts_with_all = ["minimize", "pareto", "plan_format"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["minimize", "pareto", "plan_format", "concurrent"])]
     alternatives: Option<usize>,
     #[command(flatten)]
     overlap: Overlap,
@@ -195,7 +196,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
     arguments.check()?;
 
-    let mission = arguments.situation.mission(&arguments.inputs)?;
+    let setup = arguments.situation.setup(&arguments.inputs)?;
+    let is_drawn = arguments.report.is_some() || arguments.drawing.is_file_wanted();
+    let positions = if is_drawn { setup.positions()? } else { Positions::Unknown };
+    let mission = setup.mission;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
     let limits = guard.plan();
@@ -254,13 +258,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if arguments.pareto.is_some() {
         let front = encodings::pareto(&task, &config, &mut report);
         progress.finish_and_clear();
-        return show_front(
-            front,
-            (&mission, &problem, &task),
-            &objectives,
-            &preparation,
-            (arguments, common),
-        );
+        let seen = Seen { mission: &mission, problem: &problem, positions: &positions };
+        return show_front(front, (seen, &task), &objectives, &preparation, (arguments, common));
     }
     let point = encodings::lexicographic(&task, &config, &mut report);
     progress.finish_and_clear();
@@ -391,17 +390,21 @@ fn certify(
 /// Shows a Pareto front whose every plan the validator has executed.
 fn show_front(
     mut front: Front,
-    (mission, problem, task): (&Mission, &Problem, &Task),
+    (seen, task): (Seen<'_>, &Task),
     objectives: &Objectives,
     preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
+    let Seen { mission, problem, .. } = seen;
     for point in &front.points {
         objectives.confirm(mission, problem, point, &Reading::sequential(task.is_timed()))?;
     }
-    if let Some(file) = &arguments.report {
-        let seen = Seen { mission, problem, positions: &Positions::Unknown };
-        output::write_file(file, &front_sheet(seen, objectives.texts(), &front).html())?;
+    if arguments.report.is_some() || arguments.drawing.is_file_wanted() {
+        let sheet = front_sheet(seen, objectives.texts(), &front);
+        arguments.drawing.draw_front(&sheet)?;
+        if let Some(file) = &arguments.report {
+            output::write_file(file, &visible(&sheet.html()))?;
+        }
     }
     for point in &mut front.points {
         point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));

@@ -13,9 +13,12 @@ use metaplan::picture::{Checked, Plan, Report};
 use metaplan::report::{Positions, Seen, changes, log_picture, plan_picture};
 use metaplan::setup::Setup;
 use metaplan::visible::visible;
+use num_rational::BigRational;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::concurrent::{self, Overlap};
 use crate::cli::confirm::fault;
+use crate::cli::drawn::write_pictures;
 use crate::cli::limits::Guard;
 use crate::cli::objectives::Objectives;
 use crate::cli::output;
@@ -39,10 +42,12 @@ pub struct Arguments {
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     memory_limit: Option<u64>,
     /// Also what was verified of the certificate in a directory, which `metaplan plan --certificate` has written.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "concurrent")]
     certificate: Option<PathBuf>,
+    #[command(flatten)]
+    overlap: Overlap,
     /// In place of a plan, what the loop did whose journal is in a directory: events, inferences, plans and effects.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["inputs", "certificate", "scenario", "set", "fail"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["inputs", "certificate", "scenario", "set", "fail", "concurrent"])]
     journal: Option<PathBuf>,
     /// Also each picture as an SVG file in a directory, which is made if it is not there.
     #[arg(long, value_name = "DIR")]
@@ -68,9 +73,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let positions = setup.positions()?;
     output::warnings(common, setup.mission.warnings());
     let limits = guard.plan();
-    let answer = Answer::of(&setup.mission, &positions, &limits)?;
+    let separation = arguments.overlap.separation();
+    let answer = Answer::of(&setup.mission, &positions, separation, &limits)?;
     let before = match &before {
-        Some(before) => Some((before, Answer::of(&before.mission, &positions, &limits)?)),
+        Some(before) => Some((before, Answer::of(&before.mission, &positions, separation, &limits)?)),
         None => None,
     };
     let checked = arguments
@@ -117,8 +123,13 @@ struct Answer {
 }
 
 impl Answer {
-    /// Plans for a mission; the plan is one that the validator has executed.
-    fn of(mission: &Mission, positions: &Positions, limits: &Limits) -> Result<Self, Failure> {
+    /// Plans for a mission, with a separation for actions that overlap; the plan is one that the validator has executed.
+    fn of(
+        mission: &Mission,
+        positions: &Positions,
+        separation: Option<&BigRational>,
+        limits: &Limits,
+    ) -> Result<Self, Failure> {
         let (problem, _) = mission.filled()?;
         let config = Config { limits: limits.clone(), ..Config::default() };
         let objectives = Objectives::read(mission, &problem, &[], None)?;
@@ -126,17 +137,24 @@ impl Answer {
             let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
             Failure { exit, messages }
         };
-        let (point, reading): (Point, Reading) = match mission.ground(&problem, &[], limits) {
-            Ok(task) => {
-                let point = encodings::lexicographic(&task, &config, &mut |_| {});
-                (point, Reading::sequential(task.is_timed()))
+        let (point, reading): (Point, Reading) = match separation {
+            Some(separation) => {
+                let found =
+                    concurrent::solve(mission, &problem, &objectives, separation, limits, &mut |_| {});
+                (found?, Reading::concurrent(separation))
             }
-            Err(refused) if plan_exact::is_too_large(&refused) => {
-                let found = plan_exact::solve(mission, &problem, &objectives, &config, refused);
-                let (_, point, reading) = found.map_err(failed)?;
-                (point, reading)
-            }
-            Err(messages) => return Err(failed(messages)),
+            None => match mission.ground(&problem, &[], limits) {
+                Ok(task) => {
+                    let point = encodings::lexicographic(&task, &config, &mut |_| {});
+                    (point, Reading::sequential(task.is_timed()))
+                }
+                Err(refused) if plan_exact::is_too_large(&refused) => {
+                    let found = plan_exact::solve(mission, &problem, &objectives, &config, refused);
+                    let (_, point, reading) = found.map_err(failed)?;
+                    (point, reading)
+                }
+                Err(messages) => return Err(failed(messages)),
+            },
         };
         if let Some(reason) = &point.solution.statistics.contradiction {
             return Err(fault(reason));
@@ -189,13 +207,4 @@ fn checked(report: &Verification) -> Checked {
     let text = ::verify::text(report);
     let verdict = text.lines().last().unwrap_or_default().to_owned();
     Checked { verified: report.verified(), verdict, parts: parts.collect() }
-}
-
-/// Writes pictures into a directory.
-fn write_pictures(directory: &Path, pictures: &[(String, String)]) -> Result<(), Failure> {
-    std::fs::create_dir_all(directory).map_err(|error| {
-        let text = format!("cannot be made: {}", error.kind());
-        Message::at("M109", &directory.display().to_string(), None, text)
-    })?;
-    pictures.iter().try_for_each(|(name, text)| output::write_file(&directory.join(name), &visible(text)))
 }

@@ -70,14 +70,16 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = "`--objective`, `--require`, `--budget`, `--exclusive`, `--most` and `--least` go with `--configure`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
-    let Setup { mission, settings, .. } = arguments.situation.setup(&arguments.inputs)?;
+    let setup = arguments.situation.setup(&arguments.inputs)?;
+    let painter = arguments.outlets.painter(&setup)?;
+    let Setup { mission, settings, .. } = setup;
     output::warnings(common, mission.warnings());
     let name = mission.name.clone();
     let mut control = Loop::new(mission, settings)?;
     let events = Lines::open(&arguments.events)?;
     let mut ready = ReadyLine::new(name.clone());
     let journal = journal(arguments, common, &mut control, &mut ready)?;
-    let outlet = Outlet::open(&arguments.outlets, &name)?;
+    let outlet = Outlet::open(&arguments.outlets, &name, painter)?;
     ended(drive(common, control, journal, &ready, events, &outlet), &outlet)
 }
 
@@ -121,6 +123,7 @@ fn drive(
     if is_over(outlet.say(&output::line(ready)))? {
         return Ok(());
     }
+    outlet.begin(&control);
     let line = Arc::new(AtomicU64::new(control.beliefs().lines()));
     heartbeat(control.watch(), Arc::clone(&line), outlet.clone());
     let read = Instant::now();
@@ -132,6 +135,7 @@ fn drive(
     if is_over(outlet.answer(number, &answers, read))? {
         return Ok(());
     }
+    outlet.plan(control.beliefs(), &answers);
     let mut clock = SystemClock::default();
     let begun = control.beliefs().now();
     while let Some(event) = events.next(common)? {
@@ -149,6 +153,7 @@ fn drive(
         if is_over(outlet.answer(control.beliefs().lines(), &answers, read))? {
             return Ok(());
         }
+        outlet.plan(control.beliefs(), &answers);
     }
     Ok(())
 }
@@ -162,7 +167,7 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let objectives = configurator.objectives().into_iter().map(|own| own.individual.name).collect();
     let keeper = Keeper::new(configurator, None);
     let events = Lines::open(&arguments.events)?;
-    let outlet = Outlet::open(&arguments.outlets, "")?;
+    let outlet = Outlet::open(&arguments.outlets, "", None)?;
     let ready = output::line(&KeeperReadyLine::new(objectives));
     ended(keep_going(common, keeper, &ready, events, &outlet), &outlet)
 }

@@ -7,8 +7,11 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use metaplan::answers::{HandledLine, NumberedAnswer};
 use metaplan::live::{Address, Live, Token};
+use metaplan::mapek::{Answer, Beliefs, Loop};
 use metaplan::message::Message;
 use metaplan::recording::{Form, Recorder};
+use metaplan::report::Painter;
+use metaplan::setup::Setup;
 use metaplan::visible::visible_json;
 use serde::Serialize;
 
@@ -39,6 +42,14 @@ enum Recorded {
     String,
 }
 
+impl Outlets {
+    /// Who draws the plans of a mission, if anybody can look at them.
+    pub(super) fn painter(&self, setup: &Setup) -> Result<Option<Painter>, Vec<Message>> {
+        let positions = self.serve.as_ref().map(|_| setup.positions()).transpose()?;
+        Ok(positions.map(|positions| Painter::new(&setup.mission, positions)))
+    }
+}
+
 /// Where it goes; copies lead to the same places.
 #[derive(Debug, Clone)]
 pub(super) struct Outlet {
@@ -48,12 +59,12 @@ pub(super) struct Outlet {
 
 impl Outlet {
     /// Opens what is wanted, and says on standard error where the page is.
-    pub(super) fn open(wanted: &Outlets, mission: &str) -> Result<Self, Message> {
+    pub(super) fn open(wanted: &Outlets, mission: &str, painter: Option<Painter>) -> Result<Self, Message> {
         let live = match &wanted.serve {
             None => None,
             Some(address) => {
                 let token = wanted.serve_token.as_deref().map(Token::read).transpose()?;
-                let live = Live::open(Address::read(address)?, token)?;
+                let live = Live::open(Address::read(address)?, token, painter)?;
                 output::note(&format!("the run can be seen at http://{}/\n", live.address()));
                 Some(live)
             }
@@ -70,6 +81,25 @@ impl Outlet {
         }
         if let Some(live) = &self.live {
             live.heard(line, text);
+        }
+    }
+
+    /// Shows how things are when the loop takes over: how designs are, and the plan if it has one already.
+    pub(super) fn begin(&self, control: &Loop) {
+        if let Some(live) = &self.live {
+            live.known(control.designs());
+            if control.beliefs().plan().is_some() {
+                live.planned(control.beliefs().outlook());
+            }
+        }
+    }
+
+    /// Shows the plan if these answers have led to another one, or to none.
+    pub(super) fn plan(&self, beliefs: &Beliefs, answers: &[Answer]) {
+        let is_about_plans =
+            |answer: &Answer| matches!(answer, Answer::PlanFound { .. } | Answer::PlanNone { .. });
+        if let Some(live) = self.live.as_ref().filter(|_| answers.iter().any(is_about_plans)) {
+            live.planned(beliefs.outlook());
         }
     }
 

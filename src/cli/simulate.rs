@@ -15,6 +15,7 @@ use metaplan::simulate::{Run, SUAVE_COLUMNS, Sample, Simulation, Strategy, simul
 use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::drawn::Pages;
 use crate::cli::output;
 use crate::cli::situation::consistent;
 
@@ -42,9 +43,8 @@ pub struct Arguments {
     /// Write one line for each mission, with the columns of SUAVE among others.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write a page to look at, too: how costs, reactions and reconfigurations are distributed over the seeds.
-    #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    pages: Pages,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -117,9 +117,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(file) = &arguments.csv {
         output::write_file(file, &csv(&runs))?;
     }
-    if let Some(file) = &arguments.report {
-        let sheet = simulation_sheet(&mission.name, &arguments.scenario, &strategies, &runs);
-        output::write_file(file, &sheet.html())?;
+    if arguments.pages.are_wanted() {
+        arguments.pages.write(&simulation_sheet(&mission.name, &arguments.scenario, &strategies, &runs))?;
     }
     match common.format {
         Format::Json => {

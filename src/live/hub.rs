@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::live::keep::keys;
+use crate::live::keep::{design_key, keys};
+use crate::mapek::DesignChange;
 
 /// So many lines may wait to be taken; what comes then is left out.
 const WAITING: usize = 4096;
@@ -136,6 +137,8 @@ pub(super) struct Mouth {
 enum Said {
     Heard(u64, String),
     Answer(String),
+    Known(Vec<DesignChange>),
+    Planned(Option<u64>),
 }
 
 impl Mouth {
@@ -156,6 +159,16 @@ impl Mouth {
     /// An answer, which is an object of the format as JSON.
     pub(super) fn answer(&self, answer: &str) {
         self.say(Said::Answer(answer.to_owned()));
+    }
+
+    /// How designs are.
+    pub(super) fn known(&self, designs: Vec<DesignChange>) {
+        self.say(Said::Known(designs));
+    }
+
+    /// That there is another plan to be seen, or none any more; with the number of the action under way.
+    pub(super) fn planned(&self, under_way: Option<u64>) {
+        self.say(Said::Planned(under_way));
     }
 
     /// That there will be no more. This waits until what was said before is known.
@@ -182,6 +195,14 @@ fn listen(hub: &Hub, received: &Receiver<Option<(f64, Said)>>, left_out: &Atomic
             Said::Heard(number, text) => {
                 let line = json!({"at": at, "line": number, "heard": text});
                 hub.take(line.to_string().into(), Vec::new());
+            }
+            Said::Known(designs) => {
+                let keys = designs.iter().map(|own| design_key(&own.design)).collect();
+                hub.take(json!({"at": at, "known": designs}).to_string().into(), keys);
+            }
+            Said::Planned(under_way) => {
+                let line = json!({"at": at, "planned": {"under_way": under_way}});
+                hub.take(line.to_string().into(), vec!["planned".to_owned()]);
             }
             Said::Answer(answer) => {
                 // An answer is JSON already.

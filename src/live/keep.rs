@@ -27,6 +27,11 @@ struct Objective {
     objective: String,
 }
 
+/// The word for how a design is.
+pub(super) fn design_key(design: &str) -> String {
+    format!("design {design}")
+}
+
 /// What an answer is the last word on, for now.
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
@@ -36,7 +41,7 @@ pub(super) fn keys(answer: &str) -> Vec<String> {
         kind @ ("ready" | "contradicted" | "unconcluded") => vec![kind.to_owned()],
         "reconfigure" => about.function.map(|function| format!("function {function}")).into_iter().collect(),
         "inferred" => {
-            let designs = about.designs.into_iter().map(|own| format!("design {}", own.design));
+            let designs = about.designs.iter().map(|own| design_key(&own.design));
             designs
                 .chain(about.objectives.into_iter().map(|own| format!("objective {}", own.objective)))
                 .collect()

@@ -7,10 +7,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::live::address::{Address, is_local_host};
+use crate::live::canvas::Canvas;
 use crate::live::hub::{Hub, Mouth, News};
 use crate::live::request::{Refused, Request};
 use crate::live::token::Token;
+use crate::mapek::{DesignChange, Outlook};
 use crate::message::Message;
+use crate::report::Painter;
 
 /// So long somebody may take to ask, and to take what was sent.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -25,6 +28,7 @@ const VISITORS: usize = 16;
 const FAREWELL: Duration = Duration::from_millis(500);
 
 const PAGE: &str = include_str!("page/index.html");
+/// The style of this page, in addition to that of all.
 const STYLE: &str = include_str!("page/live.css");
 const SCRIPT: &str = include_str!("page/live.js");
 
@@ -40,16 +44,17 @@ pub struct Live {
 #[derive(Debug)]
 struct House {
     hub: Arc<Hub>,
+    canvas: Canvas,
     token: Option<Token>,
     visitors: AtomicUsize,
 }
 
 impl Live {
-    /// Begins to serve. Where other machines can reach, there has to be a token.
+    /// Begins to serve. Where other machines can reach, there has to be a token. Without a painter no plan is drawn.
     ///
     /// # Errors
     /// There is none, or nothing can be served there.
-    pub fn open(address: Address, token: Option<Token>) -> Result<Self, Message> {
+    pub fn open(address: Address, token: Option<Token>, painter: Option<Painter>) -> Result<Self, Message> {
         if !address.is_loopback() && token.is_none() {
             let text = format!("who can reach {} can look at the run: a token is needed there", address.0);
             return Err(Message::error("M332", text));
@@ -61,7 +66,8 @@ impl Live {
         let address = listener.local_addr().map_err(failed)?;
         let hub = Arc::new(Hub::default());
         let mouth = Mouth::of(Arc::clone(&hub));
-        let house = Arc::new(House { hub, token, visitors: AtomicUsize::new(0) });
+        let canvas = Canvas::new(painter);
+        let house = Arc::new(House { hub, canvas, token, visitors: AtomicUsize::new(0) });
         let own = Arc::clone(&house);
         std::thread::spawn(move || {
             for stream in listener.incoming() {
@@ -88,6 +94,18 @@ impl Live {
     /// Takes an answer, which is an object of the format as JSON. This never waits.
     pub fn said(&self, answer: &str) {
         self.mouth.answer(answer);
+    }
+
+    /// Takes how designs are, before anything is answered. This never waits.
+    pub fn known(&self, designs: Vec<DesignChange>) {
+        self.mouth.known(designs);
+    }
+
+    /// Takes another plan, or that there is none any more. This never waits, and nothing is drawn before somebody looks.
+    pub fn planned(&self, outlook: Option<Outlook>) {
+        let under_way = outlook.as_ref().filter(|own| own.is_under_way).map(|own| own.first);
+        self.house.canvas.take(outlook);
+        self.mouth.planned(under_way);
     }
 
     /// Ends the run for those who look, who are given a moment to see the end.
@@ -140,7 +158,8 @@ fn answer(house: &House, stream: &mut TcpStream) -> io::Result<()> {
     }
     match request.path.as_str() {
         "/" => document(stream, "text/html", PAGE),
-        "/live.css" => document(stream, "text/css", STYLE),
+        "/live.css" => document(stream, "text/css", &[picture::STYLE, STYLE].concat()),
+        "/plan" => document(stream, "text/html", &house.canvas.picture()),
         "/live.js" => document(stream, "text/javascript", SCRIPT),
         "/events" => events(house, stream),
         _ => refuse(stream, (404, "Not Found")),

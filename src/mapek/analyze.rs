@@ -97,16 +97,8 @@ pub(crate) fn changes(
     objectives: &mut BTreeMap<String, Vec<String>>,
 ) -> (Vec<DesignChange>, Vec<ObjectiveChange>) {
     let now = available(knowledge);
-    let design = |design: &String| {
-        let available = now.contains(design);
-        let because = match knowledge.fault() {
-            _ if available => Vec::new(),
-            Some(fault) => vec![unknown(fault)],
-            None => ruled_out(knowledge, design),
-        };
-        DesignChange { design: design.clone(), available, because }
-    };
-    let changed = designs.symmetric_difference(&now).map(design).collect();
+    let changed = designs.symmetric_difference(&now);
+    let changed = changed.map(|design| judged(knowledge, design, now.contains(design))).collect();
     *designs = now;
     let now = statuses(knowledge);
     let names: BTreeSet<&String> = now.keys().chain(objectives.keys()).collect();
@@ -119,6 +111,16 @@ pub(crate) fn changes(
     let others = other.map(objective).collect();
     *objectives = now;
     (changed, others)
+}
+
+/// A design with why it is not available, if it is not.
+pub(super) fn judged(knowledge: &Knowledge, design: &str, available: bool) -> DesignChange {
+    let because = match knowledge.fault() {
+        _ if available => Vec::new(),
+        Some(fault) => vec![unknown(fault)],
+        None => ruled_out(knowledge, design),
+    };
+    DesignChange { design: design.to_owned(), available, because }
 }
 
 /// Why nothing counts as available, and no plan is looked for.

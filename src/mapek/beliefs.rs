@@ -81,6 +81,21 @@ pub(super) struct Running {
     pub(super) suspended: bool,
 }
 
+/// What is about to be done, as a task and its plan.
+#[derive(Debug, Clone)]
+pub struct Outlook {
+    /// The domain; what is left of the action under way comes first in it.
+    pub domain: Domain,
+    /// The situation as it is believed, with what the knowledge base contributes, and the goal.
+    pub problem: Problem,
+    /// The action under way, if there is one, and what is still to be requested.
+    pub steps: Vec<PlannedStep>,
+    /// The number that the request of the first of these steps has, or will have.
+    pub first: u64,
+    /// Whether it was requested.
+    pub is_under_way: bool,
+}
+
 impl Beliefs {
     pub(super) fn new(mission: Mission) -> Self {
         Self {
@@ -151,6 +166,16 @@ impl Beliefs {
     /// What is still to be requested, if there is a plan.
     pub fn plan(&self) -> Option<impl Iterator<Item = &PlannedStep>> {
         self.plan.as_ref().map(VecDeque::iter)
+    }
+
+    /// What is about to be done, if there is a plan.
+    pub fn outlook(&self) -> Option<Outlook> {
+        let plan = self.plan.as_ref()?;
+        let (domain, problem) = self.left();
+        let (domain, running) = (domain.into_owned(), self.running.as_ref());
+        let first = running.map_or(self.actions + 1, |running| running.action);
+        let steps = running.map(|running| &running.step).into_iter().chain(plan).cloned().collect();
+        Some(Outlook { domain, problem, steps, first, is_under_way: running.is_some() })
     }
 
     /// Effects that were asked for and are not acknowledged, in their order.

@@ -6,8 +6,8 @@ use serde_json::Value;
 
 use crate::knowledge::Knowledge;
 use crate::mapek::adapt::Adapting;
-use crate::mapek::analyze::{analyze, available, follow};
-use crate::mapek::answer::{Answer, Effect};
+use crate::mapek::analyze::{analyze, available, follow, judged};
+use crate::mapek::answer::{Answer, DesignChange, Effect};
 use crate::mapek::ask::Outcome;
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::digest::digest;
@@ -70,6 +70,13 @@ impl Loop {
     /// What the loop believes and has asked for.
     pub fn beliefs(&self) -> &Beliefs {
         &self.beliefs
+    }
+
+    /// All designs of the knowledge base, each with why it is not available, if it is not.
+    pub fn designs(&self) -> Vec<DesignChange> {
+        let Some(knowledge) = self.beliefs.mission.knowledge() else { return Vec::new() };
+        let designs = knowledge.catalogue().designs().iter().map(|own| own.individual.name.as_str());
+        designs.map(|design| judged(knowledge, design, self.beliefs.available.contains(design))).collect()
     }
 
     /// To look at how planning goes, from another thread.

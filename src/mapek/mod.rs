@@ -39,7 +39,7 @@ mod watch;
 
 pub(crate) use analyze::{available, changes, doubts, inferred, ruled_out, said, unavailable};
 pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange};
-pub use beliefs::Beliefs;
+pub use beliefs::{Beliefs, Outlook};
 pub use control::Loop;
 pub use drive::{Clock, Effector, Observer, SystemClock, drive};
 pub use event::{Event, FORMAT, LONGEST_LINE, Observation};

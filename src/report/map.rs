@@ -13,7 +13,7 @@ use pddl::ast::{
 };
 use picture::{Map, Place, Step};
 
-use crate::report::seen::Seen;
+use crate::report::seen::Scene;
 
 /// How an action moves something.
 struct Movement<'d> {
@@ -25,10 +25,9 @@ struct Movement<'d> {
 }
 
 /// The map, if there is one; each step of the plan gets its way on it.
-pub(super) fn map(seen: Seen<'_>, plan: &Plan, steps: &mut [Step]) -> Option<Map> {
-    let domain = seen.mission.domain();
-    let movements = movements(domain);
-    let moving = places_of_most(seen, plan, &movements)?;
+pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<Map> {
+    let movements: Vec<Movement<'_>> = scene.domain.actions.iter().flat_map(moves).collect();
+    let moving = places_of_most(scene, plan, &movements)?;
     let places = moving.places;
     let number: BTreeMap<&Name, usize> = places.iter().zip(0..).collect();
     for (own, step) in plan.steps.iter().zip(steps) {
@@ -39,19 +38,19 @@ pub(super) fn map(seen: Seen<'_>, plan: &Plan, steps: &mut [Step]) -> Option<Map
         });
     }
     let predicates: BTreeSet<&Name> = moving.movements.iter().map(|movement| movement.predicate).collect();
-    let starts = seen.problem.init.iter().filter_map(|element| match element {
+    let starts = scene.problem.init.iter().filter_map(|element| match element {
         InitialElement::Fact(atom) => Some(atom),
         _ => None,
     });
-    let (starts, goals) = (ends(starts, &predicates), ends(goals(&seen.problem.goal), &predicates));
-    let positions = seen.positions.of(seen.problem, &places);
+    let (starts, goals) = (ends(starts, &predicates), ends(goals(&scene.problem.goal), &predicates));
+    let positions = scene.positions.of(scene.problem, &places);
     let place = |name: &Name| Place {
         name: name.to_string(),
         position: positions.as_ref().and_then(|positions| positions.get(name).copied()),
         is_start: starts.contains(name),
         is_goal: goals.contains(name),
     };
-    Some(Map { places: places.iter().map(place).collect(), ways: ways(seen.problem, &number, &predicates) })
+    Some(Map { places: places.iter().map(place).collect(), ways: ways(scene.problem, &number, &predicates) })
 }
 
 /// What moves between the places that a plan uses most.
@@ -61,12 +60,11 @@ struct Moving<'d> {
 }
 
 /// Of several kinds of places, those that the plan has most moves between, and then those that most actions know. Designs are no places.
-fn places_of_most<'d>(seen: Seen<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
-    let designs = seen.mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
-    let designs: BTreeSet<Name> = designs.map(|design| Name::new(&design.individual.name)).collect();
+fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
+    let designs: BTreeSet<Name> = scene.designs.keys().map(|design| Name::new(design)).collect();
     let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();
     for movement in movements {
-        let objects = objects(seen.mission.domain(), seen.problem, movement.r#type);
+        let objects = objects(scene.domain, scene.problem, movement.r#type);
         if objects.len() > 1 && !objects.iter().any(|object| designs.contains(object)) {
             kinds.entry(objects).or_default().push(movement);
         }
@@ -77,10 +75,6 @@ fn places_of_most<'d>(seen: Seen<'_>, plan: &Plan, movements: &'d [Movement<'d>]
     };
     let most = kinds.into_iter().max_by_key(|(_, kind)| (uses(kind), kind.len()));
     most.map(|(places, movements)| Moving { movements, places })
-}
-
-fn movements(domain: &Domain) -> Vec<Movement<'_>> {
-    domain.actions.iter().flat_map(moves).collect()
 }
 
 /// How one action moves something.

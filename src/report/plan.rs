@@ -9,23 +9,31 @@ use crate::mission::{Mission, times, verdict};
 use crate::report::designs::designs;
 use crate::report::map::map;
 use crate::report::numbers::curves;
-use crate::report::seen::Seen;
+use crate::report::seen::{Designs, Scene, Seen, known_designs};
 
 /// What is drawn of a solution, whose steps have all arguments of the mission's domain.
 pub fn plan_picture(seen: Seen<'_>, solution: &Solution) -> picture::Plan {
-    let mut picture = timeline_picture(seen.mission, solution);
-    if let Some(plan) = &solution.plan {
-        picture.map = map(seen, plan, &mut picture.steps);
-        picture.curves = curves(seen, plan, &picture.steps, picture.axis);
-    }
+    let known = known_designs(seen.mission);
+    let mut picture = solution.plan.as_ref().map(|plan| drawn(seen.scene(&known), plan)).unwrap_or_default();
+    (picture.verdict, picture.search) = (sentence(solution), search(solution));
     picture.designs = designs(seen.mission, &picture.steps);
     picture
+}
+
+/// The steps of a plan, its numbers, and its way on the map.
+pub(super) fn drawn(scene: Scene<'_>, plan: &Plan) -> picture::Plan {
+    let axis = axis(plan);
+    let mut steps = steps(scene.designs, plan, axis);
+    let map = map(scene, plan, &mut steps);
+    let curves = curves(scene, plan, &steps, axis);
+    picture::Plan { steps, axis, map, curves, ..picture::Plan::default() }
 }
 
 /// The verdict, the steps and the search of a solution, and nothing else.
 pub fn timeline_picture(mission: &Mission, solution: &Solution) -> picture::Plan {
     let axis = solution.plan.as_ref().map(axis).unwrap_or_default();
-    let steps = solution.plan.as_ref().map(|plan| steps(mission, plan, axis)).unwrap_or_default();
+    let known = known_designs(mission);
+    let steps = solution.plan.as_ref().map(|plan| steps(&known, plan, axis)).unwrap_or_default();
     let (verdict, search) = (sentence(solution), search(solution));
     picture::Plan { verdict, steps, axis, search, ..picture::Plan::default() }
 }
@@ -51,12 +59,11 @@ fn axis(plan: &Plan) -> Axis {
     if is_sequence && takes_none { Axis::Steps } else { Axis::Time }
 }
 
-fn steps(mission: &Mission, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
-    let known = known_designs(mission);
+fn steps(known: &Designs, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
     let mut before: BTreeMap<String, String> = BTreeMap::new();
     let mut drawn = Vec::new();
     for (index, step) in plan.steps.iter().enumerate() {
-        let configuration = configuration(step, &known);
+        let configuration = configuration(step, known);
         let changed = configuration.iter().filter_map(|(function, design)| {
             let old = before.get(function).filter(|old| *old != design)?;
             Some((function.clone(), old.clone()))
@@ -83,19 +90,9 @@ fn steps(mission: &Mission, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
     drawn
 }
 
-/// Designs of the knowledge base, and the first function that each of them solves.
-fn known_designs(mission: &Mission) -> BTreeMap<String, String> {
-    let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
-    let solved = designs.filter_map(|design| {
-        let function = design.solves.first()?;
-        Some((design.individual.name.clone(), function.name.clone()))
-    });
-    solved.collect()
-}
-
 /// The configuration of a step; where a domain does not say which function a design is for, the knowledge base does. Of several designs
 /// of one function the last counts.
-fn configuration(step: &Step, known: &BTreeMap<String, String>) -> Vec<(String, String)> {
+fn configuration(step: &Step, known: &Designs) -> Vec<(String, String)> {
     if !step.configuration.is_empty() {
         return step.configuration.clone();
     }

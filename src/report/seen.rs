@@ -1,6 +1,8 @@
-//! A mission in the situation that is looked at.
+//! What a plan is drawn with: the task that it is for, and what else is known.
 
-use pddl::ast::Problem;
+use std::collections::BTreeMap;
+
+use pddl::ast::{Domain, Problem};
 
 use crate::mission::Mission;
 use crate::report::positions::Positions;
@@ -14,4 +16,33 @@ pub struct Seen<'a> {
     pub problem: &'a Problem,
     /// Where its places lie.
     pub positions: &'a Positions,
+}
+
+/// Designs of a knowledge base, and the first function that each of them solves.
+pub(super) type Designs = BTreeMap<String, String>;
+
+/// The task that a plan is for, with what is known beside it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scene<'a> {
+    pub(super) domain: &'a Domain,
+    pub(super) problem: &'a Problem,
+    pub(super) positions: &'a Positions,
+    pub(super) designs: &'a Designs,
+}
+
+impl<'a> Seen<'a> {
+    pub(super) fn scene(self, designs: &'a Designs) -> Scene<'a> {
+        let Self { mission, problem, positions } = self;
+        Scene { domain: mission.domain(), problem, positions, designs }
+    }
+}
+
+/// The designs of a mission's knowledge base.
+pub(super) fn known_designs(mission: &Mission) -> Designs {
+    let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+    let solved = designs.filter_map(|design| {
+        let function = design.solves.first()?;
+        Some((design.individual.name.clone(), function.name.clone()))
+    });
+    solved.collect()
 }

@@ -7,6 +7,7 @@ use std::process::Command;
 use serde_json::Value;
 
 use crate::common::{metaplan, metaplan_in, root};
+use crate::live::Run;
 
 /// Names of a Chromium, in the order of preference.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
@@ -131,6 +132,59 @@ fn other_pages_work_in_a_browser() {
     }
     let found = check(&browser, "journal", &text);
     assert!(found["unfolding"].as_u64() > Some(1), "{found}");
+}
+
+/// A run as it was seen, in one page: its style, its script, and what it gets from the program.
+fn seen(run: &Run, lines: &[String]) -> String {
+    let get = |path: &str| run.get(path, "").1;
+    let text = |text: String| Value::String(text).to_string().replace('<', "\\u003c");
+    let messages = lines.iter().map(|line| text(line.clone())).collect::<Vec<_>>().join(",");
+    let stand_in = format!(
+        "const PLAN = {}, LINES = [{messages}]; self.fetch = async () => ({{ ok: true, text: async () => PLAN }}); \
+         self.EventSource = class {{ constructor() {{ this.heard = {{}}; queueMicrotask(() => {{ this.heard.begin({{}}); \
+         LINES.forEach(data => this.heard.message({{ data }})); }}); }} addEventListener(name, own) {{ this.heard[name] = own; }} close() {{}} }};",
+        text(get("/plan"))
+    );
+    let page = get("/");
+    let link = "<link rel=\"stylesheet\" href=\"/live.css\">";
+    let script = "<script src=\"/live.js\" defer></script>";
+    assert!(page.contains(link) && page.contains(script), "{page}");
+    let page = page.replace(link, &format!("<style>{}</style>", get("/live.css"))).replace(script, "");
+    page.replace(
+        "</body>",
+        &format!("<script>{stand_in}</script><script>{}</script></body>", get("/live.js")),
+    )
+}
+
+/// The page of a run: the action under way is marked, what is done, too, and all is well on narrow screens.
+#[test]
+fn the_page_of_a_run_works_in_a_browser() {
+    let Some(browser) = browser() else { return };
+    let mut run = Run::begin(&["--serve=0"]);
+    let mut events = run.events();
+    let told = [
+        "{\"event\":\"action_started\",\"action\":1}",
+        "{\"event\":\"action_succeeded\",\"action\":1}",
+        "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}",
+        "{\"event\":\"action_cancelled\",\"action\":2}",
+        "{\"event\":\"action_started\",\"action\":3}",
+        "{\"event\":\"action_succeeded\",\"action\":3}",
+        "{\"event\":\"nonsense <b>\"}",
+    ];
+    run.tell(told.map(str::to_owned), told.len() as u64);
+    let is_last = |line: &Value| line["said"]["answer"] == "handled" && line["said"]["line"] == told.len();
+    let lines = events.until(is_last);
+    // The first says that it begins.
+    let lines: Vec<String> = lines.iter().skip(1).map(Value::to_string).collect();
+    let page = seen(&run, &lines);
+    let found = check(&browser, "a run", &page);
+    // The plan of after the failure: from wp2 over wp3 and wp6 to wp9, one lane for actions and one for designs.
+    assert_eq!(found["pictures"], 5, "timeline, cost, two numbers of the battery, map: {found}");
+    assert_eq!(found["done"], 2, "{found}");
+    assert_eq!(found["now"], serde_json::json!(["2", "2"]), "{found}");
+    assert_eq!(found["status"], "Action 4: move wp3 wp6", "{found}");
+    assert!(found["unfolding"].as_u64() > Some(1), "designs that are lost have reasons: {found}");
+    run.end();
 }
 
 /// What is wrong is found.

@@ -257,6 +257,59 @@ fn a_report_is_a_page() {
     assert_eq!(error["messages"][0]["code"], "M107");
 }
 
+/// Actions that overlap have rows of their own, and the numbers follow both.
+#[test]
+fn overlapping_actions_are_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let domain = "(define (domain two) (:requirements :durative-actions :numeric-fluents) (:predicates (done ?x)) (:functions (left))
+        (:durative-action work :parameters (?x) :duration (= ?duration 4) :condition (at start (>= (left) 1))
+         :effect (and (at end (done ?x)) (at start (decrease (left) 1)))))";
+    let problem = "(define (problem p) (:domain two) (:objects a b) (:init (= (left) 3)) (:goal (and (done a) (done b)))
+        (:metric minimize (total-time)))";
+    for (name, text) in [("domain.pddl", domain), ("problem.pddl", problem)] {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
+    let arguments = ["report", "domain.pddl", "problem.pddl", "--concurrent", "--svg", "pictures", "-q"];
+    let outcome = metaplan_in(folder.path(), &arguments, "");
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    assert!(outcome.stdout.contains("data-curve=\"left\""), "the number that the actions share");
+    let timeline = std::fs::read_to_string(folder.path().join("pictures/timeline.svg")).expect("a picture");
+    let document = Document::parse(&timeline).expect("XML");
+    let rows = document.descendants().filter(|node| node.attribute("class") == Some("action"));
+    let rows: Vec<_> = rows.filter_map(|node| Some((node.attribute("x")?, node.attribute("y")?))).collect();
+    assert!(matches!(rows[..], [one, other] if one.1 != other.1), "{rows:?}");
+}
+
+/// Each answer with pictures gives them as files, too.
+#[test]
+fn pictures_of_all_answers_are_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let commands: [(&[&str], &str, &[&str]); 3] = [
+        (&["plan", "missions/camara_like.toml", "--pareto", "total_time,total_energy"], "front.svg", &["."]),
+        (&["compare", "missions/camara_like.toml", "--battery-unit", "1000"], "compared", &["picture-1.svg"]),
+        (
+            &["simulate", "missions/ugv.toml", "--scenario", "kinect_comes_and_goes"],
+            "simulated",
+            &["picture-1.svg", "picture-2.svg", "picture-3.svg"],
+        ),
+    ];
+    for (arguments, name, files) in commands {
+        let path = at(name);
+        let all: Vec<&str> = arguments.iter().copied().chain(["--svg", &path, "-q"]).collect();
+        assert_eq!(metaplan(&all).status, 0, "{arguments:?}");
+        for file in files {
+            let file = if *file == "." { path.clone() } else { format!("{path}/{file}") };
+            let text = std::fs::read_to_string(&file).expect("a picture");
+            let document = Document::parse(&text).expect("XML");
+            assert!(
+                document.descendants().any(|node| node.has_tag_name("circle")),
+                "{file}: something is drawn"
+            );
+        }
+    }
+}
+
 /// The pictures of the README are those that the program draws.
 #[test]
 fn pictures_of_the_readme_are_made_by_the_program() {

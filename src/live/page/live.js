@@ -1,4 +1,5 @@
-// The lines of /events to tables. Whatever comes from outside becomes text, never markup.
+// The lines of /events to tables, and the picture of the plan beside them. What comes in lines becomes text, never markup; the
+// picture is drawn by the program.
 "use strict";
 
 const SHOWN = 500; // lines of what happens
@@ -6,6 +7,7 @@ const QUIET = new Set(["handled", "ready", "planning", "plan_kept"]);
 const BAD = new Set(["error", "plan_none", "contradicted", "unconcluded", "suspend_action", "cancel_action"]);
 const $ = (id) => document.getElementById(id);
 let state;
+let drawing = false, again = false;
 
 function element(name, text, attributes = {}) {
   const made = document.createElement(name);
@@ -38,18 +40,40 @@ function status(text, kind) {
 }
 
 function reset() {
-  state = { steps: [], step: -1, configuration: new Map(), designs: new Map() };
-  for (const id of ["plan", "configuration", "lines"]) $(id).tBodies[0].replaceChildren();
-  $("designs").replaceChildren();
+  state = { requested: 0, reached: false, configuration: new Map(), designs: new Map() };
+  for (const id of ["configuration", "lines"]) $(id).tBodies[0].replaceChildren();
+  for (const id of ["plan", "designs"]) $(id).replaceChildren();
   $("plan-about").textContent = "There is no plan yet.";
 }
 
-function showPlan() {
-  const rows = state.steps.map((step, index) => {
-    const attributes = index < state.step ? { class: "done" } : index === state.step ? { "aria-current": "step" } : {};
-    return row([index + 1, `${step.action} ${context(step)}`, pairs(step.configuration), step.duration, step.cost], attributes);
-  });
-  $("plan").tBodies[0].replaceChildren(...rows);
+// What is done, and what is under way, wherever it is drawn.
+function markSteps() {
+  const now = state.reached ? Infinity : state.requested - Number($("drawn")?.dataset.first) + 1;
+  for (const own of $("plan").querySelectorAll("[data-step]")) {
+    const steps = own.dataset.step.split(" ").map(Number);
+    own.classList.toggle("now", steps.includes(now));
+    own.classList.toggle("done", steps.every((step) => step < now));
+  }
+  const bar = $("plan").querySelector(".bar.now"), pane = bar?.closest(".scroll");
+  if (pane) pane.scrollLeft += bar.getBoundingClientRect().left - pane.getBoundingClientRect().left - pane.clientWidth / 3;
+}
+
+async function drawPlan() {
+  again = drawing;
+  if (drawing) return;
+  drawing = true;
+  try {
+    const answer = await fetch("/plan");
+    const drawn = new DOMParser().parseFromString(answer.ok ? await answer.text() : "", "text/html");
+    const open = [...$("plan").querySelectorAll("details")].map((own) => own.open);
+    $("plan").replaceChildren(...drawn.body.childNodes);
+    $("plan").querySelectorAll("details").forEach((own, index) => { own.open = open[index] ?? false; });
+    markSteps();
+  } catch {
+    // That the connection is lost is said elsewhere.
+  }
+  drawing = false;
+  if (again) drawPlan();
 }
 
 function showConfiguration() {
@@ -71,6 +95,10 @@ function showDesigns() {
   });
   $("designs").replaceChildren(...items);
   $("designs-about").hidden = items.length > 0;
+}
+
+function know(designs) {
+  for (const own of designs) state.designs.set(own.design, { text: own.available ? "is available" : "is not available", because: own.because });
 }
 
 // What an answer says, in words.
@@ -99,33 +127,30 @@ const CHANGES = {
   ready: (it) => ($("mission").textContent = it.mission ?? ""),
   planning: (it) => status(`Planning for ${it.seconds} s`, "works"),
   plan_found(it) {
-    Object.assign(state, { steps: it.steps, step: -1 });
+    state.reached = false;
     $("plan-about").textContent = `Cost ${it.cost}${it.optimal ? ", proved optimal" : ", not proved optimal"}.`;
-    showPlan();
   },
   plan_none(it) {
-    Object.assign(state, { steps: [], step: -1 });
     $("plan-about").textContent = `There is no plan: ${it.because}`;
     status("There is no plan", "stuck");
-    showPlan();
   },
   request_action(it) {
-    state.step = Math.min(state.step + 1, state.steps.length - 1);
+    Object.assign(state, { requested: it.action, reached: false });
     status(`Action ${it.action}: ${it.name} ${context(it)}`, "works");
-    showPlan();
+    markSteps();
   },
   suspend_action: (it) => status(`Action ${it.action} is suspended: ${it.because}`, "stuck"),
   goal_reached() {
-    state.step = state.steps.length;
+    state.reached = true;
     status("The goal is reached", "works");
-    showPlan();
+    markSteps();
   },
   reconfigure(it) {
     state.configuration.set(it.function, it.to);
     showConfiguration();
   },
   inferred(it) {
-    for (const own of it.designs) state.designs.set(own.design, { text: own.available ? "is available" : "is not available", because: own.because });
+    know(it.designs);
     for (const own of it.objectives) state.designs.set(own.objective, { text: own.statuses.join(", ") || "is well", because: own.because });
     showDesigns();
   },
@@ -142,6 +167,11 @@ function take(message) {
   const news = JSON.parse(message.data);
   if (news.left_out) return show(news.at, undefined, "left out", `${news.left_out} lines that came too fast`);
   if (news.heard !== undefined) return show(news.at, news.line, "event", news.heard);
+  if (news.known) return know(news.known), showDesigns();
+  if (news.planned) {
+    state.requested = Math.max(state.requested, news.planned.under_way ?? 0);
+    return drawPlan();
+  }
   const said = news.said;
   CHANGES[said.answer]?.(said);
   if (!QUIET.has(said.answer)) show(news.at, said.line, said.answer, WORDS[said.answer]?.(said) ?? "");

@@ -1,0 +1,70 @@
+//! What a loop is about to do, as a part of a page.
+
+use encodings::{Plan, Step};
+use num_rational::BigRational;
+use pddl::ast::Condition;
+
+use crate::mapek::{Outlook, PlannedStep};
+use crate::mission::Mission;
+use crate::report::plan::drawn;
+use crate::report::positions::Positions;
+use crate::report::seen::{Designs, Scene, known_designs};
+
+/// So many steps are drawn at most; what comes later will be drawn when it is near.
+const NEXT: usize = 500;
+
+/// Draws what a loop is about to do.
+#[derive(Debug, Clone)]
+pub struct Painter {
+    designs: Designs,
+    positions: Positions,
+}
+
+impl Painter {
+    /// For a loop that takes charge of a mission.
+    pub fn new(mission: &Mission, positions: Positions) -> Self {
+        Self { designs: known_designs(mission), positions }
+    }
+
+    /// The plan as HTML: timeline, numbers and map from now on, in the style [`picture::STYLE`].
+    pub fn part(&self, outlook: &Outlook) -> String {
+        let later = outlook.steps.len().saturating_sub(NEXT);
+        let mut problem = outlook.problem.clone();
+        if later > 0 {
+            // The goal demands nothing of how things are before the end.
+            problem.goal = Condition::And(Vec::new());
+        }
+        let scene = Scene {
+            domain: &outlook.domain,
+            problem: &problem,
+            positions: &self.positions,
+            designs: &self.designs,
+        };
+        let mut picture = drawn(scene, &plan(&outlook.steps[..outlook.steps.len() - later]));
+        if later > 0 {
+            picture.verdict = format!("The next {NEXT} steps; {later} more follow.");
+        }
+        picture.part()
+    }
+}
+
+/// Steps one after another, from now on.
+fn plan(steps: &[PlannedStep]) -> Plan {
+    let mut now = BigRational::default();
+    let mut timed = |step: &PlannedStep| {
+        let start = now.clone();
+        now += &step.duration;
+        Step {
+            action: step.action.clone(),
+            arguments: step.arguments.clone(),
+            configuration: step.configuration.clone(),
+            reconfigured: Vec::new(),
+            start: start.into(),
+            duration: step.duration.clone().into(),
+            cost: step.cost.clone().into(),
+        }
+    };
+    let steps: Vec<Step> = steps.iter().map(&mut timed).collect();
+    let cost = steps.iter().map(|step| step.cost.to_rational()).sum::<BigRational>();
+    Plan { steps, cost: cost.into() }
+}
