@@ -218,12 +218,14 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
 
 /// Adds to a problem the objects, facts and values that the knowledge base has for the domain's symbols. What
 /// the problem says of availability itself is dropped, with a warning, but for its `own` designs; values that it states stay.
+/// What `stands` for designs is declared, too, though the explicit form of a plain domain does without it.
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,
     knowledge: &Knowledge,
     bindings: &Bindings,
     own: &BTreeSet<Name>,
+    stands: &dyn Fn(&Name) -> bool,
 ) -> Vec<Message> {
     let known = knowledge.catalogue();
     let is_known = knowledge.fault().is_none();
@@ -232,7 +234,7 @@ pub(super) fn fill(
     let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
     let actions = domain.actions.iter().map(|action| &action.identifier.name);
     let declared: BTreeSet<&Name> = types.chain(symbols).chain(actions).collect();
-    for name in bindings.own.keys().filter(|name| !declared.contains(name)) {
+    for name in bindings.own.keys().filter(|name| !declared.contains(name) && !stands(name)) {
         let text =
             format!("`{name}` is bound, but the domain declares no such type, predicate, function or action");
         fill.warnings.push(Message::warning("M204", text));

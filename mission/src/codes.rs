@@ -194,4 +194,10 @@ pub const CODES: &[[&str; 4]] = &[
         "`[bindings]` names an attribute that no design estimates, a measurement, an action or a class that is not there; what is bound counts as 0 or as nothing.",
         "Correct the name, or add the estimations (for `reconfigured:ATTRIBUTE` to each design whose change has a cost).",
     ],
+    [
+        "M228",
+        "A change of designs is not counted where it is asked for.",
+        "A function that is bound to `reconfigured:ATTRIBUTE` stands in a duration, a condition, or an effect other than `increase` and `decrease`.",
+        "Add it to a number in an effect, as in `(increase (total-cost) (reconfiguration))`, and let the metric have that number.",
+    ],
 ];

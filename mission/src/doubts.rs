@@ -117,14 +117,13 @@ impl Mission {
             ActionBody::Durative { effects, .. } => effects.iter().map(|(_, effect)| effect).collect(),
         });
         let effects: Vec<&Effect> = effects.collect();
-        let stands = |name: &Name| self.adaptation.as_ref().is_some_and(|own| own.stands_for_designs(name));
         let declared = self.domain.functions.iter().map(|declared| &declared.identifier);
         let silent = declared.filter(|identifier| {
             let name = &identifier.name;
             name.as_str() != "total-cost"
                 && !valued.contains(name)
                 && is_used(name)
-                && !stands(name)
+                && !self.stands_for_designs(name)
                 && !effects.iter().any(|effect| assigns(effect, name))
         });
         let warning = |identifier: &pddl::ast::Identifier| {

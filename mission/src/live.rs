@@ -23,8 +23,14 @@ impl Mission {
             if let Some(adaptation) = &self.adaptation {
                 adaptation.fill(problem, knowledge.catalogue().designs());
             }
-            binding::fill(&self.domain, problem, knowledge, &self.bindings, &self.own)
+            let stands = |name: &Name| self.stands_for_designs(name);
+            binding::fill(&self.domain, problem, knowledge, &self.bindings, &self.own, &stands)
         })
+    }
+
+    /// Whether a function of a plain domain stands for the chosen designs, or for those that a change has brought.
+    pub(crate) fn stands_for_designs(&self, function: &Name) -> bool {
+        self.adaptation.as_ref().is_some_and(|own| own.stands_for_designs(function))
     }
 
     /// The knowledge base, to change it.

@@ -83,6 +83,38 @@ fn a_plain_domain_that_meets_nothing_is_warned_of() {
     check("ugv_plain", (domain, old, "(batery_usage)"), &["M206", "batery_usage", "plain.pddl"]);
 }
 
+/// The ground vehicle in plain PDDL with a function for what changed designs use.
+fn changing_mission() -> tempfile::TempDir {
+    let copy = copy_of_mission("ugv");
+    let read = |file: &str| std::fs::read_to_string(root().join(file)).expect("text");
+    let manifest = read("missions/ugv_plain.toml").replace("../", "");
+    let manifest = manifest.replace("encodings/ugv/plain.pddl", "plain.pddl");
+    let manifest = format!("{manifest}\n[bindings]\nchange = \"reconfigured:battery_usage\"\n");
+    let domain =
+        read("encodings/ugv/plain.pddl").replace("    (battery_used))", "    (change)\n    (battery_used))");
+    for (file, text) in [("mission.toml", manifest), ("plain.pddl", domain)] {
+        std::fs::write(copy.path().join(file), text).expect("written");
+    }
+    copy
+}
+
+/// What a change of designs costs counts where a number grows or shrinks; elsewhere it would silently count nothing.
+#[test]
+fn a_change_of_designs_is_counted_or_refused() {
+    let outcome = |place: &str, counted: &str| {
+        let copy = changing_mission();
+        edit(copy.path(), "plain.pddl", place, counted);
+        metaplan_in(copy.path(), &["plan", "mission.toml"], "")
+    };
+    let move_takes = "(= ?duration (travel_time ?from ?to))";
+    let refused = outcome(move_takes, "(= ?duration (+ (travel_time ?from ?to) (change)))");
+    assert_eq!(refused.status, 3, "{refused:#?}");
+    assert!(refused.stderr.contains("M228") && refused.stderr.contains("`(change)`"), "{refused:#?}");
+    let grows = "(at end (robot_at ?to))";
+    let counted = outcome(grows, &format!("{grows} (at end (increase (battery_used) (change)))"));
+    assert_eq!((counted.status, counted.stderr.as_str()), (0, ""), "{counted:#?}");
+}
+
 #[test]
 fn shipped_missions_raise_no_doubts() {
     for mission in ["ugv", "uuv", "ugv_plain", "uuv_plain", "camara_like"] {

@@ -10,6 +10,7 @@
 
 mod walk;
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::BigRational;
@@ -22,7 +23,7 @@ use pddl::ast::{
 
 use crate::binding::{Bindings, atom, identifier, is_pddl_name};
 use crate::message::Message;
-use walk::{mentions, walk_condition, walk_effect, walk_expression};
+use walk::{mentions, walk_condition, walk_effect, walk_expression, walk_uncounted};
 
 const FUNCTION: &str = "function";
 const DESIGN: &str = "functiondesign";
@@ -122,6 +123,13 @@ impl CoAdaptation {
                 errors.push(Message::error("M117", text));
             }
             let action = domain.actions.iter().find(|action| action.identifier.name == *name);
+            for function in action.into_iter().flat_map(|action| self.not_counted(action)) {
+                let text = format!(
+                    "`{name}` uses `({function})` where no change of designs is counted; `increase` and `decrease` count it, outside of \
+                     `when` and `forall`"
+                );
+                errors.push(Message::error("M228", text));
+            }
             for quality in &needs.quality {
                 let Some(context) = &quality.context else { continue };
                 let predicate = domain.predicates.iter().find(|p| p.identifier.name == Name::new(context));
@@ -141,6 +149,36 @@ impl CoAdaptation {
             }
         }
         errors
+    }
+
+    /// The functions for changed designs that an action mentions in durations, conditions and effects that do not count changes.
+    fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
+        let found = RefCell::new(BTreeSet::new());
+        let see = |part: &mut Expression| {
+            if let Expression::Fluent(fluent) = part
+                && self.changed.contains_key(&fluent.predicate.name)
+            {
+                found.borrow_mut().insert(fluent.predicate.name.clone());
+            }
+        };
+        match action.body.clone() {
+            ActionBody::Instantaneous { mut precondition, effect } => {
+                walk_condition(&mut precondition, &see);
+                walk_uncounted(effect, &see);
+            }
+            ActionBody::Durative { duration, conditions, effects } => {
+                for mut constraint in duration {
+                    walk_expression(&mut constraint.expression, &see);
+                }
+                for (_, mut condition) in conditions {
+                    walk_condition(&mut condition, &see);
+                }
+                for (_, effect) in effects {
+                    walk_uncounted(effect, &see);
+                }
+            }
+        }
+        found.into_inner()
     }
 
     /// How many parameters an action has in the plain domain.

@@ -1,6 +1,6 @@
 //! Changes to the expressions of conditions and effects, in place.
 
-use pddl::ast::{Condition, Effect, Expression, Name};
+use pddl::ast::{Assignment, Condition, Effect, Expression, Name};
 
 /// Whether a numeric function is mentioned whose name is wanted.
 pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool, found: &mut bool) {
@@ -43,6 +43,16 @@ pub(super) fn walk_condition(condition: &mut Condition, change: &dyn Fn(&mut Exp
             walk_expression(right, change);
         }
         Condition::Atom(_) | Condition::Equal(..) => {}
+    }
+}
+
+/// Goes through what an effect mentions where changes of designs are not counted: everywhere but in what it adds to numbers
+/// unconditionally.
+pub(super) fn walk_uncounted(effect: Effect, see: &dyn Fn(&mut Expression)) {
+    match effect {
+        Effect::And(parts) => parts.into_iter().for_each(|part| walk_uncounted(part, see)),
+        Effect::Assign(Assignment::Increase | Assignment::Decrease, ..) => {}
+        mut other => walk_effect(&mut other, see),
     }
 }
 
