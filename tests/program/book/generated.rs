@@ -3,12 +3,17 @@
 
 use std::fmt::Write as _;
 
-use crate::common::root;
+use metaplan::codes;
+
+use super::help;
+use crate::common::{metaplan, root};
 
 /// A page, the name of a part of it, and what makes that.
 type Part = (&'static str, &'static str, fn() -> String);
 
-const PARTS: [Part; 3] = [
+const PARTS: [Part; 5] = [
+    ("docs/reference/codes.md", "codes", codes),
+    ("docs/reference/commands.md", "commands", help::commands),
     ("docs/reference/tomasys.md", "classes", || terms("owl:Class")),
     ("docs/reference/tomasys.md", "relations", || terms("owl:ObjectProperty")),
     ("docs/reference/tomasys.md", "values", || terms("owl:DatatypeProperty")),
@@ -33,6 +38,40 @@ fn generated_parts_are_up_to_date() {
         stale.push(format!("{page}: {name}"));
     }
     assert!(stale.is_empty(), "out of date (METAPLAN_BLESS=1 writes them): {stale:?}");
+}
+
+/// The picture of the tutorial is what the program draws.
+#[test]
+fn the_picture_of_the_tutorial_is_drawn_by_the_program() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("plan.svg").display().to_string();
+    let outcome = metaplan(&["plan", "missions/templates/warehouse/mission.toml", "--svg", &file]);
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    let drawn = std::fs::read_to_string(&file).expect("a picture");
+    let path = root().join("docs/pictures/warehouse-timeline.svg");
+    if std::env::var_os("METAPLAN_BLESS").is_some() {
+        std::fs::write(&path, &drawn).expect("the picture is written");
+    }
+    assert!(std::fs::read_to_string(path).is_ok_and(|shown| shown == drawn), "it is another picture");
+}
+
+/// All codes, by their first letter.
+fn codes() -> String {
+    let mut text = String::new();
+    let mut letter = "";
+    for code in codes::all() {
+        if code.code[..1] != *letter {
+            letter = &code.code[..1];
+            let _ = write!(
+                text,
+                "{}### {letter}\n\n| code | says | because | so |\n|---|---|---|---|\n",
+                if text.is_empty() { "" } else { "\n" }
+            );
+        }
+        let cells = [code.meaning, code.cause, code.remedy].map(|cell| cell.replace('|', "\\|"));
+        let _ = writeln!(text, "| {} | {} |", code.code, cells.join(" | "));
+    }
+    text
 }
 
 /// The terms of the TOMASys metamodel that are of this kind, with what it says of them.

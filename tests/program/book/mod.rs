@@ -16,6 +16,7 @@
 
 mod console;
 mod generated;
+mod help;
 mod page;
 
 use std::path::{Path, PathBuf};

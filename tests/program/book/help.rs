@@ -1,0 +1,97 @@
+//! The commands as the program's own help has them, in tables.
+
+use std::fmt::Write as _;
+
+use crate::common::metaplan;
+
+/// What every command has, and the page says once.
+const COMMON: [&str; 4] = ["--format", "-q, --quiet", "-v, --verbose", "-h, --help"];
+
+/// An argument or an option, with what the help says of it.
+struct Entry {
+    head: String,
+    text: String,
+}
+
+/// All commands, each with its arguments and options.
+pub fn commands() -> String {
+    let mut text = String::new();
+    for (name, _) in subcommands(&help(&[])) {
+        let path = [name.as_str()];
+        let page = help(&path);
+        let inner = subcommands(&page);
+        describe(&path, &page, &mut text);
+        for (inner, _) in inner {
+            let path = [name.as_str(), inner.as_str()];
+            describe(&path, &help(&path), &mut text);
+        }
+    }
+    text
+}
+
+fn help(command: &[&str]) -> String {
+    let outcome = metaplan(&[&["help"], command].concat());
+    assert_eq!(outcome.status, 0, "{outcome:?}");
+    outcome.stdout
+}
+
+/// The commands that a help lists, but for `help` itself.
+fn subcommands(help: &str) -> Vec<(String, String)> {
+    let Some((_, rest)) = help.split_once("\nCommands:\n") else { return Vec::new() };
+    let lines = rest.lines().take_while(|line| !line.is_empty());
+    let named = lines.filter_map(|line| line.trim().split_once("  "));
+    let named = named.map(|(name, about)| (name.to_owned(), about.trim().to_owned()));
+    named.filter(|(name, _)| name != "help").collect()
+}
+
+fn describe(command: &[&str], help: &str, text: &mut String) {
+    let about = help.split("\n\nUsage:").next().unwrap_or_default().replace("\n\n", ". ").replace('\n', " ");
+    let usage = help.lines().find_map(|line| line.strip_prefix("Usage: ")).expect("a usage");
+    let separator = if text.is_empty() { "" } else { "\n" };
+    let _ =
+        write!(text, "{separator}### metaplan {}\n\n{about}.\n\n```text\n{usage}\n```\n", command.join(" "));
+    let entries: Vec<Entry> = entries(help).into_iter().filter(|entry| !is_common(&entry.head)).collect();
+    if !entries.is_empty() {
+        text.push_str("\n| argument or option | means |\n|---|---|\n");
+    }
+    for entry in entries {
+        let _ = writeln!(text, "| `{}` | {} |", entry.head, entry.text);
+    }
+}
+
+fn is_common(head: &str) -> bool {
+    COMMON.iter().any(|common| head == *common || head.starts_with(&format!("{common} ")))
+}
+
+/// The arguments and options of a help: each begins less than ten columns from the left, and its text follows farther in.
+fn entries(help: &str) -> Vec<Entry> {
+    let mut found: Vec<Entry> = Vec::new();
+    let mut is_list = false;
+    for line in help.lines() {
+        let indent = line.len() - line.trim_start().len();
+        let content = line.trim();
+        if line.ends_with(':') && indent == 0 {
+            is_list = matches!(content, "Arguments:" | "Options:");
+        } else if is_list && (1..10).contains(&indent) && content.starts_with(['-', '<', '[']) {
+            found.push(Entry { head: content.replace('|', "\\|"), text: String::new() });
+        } else if let Some(entry) = found.last_mut().filter(|_| is_list && !content.is_empty()) {
+            let content = content.replace('|', "\\|");
+            match content.strip_prefix("- ").and_then(|value| value.split_once(':')) {
+                Some((value, text)) => {
+                    let separator = if entry.text.ends_with(':') { ' ' } else { ';' };
+                    let space = if separator == ';' { " " } else { "" };
+                    let _ = write!(entry.text, "{separator}{space}`{value}`: {}", text.trim());
+                }
+                None if content == "Possible values:" => entry.text.push_str(". Values:"),
+                None if content.starts_with('[') => {
+                    let _ = write!(entry.text, " {content}");
+                }
+                None if entry.text.is_empty() => entry.text = content,
+                None => {
+                    let _ = write!(entry.text, ". {content}");
+                }
+            }
+        }
+    }
+    found
+}
