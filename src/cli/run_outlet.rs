@@ -2,6 +2,8 @@
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -54,6 +56,8 @@ impl Outlets {
 #[derive(Debug, Clone)]
 pub(super) struct Outlet {
     recorder: Option<(Recorder, String)>,
+    /// Whether it was said that the recording has failed.
+    is_told: Arc<AtomicBool>,
     live: Option<Live>,
 }
 
@@ -71,7 +75,7 @@ impl Outlet {
         };
         let recorder =
             wanted.mcap.as_deref().map(|path| record(path, wanted.mcap_events, mission)).transpose()?;
-        Ok(Self { recorder, live })
+        Ok(Self { recorder, is_told: Arc::default(), live })
     }
 
     /// A line that is about to be handled, with its number and the time since the start of the mission.
@@ -110,8 +114,12 @@ impl Outlet {
         stdout.write_all(lines.as_bytes())?;
         stdout.flush()?;
         drop(stdout);
-        if let Some((recorder, _)) = &self.recorder {
+        if let Some((recorder, name)) = &self.recorder {
             lines.lines().for_each(|line| recorder.answer(line));
+            if recorder.has_failed() && !self.is_told.swap(true, Ordering::Relaxed) {
+                let text = format!("{name} cannot be written any more: the run goes on without a recording");
+                output::note(Message::warning("M331", text).text());
+            }
         }
         if let Some(live) = &self.live {
             lines.lines().for_each(|line| live.said(line));

@@ -1,7 +1,7 @@
 //! What is known of a run, for those who look at it: the last lines, and the last word on each thing.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -11,8 +11,9 @@ use serde_json::{Value, json};
 use crate::live::keep::{design_key, keys};
 use crate::mapek::DesignChange;
 
-/// So many lines may wait to be taken; what comes then is left out.
+/// So many lines, with so many bytes together, may wait to be taken; what comes then is left out.
 const WAITING: usize = 4096;
+const WAITING_BYTES: usize = 16 << 20;
 
 /// So many lines are kept.
 const LINES: usize = 2000;
@@ -129,8 +130,15 @@ impl Known {
 #[derive(Debug, Clone)]
 pub(super) struct Mouth {
     said: SyncSender<Option<(f64, Said)>>,
-    left_out: Arc<AtomicU64>,
+    behind: Arc<Behind>,
     begun: Instant,
+}
+
+/// What was said and is not taken yet.
+#[derive(Debug, Default)]
+struct Behind {
+    left_out: AtomicU64,
+    bytes: AtomicUsize,
 }
 
 #[derive(Debug)]
@@ -141,14 +149,24 @@ enum Said {
     Planned(Option<u64>),
 }
 
+impl Said {
+    /// So much of it is text.
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Heard(_, text) | Self::Answer(text) => text.len(),
+            Self::Known(_) | Self::Planned(_) => 0,
+        }
+    }
+}
+
 impl Mouth {
     /// A way to speak to a hub, and a thread that listens.
     pub(super) fn of(hub: Arc<Hub>) -> Self {
         let (said, received) = sync_channel(WAITING);
-        let left_out = Arc::new(AtomicU64::new(0));
-        let counted = Arc::clone(&left_out);
+        let behind = Arc::new(Behind::default());
+        let counted = Arc::clone(&behind);
         std::thread::spawn(move || listen(&hub, &received, &counted));
-        Self { said, left_out, begun: Instant::now() }
+        Self { said, behind, begun: Instant::now() }
     }
 
     /// A line that the loop has heard, with its number.
@@ -178,16 +196,22 @@ impl Mouth {
 
     fn say(&self, said: Said) {
         let at = self.begun.elapsed().as_secs_f64();
-        if let Err(TrySendError::Full(_)) = self.said.try_send(Some((at, said))) {
-            self.left_out.fetch_add(1, Ordering::Relaxed);
+        let bytes = said.bytes();
+        let waiting = self.behind.bytes.fetch_add(bytes, Ordering::Relaxed);
+        let is_taken = waiting.saturating_add(bytes) <= WAITING_BYTES
+            && !matches!(self.said.try_send(Some((at, said))), Err(TrySendError::Full(_)));
+        if !is_taken {
+            self.behind.bytes.fetch_sub(bytes, Ordering::Relaxed);
+            self.behind.left_out.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
 
-fn listen(hub: &Hub, received: &Receiver<Option<(f64, Said)>>, left_out: &AtomicU64) {
+fn listen(hub: &Hub, received: &Receiver<Option<(f64, Said)>>, behind: &Behind) {
     while let Ok(Some((at, said))) = received.recv() {
+        behind.bytes.fetch_sub(said.bytes(), Ordering::Relaxed);
         let at = (at * 1000.0).round() / 1000.0;
-        let missing = left_out.swap(0, Ordering::Relaxed);
+        let missing = behind.left_out.swap(0, Ordering::Relaxed);
         if missing > 0 {
             hub.take(json!({"at": at, "left_out": missing}).to_string().into(), Vec::new());
         }
@@ -212,4 +236,46 @@ fn listen(hub: &Hub, received: &Receiver<Option<(f64, Said)>>, left_out: &Atomic
         }
     }
     hub.end();
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::Ordering;
+    use std::time::Duration;
+
+    use super::{Hub, Mouth, News, WAITING_BYTES};
+
+    #[test]
+    fn what_waits_is_bounded_by_its_bytes() {
+        let hub = Arc::new(Hub::default());
+        let mouth = Mouth::of(Arc::clone(&hub));
+        let long = "x".repeat(1 << 20);
+        // Nothing is taken meanwhile.
+        let known = hub.lock();
+        for number in 0..100 {
+            mouth.heard(number, &long);
+        }
+        assert!(mouth.behind.bytes.load(Ordering::Relaxed) <= WAITING_BYTES);
+        assert!(mouth.behind.left_out.load(Ordering::Relaxed) >= 83);
+        drop(known);
+        while mouth.behind.bytes.load(Ordering::Relaxed) > 0 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        mouth.heard(100, "short");
+        mouth.end();
+        let (mut next, mut seen) = (0, 0);
+        loop {
+            match hub.news(next, Duration::from_secs(1)) {
+                News::Lines(lines) => {
+                    next += lines.len() as u64;
+                    seen += lines.iter().filter(|line| line.contains("short")).count();
+                }
+                News::Missed => next = hub.state().1,
+                News::Nothing => {}
+                News::Ended => break,
+            }
+        }
+        assert_eq!(seen, 1, "what comes then is there");
+    }
 }

@@ -57,6 +57,12 @@ impl Recorder {
         self.send(Entry::Answer { time: self.time(), text: text.to_owned() });
     }
 
+    /// Whether something could not be written, so that nothing is recorded any more; [`Recorder::finish`] says why.
+    pub fn has_failed(&self) -> bool {
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
+        thread.as_ref().is_some_and(JoinHandle::is_finished)
+    }
+
     /// Ends the file with its index. What is said afterwards is not recorded.
     ///
     /// # Errors
