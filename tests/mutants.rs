@@ -17,10 +17,11 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 19] = [
+const PARTS: [&str; 20] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
+    "docs",
     "src",
     "ontology",
     "rules",

@@ -310,9 +310,9 @@ fn pictures_of_all_answers_are_files() {
     }
 }
 
-/// The pictures of the README are those that the program draws.
+/// The pictures of README and book are those that the program draws.
 #[test]
-fn pictures_of_the_readme_are_made_by_the_program() {
+fn pictures_of_the_book_are_made_by_the_program() {
     let folder = tempfile::tempdir().expect("a folder");
     let directory = folder.path().display().to_string();
     let missions = [
