@@ -285,25 +285,3 @@ fn untyped_names_keep_their_place_before_typed_ones() {
         assert_eq!(print(&Source::new("again", printed.clone())), Some(printed), "{types}");
     }
 }
-
-#[test]
-fn every_code_is_documented() {
-    fn codes(folder: &std::path::Path, found: &mut std::collections::BTreeSet<String>) {
-        for entry in std::fs::read_dir(folder).expect("the sources are there").filter_map(Result::ok) {
-            let path = entry.path();
-            if path.is_dir() {
-                codes(&path, found);
-                continue;
-            }
-            let text = std::fs::read_to_string(&path).expect("a source is text");
-            let quoted = text.split('"').filter(|word| word.len() == 4 && word.starts_with(['P', 'E']));
-            found.extend(quoted.filter(|word| word[1..].parse::<u16>().is_ok()).map(str::to_owned));
-        }
-    }
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut found = std::collections::BTreeSet::new();
-    codes(&root.join("src"), &mut found);
-    let readme = std::fs::read_to_string(root.join("README.md")).expect("the README is there");
-    let missing: Vec<_> = found.iter().filter(|code| !readme.contains(code.as_str())).collect();
-    assert!(found.len() > 30 && missing.is_empty(), "{missing:?}");
-}

@@ -111,7 +111,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => Coadaptation::new(&mission, &problem, &roles)?,
     };
     if tasked.is_some() && arguments.pairs.is_some() {
-        let text = "`--pairs` is for missions whose problem spells out places (see the book: Compare with PRISM)";
+        let text =
+            "`--pairs` is for missions whose problem spells out places (see the book: Compare with PRISM)";
         return Err(Failure::usage(Message::error("M129", text)));
     }
     if let Some(loss) = &coadaptation.loss

@@ -123,6 +123,9 @@ fn the_summary_has_every_page_of_the_book() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let summary = Path::new("docs/SUMMARY.md");
     let listed = anchors_and_links(&read(root, summary)).1;
+    let twice: Vec<_> =
+        (1..listed.len()).filter(|&at| listed[..at].contains(&listed[at])).map(|at| &listed[at]).collect();
+    assert!(twice.is_empty(), "docs/SUMMARY.md has these twice, and mdBook refuses that: {twice:?}");
     let listed: BTreeSet<PathBuf> = listed.iter().filter_map(|link| within(summary, link)).collect();
     let book = pages(root).into_iter().filter(|page| page.starts_with("docs") && page != summary);
     let missing: Vec<_> = book.filter(|page| !listed.contains(page)).collect();
