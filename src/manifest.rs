@@ -1,10 +1,11 @@
 //! A manifest's text to data, read once. Which sections there are, and what stands in them, is known to whoever asks.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use num_rational::BigRational;
 use serde::de::DeserializeOwned;
+use toml::Spanned;
 
 use crate::file::{self, Kind, source};
 use crate::message::{Message, did_you_mean};
@@ -38,9 +39,25 @@ pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Vec<M
 }
 
 impl ManifestPath {
-    /// A path of the manifest, from the current directory: in the manifest it is relative to the manifest.
+    /// A path of the manifest, from the current directory: in the manifest it is relative to the manifest. It goes up no further than it
+    /// has to.
     pub fn path(&self, path: &Path) -> PathBuf {
-        self.directory.join(path)
+        let whole = self.directory.join(path);
+        let short = shortened(&whole);
+        // Behind a link to a directory, up leads elsewhere.
+        match (whole.canonicalize(), short.canonicalize()) {
+            (Ok(whole_target), Ok(short_target)) if whole_target != short_target => whole,
+            (Ok(_), Err(_)) => whole,
+            _ => short,
+        }
+    }
+
+    /// Messages about the manifest with the lines that they are about.
+    pub fn quote(&self, messages: Vec<Message>) -> Vec<Message> {
+        let is_own = |message: &Message| message.file.as_ref() == Some(&self.file);
+        let quoted =
+            |message: Message| if is_own(&message) { message.with_source(&self.text) } else { message };
+        messages.into_iter().map(quoted).collect()
     }
 
     /// The manifest's own name.
@@ -53,24 +70,41 @@ impl ManifestPath {
         line_and_column(&self.text, offset)
     }
 
-    /// That a value of the manifest is wrong.
-    pub fn wrong(&self, text: impl Into<String>) -> Message {
-        Message::at("M105", &self.file, None, text)
+    /// That the value which stands at an offset in bytes is wrong.
+    pub fn wrong(&self, offset: usize, text: impl Into<String>) -> Message {
+        Message::at("M105", &self.file, Some(self.place(offset)), text).with_source(&self.text)
     }
 
     /// The value of a key as an exact number: a decimal, not negative.
     ///
     /// # Errors
-    /// It is none.
-    pub fn number(&self, key: &str, value: &toml::Value) -> Result<BigRational, Message> {
-        let text = match value {
+    /// It is something else.
+    pub fn number(&self, key: &str, value: &Spanned<toml::Value>) -> Result<BigRational, Message> {
+        let text = match value.get_ref() {
             toml::Value::String(text) => text.clone(),
             other => other.to_string(),
         };
         let number = number::exact(&text).filter(|number| *number >= BigRational::default());
-        let wrong = || format!("`{key}` is {value}, but should be a decimal number, not negative");
-        number.ok_or_else(|| self.wrong(wrong()))
+        let wrong = || {
+            let text =
+                format!("`{key}` is {}, but should be a decimal number, not negative", value.get_ref());
+            self.wrong(value.span().start, text)
+        };
+        number.ok_or_else(wrong)
     }
+}
+
+/// A path without the parts that it goes down only to go up again.
+fn shortened(path: &Path) -> PathBuf {
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match (part, parts.last()) {
+            (Component::ParentDir, Some(Component::Normal(_))) => drop(parts.pop()),
+            (Component::CurDir, _) => {}
+            _ => parts.push(part),
+        }
+    }
+    parts.into_iter().collect()
 }
 
 /// All that is wrong with a manifest, in its order; of it one thing is known: where an entry is wrong, the rest is read without it.
@@ -84,7 +118,7 @@ fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str)
         let counts = is_new && (messages.is_empty() || !said.starts_with("missing field"));
         if counts {
             let place = error.span().map(|span| line_and_column(text, span.start));
-            let message = Message::at("M104", name, place, said.to_owned() + &meant(said));
+            let message = Message::at("M104", name, place, said.to_owned() + &meant(said)).with_source(text);
             messages.push((place, message));
         }
         let is_toml = rest.parse::<toml::Table>().is_ok();

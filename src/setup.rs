@@ -64,8 +64,8 @@ impl Setup {
         let (sections, origin): (Sections, ManifestPath) = manifest::read(manifest)?;
         let (settings, bindings) =
             (sections.adaptation.settings(&origin), sections.bindings.bindings(&origin));
-        let mut wrong: Vec<Message> =
-            [settings.as_ref().err(), bindings.as_ref().err()].into_iter().flatten().cloned().collect();
+        let mut wrong: Vec<Message> = settings.as_ref().err().into_iter().cloned().collect();
+        wrong.extend(bindings.as_ref().err().into_iter().flatten().cloned());
         let (domain, problem) =
             (origin.path(&sections.planning.domain), origin.path(&sections.planning.problem));
         let (domain, problem) = (source(&domain), source(&problem));
@@ -81,10 +81,11 @@ impl Setup {
                 Err(knowledge.err().into_iter().flatten().chain(domain.err()).chain(problem.err()).collect())
             }
         };
-        let (mission, settings) = mission.map_err(|more| {
-            wrong.extend(more);
+        let (mut mission, settings) = mission.map_err(|more| {
+            wrong.extend(origin.quote(more));
             wrong
         })?;
+        mission.change_warnings(|warnings| origin.quote(warnings));
         let Sections { description, probabilistic: roles, report, scenarios, .. } = sections;
         Ok(Self { mission, description, settings, roles, scenarios, report, origin })
     }

@@ -244,7 +244,7 @@ fn warning(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Messag
             });
             if let Some((at, _)) = place.filter(|_| !line.trim_start().starts_with('#')) {
                 let column = line[..at].chars().count() + 1;
-                return Message::warning_at(code, file, (number, column), text);
+                return Message::warning_at(code, file, (number, column), text).with_source(&document);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Files to what they are: regular ones of a reasonable size, and of the expected kind. Of a file of another kind nothing is
 //! quoted in a message: a hostile manifest may name any file.
 
+use std::collections::BTreeMap;
 use std::io::{self, Read as _, Write as _};
 use std::path::Path;
 
@@ -48,7 +49,7 @@ pub fn source(path: &Path) -> Result<Source, Message> {
     };
     match bytes {
         Ok(bytes) => Ok(Source::from_bytes(name, &bytes)),
-        Err(error) => Err(Message::at("M101", &name, None, format!("cannot be read: {error}"))),
+        Err(error) => Err(Message::at("M101", &name, None, format!("the file cannot be read: {error}"))),
     }
 }
 
@@ -70,7 +71,7 @@ pub fn write(path: &Path, text: &str) -> Result<(), Message> {
     match written {
         Ok(_) => Ok(()),
         Err(error) => {
-            let text = format!("cannot be written: {}", error.kind());
+            let text = format!("the file cannot be written: {}", error.kind());
             Err(Message::at("M109", &path.display().to_string(), None, text))
         }
     }
@@ -187,6 +188,24 @@ pub(crate) fn discreet(messages: Vec<Message>) -> Vec<Message> {
         }
     }
     kept
+}
+
+/// Messages about documents of knowledge bases with the lines that they are about, where a file begins like one.
+pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
+    let mut texts: BTreeMap<String, Option<String>> = BTreeMap::new();
+    let quoted = |message: Message| {
+        let Some(file) = message.file.clone().filter(|_| message.line.is_some()) else { return message };
+        let text = texts.entry(file).or_insert_with_key(|file| {
+            let path = Path::new(file);
+            let bytes = is_knowledge(path).then(|| read(path).ok()).flatten()?;
+            String::from_utf8(bytes).ok().filter(|text| !text.contains('\0'))
+        });
+        match text {
+            Some(text) => message.with_source(text),
+            None => message,
+        }
+    };
+    messages.into_iter().map(quoted).collect()
 }
 
 /// Whether a file begins like a knowledge base. What is no file, or cannot be read, was given otherwise.

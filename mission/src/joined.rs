@@ -121,6 +121,11 @@ impl Mission {
         self.warnings.iter().chain(self.knowledge.iter().flat_map(Knowledge::warnings))
     }
 
+    /// Changes the warnings of joining, to add what only who has read the mission knows.
+    pub fn change_warnings(&mut self, change: impl FnOnce(Vec<Message>) -> Vec<Message>) {
+        self.warnings = change(std::mem::take(&mut self.warnings));
+    }
+
     /// Adds [`Mission::doubts`] to the warnings, once the situation is complete.
     pub fn note_doubts(&mut self) {
         self.warnings.extend(self.doubts());
@@ -207,6 +212,12 @@ impl Mission {
         });
         let (domain, problem) = merged.unwrap_or_else(|| (self.domain.clone(), filled));
         Ok((domain, problem, warnings))
+    }
+
+    /// A condition as it is shown to people: a plain domain is completed with predicates that its author does not know. That a design
+    /// meets a requirement is `(meets DESIGN REQUIREMENT)`.
+    pub fn spoken(&self, condition: &str) -> String {
+        self.adaptation.as_ref().map_or_else(|| condition.to_owned(), |own| own.spoken(condition))
     }
 
     /// What the knowledge base adds to the actions of a plain domain; none if the domain is explicit.

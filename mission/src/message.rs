@@ -1,9 +1,9 @@
 //! What went wrong or is questionable, from whatever room it came, in one form for people and programs.
 
-use std::fmt::Write as _;
-
-use pddl::{self, Diagnostic, Severity, Source};
+use pddl::{self, Diagnostic, Excerpt, Severity, Shown, Source};
 use serde::Serialize;
+
+use crate::visible::visible;
 
 /// A message about an input.
 #[derive(Debug, Clone, Serialize)]
@@ -39,9 +39,34 @@ pub struct Details {
     /// What would be right.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub help: Option<String>,
-    /// The message as a terminal shows it, with its source line where there is one.
+    /// The source line, where there is one, and that of another place that matters.
+    #[serde(skip)]
+    excerpts: Vec<Excerpt>,
+    /// The message as a terminal shows it.
     #[serde(skip)]
     text: String,
+}
+
+impl Details {
+    /// As a terminal shows it, its parts changed by a function.
+    fn shown(&self, color: bool, part: impl Fn(&str) -> String) -> String {
+        let place = self.file.as_ref().map(|file| match (self.line, self.column) {
+            (Some(line), Some(column)) => format!("{file}:{line}:{column}"),
+            _ => file.clone(),
+        });
+        let [message, place, help] = [Some(&self.message), place.as_ref(), self.help.as_ref()]
+            .map(|text| text.map(|text| part(&one_line(text))));
+        let excerpts: Vec<Excerpt> = self.excerpts.iter().map(|excerpt| excerpt.map(&part)).collect();
+        let shown = Shown {
+            is_error: self.severity == "error",
+            code: &self.code,
+            message: &message.unwrap_or_default(),
+            place: place.as_deref(),
+            help: help.as_deref(),
+            excerpts: &excerpts,
+        };
+        shown.text(color)
+    }
 }
 
 impl Message {
@@ -79,21 +104,9 @@ impl Message {
         message: String,
         place: Option<(String, Option<(usize, usize)>)>,
     ) -> Self {
-        let mut text = String::new();
-        let (file, line, column) = match place {
-            Some((file, Some((line, column)))) => {
-                let _ = write!(text, "{file}:{line}:{column}: ");
-                (Some(file), Some(line), Some(column))
-            }
-            Some((file, None)) => {
-                let _ = write!(text, "{file}: ");
-                (Some(file), None, None)
-            }
-            None => (None, None, None),
-        };
-        let _ = write!(text, "{severity}[{code}]: {message}");
-        let text = one_line(&text);
-        Self(Box::new(Details {
+        let (file, place) = place.map_or((None, None), |(file, place)| (Some(file), place));
+        let (line, column) = place.unzip();
+        Self::of(Details {
             severity,
             code: code.to_owned(),
             message,
@@ -101,8 +114,33 @@ impl Message {
             line,
             column,
             help: None,
-            text,
-        }))
+            excerpts: Vec::new(),
+            text: String::new(),
+        })
+    }
+
+    fn of(mut details: Details) -> Self {
+        details.text = details.shown(false, str::to_owned);
+        Self(Box::new(details))
+    }
+
+    /// The same with the line that it is about, from the text of its file.
+    #[must_use]
+    pub fn with_source(mut self, text: &str) -> Self {
+        let details = &mut *self.0;
+        if let (Some(file), Some(line), Some(column)) = (&details.file, details.line, details.column) {
+            details.excerpts = Excerpt::at(file, text, line, column).into_iter().collect();
+            details.text = details.shown(false, str::to_owned);
+        }
+        self
+    }
+
+    /// The same with what would be right.
+    #[must_use]
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.0.help = Some(help.into());
+        self.0.text = self.0.shown(false, str::to_owned);
+        self
     }
 
     /// Messages of the PDDL front end, with the source lines that they are about.
@@ -115,9 +153,10 @@ impl Message {
             line: Some(diagnostic.line),
             column: Some(diagnostic.column),
             help: diagnostic.help.clone(),
-            text: pddl::render(std::slice::from_ref(diagnostic), sources, false),
+            excerpts: diagnostic.excerpts(sources),
+            text: String::new(),
         };
-        diagnostics.iter().map(|diagnostic| Self(Box::new(details(diagnostic)))).collect()
+        diagnostics.iter().map(|diagnostic| Self::of(details(diagnostic))).collect()
     }
 
     /// An error of reading a knowledge base.
@@ -158,8 +197,8 @@ impl Message {
             (Some(file), Some(line), Some(column)) => (Some(file.to_owned()), Some(line), Some(column)),
             _ => ((!place.is_empty()).then(|| place.to_owned()), None, None),
         };
-        let (code, message, text) = (code.to_owned(), message.to_owned(), one_line(text));
-        Self(Box::new(Details { severity, code, message, file, line, column, help: None, text }))
+        let place = file.map(|file| (file, line.zip(column)));
+        Self::plain(severity, code, message.to_owned(), place)
     }
 
     /// Whether it is an error.
@@ -170,6 +209,11 @@ impl Message {
     /// As a terminal shows it, with a line break at its end.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// The same with colours, as ANSI escapes; what would change a terminal is escaped as by [`visible`].
+    pub fn colored(&self) -> String {
+        self.shown(true, |part| visible(part).into_owned())
     }
 }
 
@@ -189,7 +233,7 @@ impl<'a> ErrorAnswer<'a> {
 
 /// A message as one line: a name or a value with a line break in it must not look like another message.
 fn one_line(text: &str) -> String {
-    text.replace('\r', "\\r").replace('\n', "\\n") + "\n"
+    text.replace('\r', "\\r").replace('\n', "\\n")
 }
 
 /// `; did you mean ...?` with the known name that is most like what was written, or nothing.

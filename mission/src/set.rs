@@ -110,9 +110,13 @@ impl Mission {
     fn unknown_setting(&self, name: &str) -> Message {
         let attributes = self.knowledge.iter().flat_map(|knowledge| knowledge.view().attribute_types());
         let attributes: Vec<_> = attributes.map(|attribute| attribute.name).collect();
+        // What a plain domain is completed with is not there to be set.
+        let adaptation = self.adaptation.as_ref();
+        let own =
+            |d: &&pddl::ast::Declaration| adaptation.is_none_or(|own| !own.is_added(&d.identifier.name));
         let declared = |all: &[pddl::ast::Declaration]| {
             let each = |d: &pddl::ast::Declaration| d.identifier.name.to_string();
-            all.iter().map(each).collect::<Vec<_>>().join(", ")
+            all.iter().filter(own).map(each).collect::<Vec<_>>().join(", ")
         };
         let text = format!(
             "`{name}` is neither an attribute of the knowledge base ({}), nor a numeric function ({}) with its arguments, \
@@ -121,7 +125,7 @@ impl Mission {
             declared(&self.domain.functions),
             declared(&self.domain.predicates),
         );
-        let declared = self.domain.functions.iter().chain(&self.domain.predicates);
+        let declared = self.domain.functions.iter().chain(&self.domain.predicates).filter(own);
         let known =
             declared.map(|own| own.identifier.name.as_str()).chain(attributes.iter().map(String::as_str));
         let symbol = name.split_whitespace().next().unwrap_or(name);

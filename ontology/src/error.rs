@@ -42,7 +42,7 @@ impl fmt::Display for Position {
 #[non_exhaustive]
 pub enum Error {
     /// O101: the file is not there or cannot be read.
-    #[error("{}: error[O101]: cannot be read: {reason}", file.display())]
+    #[error("{}: error[O101]: the file cannot be read: {reason}", file.display())]
     Unreadable {
         /// The file asked for.
         file: PathBuf,
@@ -82,7 +82,7 @@ pub enum Error {
         import: String,
     },
     /// O104: a catalog cannot be read.
-    #[error("{}: error[O104]: not a usable catalog: {reason}", file.display())]
+    #[error("{}: error[O104]: this is not a usable catalog: {reason}", file.display())]
     Catalog {
         /// The catalog.
         file: PathBuf,
@@ -125,7 +125,7 @@ pub enum Error {
         known: Vec<String>,
     },
     /// O107: a name that cannot be part of an IRI.
-    #[error("error[O107]: `{name}` cannot name an individual: {character:?} is not allowed in an IRI")]
+    #[error("error[O107]: `{name}` cannot name an individual: `{character}` is not allowed in an IRI")]
     BadName {
         /// The name.
         name: String,

@@ -2,11 +2,8 @@
 //!
 //! Codes are stable. P100 to P119 are about the form of a file, P120 to P149 about names and types.
 
-use codespan_reporting::diagnostic::{self as codespan, Label};
-use codespan_reporting::files::{Error as FilesError, Files};
-use codespan_reporting::term::{self, termcolor};
-
 use super::ast::Span;
+use super::excerpt::{Excerpt, Shown};
 use super::source::Source;
 
 /// How bad it is.
@@ -87,6 +84,19 @@ impl Diagnostic {
             help: None,
             related: None,
         }
+    }
+
+    /// The lines that it shows: its own, and that of its related place, as far as their files are among the sources.
+    pub fn excerpts(&self, sources: &[&Source]) -> Vec<Excerpt> {
+        let excerpt = |file: &str, span: Span, message: &str| {
+            let source = sources.iter().find(|source| source.name() == file)?;
+            let line = source.position(span.start).line;
+            Excerpt::new(file, source.text(), line, span.start as usize..span.end as usize, message)
+        };
+        let own = excerpt(&self.file, self.span, "");
+        let related = self.related.as_ref();
+        let related = related.and_then(|place| excerpt(&place.file, place.span, &place.message));
+        own.into_iter().chain(related).collect()
     }
 
     /// Says what would be right.
@@ -203,117 +213,17 @@ pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
 /// The diagnostics as text for a terminal, `color` with ANSI escapes. A diagnostic whose file is not among
 /// the sources is shown without its source line.
 pub fn render(diagnostics: &[Diagnostic], sources: &[&Source], color: bool) -> String {
-    let config = term::Config::default();
-    let mut buffer = if color { termcolor::Buffer::ansi() } else { termcolor::Buffer::no_color() };
-    for diagnostic in diagnostics {
-        let excerpts = Excerpts::of(diagnostic, sources);
-        // Writing to memory does not fail, and the labels lie in the excerpts by construction.
-        let _ = term::emit_to_write_style(&mut buffer, &config, &excerpts, &excerpts.rendered(diagnostic));
-    }
-    String::from_utf8_lossy(buffer.as_slice()).into_owned()
-}
-
-/// One line of a source, cut around the place in question: generated files have lines of megabytes.
-struct Excerpt {
-    file: String,
-    text: String,
-    range: std::ops::Range<usize>,
-    line: usize,
-    skipped: usize,
-    message: String,
-}
-
-/// The lines that a diagnostic shows: its own, and that of its related place.
-struct Excerpts(Vec<Excerpt>);
-
-/// How many bytes of a long line are shown before and after the place in question.
-const CONTEXT: usize = 150;
-
-impl Excerpt {
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "positions in a text in memory; the label starts in the part that is shown"
-    )]
-    fn of(sources: &[&Source], file: &str, span: Span, message: &str) -> Option<Self> {
-        let source = sources.iter().find(|source| source.name() == file)?;
-        let line = source.line_span(span.start);
-        let floor = |at: usize| (0..=at).rev().find(|at| source.text().is_char_boundary(*at)).unwrap_or(0);
-        let start = floor((span.start as usize).saturating_sub(CONTEXT)).max(line.start as usize);
-        let label_start = (span.start as usize).clamp(start, line.end as usize);
-        let end = floor((label_start + CONTEXT).min(line.end as usize)).max(label_start);
-        let label_end = (span.end as usize).clamp(label_start, end);
-        Some(Self {
-            file: file.to_owned(),
-            text: source.text().get(start..end)?.to_owned(),
-            range: label_start - start..label_end - start,
-            line: source.position(span.start).line,
-            skipped: source.text().get(line.start as usize..start)?.chars().count(),
-            message: message.to_owned(),
-        })
-    }
-}
-
-impl Excerpts {
-    fn of(diagnostic: &Diagnostic, sources: &[&Source]) -> Self {
-        let own = Excerpt::of(sources, &diagnostic.file, diagnostic.span, "");
-        let related = diagnostic.related.as_ref();
-        let related = related.and_then(|place| Excerpt::of(sources, &place.file, place.span, &place.message));
-        Self(own.into_iter().chain(related).collect())
-    }
-
-    fn rendered(&self, diagnostic: &Diagnostic) -> codespan::Diagnostic<usize> {
-        let severity = match diagnostic.severity {
-            Severity::Warning => codespan::Severity::Warning,
-            Severity::Error => codespan::Severity::Error,
-        };
-        let labels = self.0.iter().enumerate().map(|(id, excerpt)| {
-            let style = if excerpt.message.is_empty() {
-                codespan::LabelStyle::Primary
-            } else {
-                codespan::LabelStyle::Secondary
-            };
-            Label::new(style, id, excerpt.range.clone()).with_message(&excerpt.message)
-        });
+    let text = |diagnostic: &Diagnostic| {
         let place = format!("{}:{}:{}", diagnostic.file, diagnostic.line, diagnostic.column);
-        let notes = self.0.is_empty().then_some(format!("at {place}")).into_iter();
-        let help = diagnostic.help.iter().map(|help| format!("help: {help}"));
-        codespan::Diagnostic::new(severity)
-            .with_code(diagnostic.code)
-            .with_message(&diagnostic.message)
-            .with_labels(labels.collect())
-            .with_notes(notes.chain(help).collect())
-    }
-}
-
-impl<'a> Files<'a> for Excerpts {
-    type FileId = usize;
-    type Name = &'a str;
-    type Source = &'a str;
-
-    fn name(&'a self, id: usize) -> Result<&'a str, FilesError> {
-        self.0.get(id).map(|excerpt| excerpt.file.as_str()).ok_or(FilesError::FileMissing)
-    }
-
-    fn source(&'a self, id: usize) -> Result<&'a str, FilesError> {
-        self.0.get(id).map(|excerpt| excerpt.text.as_str()).ok_or(FilesError::FileMissing)
-    }
-
-    fn line_index(&'a self, _: usize, _: usize) -> Result<usize, FilesError> {
-        Ok(0)
-    }
-
-    fn line_number(&'a self, id: usize, _: usize) -> Result<usize, FilesError> {
-        self.0.get(id).map(|excerpt| excerpt.line).ok_or(FilesError::FileMissing)
-    }
-
-    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
-    fn column_number(&'a self, id: usize, _: usize, byte: usize) -> Result<usize, FilesError> {
-        let excerpt = self.0.get(id).ok_or(FilesError::FileMissing)?;
-        let before = excerpt.text.get(..byte).unwrap_or(&excerpt.text);
-        Ok(excerpt.skipped + before.chars().count() + 1)
-    }
-
-    fn line_range(&'a self, id: usize, _: usize) -> Result<std::ops::Range<usize>, FilesError> {
-        self.0.get(id).map(|excerpt| 0..excerpt.text.len()).ok_or(FilesError::FileMissing)
-    }
+        let shown = Shown {
+            is_error: diagnostic.severity == Severity::Error,
+            code: diagnostic.code,
+            message: &diagnostic.message,
+            place: Some(&place),
+            help: diagnostic.help.as_deref(),
+            excerpts: &diagnostic.excerpts(sources),
+        };
+        shown.text(color)
+    };
+    diagnostics.iter().map(text).collect()
 }

@@ -70,19 +70,6 @@ impl Source {
         Position { line: index + 1, column }
     }
 
-    /// The line in which `byte` stands, without its end of line.
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "a line that is not the last one ends with a line feed"
-    )]
-    pub(super) fn line_span(&self, byte: u32) -> Span {
-        let index = self.line_index(byte);
-        let start = self.line_starts[index] as usize;
-        let end = self.line_starts.get(index + 1).map_or(self.text.len(), |next| *next as usize - 1);
-        let end = start + self.text[start..end].trim_end_matches('\r').len();
-        Span { start: place(start), end: place(end) }
-    }
-
     fn line_index(&self, byte: u32) -> usize {
         // The first line starts at 0, so at least one start is not after `byte`.
         self.line_starts.partition_point(|start| *start <= byte).saturating_sub(1)
@@ -100,8 +87,6 @@ mod tests {
         for (byte, line, column) in cases {
             assert_eq!(source.position(byte), Position { line, column }, "byte {byte}");
         }
-        assert_eq!(source.slice(source.line_span(1)), "ab");
-        assert_eq!(source.slice(source.line_span(9)), "");
         assert_eq!(source.slice(Span { start: 90, end: 91 }), "");
     }
 

@@ -122,7 +122,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     }
     let parent = directory.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let failed = |error: std::io::Error| {
-        Message::at("M109", &name, None, format!("cannot be written: {}", error.kind()))
+        Message::at("M109", &name, None, format!("the directory cannot be written: {}", error.kind()))
     };
     let whole = tempfile::tempdir_in(parent).map_err(failed)?;
     let metric = contents.metric().map_err(|reason| wrong(&reason))?;

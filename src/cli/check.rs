@@ -1,12 +1,9 @@
 //! `metaplan check`.
 
 use std::fmt::Write as _;
-use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use metaplan::answers::CheckAnswer;
 use metaplan::file::source;
 use metaplan::message::Message;
@@ -17,6 +14,7 @@ use probabilistic::{prism, property};
 
 use crate::cli::common::{Common, Exit, Failure, Format, in_file, process_failure};
 use crate::cli::output;
+use crate::cli::progress::Progress;
 use crate::cli::values::setting;
 
 /// Arguments of `check`.
@@ -54,12 +52,13 @@ pub struct Arguments {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let file = source(&arguments.model)?;
-    let model = prism::parse(file.text()).map_err(|problems| in_file(&problems, file.name()))?;
-    let property =
-        property::parse(&arguments.property).map_err(|error| process_failure(error, file.name()))?;
-    let bar = progress(common);
+    let model_text = (file.name(), file.text());
+    let model = prism::parse(file.text()).map_err(|problems| in_file(&problems, model_text))?;
+    let failed = |error| process_failure(error, model_text, &arguments.property);
+    let property = property::parse(&arguments.property).map_err(failed)?;
+    let progress = Progress::new("checking", common);
     let told = |states: usize| {
-        bar.set_message(format!("{states} states"));
+        progress.set_message(format!("{states} states"));
         true
     };
     let options = Options {
@@ -75,8 +74,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         evaluate: arguments.evaluate.as_deref().map(read_policy).transpose()?,
     };
     let report = check(&model, &property, &options);
-    bar.finish_and_clear();
-    let report = report.map_err(|error| process_failure(error, file.name()))?;
+    progress.finish();
+    let report = report.map_err(failed)?;
     if let Some(path) = &arguments.policy {
         let Some(policy) = &report.policy else {
             let text = "this property has no policy to write; ask for one value with `F`, `G` or `U`";
@@ -94,20 +93,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     })
 }
 
-fn progress(common: &Common) -> ProgressBar {
-    let shown = !common.quiet && std::io::stderr().is_terminal();
-    let target = if shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-    let bar = ProgressBar::with_draw_target(None, target);
-    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
-        bar.set_style(style);
-    }
-    bar.enable_steady_tick(Duration::from_millis(200));
-    bar
-}
-
 fn read_policy(path: &Path) -> Result<PolicyTable, Failure> {
     let file = source(path)?;
-    PolicyTable::from_json(file.text()).map_err(|error| process_failure(error, file.name()))
+    PolicyTable::from_json(file.text())
+        .map_err(|error| process_failure(error, (file.name(), file.text()), ""))
 }
 
 fn as_text(report: &Report, verbose: bool) -> String {

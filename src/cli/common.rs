@@ -1,6 +1,8 @@
 //! What all commands share: the exit status, why there is no answer, and how one is written.
 
-use clap::{Args, ValueEnum};
+use std::io::IsTerminal;
+
+use clap::{Args, ColorChoice, ValueEnum};
 use metaplan::message::Message;
 use probabilistic::{Diagnostic, Error};
 
@@ -55,6 +57,22 @@ pub(super) struct Common {
     /// Statistics besides the answer.
     #[arg(long, short, global = true)]
     pub(super) verbose: bool,
+    /// When messages have colours: on a terminal unless `NO_COLOR` is set, always, or never.
+    #[arg(long, global = true, value_enum, default_value_t = ColorChoice::Auto, value_name = "WHEN")]
+    pub(super) color: ColorChoice,
+}
+
+impl Common {
+    /// Whether what goes there has colours.
+    pub(super) fn colors(&self, stream: &impl IsTerminal) -> bool {
+        let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+        let is_dumb = std::env::var_os("TERM").is_some_and(|terminal| terminal == "dumb");
+        match self.color {
+            ColorChoice::Always => true,
+            ColorChoice::Never => false,
+            ColorChoice::Auto => stream.is_terminal() && !is_set("NO_COLOR") && !is_dumb,
+        }
+    }
 }
 
 /// How answers are written.
@@ -70,24 +88,24 @@ pub(super) enum Format {
     Turtle,
 }
 
-/// What the library reports, with the file that it is about.
-pub(super) fn process_failure(error: Error, file: &str) -> Failure {
+/// What the library reports of a model and a property, each with its name and its text.
+pub(super) fn process_failure(error: Error, model: (&str, &str), property: &str) -> Failure {
     match error {
-        Error::Model(problems) => in_file(&problems, file),
-        Error::Property(problems) => in_file(&problems, "property"),
+        Error::Model(problems) => in_file(&problems, model),
+        Error::Property(problems) => in_file(&problems, ("property", property)),
         Error::Constant(text) => Failure::usage(Message::error("Q504", text)),
         Error::StateLimit { .. } | Error::Interrupted { .. } => Failure {
             exit: Exit::NothingFound,
-            messages: vec![Message::at("Q505", file, None, error.to_string())],
+            messages: vec![Message::at("Q505", model.0, None, error.to_string())],
         },
-        other => Message::at("Q506", file, None, other.to_string()).into(),
+        other => Message::at("Q506", model.0, None, other.to_string()).into(),
     }
 }
 
-pub(super) fn in_file(problems: &[Diagnostic], file: &str) -> Failure {
+pub(super) fn in_file(problems: &[Diagnostic], (file, text): (&str, &str)) -> Failure {
     let message = |problem: &Diagnostic| {
         let place = Some((problem.place.line, problem.place.column));
-        Message::at(problem.code, file, place, problem.message.clone())
+        Message::at(problem.code, file, place, problem.message.clone()).with_source(text)
     };
     problems.iter().map(message).collect::<Vec<_>>().into()
 }

@@ -1,14 +1,10 @@
 //! `metaplan compare`.
 
-use std::io::IsTerminal as _;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use encodings::Limits;
-use indicatif::{ProgressBar, ProgressDrawTarget};
 use metaplan::answers::Pair;
 use metaplan::comparison::{
     Action, Candidate, Coadaptation, Comparison, Config, Costs, Listener, NoResult, Planned, Risk, Roles,
@@ -24,6 +20,7 @@ use crate::cli::compare_so_far::{Begun, Shared};
 use crate::cli::compare_table::{memory_since, published_rows};
 use crate::cli::drawn::Pages;
 use crate::cli::output;
+use crate::cli::progress::Progress;
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
 
@@ -130,7 +127,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         (own.of, own.added, own.csv) = (Some(missions.len()), added, arguments.csv.clone());
         (own.mission, own.pages) = (mission.name.clone(), arguments.pages.clone());
     });
-    let progress = Progress::new(missions.len(), common);
+    let progress = Progress::new("comparing", common);
+    let total = missions.len();
     for (number, (pair, mission, coadaptation)) in missions.into_iter().enumerate() {
         let mut report = |candidates: &[Candidate], costs: &Costs| {
             let (pair, candidates, costs) = (pair.clone(), candidates.to_vec(), costs.clone());
@@ -141,59 +139,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             own.begun = None;
             own.done.push((pair, comparison));
         });
-        progress.done(number + 1);
+        progress.set_message(format!("{} of {total} missions", number + 1));
     }
-    progress.end();
+    progress.finish();
     so_far.end(common)
-}
-
-/// How far the comparison is: a bar on a terminal, and otherwise a line now and then.
-struct Progress {
-    bar: ProgressBar,
-    done: Arc<AtomicUsize>,
-}
-
-impl Progress {
-    fn new(missions: usize, common: &Common) -> Self {
-        let (shown, done) = (std::io::stderr().is_terminal(), Arc::new(AtomicUsize::new(0)));
-        let target =
-            if shown && !common.quiet { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        if !shown && !common.quiet {
-            tell(missions, Arc::clone(&done));
-        }
-        Self { bar: ProgressBar::with_draw_target(Some(missions as u64), target), done }
-    }
-
-    fn done(&self, count: usize) {
-        self.bar.set_position(count as u64);
-        self.done.store(count, Ordering::Relaxed);
-    }
-
-    fn end(self) {
-        self.bar.finish_and_clear();
-        self.done.store(usize::MAX, Ordering::Relaxed);
-    }
-}
-
-/// Between two lines that tell how far the comparison is.
-const TELLING: Duration = Duration::from_secs(5);
-
-/// Tells on standard error how many missions are compared until all are.
-fn tell(missions: usize, done: Arc<AtomicUsize>) {
-    let begun = Instant::now();
-    std::thread::spawn(move || {
-        loop {
-            std::thread::sleep(TELLING);
-            let count = done.load(Ordering::Relaxed);
-            if count >= missions {
-                return;
-            }
-            output::note(&format!(
-                "comparing: {count} of {missions} done, {} s\n",
-                begun.elapsed().as_secs()
-            ));
-        }
-    });
 }
 
 /// The mission itself, or the same mission between other places.
@@ -248,7 +197,7 @@ fn one(
         None => plan(mission, coadaptation, roles, risk, *situation),
     };
     compare(coadaptation, &config, &mut planner, report).map_err(|error| match error {
-        NoResult::Process(error) => process_failure(error, &mission.name),
+        NoResult::Process(error) => process_failure(error, (&mission.name, ""), ""),
         NoResult::Planner(messages) => messages.into(),
     })
 }

@@ -15,7 +15,13 @@ pub fn published_rows(path: &std::path::Path) -> Result<Vec<Row>, Failure> {
     let file = source(path)?;
     let wrong = |text: String| Message::at("M126", file.name(), None, text);
     let json: Value = serde_json::from_str(file.text()).map_err(|error| {
-        Message::at("M126", file.name(), Some((error.line(), error.column())), format!("no JSON: {error}"))
+        Message::at(
+            "M126",
+            file.name(),
+            Some((error.line(), error.column())),
+            format!("this is not JSON: {error}"),
+        )
+        .with_source(file.text())
     })?;
     let list = json.as_array().ok_or_else(|| wrong("a list of objects is needed".to_owned()))?;
     let mut rows = Vec::new();

@@ -40,7 +40,7 @@ pub fn man(arguments: &ManArguments, command: Command) -> Result<Exit, Failure> 
     let written =
         std::fs::create_dir_all(directory).and_then(|()| clap_mangen::generate_to(command, directory));
     written.map_err(|error| {
-        let text = format!("cannot be written: {}", error.kind());
+        let text = format!("the pages cannot be written: {}", error.kind());
         Message::at("M109", &directory.display().to_string(), None, text)
     })?;
     Ok(Exit::Done)

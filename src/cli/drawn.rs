@@ -72,7 +72,7 @@ impl Pages {
 /// Writes pictures into a directory.
 pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) -> Result<(), Failure> {
     std::fs::create_dir_all(directory).map_err(|error| {
-        let text = format!("cannot be made: {}", error.kind());
+        let text = format!("the directory cannot be made: {}", error.kind());
         Message::at("M109", &directory.display().to_string(), None, text)
     })?;
     pictures.iter().try_for_each(|(name, text)| output::write_file(&directory.join(name), &visible(text)))

@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     match &arguments.output {
         Some(directory) => {
             std::fs::create_dir_all(directory).map_err(|error| {
-                let text = format!("cannot be made: {}", error.kind());
+                let text = format!("the directory cannot be made: {}", error.kind());
                 Message::at("M109", &directory.display().to_string(), None, text)
             })?;
             output::write_file(&directory.join("domain.pddl"), &domain)?;

@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let files = import_map(file.name(), file.text(), &options)?;
     output::warnings(common, &files.warnings);
     std::fs::create_dir_all(&map.output).map_err(|error| {
-        let text = format!("cannot be made: {}", error.kind());
+        let text = format!("the directory cannot be made: {}", error.kind());
         Message::at("M109", &map.output.display().to_string(), None, text)
     })?;
     let manifest = format!("{}.toml", map.name);

@@ -67,13 +67,14 @@ fn refused(directory: &Path, shown: &str, error: ErrorKind) -> Message {
     let above = directory.parent().filter(|above| !above.as_os_str().is_empty());
     match (error, above) {
         (ErrorKind::AlreadyExists | ErrorKind::DirectoryNotEmpty, _) => {
-            let text = "is there already, and nothing is overwritten; choose another name";
+            let text = "this is there already, and nothing is overwritten; choose another name";
             Message::at("M133", shown, None, text)
         }
         (ErrorKind::NotFound, Some(above)) => {
-            let text = format!("cannot be written: there is no directory `{}`", above.display());
+            let text =
+                format!("the directory cannot be written: there is no directory `{}`", above.display());
             Message::at("M109", shown, None, text)
         }
-        (error, _) => Message::at("M109", shown, None, format!("cannot be written: {error}")),
+        (error, _) => Message::at("M109", shown, None, format!("the directory cannot be written: {error}")),
     }
 }

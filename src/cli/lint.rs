@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::Args;
 use metaplan::answers::LintAnswer;
 use metaplan::lint::{in_order, lint};
-use metaplan::message::Message;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
@@ -33,8 +32,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if common.format == Format::Json {
         output::json_answer(&answer);
     } else {
-        let texts: String = messages.iter().map(Message::text).collect();
-        output::answer(&(texts + &summary(errors, warnings)));
+        let colors = common.colors(&std::io::stdout());
+        let texts: String = messages.iter().map(|message| output::shown(message, colors)).collect();
+        output::document(&(texts + &summary(errors, warnings)));
     }
     Ok(match (errors, warnings) {
         (0, 0) => Exit::Done,

@@ -25,6 +25,7 @@ mod plan;
 mod plan_answer;
 mod plan_exact;
 mod plan_text;
+mod progress;
 mod reason;
 mod reason_ask;
 mod report;
@@ -39,7 +40,7 @@ mod verify;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum as _};
 use metaplan::message::Message;
 
 use common::{Common, Exit, Failure, Format};
@@ -98,7 +99,7 @@ enum Subcommands {
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = parse();
     // The default hook would print a stack trace at users; what matters is printed below.
     std::panic::set_hook(Box::new(|_| {}));
     let outcome = std::panic::catch_unwind(|| run(&cli));
@@ -115,6 +116,17 @@ pub fn main() -> ExitCode {
         }
     };
     ExitCode::from(exit as u8)
+}
+
+/// The command line. What is wrong with it is said in colours where `--color` asks for that, wherever it stands.
+fn parse() -> Cli {
+    let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    let beside = words.iter().zip(words.iter().skip(1)).filter(|(word, _)| *word == "--color");
+    let beside = beside.map(|(_, value)| value.as_str());
+    let joined = words.iter().filter_map(|word| word.strip_prefix("--color="));
+    let color = beside.chain(joined).last().and_then(|value| ColorChoice::from_str(value, false).ok());
+    let matches = Cli::command().color(color.unwrap_or_default()).get_matches();
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
 fn run(cli: &Cli) -> Result<Exit, Failure> {

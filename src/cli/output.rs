@@ -1,5 +1,6 @@
 //! Writing: answers, messages, tables, files that are either whole or not there.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
@@ -61,15 +62,21 @@ pub fn note(text: &str) {
     let _ = std::io::stderr().write_all(visible(text).as_bytes());
 }
 
+/// A message as a terminal shows it.
+pub fn shown(message: &Message, colors: bool) -> Cow<'_, str> {
+    if colors { message.colored().into() } else { visible(message.text()) }
+}
+
 /// Messages beside the answer, on standard error; warnings only unless asked to be quiet.
 pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Message>) {
     let mut stderr = std::io::stderr().lock();
+    let colors = common.colors(&stderr);
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for message in messages.into_iter().filter(|message| message.is_error() || !common.quiet) {
         let count = counts.entry(&message.code).or_default();
         *count += 1;
         if message.is_error() || *count <= KIND_LIMIT {
-            let _ = stderr.write_all(visible(message.text()).as_bytes());
+            let _ = stderr.write_all(shown(message, colors).as_bytes());
         }
     }
     let more = counts.into_iter().filter(|(_, count)| !common.quiet && *count > KIND_LIMIT);
@@ -85,12 +92,13 @@ pub fn failure(common: &Common, messages: &[Message]) {
         return;
     }
     let mut stderr = std::io::stderr().lock();
-    let shown: Vec<_> = messages.iter().filter(|message| message.is_error() || !common.quiet).collect();
-    for message in shown.iter().take(MESSAGE_LIMIT) {
-        let _ = stderr.write_all(visible(message.text()).as_bytes());
+    let colors = common.colors(&stderr);
+    let told: Vec<_> = messages.iter().filter(|message| message.is_error() || !common.quiet).collect();
+    for message in told.iter().take(MESSAGE_LIMIT) {
+        let _ = stderr.write_all(shown(message, colors).as_bytes());
     }
-    if shown.len() > MESSAGE_LIMIT {
-        let rest = shown.len() - MESSAGE_LIMIT;
+    if told.len() > MESSAGE_LIMIT {
+        let rest = told.len() - MESSAGE_LIMIT;
         let _ = writeln!(stderr, "… and {rest} more; `--format json` lists all");
     }
 }

@@ -7,7 +7,6 @@ use clap::{Args, ValueEnum};
 use encodings::{
     Alternatives, Backend, Config, Front, Improvement, Limits, Plan, Point, Semantics, Solution, Status, Task,
 };
-use indicatif::{ProgressBar, ProgressStyle};
 use metaplan::answers::{PlanAnswer, Preparation};
 use metaplan::certificate::{self, Ground};
 use metaplan::message::Message;
@@ -29,6 +28,7 @@ use crate::cli::output;
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_exact;
 use crate::cli::plan_text::{PlanFormat, plan_text};
+use crate::cli::progress::Progress;
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
 
@@ -205,7 +205,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let limits = guard.plan();
     let read = started.elapsed();
     let objectives = Objectives::read(&mission, &problem, &arguments.minimize, arguments.pareto.as_deref())?;
-    let progress = progress(common);
+    let progress = Progress::new("planning", common);
     let mut report = |improvement: Improvement| {
         progress.set_message(format!(
             "cost {}, lower bound {}, gap {:.1} %, up to {} steps",
@@ -218,10 +218,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(separation) = arguments.overlap.separation() {
         if objectives.metrics.len() > 1 {
             let text = "`--concurrent` takes one objective; add several with weights";
-            return Err(Failure::usage(Message::error("M109", text)));
+            return Err(Failure::usage(Message::error("M107", text)));
         }
         let point = concurrent::solve(&mission, &problem, &objectives, separation, &limits, &mut report)?;
-        progress.finish_and_clear();
+        progress.finish();
         let ground = started.elapsed().saturating_sub(read + point.solution.statistics.search);
         let preparation = Preparation { read, ground };
         let reading = Reading::concurrent(separation);
@@ -240,7 +240,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Ok(task) => task,
         Err(refused) if plan_exact::is_too_large(&refused) && !arguments.asks_for_more() => {
             let found = plan_exact::solve(&mission, &problem, &objectives, &config, refused.clone());
-            progress.finish_and_clear();
+            progress.finish();
             let (task, point, reading) = found.map_err(failed)?;
             objectives.confirm(&mission, &problem, &point, &reading)?;
             if common.verbose {
@@ -251,18 +251,18 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             let beside = Beside::default();
             let subject = (&mission, &problem, &reading);
             let exit = finish(point, &beside, subject, &objectives, &preparation, (arguments, common))?;
-            return Ok(certified_or(certified, exit));
+            return Ok(certified_or(certified, exit, common));
         }
         Err(messages) => return Err(failed(messages)),
     };
     if arguments.pareto.is_some() {
         let front = encodings::pareto(&task, &config, &mut report);
-        progress.finish_and_clear();
+        progress.finish();
         let seen = Seen { mission: &mission, problem: &problem, positions: &positions };
         return show_front(front, (seen, &task), &objectives, &preparation, (arguments, common));
     }
     let point = encodings::lexicographic(&task, &config, &mut report);
-    progress.finish_and_clear();
+    progress.finish();
     if let Some(reason) = &point.solution.statistics.contradiction {
         return Err(fault(reason));
     }
@@ -285,15 +285,15 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let beside = Beside { others, blocking };
     let subject = (&mission, &problem, &reading);
     let exit = finish(point, &beside, subject, &objectives, &preparation, (arguments, common))?;
-    Ok(certified_or(certified, exit))
+    Ok(certified_or(certified, exit, common))
 }
 
 /// How the program ends: the plan is there, but what was asked for besides may not be.
-fn certified_or(certified: Result<(), Message>, exit: Exit) -> Exit {
+fn certified_or(certified: Result<(), Message>, exit: Exit, common: &Common) -> Exit {
     match certified {
         Ok(()) => exit,
         Err(message) => {
-            output::note(message.text());
+            output::warnings(common, [&message]);
             Exit::BadInput
         }
     }
@@ -429,16 +429,4 @@ pub(super) fn exit(status: Status) -> Exit {
         Status::UnsolvableWithinHorizon => Exit::UnsolvableWithinHorizon,
         Status::Unknown => Exit::NothingFound,
     }
-}
-
-fn progress(common: &Common) -> ProgressBar {
-    if common.quiet {
-        return ProgressBar::hidden();
-    }
-    let bar = ProgressBar::new_spinner();
-    if let Ok(style) = ProgressStyle::with_template("{spinner} planning {elapsed} {msg}") {
-        bar.set_style(style);
-    }
-    bar.enable_steady_tick(Duration::from_millis(200));
-    bar
 }

@@ -48,8 +48,9 @@ impl Lines {
         let reader: Box<dyn BufRead> = if name == "-" {
             Box::new(BufReader::new(io::stdin()))
         } else {
-            let file = regular(path)
-                .map_err(|error| Message::at("M101", &name, None, format!("cannot be read: {error}")))?;
+            let file = regular(path).map_err(|error| {
+                Message::at("M101", &name, None, format!("the file cannot be read: {error}"))
+            })?;
             Box::new(BufReader::new(file))
         };
         Ok(Self { name, source: Source::Fresh(Some(reader)) })
@@ -65,8 +66,9 @@ impl Lines {
                 Ok(line.map(|line| Line { text: line.text, now: Some(line.now) }))
             }
         });
-        let line =
-            line.map_err(|error| Message::at("M101", &self.name, None, format!("cannot be read: {error}")))?;
+        let line = line.map_err(|error| {
+            Message::at("M101", &self.name, None, format!("the file cannot be read: {error}"))
+        })?;
         if let (None, Source::Recorded(replay)) = (&line, &self.source)
             && replay.is_unfinished()
         {

@@ -144,7 +144,9 @@ impl Outlet {
         }
         let Some((recorder, name)) = &self.recorder else { return Ok(()) };
         recorder.finish().map_err(|error| {
-            let text = format!("cannot be written: {error}; what was recorded before can be recovered");
+            let text = format!(
+                "the recording cannot be written: {error}; what was recorded before can be recovered"
+            );
             Message::at("M331", name, None, text)
         })
     }
@@ -161,7 +163,7 @@ fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, Str
         let text = if error.kind() == io::ErrorKind::AlreadyExists {
             "is there already, and no recording is overwritten: name another file, or remove it".to_owned()
         } else {
-            format!("cannot be written: {error}")
+            format!("the recording cannot be written: {error}")
         };
         Message::at("M331", &name, None, text)
     })?;

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use indicatif::ProgressBar;
 use metaplan::answers::{LogLine, SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
 use metaplan::mapek::{Answer, Observation, Settings};
 use metaplan::message::Message;
@@ -17,6 +16,7 @@ use serde_json::Value;
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::drawn::Pages;
 use crate::cli::output;
+use crate::cli::progress::Progress;
 use crate::cli::situation::consistent;
 
 /// Arguments of `simulate`.
@@ -139,7 +139,7 @@ fn play(
     log: &mut String,
 ) -> Result<Vec<Run>, Failure> {
     let total = strategies.len() as u64 * u64::from(arguments.runs);
-    let progress = if common.quiet { ProgressBar::hidden() } else { ProgressBar::new(total) };
+    let progress = Progress::new("simulating", common);
     let mut runs = Vec::new();
     for &strategy in strategies {
         for seed in (arguments.seed..).take(arguments.runs as usize) {
@@ -150,10 +150,10 @@ fn play(
                 }
             };
             runs.push(simulate(mission, control, settings, strategy, seed, &mut note)?);
-            progress.inc(1);
+            progress.set_message(format!("{} of {total} missions", runs.len()));
         }
     }
-    progress.finish_and_clear();
+    progress.finish();
     Ok(runs)
 }
 

@@ -7,6 +7,7 @@ use clap::Args;
 use metaplan::answers::VerdictAnswer;
 use metaplan::file::source;
 use metaplan::message::Message;
+use metaplan::mission::Mission;
 use num_rational::BigRational;
 use pddl::Source;
 use pddl::ast::Name;
@@ -54,7 +55,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let verdict = validate(mission.domain(), &problem, &plan, &options);
     match common.format {
         Format::Json => output::json_answer(&VerdictAnswer::new(&verdict)),
-        _ => output::answer(&text(&verdict)),
+        _ => output::answer(&text(&mission, &verdict)),
     }
     Ok(if verdict.valid { Exit::Done } else { Exit::Invalid })
 }
@@ -68,7 +69,9 @@ fn read_plan(source: &Source) -> Result<PlanText, Failure> {
 
 /// The steps of a `metaplan-plan/1` document.
 fn json_plan(source: &Source) -> Result<PlanText, Failure> {
-    let bad = |place, text: &str| Message::at("M111", source.name(), place, text.to_owned());
+    let bad = |place, text: &str| {
+        Message::at("M111", source.name(), place, text.to_owned()).with_source(source.text())
+    };
     let document: Value = serde_json::from_str(source.text())
         .map_err(|error| bad(Some((error.line(), error.column())), &format!("not JSON: {error}")))?;
     let steps =
@@ -88,7 +91,7 @@ fn json_plan(source: &Source) -> Result<PlanText, Failure> {
     Ok(plan)
 }
 
-fn text(verdict: &Verdict) -> String {
+fn text(mission: &Mission, verdict: &Verdict) -> String {
     let mut text = String::new();
     match &verdict.violation {
         None => {
@@ -105,7 +108,7 @@ fn text(verdict: &Verdict) -> String {
             }
             let _ = writeln!(text, "{}", violation.message);
             for unmet in &violation.unmet {
-                let _ = writeln!(text, "    {}", unmet.condition);
+                let _ = writeln!(text, "    {}", mission.spoken(&unmet.condition));
                 for (name, value) in &unmet.values {
                     let value = value.as_ref().map_or("undefined".to_owned(), output::decimal);
                     let _ = writeln!(text, "        {name} = {value}");

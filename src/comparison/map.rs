@@ -96,7 +96,10 @@ impl<'t> Map<'t> {
             let place = Some((error.line().max(1), error.column().max(1)));
             let sentence = error.to_string();
             let sentence = sentence.split(" at line ").next().unwrap_or_default();
-            vec![Message::at("M123", file, place, format!("this is no map: {sentence}{older}"))]
+            vec![
+                Message::at("M123", file, place, format!("this is not a map: {sentence}{older}"))
+                    .with_source(text),
+            ]
         })?;
         let problems = map.problems(file, text);
         if problems.is_empty() { Ok(map) } else { Err(problems) }
@@ -111,7 +114,7 @@ impl<'t> Map<'t> {
         let known = self.places();
         let mut problems = Vec::new();
         let mut wrong = |raw: &str, sentence: String| {
-            problems.push(Message::at("M124", file, Some(place(text, raw)), sentence));
+            problems.push(Message::at("M124", file, Some(place(text, raw)), sentence).with_source(text));
         };
         let mut objects: BTreeMap<String, &str> = BTreeMap::new();
         for node in &self.nodes {

@@ -102,7 +102,7 @@ impl Tasked {
             let done = advance(mission.domain(), &current, &step, false).map_err(|violation| {
                 vec![Message::error(
                     "M128",
-                    format!("a step of the process cannot be executed: {violation:?}"),
+                    format!("a step of the process cannot be executed: {}", violation.message),
                 )]
             })?;
             done.apply(&mut current.init);

@@ -37,7 +37,7 @@ impl Token {
         if size > 2 * LONGEST as u64 {
             return Err(wrong("this is too long for a token".to_owned()));
         }
-        let text = std::fs::read(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+        let text = std::fs::read(path).map_err(|error| wrong(format!("the file cannot be read: {error}")))?;
         let word = text.trim_ascii();
         let fits = (SHORTEST..=LONGEST).contains(&word.len()) && word.iter().all(u8::is_ascii_graphic);
         if !fits {

@@ -250,7 +250,7 @@ impl Beliefs {
 
     /// Why the plan, with what is left of the action under way, does not fit the situation as it is believed.
     pub fn violation(&self) -> Option<String> {
-        self.verdict().violation.map(|violation| sentence(&violation))
+        self.verdict().violation.map(|violation| self.mission.spoken(&sentence(&violation)))
     }
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use num_rational::BigRational;
 use serde::Deserialize;
+use toml::Spanned;
 
 use crate::manifest::ManifestPath;
 use crate::message::Message;
@@ -13,9 +14,9 @@ use crate::number;
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptationSection {
-    minimum_benefit: Option<toml::Value>,
-    settle: Option<toml::Value>,
-    time_limit: Option<toml::Value>,
+    minimum_benefit: Option<Spanned<toml::Value>>,
+    settle: Option<Spanned<toml::Value>>,
+    time_limit: Option<Spanned<toml::Value>>,
     #[serde(default)]
     stay_close: bool,
 }
@@ -24,15 +25,15 @@ impl AdaptationSection {
     /// What it says, and what is so unless it says otherwise.
     ///
     /// # Errors
-    /// A value that is no number, or negative.
+    /// A value that is not a number, or negative.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let mut settings = Settings { stay_close: self.stay_close, ..Settings::default() };
         if let Some(value) = &self.minimum_benefit {
             settings.minimum_benefit = origin.number("minimum_benefit", value)?;
         }
-        let seconds = |name: &str, value: &toml::Value| {
+        let seconds = |name: &str, value: &Spanned<toml::Value>| {
             let number = origin.number(name, value)?;
-            let wrong = || origin.wrong(format!("`{name}` is too long"));
+            let wrong = || origin.wrong(value.span().start, format!("`{name}` is too long"));
             Duration::try_from_secs_f64(number::to_f64(&number)).map_err(|_| wrong())
         };
         if let Some(value) = &self.settle {

@@ -66,7 +66,7 @@ pub struct PlanningSection {
 #[derive(Debug, Clone, Default)]
 pub struct BindingsSection {
     /// PDDL symbol to query, beyond the defaults.
-    symbols: BTreeMap<String, String>,
+    symbols: BTreeMap<String, Spanned<String>>,
     /// Individuals to objects, and where that stands.
     names: Vec<(Spanned<String>, String)>,
 }
@@ -75,14 +75,23 @@ impl BindingsSection {
     /// The bindings.
     ///
     /// # Errors
-    /// A query is none.
-    pub fn bindings(&self, origin: &ManifestPath) -> Result<Bindings, Message> {
+    /// All queries that are malformed.
+    pub fn bindings(&self, origin: &ManifestPath) -> Result<Bindings, Vec<Message>> {
         let mut names = Names::default();
         for (individual, object) in &self.names {
             let place = (origin.file().to_owned(), Some(origin.place(individual.span().start)));
             names.add(individual.get_ref(), object, Some(place));
         }
-        Ok(Bindings::with(&self.symbols).map_err(|text| origin.wrong(text))?.naming(names))
+        let one = |(symbol, query): (&String, &Spanned<String>)| {
+            let own = BTreeMap::from([(symbol.clone(), query.get_ref().clone())]);
+            Bindings::with(&own).err().map(|text| origin.wrong(query.span().start, text))
+        };
+        let wrong: Vec<Message> = self.symbols.iter().filter_map(one).collect();
+        let symbols = self.symbols.iter().map(|(symbol, query)| (symbol.clone(), query.get_ref().clone()));
+        match Bindings::with(&symbols.collect()) {
+            Ok(bindings) if wrong.is_empty() => Ok(bindings.naming(names)),
+            _ => Err(wrong),
+        }
     }
 }
 
@@ -105,9 +114,11 @@ impl<'de> Visitor<'de> for Section {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<BindingsSection, A::Error> {
         let mut section = BindingsSection::default();
         while let Some(symbol) = map.next_key::<String>()? {
-            match map.next_value()? {
+            let value: Spanned<Bound> = map.next_value()?;
+            let span = value.span();
+            match value.into_inner() {
                 Bound::Query(query) => {
-                    section.symbols.insert(symbol, query);
+                    section.symbols.insert(symbol, Spanned::new(span, query));
                 }
                 Bound::Names(names) if symbol == "names" => section.names = names,
                 Bound::Names(_) => {

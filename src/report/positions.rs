@@ -105,13 +105,17 @@ fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Vec<Message>> {
             (Some(place), Some(x), Some(y), 3) => {
                 if positions.insert(Name::new(place), (x, y)).is_some() {
                     let text = format!("`{place}` has a position already");
-                    wrong.push(Message::at("M141", source.name(), Some((line, 1)), text));
+                    wrong.push(
+                        Message::at("M141", source.name(), Some((line, 1)), text).with_source(source.text()),
+                    );
                 }
             }
             _ if is_heading => {}
             _ => {
                 let text = "a position is `place,x,y`, the last two numbers";
-                wrong.push(Message::at("M141", source.name(), Some((line, 1)), text));
+                wrong.push(
+                    Message::at("M141", source.name(), Some((line, 1)), text).with_source(source.text()),
+                );
             }
         }
     }

@@ -21,6 +21,20 @@ impl Outcome {
     }
 }
 
+/// Messages of standard error, each as one line `PLACE: SEVERITY[CODE]: SENTENCE`, without source lines and help.
+pub fn headlines(stderr: &str) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for line in stderr.lines() {
+        let is_head = ["error[", "warning["].iter().any(|word| line.starts_with(word));
+        match (line.trim_start().strip_prefix("┌─ "), lines.last_mut()) {
+            _ if is_head => lines.push(line.to_owned()),
+            (Some(place), Some(head)) => *head = format!("{place}: {head}"),
+            _ => {}
+        }
+    }
+    lines.iter().fold(String::new(), |all, line| all + line + "\n")
+}
+
 /// The root of the project.
 pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

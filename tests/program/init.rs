@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::{metaplan_in, root};
+use crate::common::{headlines, metaplan_in, root};
 
 /// A template in a new directory: what plans of it cost, as its files have it and in each scenario.
 fn check(template: &str, cost: &str, scenarios: &[(&str, &str)]) {
@@ -76,7 +76,7 @@ fn nothing_is_overwritten() {
         let outcome = metaplan_in(here, &["init", name], "");
         assert_eq!(outcome.status, 3, "{outcome:#?}");
         assert!(
-            outcome.stderr.starts_with(&format!("{name}: error[M133]: is there already")),
+            headlines(&outcome.stderr).starts_with(&format!("{name}: error[M133]: this is there already")),
             "{outcome:#?}"
         );
     }

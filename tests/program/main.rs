@@ -20,6 +20,7 @@ mod lint;
 mod live;
 mod manifest;
 mod maps;
+mod messages;
 mod mutation;
 mod names;
 mod paper;

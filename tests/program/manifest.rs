@@ -1,6 +1,6 @@
 //! Mistakes in a manifest: whichever room a section belongs to, every command that reads the manifest refuses it, with the place.
 
-use crate::common::{metaplan_in, root};
+use crate::common::{headlines, metaplan_in, root};
 
 /// A manifest with further lines, which begin in line 9; all commands refuse it with this message.
 fn check(lines: &str, expected: &str) {
@@ -21,7 +21,9 @@ fn check(lines: &str, expected: &str) {
     ] {
         let outcome = metaplan_in(directory.path(), command, "");
         assert_eq!(outcome.status, 3, "{command:?}: {outcome:#?}");
-        assert_eq!(outcome.stderr, format!("m.toml:{expected}\n"), "{command:?}");
+        assert_eq!(headlines(&outcome.stderr), format!("m.toml:{expected}\n"), "{command:?}");
+        // Each has its line of the file.
+        assert_eq!(outcome.stderr.matches(" │ ").count(), expected.lines().count() * 2, "{outcome:#?}");
         assert!(outcome.stdout.is_empty(), "{command:?}: {outcome:#?}");
     }
 }
@@ -40,7 +42,7 @@ fn a_section_is_refused_whoever_uses_it() {
     );
     check(
         "[adaptation]\nsettle = -1",
-        " error[M105]: `settle` is -1, but should be a decimal number, not negative",
+        "10:10: error[M105]: `settle` is -1, but should be a decimal number, not negative",
     );
     check(
         "[probabilistic]\nloss_rate = \"often\"",

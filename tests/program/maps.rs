@@ -5,7 +5,7 @@ use std::path::Path;
 
 use metaplan::comparison::{MapOptions, import_map};
 
-use crate::common::{Outcome, metaplan_in, steps};
+use crate::common::{Outcome, headlines, metaplan_in, steps};
 
 /// Places, where they lie, and where arcs lead that the other end need not name, too.
 const PLACES: [(&str, f64, f64, &str); 6] = [
@@ -102,13 +102,13 @@ fn malformed_maps_have_a_place() {
         assert_eq!(outcome.status, 3, "{new}: {outcome:#?}");
         assert!(!directory.path().join("out").exists(), "{new}: nothing is written");
         for word in [&format!("map.json:{place}: error["), words] {
-            assert!(outcome.stderr.contains(word), "{new}: no `{word}`: {outcome:#?}");
+            assert!(headlines(&outcome.stderr).contains(word), "{new}: no `{word}`: {outcome:#?}");
         }
     };
     check("\"coord\"", "\"cord\"", "2:79", "missing field `coords` (or `coord`, in maps of 2017)");
     check("\"x\" : 0,", "\"x\" : \"far\",", "2:42", "expected f64");
     check("\"x\" : 0,", "", "2:40", "missing field `x`");
-    check("\"x\" : 0", "\"x\" : 1e999", "2:42", "this is no map");
+    check("\"x\" : 0", "\"x\" : 1e999", "2:42", "this is not a map");
     check("\"coord\" :", "\"coords\": {\"x\": 1, \"y\": 1}, \"coord\" :", "2:56", "duplicate field");
     check("\"node-id\": \"h1\"", "\"node-id\": 1", "2:15", "the name of a place is a string");
     check("\"node-id\": \"h3\"", "\"node-id\": \"h1\"", "4:15", "the place `h1` is there twice");
@@ -121,7 +121,7 @@ fn malformed_maps_have_a_place() {
         "`h2` leads to `hh3`, which is no place; did you mean",
     );
     check("[\"h1\", \"h3\"]", "[\"h1\", \"h2\"]", "3:76", "`h2` leads to itself");
-    check("],\n", "],,\n", "8:3", "this is no map");
+    check("],\n", "],,\n", "8:3", "this is not a map");
     check("\n}\n", "\n", "12:1", "EOF");
     check("],\n", "],\n\"time\": [{\"from\": \"h1\"}],\n", "9:24", "needs a place `to`");
 }
@@ -134,7 +134,7 @@ fn all_that_is_wrong_with_a_map_is_said() {
         .replace("\"node-id\": \"hs\"", "\"node-id\": \"h1\"");
     let outcome = import(directory.path(), &text, &[]);
     for word in ["map.json:6:73: ", "map.json:6:79: ", "map.json:7:15: "] {
-        assert!(outcome.stderr.contains(word), "no `{word}`: {outcome:#?}");
+        assert!(headlines(&outcome.stderr).contains(word), "no `{word}`: {outcome:#?}");
     }
     assert_eq!(outcome.stderr.matches("error[M124]").count(), 3, "{outcome:#?}");
     std::fs::write(directory.path().join("map.json"), map()).expect("written");

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::certificate::change;
-use crate::common::{Outcome, copy_of_mission, edit, metaplan, metaplan_in, steps, verify_in};
+use crate::common::{Outcome, copy_of_mission, edit, headlines, metaplan, metaplan_in, steps, verify_in};
 
 /// The objects that the problem of the mission `uuv` may declare, and gets from its knowledge base otherwise.
 const OBJECTS: &str = "fd_speed_low fd_speed_medium fd_speed_high fd_search_low fd_search_medium fd_search_high \
@@ -156,7 +156,8 @@ fn check(entries: &str, status: i32, words: &[&str]) -> Outcome {
     let outcome = metaplan_in(copy.path(), &["plan", MANIFEST], "");
     assert_eq!(outcome.status, status, "{entries}: {outcome:#?}");
     for word in words {
-        assert!(outcome.stderr.contains(word), "{entries}: no `{word}`: {outcome:#?}");
+        let said = headlines(&outcome.stderr) + &outcome.stderr;
+        assert!(said.contains(word), "{entries}: no `{word}`: {outcome:#?}");
     }
     outcome
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ontology::{Equality, Ontology, ReadOptions};
 use rules::{Fact, Limits, Prefixes, Program, Rule, Symbols, Syntax};
 
-use crate::file::{self, discreet};
+use crate::file::{self, discreet, quoted};
 use crate::knowledge::statement::Statements;
 use crate::message::Message;
 use crate::planta::{self, Terms};
@@ -84,7 +84,7 @@ impl Stated {
             Ok(_) => return Err(errors),
             Err(more) => {
                 let more = more.iter().map(Message::from_ontology).collect();
-                errors.extend(discreet(more));
+                errors.extend(quoted(discreet(more)));
                 return Err(errors);
             }
         };
@@ -93,7 +93,7 @@ impl Stated {
         let lowered = ontology::lower_together(&ontology, own, equality, &mut symbols);
         let warnings =
             ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
-        let (program, facts) = (lowered.program, lowered.facts);
+        let (warnings, program, facts) = (quoted(warnings), lowered.program, lowered.facts);
         Ok(Self { symbols, program, facts, ontology, rule_count, warnings, terms })
     }
 
@@ -119,7 +119,7 @@ pub fn rule_text(file: &str) -> Result<String, Message> {
             String::from_utf8(bytes).map_err(|_| std::io::Error::other("it is no UTF-8 text"))
         }),
     };
-    text.map_err(|error| Message::at("M101", file, None, format!("cannot be read: {error}")))
+    text.map_err(|error| Message::at("M101", file, None, format!("the file cannot be read: {error}")))
 }
 
 /// The rules of all files. What one file asks for, another may conclude.
@@ -135,6 +135,13 @@ fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>
     match rules::parse_rules_together(&texts, symbols, &Prefixes::default(), &Syntax::default()) {
         Ok(program) if errors.is_empty() => Ok(program.rules),
         Ok(_) => Err(errors),
-        Err(more) => Err(errors.into_iter().chain(more.iter().map(Message::from_rules)).collect()),
+        Err(more) => {
+            let quoted = |error: &rules::Error| {
+                let message = Message::from_rules(error);
+                let text = texts.iter().find(|(file, _)| message.file.as_deref() == Some(file));
+                text.map_or(message.clone(), |(_, text)| message.with_source(text))
+            };
+            Err(errors.into_iter().chain(more.iter().map(quoted)).collect())
+        }
     }
 }

@@ -8,6 +8,7 @@
 //! slots of the encoding as in the explicit form, so no design is ever ground into an action, unless what a change of designs
 //! costs makes the designs part of the state.
 
+mod spoken;
 mod walk;
 
 use std::cell::RefCell;
@@ -99,11 +100,6 @@ impl CoAdaptation {
         let adaptation = Self { actions, chosen, changed };
         let errors = adaptation.errors(domain);
         if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors) }
-    }
-
-    /// Whether a function stands for the chosen designs, or for those that a change has brought.
-    pub(super) fn stands_for_designs(&self, function: &Name) -> bool {
-        self.chosen.contains_key(function) || self.changed.contains_key(function)
     }
 
     fn errors(&self, domain: &Domain) -> Vec<Message> {

@@ -45,15 +45,15 @@ fn entities(context: &mut Context) {
     let mut variables = Variables::default();
     let (x, y) = (variables.fresh("x"), variables.fresh("y"));
     let named: HashSet<Symbol> = context.facts.iter().flat_map(|fact| fact.arguments.to_vec()).collect();
-    for (kind, arguments) in [
-        (EntityKind::Class, vec![x]),
-        (EntityKind::ObjectProperty, vec![x, y]),
-        (EntityKind::DataProperty, vec![x, y]),
+    for (kind, kinds, arguments) in [
+        (EntityKind::Class, "classes", vec![x]),
+        (EntityKind::ObjectProperty, "object properties", vec![x, y]),
+        (EntityKind::DataProperty, "data properties", vec![x, y]),
     ] {
         let all: Vec<Symbol> = context.all(kind).iter().map(|iri| context.name(iri)).collect();
         let punned: Vec<Symbol> = all.into_iter().filter(|symbol| named.contains(symbol)).collect();
         if punned.len() > MOST_PUNNED {
-            let what = format!("{} names of {kind:?}s are individuals, too", punned.len());
+            let what = format!("{} names of {kinds} are individuals, too", punned.len());
             let reason = "too many to ask of each pair whether it is one".to_owned();
             context.warnings.push(Warning::OutsideProfile { axiom: what, partly: true, reason });
             continue;

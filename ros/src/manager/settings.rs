@@ -88,10 +88,10 @@ impl Settings {
         };
         let name = file.display().to_string();
         let text = std::fs::read_to_string(file)
-            .map_err(|error| Message::at("N130", &name, None, format!("cannot be read: {error}")))?;
+            .map_err(|error| Message::at("N130", &name, None, format!("the file cannot be read: {error}")))?;
         toml::from_str(&text).map_err(|error| {
             let place = error.span().map(|span| position(&text, span.start));
-            Message::at("N130", &name, place, error.message())
+            Message::at("N130", &name, place, error.message()).with_source(&text)
         })
     }
 }

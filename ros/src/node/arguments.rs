@@ -151,9 +151,10 @@ fn parameter(text: &str) -> Result<Assigned, Message> {
 fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Vec<Message>> {
     let file = path.display().to_string();
     let fault = |text: String| vec![Message::at("N102", &file, None, text)];
-    let text = std::fs::read_to_string(path).map_err(|error| fault(format!("cannot be read: {error}")))?;
+    let text =
+        std::fs::read_to_string(path).map_err(|error| fault(format!("the file cannot be read: {error}")))?;
     let root: Value =
-        serde_yaml_ng::from_str(&text).map_err(|error| fault(format!("is not YAML: {error}")))?;
+        serde_yaml_ng::from_str(&text).map_err(|error| fault(format!("the file is not YAML: {error}")))?;
     let (mut found, mut messages) = (Vec::new(), Vec::new());
     nodes("", &root, &mut found, &mut messages);
     let messages: Vec<Message> =

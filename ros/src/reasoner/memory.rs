@@ -55,10 +55,11 @@ impl MemoryFile {
     pub(super) fn open(directory: &Path) -> Result<Self, Message> {
         let path = directory.join("reasoner.json");
         let failed = |text: String| Message::at("N141", &path.display().to_string(), None, text);
-        std::fs::create_dir_all(directory).map_err(|error| failed(format!("cannot be made: {error}")))?;
+        std::fs::create_dir_all(directory)
+            .map_err(|error| failed(format!("the directory cannot be made: {error}")))?;
         let last = match std::fs::read_to_string(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Memory::default(),
-            Err(error) => return Err(failed(format!("cannot be read: {error}"))),
+            Err(error) => return Err(failed(format!("the file cannot be read: {error}"))),
             Ok(text) => {
                 serde_json::from_str(&text).map_err(|error| failed(format!("is damaged: {error}")))?
             }
@@ -83,7 +84,12 @@ impl MemoryFile {
             return Ok(());
         }
         let failed = |error: std::io::Error| {
-            Message::at("N141", &self.path.display().to_string(), None, format!("cannot be written: {error}"))
+            Message::at(
+                "N141",
+                &self.path.display().to_string(),
+                None,
+                format!("the file cannot be written: {error}"),
+            )
         };
         let directory = self.path.parent().unwrap_or_else(|| Path::new("."));
         let mut file = tempfile::NamedTempFile::new_in(directory).map_err(failed)?;

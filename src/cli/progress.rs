@@ -1,0 +1,100 @@
+//! How far a command is, on standard error: a line that changes on a terminal, and elsewhere a line every few seconds.
+
+use std::io::IsTerminal as _;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::cli::common::Common;
+use crate::cli::output;
+
+/// What takes less is not worth a line.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// From one line to the next.
+const INTERVAL: Duration = Duration::from_secs(5);
+
+/// What is shown until it is finished or dropped.
+pub(super) struct Progress {
+    bar: ProgressBar,
+    message: Arc<Mutex<String>>,
+    teller: Option<(Sender<()>, JoinHandle<()>)>,
+}
+
+impl Progress {
+    /// Begins to show what is being done, in a word.
+    pub(super) fn new(what: &'static str, common: &Common) -> Self {
+        let is_terminal = std::io::stderr().is_terminal();
+        let is_shown = is_terminal && !common.quiet;
+        let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(None, target);
+        if let Ok(style) = ProgressStyle::with_template(&format!("{{spinner}} {what} {{elapsed}} {{msg}}")) {
+            bar.set_style(style);
+        }
+        if is_shown {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+        let message = Arc::default();
+        let tells = !is_terminal && !common.quiet;
+        let teller = tells.then(|| tell(what, Arc::clone(&message)));
+        Self { bar, message, teller }
+    }
+
+    /// How far it is.
+    pub(super) fn set_message(&self, text: String) {
+        text.clone_into(&mut self.message.lock().unwrap_or_else(PoisonError::into_inner));
+        self.bar.set_message(text);
+    }
+
+    /// There is nothing more to show.
+    pub(super) fn finish(self) {
+        drop(self);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+        if let Some((sender, thread)) = self.teller.take() {
+            drop(sender);
+            // It ends at once: its sender is gone.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Writes a line every few seconds until the sender is dropped.
+fn tell(what: &'static str, message: Arc<Mutex<String>>) -> (Sender<()>, JoinHandle<()>) {
+    let (sender, receiver) = channel();
+    let started = Instant::now();
+    let thread = std::thread::spawn(move || {
+        let mut wait = PATIENCE;
+        while receiver.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
+            let text = message.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            output::note(&line(what, started.elapsed(), &text));
+            wait = INTERVAL;
+        }
+    });
+    (sender, thread)
+}
+
+fn line(what: &str, elapsed: Duration, text: &str) -> String {
+    let separator = if text.is_empty() { "" } else { ": " };
+    format!("{what}, {} s{separator}{text}\n", elapsed.as_secs())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::line;
+
+    #[test]
+    fn lines_say_what_is_known() {
+        assert_eq!(line("planning", Duration::from_millis(3_100), ""), "planning, 3 s\n");
+        assert_eq!(line("planning", Duration::from_secs(8), "cost 4"), "planning, 8 s: cost 4\n");
+    }
+}
