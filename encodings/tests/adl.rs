@@ -2,14 +2,10 @@
 //! which the quick search and the SAT solver alone must agree. (That ground tasks mean what the files mean is
 //! checked elsewhere, against an interpreter of the files.)
 
-#[path = "random/adl.rs"]
-mod generator;
-mod random;
-
-use generator::Generator;
+use crate::random::Random;
+use crate::random_adl::Generator;
 use metaplan_encodings::{Config, Engine, GroundConfig, Limits, Solution, Status, ground, optimize};
 use pddl::{Source, read};
-use random::Random;
 
 /// Engines, each with the states that the exact search stores before others have their turn.
 const WAYS: [(Engine, usize); 5] =

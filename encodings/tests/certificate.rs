@@ -1,16 +1,13 @@
 //! Certificates of generated missions: accepted for what is true, rejected for what is not, however they are changed.
 
+use crate::missions::Mission;
+use crate::random::Random;
 #[allow(dead_code, reason = "another suite uses the rest")]
-mod missions;
-mod random;
-
 use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
 use metaplan_encodings::{Certificate, Config, GroundConfig, Limits, Status, certify, ground, optimize};
-use missions::Mission;
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 use pddl::{Source, read};
-use random::Random;
 use serde_json::{Value, json};
 
 /// The files of a mission.

@@ -1,10 +1,9 @@
 //! Plans whose actions overlap: known optima, among them tasks that no sequence of actions solves, and random tasks on which the
 //! planner must agree with the validator run on every plan of up to three actions over a grid of times.
 
-mod random;
-
 use std::fmt::Write as _;
 
+use crate::random::Random;
 use metaplan_encodings::{
     GroundConfig, Limits, Plan, Solution, Status, ground_concurrent, optimize_concurrent,
 };
@@ -13,7 +12,6 @@ use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
-use random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));

@@ -3,11 +3,10 @@
 
 #![allow(clippy::format_collect, clippy::print_stderr)]
 
-mod random;
-
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
+use crate::random::Random;
 use metaplan_encodings::{
     Config, GroundConfig, Plan, Proof, Solution, Status, ground, ground_exact, optimize, optimize_exact,
 };
@@ -17,7 +16,6 @@ use num_traits::{One, Signed, Zero};
 use pddl::ast::{Domain, Name, Problem};
 use pddl::validate::{Options, PlanStep, PlanText, validate};
 use pddl::{Source, read};
-use random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));

@@ -6,10 +6,7 @@ use metaplan_encodings::{
 };
 use pddl::{Source, read};
 
-#[path = "random/mod.rs"]
-mod random;
-
-use random::Random;
+use crate::random::Random;
 
 const FLUENTS: [&str; 4] = ["a", "b", "c", "e"];
 const FACTORS: [&str; 8] = ["0.5", "-0.5", "0.25", "1.5", "2", "-1", "0.2", "1.75"];

@@ -1,14 +1,12 @@
 //! Several objectives and the choice among equals, against enumeration of all plans of small missions.
 
-mod random;
-
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use crate::random::Random;
 use metaplan_encodings::{Config, GroundConfig, Plan, Status, Task, ground, lexicographic, optimize, pareto};
 use pddl::ast::{Direction, Metric};
 use pddl::{Source, read, read_objective};
-use random::Random;
 
 /// Waypoints with corridors, and two functions with designs; every move costs time and energy by its designs.
 #[derive(Debug)]

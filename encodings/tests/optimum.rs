@@ -1,11 +1,8 @@
 //! Cheapest plans of generated missions against an oracle that shares nothing with the planner: Dijkstra over the
 //! explicit states of the mission, from which the PDDL text is generated, too.
 
-mod missions;
-mod random;
-
+use crate::missions::Mission;
 use metaplan_encodings::{Backend, Config, Engine, GroundConfig, Proof, Status, Strategy, ground, optimize};
-use missions::Mission;
 use pddl::{Source, read};
 
 /// How a mission without a plan, and one with a free metric, is answered: the SAT solver alone cannot tell.

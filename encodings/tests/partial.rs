@@ -1,14 +1,12 @@
 //! Numbers without an initial value: random tasks against all plans up to a length, executed with values that may be undefined.
 //! Planner and validator have to agree with that.
 
-mod random;
-
 use std::time::Duration;
 
+use crate::random::Random;
 use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, ground, optimize};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
-use random::Random;
 
 const DEPTH: usize = 5;
 

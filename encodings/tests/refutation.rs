@@ -2,21 +2,18 @@
 //! is noticed.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
-mod missions;
-mod random;
-
 use std::cell::RefCell;
 use std::io::Write;
 use std::rc::Rc;
 
+use crate::missions::Mission;
+use crate::random::Random;
 use certificate::{Inputs, StepBound, check_refutation};
 use metaplan_encodings::{
     Certificate, Config, GroundConfig, Limits, RefutationOutputs, certify, ground, optimize, refute,
 };
-use missions::Mission;
 use num_rational::BigRational;
 use pddl::{Source, read};
-use random::Random;
 
 /// The certificate of a mission and its least cost; none if there is no plan.
 fn certified(seed: u64) -> Option<(Certificate, BigRational)> {

@@ -3,23 +3,19 @@
 #![allow(clippy::format_collect)]
 #![expect(clippy::print_stdout, reason = "times are what one of these tests is for")]
 
-#[expect(dead_code, reason = "the oracle is for other tests")]
-mod missions;
-mod random;
-
 use std::path::Path;
 use std::process::Command;
 
+use crate::missions::Mission;
+use crate::random::Random;
 use metaplan_encodings::{
     Config, GroundConfig, Limits, Query, Replanned, Replanner, Solution, Status, alternatives, ground,
     optimize,
 };
-use missions::Mission;
 use num_rational::BigRational;
 use pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
 use pddl::validate::metric_after;
 use pddl::{Source, read};
-use random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let sources = (Source::new("domain", domain), Source::new("problem", problem));

@@ -1,16 +1,14 @@
 //! Plans with timed initial literals: known optima, and random tasks on which the planner must agree with the validator
 //! run on every sequence of up to three actions.
 
-mod random;
-
 use std::fmt::Write as _;
 
+use crate::random::Random;
 use metaplan_encodings::{Config, Engine, GroundConfig, Limits, Plan, Status, ground, optimize};
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
-use random::Random;
 
 fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));

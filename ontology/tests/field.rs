@@ -3,7 +3,7 @@
 
 #![allow(clippy::print_stdout, clippy::needless_for_each, clippy::case_sensitive_file_extension_comparisons)]
 
-mod common;
+use crate::common;
 
 use std::path::Path;
 use std::time::{Duration, Instant};

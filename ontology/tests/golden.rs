@@ -2,12 +2,10 @@
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use common::{SHARED, recorded};
+use crate::common::{SHARED, recorded};
 use ontology::{
     ANONYMOUS, Equality, INTERNAL, Ontology, ReadOptions, lower_with, read_files, read_text, vocab,
 };

@@ -119,7 +119,7 @@ fn a_few_damaged_documents() {
     assert!(accepted > cases / 20, "{accepted} of {cases} were still knowledge bases");
 }
 
-/// `METAPLAN_SECONDS=900 METAPLAN_SEED=7 cargo test --release --test mutations -- --ignored --nocapture`
+/// `METAPLAN_SECONDS=900 METAPLAN_SEED=7 cargo test --release -p metaplan-ontology --test all mutations:: -- --ignored --nocapture`
 #[test]
 #[ignore = "runs as long as METAPLAN_SECONDS says"]
 fn many_damaged_documents() {

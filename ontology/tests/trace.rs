@@ -2,12 +2,10 @@
 
 #![allow(clippy::print_stdout)] // a skipped test says so
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use common::{SHARED, recorded};
+use crate::common::{SHARED, recorded};
 use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::{ReadOptions, lower, read_files, vocab};
 use rules::{Delta, Engine, Fact, Literal, Symbols};

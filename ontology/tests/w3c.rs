@@ -3,7 +3,7 @@
 
 #![allow(clippy::print_stdout, clippy::format_push_string)]
 
-mod common;
+use crate::common;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

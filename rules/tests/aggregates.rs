@@ -1,9 +1,7 @@
 //! Aggregates: their values before and after changes, what they explain, and which rules with them are refused.
 
-mod text;
-
+use crate::text::{engine, fact, facts};
 use metaplan_rules::{Delta, Engine, Obstacle, Reason};
-use text::{engine, fact, facts};
 
 const RULES: &str = "
     [spares]  function(?f) ^ ?n = count { solves(?d, ?f) ^ not failed(?d) } -> spares(?f, ?n) .

@@ -1,11 +1,11 @@
 //! What follows from small rule texts, before and after changes.
 
-mod text;
+use crate::text;
 
+use crate::text::{engine, fact, facts, show_violation};
 use metaplan_rules::{
     COADAPTATION_RULES, Delta, Engine, Interrupt, Limits, Prefixes, Symbols, TOMASYS_RULES, parse_rules,
 };
-use text::{engine, fact, facts, show_violation};
 
 /// Each script line is `+fact`, `-fact`, `?fact` (must hold) or `!fact` (must not).
 fn check(rules: &str, stated: &str, script: &[&str]) {

@@ -1,12 +1,10 @@
 //! The same rules compiled into a plain crepe program, from scratch each time: the engine agrees after every change.
 
-mod text;
-
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::text::engine;
 use metaplan_rules::{Delta, Fact, Literal, Symbol};
 use proptest::prelude::*;
-use text::engine;
 
 mod reference {
     //! Graph rules with recursion, negation, a self join and a comparison.

@@ -1,11 +1,9 @@
 //! Individuals with several names: what holds of each name, before and after changes.
 
-mod text;
-
 use std::collections::BTreeSet;
 
+use crate::text::{fact, facts, prefixes, show_violation};
 use metaplan_rules::{Delta, Engine, Fact, Limits, Symbols, owl_rl, parse_rules};
-use text::{fact, facts, prefixes, show_violation};
 
 fn engine(rules: &str, stated: &str) -> Engine {
     let mut symbols = Symbols::new();

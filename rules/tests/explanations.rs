@@ -1,9 +1,7 @@
 //! Why, and why not, as text.
 
-mod text;
-
+use crate::text::{engine, fact};
 use metaplan_rules::Obstacle;
-use text::{engine, fact};
 
 const RULES: &str = "
     [usable] design(?fd) ^ not broken(?fd) -> usable(?fd) .

@@ -1,12 +1,9 @@
 //! The master test: random programs under random scripts of changes, against naive evaluation from scratch.
 
-mod oracle;
-mod script;
-
 use std::ops::Range;
 
+use crate::script::{RawChange, RawRule, check};
 use proptest::prelude::*;
-use script::{RawChange, RawRule, check};
 
 fn scripts() -> u32 {
     std::env::var("METAPLAN_SCRIPTS").ok().and_then(|number| number.parse().ok()).unwrap_or(100_000)

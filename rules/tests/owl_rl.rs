@@ -1,12 +1,10 @@
 //! What each axiom of OWL 2 RL makes follow, and what it forbids, under both readings of names.
 
-mod text;
-
 use std::collections::BTreeSet;
 
+use crate::text::{facts, prefixes};
 use metaplan_rules::owl_rl::{Axiom as A, Names, difference, rules, with_equality};
 use metaplan_rules::{Atom, Engine, Fact, Literal, Symbol, Symbols, parse_rules};
-use text::{facts, prefixes};
 
 /// Axioms over names.
 type Axioms<'a> = &'a dyn Fn(Name) -> Vec<A>;

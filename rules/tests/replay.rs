@@ -1,11 +1,9 @@
 //! Derivations are checked without the engine: what is changed in them is found, and named. Random programs are replayed by
 //! the master test, after every step.
 
-mod text;
-
+use crate::text::{engine, facts, prefixes};
 use metaplan_rules::replay::{Replayed, replay};
 use metaplan_rules::{Delta, Derivation, Engine, Fact, Program, Reason, Symbols, parse_rules};
-use text::{engine, facts, prefixes};
 
 const RULES: &str = "
     [usable] design(?fd) ^ not broken(?fd) -> usable(?fd) .

@@ -1,9 +1,7 @@
 //! Rule text: what is read prints and reads back the same; what is wrong is reported with its position.
 
-mod text;
-
+use crate::text::{engine, prefixes};
 use metaplan_rules::{COADAPTATION_RULES, Symbols, TOMASYS_RULES, parse_rules, print_rules};
-use text::{engine, prefixes};
 
 #[test]
 fn printed_rules_read_back_the_same() {

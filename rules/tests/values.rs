@@ -1,9 +1,7 @@
 //! Literals by value, and built-ins on them.
 
-mod text;
-
+use crate::text::literal;
 use metaplan_rules::{BuiltIn, Literal};
-use text::literal;
 
 /// `=`: one value; `<`, `>`: ordered; `~`: compare equal, though in different value spaces; `#`: incomparable.
 fn check(left: &str, relation: &str, right: &str) {

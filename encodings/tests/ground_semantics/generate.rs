@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::Ratio;
 
-use crate::interpret::Step;
-use crate::model::{
+use crate::ground_semantics::interpret::Step;
+use crate::ground_semantics::model::{
     Action, CHANGING, CONSTANT, DERIVED, Effect, Expression, FLUENTS, FUNCTIONS, Formula, Number, PREDICATES,
     Range, STATICS, Sign, TOTAL_COST, Task, Term, UPPER, Way,
 };

@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use metaplan_encodings::{GroundConfig, Situation, ground};
 use pddl::ast::{Domain, Problem};
 
-use crate::interpret::{State, choices};
-use crate::model::{Action, Expression, Number, OBJECTS, Sign, Task, fact_text};
+use crate::ground_semantics::interpret::{State, choices};
+use crate::ground_semantics::model::{Action, Expression, Number, OBJECTS, Sign, Task, fact_text};
 
 /// How many pairs of states are compared.
 const LIMIT: usize = 60;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::interpret::{Change, Changes, objects, with};
-use crate::model::{Atom, DERIVED, Effect, Expression, Formula, PREDICATES, Task, UPPER};
+use crate::ground_semantics::interpret::{Change, Changes, objects, with};
+use crate::ground_semantics::model::{Atom, DERIVED, Effect, Expression, Formula, PREDICATES, Task, UPPER};
 
 /// What a happening reads and writes.
 #[derive(Debug, Default)]

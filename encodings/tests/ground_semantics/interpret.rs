@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use num_rational::Ratio;
 
-use crate::interfere::Touch;
-use crate::model::{
+use crate::ground_semantics::interfere::Touch;
+use crate::ground_semantics::model::{
     Action, Atom, DERIVED, Effect, Expression, Formula, Number, PREDICATES, Task, Term, UPPER, Way,
 };
 
@@ -269,7 +269,7 @@ impl State {
         let mut exact = None;
         for (_, sign, value) in bounds.iter().filter(|(at_end, ..)| !at_end) {
             let value = view.value(value, scope)?;
-            if *sign == crate::model::Sign::Equal && exact.is_none() {
+            if *sign == crate::ground_semantics::model::Sign::Equal && exact.is_none() {
                 exact = Some(value);
             }
             if stated.is_some_and(|stated| !sign.holds(stated, value)) {

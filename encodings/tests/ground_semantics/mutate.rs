@@ -1,10 +1,10 @@
 //! A task to a plan that is valid, because the goal is made of what it achieves, and to plans that differ from it in
 //! one place. The validator has to reject those that the interpreter rejects.
 
-use crate::generate::Draw;
-use crate::interpret::{State, Step, choices};
-use crate::model::{Action, Atom, Expression, Formula, Number, Sign, Task, Term};
-use crate::text;
+use crate::ground_semantics::generate::Draw;
+use crate::ground_semantics::interpret::{State, Step, choices};
+use crate::ground_semantics::model::{Action, Atom, Expression, Formula, Number, Sign, Task, Term};
+use crate::ground_semantics::text;
 
 /// How many changed plans there are for each valid one.
 const CHANGES: usize = 8;

@@ -5,8 +5,8 @@ use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render};
 
-use crate::interpret::{State, Step};
-use crate::model::{Number, OBJECTS, Task, function_text};
+use crate::ground_semantics::interpret::{State, Step};
+use crate::ground_semantics::model::{Number, OBJECTS, Task, function_text};
 
 /// The trees of a task's texts.
 pub fn trees(task: &Task) -> (Domain, Problem) {

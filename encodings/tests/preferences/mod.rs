@@ -3,16 +3,14 @@
 
 mod generate;
 mod model;
-#[path = "../random/mod.rs"]
-mod random;
 
 use std::time::Duration;
 
+use crate::random::Random;
 use generate::Generator;
 use metaplan_encodings::{Config, Engine, GroundConfig, Limits, Solution, Status, ground, optimize};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
-use random::Random;
 
 /// None where an instance has too many cases.
 fn solve(domain: &str, problem: &str, engine: Engine) -> Option<Solution> {

@@ -4,16 +4,14 @@
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
 mod model;
-#[path = "../random/mod.rs"]
-mod random;
 
 use std::time::Duration;
 
+use crate::random::Random;
 use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, ground, optimize};
 use model::{Action, Change, Effect, Formula, OBJECTS, State, Step, Task, Term};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, print_domain, print_problem, read};
-use random::Random;
 
 struct Generator(Random);
 

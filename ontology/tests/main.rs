@@ -1,0 +1,20 @@
+//! Reading, reasoning about and writing knowledge bases.
+
+mod clauses;
+mod common;
+mod entail;
+mod field;
+mod golden;
+mod kb;
+mod lower;
+mod meaning;
+mod model;
+mod mutations;
+mod read;
+mod real;
+mod real_tomasys;
+mod robust;
+mod runtime;
+mod trace;
+mod w3c;
+mod write;

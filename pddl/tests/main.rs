@@ -1,0 +1,13 @@
+//! Reading, printing and validating PDDL.
+
+mod course;
+mod definition;
+mod files;
+mod language;
+mod messages;
+mod object_fluents;
+mod oracle;
+mod properties;
+mod quirks;
+mod real_plans;
+mod validate;

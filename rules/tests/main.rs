@@ -1,0 +1,19 @@
+//! The rule engine through its public functions.
+
+mod aggregates;
+mod built_ins;
+mod closure;
+mod consequences;
+mod crepe_reference;
+mod dialects;
+mod equality;
+mod explanations;
+mod incremental;
+mod oracle;
+mod owl_rl;
+mod replay;
+mod robustness;
+mod script;
+mod syntax;
+mod text;
+mod values;
