@@ -37,7 +37,7 @@ struct Step {
 
 impl Session {
     pub fn can_be_held() -> bool {
-        Command::new("sh").args(["-c", "true"]).status().is_ok()
+        cfg!(unix) && Command::new("sh").args(["-c", "true"]).status().is_ok()
     }
 
     pub fn new() -> Self {
@@ -98,6 +98,8 @@ impl Session {
             .current_dir(&self.place)
             .env("PATH", &self.path)
             .env_remove("CLICOLOR_FORCE");
+        // Whatever the machine is set to, and wherever temporary files lie.
+        shell.env("LC_ALL", "C").env("GIT_CEILING_DIRECTORIES", std::env::temp_dir());
         let output = shell.stdin(Stdio::null()).output().expect("the shell runs");
         self.status = output.status.code().unwrap_or(-1);
         Some(String::from_utf8(output.stdout).expect("UTF-8"))

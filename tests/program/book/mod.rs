@@ -65,7 +65,7 @@ fn pages_with_blocks() -> Vec<(String, String, Vec<Block>)> {
 #[test]
 fn every_session_is_as_shown() {
     if !Session::can_be_held() {
-        println!("skipped: there is no shell `sh`");
+        println!("skipped: there is no shell `sh` of a Unix");
         return;
     }
     for (page, reason) in NOT_RUN {
