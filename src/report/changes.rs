@@ -16,8 +16,8 @@ const UNSAID: &str = "not said";
 pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: [&str; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });
-    differences(&components(before.0), &components(after.0)).into_iter().for_each(&mut say);
-    differences(&measured(before.0), &measured(after.0)).into_iter().for_each(&mut say);
+    differences(&components(before.0), &components(after.0), UNSAID).into_iter().for_each(&mut say);
+    differences(&measured(before.0), &measured(after.0), UNSAID).into_iter().for_each(&mut say);
     task(before.0, after.0).into_iter().for_each(&mut say);
     changes.extend(designs(before.0, after.0));
     changes
@@ -25,11 +25,15 @@ pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: [&str
     changes
 }
 
-/// `name: old, and now new` for what differs.
-fn differences(before: &BTreeMap<String, String>, after: &BTreeMap<String, String>) -> Vec<String> {
+/// `name: old before, new now` for what differs.
+fn differences(
+    before: &BTreeMap<String, String>,
+    after: &BTreeMap<String, String>,
+    missing: &str,
+) -> Vec<String> {
     let names: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
     let of = |all: &BTreeMap<String, String>, name: &String| {
-        all.get(name).cloned().unwrap_or_else(|| UNSAID.to_owned())
+        all.get(name).cloned().unwrap_or_else(|| missing.to_owned())
     };
     let changed = names.into_iter().map(|name| (name, of(before, name), of(after, name)));
     let changed = changed.filter(|(_, old, new)| old != new);
@@ -125,7 +129,7 @@ fn plans(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<St
             .map(|(function, designs)| (format!("Designs of {function}"), join(designs)))
             .collect()
     };
-    texts.extend(differences(&words(used(before)), &words(used(after))));
+    texts.extend(differences(&words(used(before)), &words(used(after)), "none"));
     let actions = |plan: &Plan| plan.steps.iter().map(|step| step.label.clone()).collect::<Vec<_>>();
     let (old, new) = (actions(before), actions(after));
     let kept = new.iter().filter(|action| old.contains(action)).count();

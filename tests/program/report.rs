@@ -78,6 +78,13 @@ fn before_and_after_stand_side_by_side_with_the_reasons() {
     }
 }
 
+/// A function that nothing was done with before had no design.
+#[test]
+fn what_is_used_for_the_first_time_is_said() {
+    let page = page(&["missions/uuv.toml", "--scenario", "battery_drop"]);
+    assert!(page.contains("Designs of f_recharge: none before, fd_recharge now."));
+}
+
 /// The battery needs at least what the next move takes.
 #[test]
 fn numbers_come_with_the_bounds_that_constrain_them() {
