@@ -26,6 +26,7 @@ mod random_adl;
 mod refutation;
 mod replan;
 mod statuses;
+mod tally;
 mod timed;
 mod validate_peer;
 mod validate_peer_timed;
