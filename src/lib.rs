@@ -24,6 +24,7 @@ pub mod mission;
 mod number;
 pub mod recording;
 pub mod report;
+pub mod schemas;
 pub mod setup;
 pub mod simulate;
 pub mod templates;

@@ -4,6 +4,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use num_rational::BigRational;
+use schemars::{Schema, SchemaGenerator, json_schema};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
@@ -92,6 +93,11 @@ impl ManifestPath {
         };
         number.ok_or_else(wrong)
     }
+}
+
+/// The JSON Schema of a value that [`ManifestPath::number`] reads.
+pub fn decimal(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": ["number", "string"], "minimum": 0 })
 }
 
 /// A path without the parts that it goes down only to go up again.

@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use schemars::{JsonSchema, Schema, schema_for};
 use serde::Deserialize;
 
 use crate::comparison::Roles;
@@ -18,7 +19,7 @@ use crate::report::{Positions, ReportSection};
 use crate::simulate::Simulation;
 
 /// All sections of a manifest.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Sections {
     name: String,
@@ -108,6 +109,11 @@ impl Setup {
     pub fn file(&self) -> &str {
         self.origin.file()
     }
+}
+
+/// The JSON Schema of a manifest.
+pub fn schema() -> Schema {
+    schema_for!(Sections)
 }
 
 /// A mission without a manifest: all else is as it is unless said otherwise.

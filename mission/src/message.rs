@@ -7,6 +7,7 @@ use crate::visible::visible;
 
 /// A message about an input.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(transparent)]
 pub struct Message(Box<Details>);
 
@@ -20,6 +21,7 @@ impl std::ops::Deref for Message {
 
 /// What a message says.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Details {
     /// `error` or `warning`.
     pub severity: &'static str,
@@ -219,6 +221,7 @@ impl Message {
 
 /// What every command answers that has failed.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ErrorAnswer<'a> {
     format: &'static str,
     messages: &'a [Message],

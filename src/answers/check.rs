@@ -1,10 +1,11 @@
 //! What `metaplan check` answers.
 
 use probabilistic::check::{Answer, Outcome, Report};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A value of a property, its policy's size, and what it took.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CheckAnswer<'a> {
     format: &'static str,
     property: &'a str,
@@ -14,7 +15,7 @@ pub struct CheckAnswer<'a> {
 }
 
 /// What stands in the middle, by the kind of property.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[serde(untagged)]
 enum Found {
     Value(ValuePart),
@@ -37,7 +38,7 @@ enum Found {
 
 /// A value: `value`, `lower` and `upper` are null where it is infinite or undefined, which `status` says; `exact` is a fraction,
 /// `inf`, or null.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ValuePart {
     status: &'static str,
     value: Option<f64>,
@@ -47,14 +48,14 @@ struct ValuePart {
 }
 
 /// A value, and whether it is proved to be the best.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ProvedPart {
     #[serde(flatten)]
     value: ValuePart,
     proved: bool,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct SizePart {
     states: usize,
     choices: usize,
@@ -63,7 +64,7 @@ struct SizePart {
     milliseconds: DurationPart,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct DurationPart {
     build: f64,
     solve: f64,

@@ -1,11 +1,12 @@
 //! What `metaplan explain CODE` answers.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::codes::Code;
 
 /// What a code of a message means.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CodeAnswer {
     format: &'static str,
     code: &'static str,

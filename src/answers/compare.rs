@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use schemars::JsonSchema;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::comparison::{Candidate, Comparison, Costs, LossAt, LossReport, Measures};
@@ -97,11 +98,12 @@ pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
 }
 
 /// All comparisons, or as many as there were when time was up.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct CompareAnswer<'a> {
     format: &'static str,
     complete: bool,
     comparisons: Vec<ComparisonAnswer>,
+    #[schemars(with = "Vec<std::collections::BTreeMap<String, serde_json::Value>>")]
     published: &'a [Row],
     messages: &'a [Message],
 }
@@ -115,10 +117,11 @@ impl<'a> CompareAnswer<'a> {
 }
 
 /// One comparison.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct ComparisonAnswer {
     start: Option<String>,
     goal: Option<String>,
+    #[schemars(with = "Vec<std::collections::BTreeMap<String, serde_json::Value>>")]
     candidates: Vec<Row>,
     #[serde(flatten)]
     figures: Option<Figures>,
@@ -127,7 +130,7 @@ pub struct ComparisonAnswer {
 }
 
 /// What a comparison has that is done.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct Figures {
     front: Vec<[f64; 2]>,
     penalty: f64,
@@ -138,14 +141,14 @@ struct Figures {
     loss: Option<LossPart>,
 }
 
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct LossPart {
     component: String,
     rate: f64,
     steps: Vec<LossStep>,
 }
 
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct LossStep {
     moves: usize,
     open_loop: Option<f64>,
@@ -154,7 +157,7 @@ struct LossStep {
     anticipated: Option<f64>,
 }
 
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct CostsPart {
     states: usize,
     transitions: usize,
@@ -168,7 +171,7 @@ struct CostsPart {
     first_plan_memory_mb: Option<u64>,
 }
 
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct Milliseconds {
     build: f64,
     solve: f64,

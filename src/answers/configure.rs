@@ -1,5 +1,6 @@
 //! What `metaplan configure` answers, and the first line of its loop.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -9,19 +10,20 @@ use crate::message::Message;
 use crate::number::to_json;
 
 /// A design for every function in need.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ConfigureAnswer<'a> {
     format: &'static str,
     /// Whether each function in need has a design.
     served: bool,
     /// Whether it is proved that no choice is better.
     optimal: bool,
+    #[schemars(with = "f64")]
     utility: Value,
     choices: Vec<ChoicePart<'a>>,
     warnings: &'a [Message],
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ChoicePart<'a> {
     objective: &'a str,
     function: Option<&'a str>,
@@ -31,9 +33,10 @@ struct ChoicePart<'a> {
     considered: Vec<ConsideredPart<'a>>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ConsideredPart<'a> {
     design: &'a str,
+    #[schemars(with = "f64")]
     utility: Value,
     /// Requirements of the objective that it is estimated to miss.
     missed: &'a [String],
@@ -88,7 +91,7 @@ impl<'a> ConsideredPart<'a> {
 }
 
 /// The first line of the loop of `run --configure`.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct KeeperReadyLine {
     answer: &'static str,
     format: &'static str,

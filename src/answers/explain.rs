@@ -1,6 +1,7 @@
 //! What `metaplan explain` answers.
 
 use num_rational::BigRational;
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -9,7 +10,7 @@ use crate::mapek::PlannedStep;
 use crate::number::to_json;
 
 /// What would change the plan.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChangesAnswer<'a> {
     format: &'static str,
     mission: &'a str,
@@ -18,7 +19,7 @@ pub struct ChangesAnswer<'a> {
 }
 
 /// All about one design.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DesignAnswer<'a> {
     format: &'static str,
     mission: &'a str,
@@ -33,18 +34,21 @@ pub struct DesignAnswer<'a> {
     changes: Vec<ChangePart<'a>>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct BestPart<'a> {
+    #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
     proved: bool,
     steps: &'a [PlannedStep],
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ChangePart<'a> {
     name: &'a str,
+    #[schemars(with = "Option<f64>")]
     from: Option<Value>,
     relation: &'static str,
+    #[schemars(with = "Option<f64>")]
     bound: Option<Value>,
     then: BestPart<'a>,
 }

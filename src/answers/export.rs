@@ -1,9 +1,10 @@
 //! What `metaplan export` and `metaplan import` answer.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A mission as PDDL for other planners.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct MissionExport {
     format: &'static str,
     domain: String,
@@ -11,14 +12,14 @@ pub struct MissionExport {
 }
 
 /// A mission's process as a model for model checkers.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ModelExport {
     format: &'static str,
     model: String,
 }
 
 /// Where the mission is that was made of another tool's files.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ImportAnswer {
     format: &'static str,
     mission: String,

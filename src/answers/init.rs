@@ -1,9 +1,10 @@
 //! What `metaplan init` answers.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Where a new mission lies, and what it consists of.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct InitAnswer<'a> {
     format: &'static str,
     directory: &'a str,

@@ -1,5 +1,6 @@
 //! What `metaplan journal` answers.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -7,7 +8,7 @@ use crate::journal::{Entry, JournalReport};
 use crate::message::Message;
 
 /// What is in a journal, and what is wrong with it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct JournalAnswer<'a> {
     format: &'static str,
     sound: bool,
@@ -17,7 +18,7 @@ pub struct JournalAnswer<'a> {
     records: Option<Vec<RecordPart<'a>>>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RecordPart<'a> {
     record: u64,
     segment: u64,

@@ -1,11 +1,12 @@
 //! What `metaplan lint` answers.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::message::Message;
 
 /// All that is wrong or questionable about a mission.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct LintAnswer<'a> {
     format: &'static str,
     errors: usize,

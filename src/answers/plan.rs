@@ -6,6 +6,7 @@ use encodings::{
     Alternatives, Exact, Front, Moment, Part, Plan, Point, Proof, Solution, Statistics, Status, Step,
     Unbounded,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -13,12 +14,14 @@ use crate::mission::{Blocking, times};
 use crate::number::exact_to_json;
 
 /// A plan with its proof and its figures.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct PlanAnswer {
     format: &'static str,
     mission: String,
     status: &'static str,
+    #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
+    #[schemars(with = "Option<f64>")]
     lower_bound: Option<Value>,
     horizon: usize,
     proof: Option<ProofPart>,
@@ -30,13 +33,14 @@ pub struct PlanAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     alternatives: Option<AlternativesPart>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<f64>")]
     makespan: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     blocking: Option<Vec<String>>,
 }
 
 /// The front of several objectives.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ParetoAnswer {
     format: &'static str,
     mission: String,
@@ -46,13 +50,14 @@ pub struct ParetoAnswer {
 }
 
 /// An objective, and the value that a plan has by it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Objective {
     minimize: String,
+    #[schemars(with = "f64")]
     value: Value,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[serde(tag = "by", rename_all = "snake_case")]
 enum ProofPart {
     Sat {
@@ -68,24 +73,29 @@ enum ProofPart {
     },
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StepPart {
     action: String,
     arguments: Vec<String>,
     /// Function to design.
+    #[schemars(with = "std::collections::BTreeMap<String, String>")]
     configuration: Map<String, Value>,
+    #[schemars(with = "f64")]
     start: Value,
+    #[schemars(with = "f64")]
     duration: Value,
+    #[schemars(with = "f64")]
     cost: Value,
     reconfigured: Vec<String>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StatisticsPart {
     operators: usize,
     variables: usize,
     clauses: usize,
     /// Clauses by family.
+    #[schemars(with = "std::collections::BTreeMap<String, usize>")]
     families: Map<String, Value>,
     conflicts: u64,
     solver_calls: usize,
@@ -99,13 +109,15 @@ struct StatisticsPart {
     milliseconds: MillisecondsPart,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct MomentPart {
+    #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
+    #[schemars(with = "f64")]
     lower_bound: Value,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct MillisecondsPart {
     read: f64,
     ground: f64,
@@ -116,14 +128,14 @@ struct MillisecondsPart {
     history: Vec<f64>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct AlternativesPart {
     plans: Vec<Vec<StepPart>>,
     complete: bool,
     forced: Option<Vec<ForcedPart>>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ForcedPart {
     action: bool,
     functions: Vec<String>,

@@ -4,13 +4,14 @@ use ontology::entail::{Answer, Entailment, Schema, SchemaEntity};
 use ontology::tomasys::{FunctionDesign, Individual};
 use ontology::vocab::local_name;
 use rules::Value;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::knowledge::{Contradiction, Knowledge};
 use crate::message::Message;
 
 /// What follows from documents and rules.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ReasonAnswer<'a> {
     format: &'static str,
     consistent: bool,
@@ -23,7 +24,7 @@ pub struct ReasonAnswer<'a> {
     warnings: &'a [Message],
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct DesignPart {
     name: String,
     iri: String,
@@ -32,21 +33,21 @@ struct DesignPart {
     available: bool,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ObjectivePart {
     objective: String,
     status: String,
 }
 
 /// Whether the statements of documents follow.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EntailmentAnswer<'a> {
     format: &'static str,
     entailed: bool,
     statements: Vec<StatementPart<'a>>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StatementPart<'a> {
     statement: &'a str,
     follows: bool,
@@ -54,14 +55,14 @@ struct StatementPart<'a> {
 }
 
 /// Why assertions hold, or do not.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ReasonsAnswer {
     format: &'static str,
     answers: Vec<AssertionAnswer>,
 }
 
 /// Why one assertion holds, or does not.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct AssertionAnswer {
     /// As it was asked.
     pub assertion: String,
@@ -72,7 +73,7 @@ pub struct AssertionAnswer {
 }
 
 /// What follows about classes and properties.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SchemaAnswer<'a> {
     format: &'static str,
     classes: Vec<EntityPart<'a>>,
@@ -80,7 +81,7 @@ pub struct SchemaAnswer<'a> {
     data_properties: Vec<EntityPart<'a>>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct EntityPart<'a> {
     iri: &'a str,
     direct: &'a [String],

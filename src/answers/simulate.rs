@@ -1,11 +1,12 @@
 //! What `metaplan simulate` answers, and the figures of its table.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::simulate::{Run, Sample, Strategy};
 
 /// The figures of all ways of control, and all missions.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SimulateAnswer<'a> {
     format: &'static str,
     mission: &'a str,
@@ -14,7 +15,7 @@ pub struct SimulateAnswer<'a> {
     runs: Vec<RunPart>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StrategyPart {
     strategy: &'static str,
     runs: usize,
@@ -27,14 +28,14 @@ struct StrategyPart {
     worse_than_joint: Option<usize>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct SamplePart {
     mean: f64,
     deviation: f64,
     half_width_95: f64,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RunPart {
     strategy: &'static str,
     seed: u64,

@@ -2,37 +2,43 @@
 
 use num_rational::BigRational;
 use pddl::validate::{Unmet, Verdict, Violation};
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::number::to_json;
 
 /// Whether a plan is valid, and what it costs; or what is wrong with it.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct VerdictAnswer<'a> {
     format: &'static str,
     valid: bool,
+    #[schemars(with = "Option<f64>")]
     metric: Option<Value>,
+    #[schemars(with = "f64")]
     total_time: Value,
     /// By function with arguments.
+    #[schemars(with = "std::collections::BTreeMap<String, Option<f64>>")]
     values: Map<String, Value>,
     violation: Option<ViolationPart<'a>>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ViolationPart<'a> {
     step: Option<usize>,
     action: Option<&'a str>,
+    #[schemars(with = "f64")]
     time: Value,
     kind: &'static str,
     message: &'a str,
     unmet: Vec<UnmetPart<'a>>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 struct UnmetPart<'a> {
     condition: &'a str,
     /// By function with arguments; null where it is undefined.
+    #[schemars(with = "std::collections::BTreeMap<String, Option<f64>>")]
     values: Map<String, Value>,
 }
 

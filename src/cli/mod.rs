@@ -32,6 +32,7 @@ mod report;
 mod run;
 mod run_lines;
 mod run_outlet;
+mod schema;
 mod simulate;
 mod situation;
 mod validate;
@@ -91,6 +92,8 @@ enum Subcommands {
     Validate(validate::Arguments),
     /// Checks a certificate without trusting the planner.
     Verify(verify::Arguments),
+    /// The JSON Schema of a format, or of manifests: for editors and for programs.
+    Schema(schema::Arguments),
     /// A script that completes commands and options in a shell.
     Completions(completions::Arguments),
     /// Pages for `man`, one for each command.
@@ -153,6 +156,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Subcommands::Simulate(arguments) => simulate::run(arguments, &cli.common),
         Subcommands::Validate(arguments) => validate::run(arguments, &cli.common),
         Subcommands::Verify(arguments) => verify::run(arguments, &cli.common),
+        Subcommands::Schema(arguments) => schema::run(arguments),
         Subcommands::Completions(arguments) => Ok(completions::run(arguments, Cli::command())),
         Subcommands::Man(arguments) => completions::man(arguments, Cli::command()),
     }

@@ -165,6 +165,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Codes are a letter and three digits; take the one that the message proposes.",
     ],
     [
+        "M139",
+        "A format does not exist.",
+        "`schema` was asked about a format that nothing has.",
+        "Take one of those that the message lists.",
+    ],
+    [
         "M140",
         "The knowledge base does not have a function, attribute or component.",
         "A name after `--objective`, `--require`, `--budget`, `--exclusive`, `--most` or `--least` is unknown.",

@@ -9,13 +9,14 @@ use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 use ontology::tomasys::View;
 use pddl::ast::{Atom, Condition, InitialElement, Problem, Term};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::message::Message;
 use crate::mission::Mission;
 
 /// Which PDDL symbols stand for what; the section `[probabilistic]` of a manifest.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs, reason = "the names are those of the roles")]
 pub struct Roles {

@@ -5,12 +5,14 @@
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
 use serde::{Serialize, Serializer};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use crate::mapek::fields::{Refusal, doubled_key, fraction, need, numbers, seconds, take, text, word};
 use crate::message::did_you_mean;
@@ -23,8 +25,9 @@ pub const FORMAT: &str = "metaplan-events/1";
 pub const LONGEST_LINE: usize = 1 << 20;
 
 /// Something that has happened.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "event")]
+#[schemars(deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Event {
     /// A sensor reports the value of a quality attribute, or of a function of the problem without parameters.
@@ -34,6 +37,7 @@ pub enum Event {
         attribute: String,
         /// In the attribute's unit.
         #[serde(serialize_with = "as_number")]
+        #[schemars(with = "f64")]
         value: BigRational,
     },
     /// A component reports how it is.
@@ -43,6 +47,7 @@ pub enum Event {
         component: String,
         /// How it is.
         #[serde(serialize_with = "as_word")]
+        #[schemars(schema_with = "status_schema")]
         status: Status,
     },
     /// A requested action has begun.
@@ -64,6 +69,7 @@ pub enum Event {
         action: u64,
         /// Why, in words.
         #[serde(skip_serializing_if = "String::is_empty")]
+        #[schemars(default)]
         reason: String,
     },
     /// An action has been brought to a safe end, as asked for.
@@ -79,6 +85,7 @@ pub enum Event {
         action: u64,
         /// From 0 to 1, in hundredths.
         #[serde(serialize_with = "as_number")]
+        #[schemars(with = "f64")]
         fraction: BigRational,
     },
     /// Another goal from now on, as a PDDL condition.
@@ -93,6 +100,7 @@ pub enum Event {
         /// `battery`, `robot_at`, `pipeline_found pl1`.
         name: String,
         /// The value, the last argument, or a truth value.
+        #[schemars(schema_with = "word_schema")]
         value: String,
     },
     /// An effect has reached the managed system.
@@ -121,6 +129,7 @@ pub enum Event {
         /// Local name.
         function: String,
         /// Local name; none where the function has no design.
+        #[schemars(schema_with = "name_or_null_schema")]
         design: Option<String>,
     },
     /// A function is needed from now on.
@@ -132,8 +141,10 @@ pub enum Event {
         function: String,
         /// Attribute types, by local name or IRI, and bounds in their units.
         #[serde(serialize_with = "as_numbers", skip_serializing_if = "Vec::is_empty")]
+        #[schemars(with = "BTreeMap<String, f64>", default)]
         requirements: Vec<(String, BigRational)>,
         /// Whether to look for a better design also while all is well.
+        #[schemars(default)]
         always_improve: bool,
     },
     /// An objective is given up.
@@ -151,6 +162,39 @@ pub enum Event {
         /// What is to be remembered.
         text: String,
     },
+}
+
+/// What [`status`] reads, as a JSON Schema.
+fn status_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "anyOf": [
+            { "type": "string", "pattern": "^ *([Ff][Aa][Ll][Ss][Ee]|[Ee][Rr][Rr][Oo][Rr]|[Rr][Ee][Cc][Oo][Vv][Ee][Rr][Ee][Dd]|[Tt][Rr][Uu][Ee]|[Oo][Kk]) *$" },
+            { "type": "boolean" }
+        ]
+    })
+}
+
+/// A name, or null; in either case it is there.
+fn name_or_null_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": ["string", "null"] })
+}
+
+/// What [`word`] reads, as a JSON Schema.
+fn word_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": ["string", "number", "boolean"] })
+}
+
+/// The JSON Schema of a line that is an event. Diagnostic arrays are described by ROS.
+pub fn event_schema() -> Schema {
+    let mut schema = schema_for!(Event);
+    let kinds = schema.get_mut("oneOf").and_then(Value::as_array_mut);
+    for kind in kinds.into_iter().flatten() {
+        if let Some(fields) = kind.get_mut("properties").and_then(Value::as_object_mut) {
+            fields.insert("seq".to_owned(), json!({ "type": "integer", "minimum": 0 }));
+            fields.insert("time".to_owned(), json!({ "type": "number", "minimum": 0 }));
+        }
+    }
+    schema
 }
 
 /// One line of input.

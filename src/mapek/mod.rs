@@ -42,7 +42,7 @@ pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange};
 pub use beliefs::{Beliefs, Outlook};
 pub use control::Loop;
 pub use drive::{Clock, Effector, Observer, SystemClock, drive};
-pub use event::{Event, FORMAT, LONGEST_LINE, Observation};
+pub use event::{Event, FORMAT, LONGEST_LINE, Observation, event_schema};
 pub use fields::Refusal;
 pub use record::{Decision, Snapshot};
 pub(crate) use resume::resume;

@@ -3,19 +3,26 @@
 use std::time::Duration;
 
 use num_rational::BigRational;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::manifest::ManifestPath;
+use crate::manifest::{self, ManifestPath};
 use crate::message::Message;
 use crate::number;
 
 /// The section `adaptation` of a manifest.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptationSection {
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
     minimum_benefit: Option<Spanned<toml::Value>>,
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
     settle: Option<Spanned<toml::Value>>,
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
     time_limit: Option<Spanned<toml::Value>>,
     #[serde(default)]
     stay_close: bool,

@@ -1,8 +1,12 @@
 //! Steps of a plan as the loop keeps them: with exact numbers, and so that they can be written to the journal.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
 use num_rational::BigRational;
 use pddl::ast::Name;
 use pddl::validate::{PlanStep, PlanText};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value, json};
 
@@ -33,6 +37,28 @@ impl Serialize for PlannedStep {
         object.serialize_entry("action", &self.action)?;
         self.fields(&mut object)?;
         object.end()
+    }
+}
+
+impl JsonSchema for PlannedStep {
+    fn schema_name() -> Cow<'static, str> {
+        "PlannedStep".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let names = generator.subschema_for::<Vec<String>>();
+        let configuration = generator.subschema_for::<BTreeMap<String, String>>();
+        json_schema!({
+            "type": "object",
+            "properties": {
+                "action": { "type": "string" },
+                "arguments": names,
+                "configuration": configuration,
+                "duration": { "type": "number" },
+                "cost": { "type": "number" }
+            },
+            "required": ["action", "arguments", "configuration", "duration", "cost"]
+        })
     }
 }
 

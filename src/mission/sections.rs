@@ -1,11 +1,13 @@
 //! What a manifest says of a mission: its sections `knowledge`, `planning`, `bindings` and `scenarios`.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use ::mission::{Bindings, Mission, Names};
 use ontology::ReadOptions;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use toml::Spanned;
@@ -15,7 +17,7 @@ use crate::manifest::ManifestPath;
 use crate::message::Message;
 
 /// The section `knowledge` of a manifest; paths are relative to the manifest.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KnowledgeSection {
     files: Vec<PathBuf>,
@@ -53,7 +55,7 @@ impl KnowledgeSection {
 }
 
 /// The section `planning`; paths are relative to the manifest.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanningSection {
     /// The domain file.
@@ -92,6 +94,21 @@ impl BindingsSection {
             Ok(bindings) if wrong.is_empty() => Ok(bindings.naming(names)),
             _ => Err(wrong),
         }
+    }
+}
+
+impl JsonSchema for BindingsSection {
+    fn schema_name() -> Cow<'static, str> {
+        "BindingsSection".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "type": "object",
+            "description": "PDDL symbols with queries, and the table `names`: what individuals are called in the problem.",
+            "properties": { "names": { "type": "object", "additionalProperties": { "type": "string" } } },
+            "additionalProperties": { "type": "string" }
+        })
     }
 }
 
@@ -167,7 +184,7 @@ impl<'de> Visitor<'de> for QueryOrNames {
 }
 
 /// A situation: what has failed, and what has changed; and what a simulated robot meets, of which a mission knows nothing.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario<S> {
     /// What happens, in a sentence.
@@ -178,6 +195,7 @@ pub struct Scenario<S> {
     pub fail: Vec<String>,
     /// Measured attributes, fluents and facts by name, as for `--set`; strings, numbers or truth values.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     pub set: BTreeMap<String, toml::Value>,
     /// What a simulated robot meets.
     pub simulation: Option<S>,

@@ -21,6 +21,7 @@ mod write;
 
 pub use recorder::{INTERVAL, Recorder};
 pub use replay::{Replay, Replayed};
+pub use schema::answer_schema;
 pub use write::{Form, Recording};
 
 /// With this byte an MCAP file begins, and no line of text.

@@ -1,5 +1,6 @@
 //! The JSON schemas of the topics of a recording, and which answer belongs to which topic.
 
+use schemars::Schema;
 use serde_json::{Value, json};
 
 /// The topic of diagnostics.
@@ -63,6 +64,11 @@ pub(super) fn event() -> Value {
 }
 
 /// The schema of answers.
+pub fn answer_schema() -> Schema {
+    Schema::try_from(answer()).unwrap_or_default()
+}
+
+/// The schema of answers, as it is recorded.
 pub(super) fn answer() -> Value {
     let texts = json!({"type": "array", "items": {"type": "string"}});
     let step = json!({

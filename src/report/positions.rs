@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use num_traits::ToPrimitive as _;
 use pddl::ast::{InitialElement, Name, Problem, Term};
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::file::source;
@@ -12,14 +13,14 @@ use crate::manifest::ManifestPath;
 use crate::message::Message;
 
 /// The section `report`.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReportSection {
     positions: Option<Written>,
 }
 
 /// How a manifest says where places lie.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(
     untagged,
     expecting = "the name of a CSV file (place,x,y), or two functions of places: [\"x\", \"y\"]"

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// How a scenario is simulated. Times are in the domain's time unit.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Simulation {
     /// The time from one report to the next.
@@ -35,7 +36,7 @@ pub struct Simulation {
 }
 
 /// Something that happens once: at a time, or when a fact holds for the first time.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Disturbance {
     /// When.
@@ -59,7 +60,7 @@ pub struct Disturbance {
 }
 
 /// An attribute that swings: `mean + amplitude * sin(2 * pi * (time / period + phase))`.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Signal {
     /// The attribute.
@@ -76,7 +77,7 @@ pub struct Signal {
 }
 
 /// A component that fails at random.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RandomFailure {
     /// The component.
@@ -89,7 +90,7 @@ pub struct RandomFailure {
 }
 
 /// How the figures that SUAVE reports are found in this mission.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Suave {
     /// The fact that the pipeline is found.

@@ -32,6 +32,7 @@ mod reference;
 mod report;
 mod routes;
 mod run;
+mod schemas;
 mod shell;
 mod simulate;
 mod ugv;

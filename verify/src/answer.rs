@@ -9,6 +9,7 @@ use crate::manifest::{Claim, Verification, VerifiedPart};
 
 /// What a certificate claims, and whether each part of it holds.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct VerificationAnswer<'a> {
     format: &'static str,
     verified: bool,
@@ -17,6 +18,7 @@ pub struct VerificationAnswer<'a> {
 }
 
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 struct PartAnswer<'a> {
     part: &'static str,
     verified: bool,

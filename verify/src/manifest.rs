@@ -59,6 +59,7 @@ pub enum Refutation {
 
 /// What is claimed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Claim {
     /// The plan is valid, this is its metric, and no plan has a better one.

@@ -49,6 +49,7 @@ pub struct Knowledge {
 
 /// Something that the knowledge contradicts.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Contradiction {
     /// The axiom or rule that is violated.
     pub violated: String,

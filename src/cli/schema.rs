@@ -1,0 +1,34 @@
+//! `metaplan schema`.
+
+use clap::Args;
+use metaplan::message::{Message, did_you_mean};
+use metaplan::schemas::{FORMATS, schema};
+
+use crate::cli::common::{Exit, Failure};
+use crate::cli::output;
+
+/// Arguments of `schema`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// `manifest`, `event`, `answer`, or the `format` of an answer without `metaplan-` and version: `plan`, `lint`, `verdict` and so on;
+    /// without one, all are listed.
+    #[arg(value_name = "FORMAT")]
+    name: Option<String>,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Result<Exit, Failure> {
+    let Some(name) = &arguments.name else {
+        let rows = FORMATS.iter().map(|(format, about, _)| vec![(*format).to_owned(), (*about).to_owned()]);
+        output::answer(&output::table(&["format", "of"], rows));
+        return Ok(Exit::Done);
+    };
+    let Some(schema) = schema(name) else {
+        let known: Vec<&str> = FORMATS.iter().map(|(format, ..)| *format).collect();
+        let meant = did_you_mean(name, known.iter().copied());
+        let text = format!("there is no format `{name}`; there are: {}{meant}", known.join(", "));
+        return Err(Failure::usage(Message::error("M139", text)));
+    };
+    output::document(&output::pretty(&schema));
+    Ok(Exit::Done)
+}

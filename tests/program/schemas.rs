@@ -1,0 +1,227 @@
+//! JSON Schemas: what the program answers and reads fits them, and what it refuses does not.
+
+use jsonschema::Validator;
+use metaplan::mapek::Observation;
+use metaplan::schemas::{FORMATS, schema};
+use serde_json::{Value, json};
+
+use crate::common::{metaplan, metaplan_in, root};
+
+fn validator(format: &str) -> Validator {
+    let schema = schema(format).unwrap_or_else(|| panic!("no schema of {format}"));
+    jsonschema::validator_for(&schema).unwrap_or_else(|error| panic!("{format}: {error}"))
+}
+
+/// A document fits, or the reasons why it does not.
+fn fits(format: &str, document: &Value) -> Result<(), String> {
+    let faults: Vec<String> = validator(format)
+        .iter_errors(document)
+        .map(|error| format!("{}: {error}", error.instance_path()))
+        .collect();
+    if faults.is_empty() { Ok(()) } else { Err(format!("{format}: {}\n{document:#}", faults.join("\n"))) }
+}
+
+/// The format that a document says it has.
+fn format_of(document: &Value) -> &str {
+    let format = document["format"].as_str().expect("a format");
+    format.strip_prefix("metaplan-").and_then(|name| name.split('/').next()).expect("a name and a version")
+}
+
+#[test]
+fn answers_fit_their_schemas() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let here = directory.path();
+    let json = ["--format", "json"];
+    let mission = "m/mission.toml";
+    let commands: [&[&str]; 20] = [
+        &["init", "m", "--from", "warehouse"],
+        &["plan", mission],
+        &["plan", mission, "--fail", "c_arm"],
+        &["plan", "none.toml"],
+        &["lint", mission],
+        &["lint", "m/domain.pddl", "m/problem.pddl"],
+        &["explain", "M118"],
+        &["explain", mission],
+        &["explain", mission, "fd_lidar"],
+        &["reason", "m/robot.ttl"],
+        &["reason", "m/robot.ttl", "--why", "c_arm a t:Component"],
+        &["reason", "m/robot.ttl", "--schema"],
+        &["reason", "m/robot.ttl", "--entails", "m/robot.ttl"],
+        &["configure", "m/robot.ttl", "--objective", "f_grasp", "--least", "grasp_energy"],
+        &["export", mission, "--to", "pddl"],
+        &["simulate", mission, "--scenario", "lidar_under_way", "--strategy", "joint"],
+        &["check", "m.prism", "Pmax=? [ F s=1 ]"],
+        &["validate", mission, "plan"],
+        &["verify", "proof"],
+        &["journal", "check", "none"],
+    ];
+    std::fs::write(here.join("m.prism"), "mdp\nmodule m\n s : [0..1];\n [] s=0 -> (s'=1);\nendmodule\n")
+        .expect("written");
+    std::fs::write(here.join("plan"), "(pick box near_rack fd_suction)\n").expect("written");
+    let mut seen = std::collections::BTreeSet::new();
+    for command in commands {
+        let answer = metaplan_in(here, &[command, &json].concat(), "");
+        let document = answer.json();
+        seen.insert(format_of(&document).to_owned());
+        let checked = fits(format_of(&document), &document);
+        assert!(checked.is_ok(), "{command:?}: {}", checked.unwrap_err());
+    }
+    metaplan_in(here, &["run", mission, "--journal", "j"], "");
+    let journal = metaplan_in(here, &["journal", "show", "j", "--format", "json"], "").json();
+    seen.insert(format_of(&journal).to_owned());
+    assert_eq!(fits(format_of(&journal), &journal), Ok(()));
+    for command in [
+        &["plan", "missions/ugv.toml", "--pareto", "total-time,battery_used"][..],
+        &["plan", "missions/ugv.toml", "--minimize", "total-time", "--minimize", "battery_used"],
+        &["plan", "missions/ugv.toml", "--alternatives", "2"],
+    ] {
+        let document = metaplan(&[command, &json].concat()).json();
+        seen.insert(format_of(&document).to_owned());
+        assert_eq!(fits(format_of(&document), &document), Ok(()), "{command:?}");
+    }
+    // What reads and what needs files of others is tested elsewhere, or described by hand.
+    let silent: Vec<&str> =
+        FORMATS.iter().map(|(format, ..)| *format).filter(|format| !seen.contains(*format)).collect();
+    assert_eq!(silent, ["manifest", "event", "answer", "compare", "import"]);
+}
+
+#[test]
+fn a_schema_refuses_what_is_not_of_its_format() {
+    let plan = metaplan(&["plan", "missions/ugv.toml", "--format", "json"]).json();
+    assert!(fits("plan", &plan).is_ok());
+    for field in plan.as_object().expect("an object").keys() {
+        let mut other = plan.clone();
+        other[field] = json!({ "no": ["such", "value"] });
+        assert!(fits("plan", &other).is_err(), "{field} may be anything");
+    }
+    for format in ["lint", "verdict", "init"] {
+        assert!(fits(format, &plan).is_err(), "{format}");
+    }
+}
+
+/// A manifest as JSON.
+fn manifest(path: &std::path::Path) -> Value {
+    let text = std::fs::read_to_string(path).expect("a manifest");
+    toml::from_str(&text).expect("TOML")
+}
+
+#[test]
+fn manifests_fit_and_unknown_keys_do_not() {
+    let mut paths: Vec<_> = std::fs::read_dir(root().join("missions"))
+        .expect("missions")
+        .map(|entry| entry.expect("an entry").path())
+        .collect();
+    paths.extend(
+        ["blank", "ugv", "warehouse"]
+            .map(|name| root().join("missions/templates").join(name).join("mission.toml")),
+    );
+    let mut count = 0;
+    for path in paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "toml")) {
+        let whole = manifest(path);
+        assert_eq!(fits("manifest", &whole), Ok(()), "{}", path.display());
+        // Each table in turn gets a key that none has; tables of names take any key.
+        for pointer in [
+            "",
+            "/knowledge",
+            "/planning",
+            "/report",
+            "/scenarios/dusty",
+            "/scenarios/undisturbed/simulation",
+        ] {
+            let mut other = whole.clone();
+            let Some(table) = other.pointer_mut(pointer).and_then(Value::as_object_mut) else { continue };
+            table.insert("no_such_key".to_owned(), json!(1));
+            assert!(fits("manifest", &other).is_err(), "{} {pointer}", path.display());
+            count += 1;
+        }
+    }
+    assert!(count > 20, "{count}");
+    for (section, key, wrong) in [
+        ("adaptation", "settle", json!(-1)),
+        ("adaptation", "settle", json!([1])),
+        ("bindings", "battery", json!(3)),
+        ("report", "positions", json!(["x"])),
+        ("probabilistic", "battery_unit", json!("one")),
+    ] {
+        let mut other = manifest(&root().join("missions/ugv.toml"));
+        other[section] = json!({ key: wrong });
+        assert!(fits("manifest", &other).is_err(), "{section} {key}");
+    }
+    let mut right = manifest(&root().join("missions/ugv.toml"));
+    right["adaptation"] = json!({ "settle": "0.5", "time_limit": 2, "stay_close": true });
+    right["bindings"] = json!({ "battery": "measured:battery", "names": { "a": "b" } });
+    assert_eq!(fits("manifest", &right), Ok(()));
+}
+
+/// Every kind of event, as its reader and as its schema see it.
+#[test]
+fn events_fit_as_they_are_read() {
+    let events = [
+        json!({"event": "measured", "attribute": "a", "value": 0.5, "seq": 1, "time": 0.25}),
+        json!({"event": "component_status", "component": "c", "status": "FALSE"}),
+        json!({"event": "component_status", "component": "c", "status": true}),
+        json!({"event": "action_started", "action": 1}),
+        json!({"event": "action_succeeded", "action": 1}),
+        json!({"event": "action_failed", "action": 1, "reason": "slipped"}),
+        json!({"event": "action_cancelled", "action": 1}),
+        json!({"event": "action_progress", "action": 1, "fraction": 0.5}),
+        json!({"event": "goal_changed", "goal": "(p)"}),
+        json!({"event": "fact_changed", "name": "battery", "value": 3}),
+        json!({"event": "fact_changed", "name": "p a", "value": true}),
+        json!({"event": "acknowledged", "effect": 1}),
+        json!({"event": "reconfiguration_failed", "effect": 1}),
+        json!({"event": "design_status", "design": "d", "realisable": false}),
+        json!({"event": "configuration_observed", "function": "f", "design": null}),
+        json!({"event": "objective_added", "objective": "o", "function": "f", "requirements": {"a": 1.5}, "always_improve": true}),
+        json!({"event": "objective_removed", "objective": "o"}),
+        json!({"event": "tick"}),
+        json!({"event": "note", "text": "t"}),
+    ];
+    let validator = validator("event");
+    let agree = |event: &Value| {
+        let read = Observation::parse(&event.to_string()).events.iter().all(Result::is_ok);
+        assert_eq!(validator.is_valid(event), read, "{event}");
+        read
+    };
+    let optional = ["seq", "time", "reason", "requirements", "always_improve"];
+    for event in &events {
+        assert!(agree(event), "{event}");
+        for field in event.as_object().expect("an object").keys() {
+            let mut less = event.clone();
+            less.as_object_mut().expect("an object").remove(field);
+            assert_eq!(agree(&less), optional.contains(&field.as_str()), "{event} without {field}");
+            let mut other = event.clone();
+            other[field] = json!([[]]);
+            assert!(!agree(&other), "{other}");
+        }
+        let mut more = event.clone();
+        more["no_such_field"] = json!(1);
+        assert!(!agree(&more), "{more}");
+    }
+    assert!(!agree(&json!({"event": "measrued"})));
+}
+
+/// The lines of a loop fit the schema that recordings have, too.
+#[test]
+fn answers_of_the_loop_fit() {
+    let lines = "{\"event\":\"component_status\",\"component\":\"c_kinect\",\"status\":\"FALSE\"}\n{\"event\":\"zzz\"}\n";
+    let outcome = metaplan_in(&root(), &["run", "missions/ugv.toml"], lines);
+    assert!(outcome.stdout.lines().count() > 5, "{outcome:#?}");
+    for line in outcome.stdout.lines() {
+        let answer: Value = serde_json::from_str(line).expect("JSON");
+        assert_eq!(fits("answer", &answer), Ok(()));
+    }
+}
+
+#[test]
+fn the_command_prints_them() {
+    let listed = metaplan(&["schema"]).stdout;
+    for (format, ..) in FORMATS {
+        assert!(listed.contains(format), "{format}: {listed}");
+        let printed = metaplan(&["schema", format]);
+        assert_eq!((printed.status, printed.stderr.as_str()), (0, ""), "{format}");
+        assert_eq!(Some(printed.json()), schema(format), "{format}");
+    }
+    let unknown = metaplan(&["schema", "manifst"]);
+    assert!(unknown.status == 2 && unknown.stderr.contains("did you mean `manifest`?"), "{unknown:#?}");
+}
