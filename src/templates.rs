@@ -9,6 +9,9 @@ use ontology::kb;
 /// The manifest's file in every template.
 pub const MANIFEST: &str = "mission.toml";
 
+/// The file beside it by which editors know its keys.
+pub const SCHEMA: &str = "mission.schema.json";
+
 /// A mission to start from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Template {
@@ -33,8 +36,8 @@ impl Template {
         }
     }
 
-    /// Its files, each a name and a text, for a mission with a name.
-    pub fn files(self, mission: &str) -> Vec<(&'static str, String)> {
+    /// Its files, each a name and a text, for a mission with a name; `schema` is the JSON Schema of manifests.
+    pub fn files(self, mission: &str, schema: &str) -> Vec<(&'static str, String)> {
         let texts: &[(&str, &str)] = match self {
             Self::Blank => &[
                 (MANIFEST, include_str!("../missions/templates/blank/mission.toml")),
@@ -60,14 +63,14 @@ impl Template {
             MANIFEST => (*file, named(text, mission)),
             _ => (*file, (*text).to_owned()),
         };
-        texts.iter().map(named).collect()
+        texts.iter().map(named).chain([(SCHEMA, schema.to_owned())]).collect()
     }
 
     /// Writes the files into a new directory, which is there with all of them afterwards or not at all.
     ///
     /// # Errors
     /// There is something of that name already, the directory above it is not there, or it cannot be written.
-    pub fn write(self, directory: &Path, mission: &str) -> io::Result<()> {
+    pub fn write(self, directory: &Path, mission: &str, schema: &str) -> io::Result<()> {
         if directory.symlink_metadata().is_ok() {
             return Err(io::ErrorKind::AlreadyExists.into());
         }
@@ -78,7 +81,7 @@ impl Template {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
         let whole = builder.tempdir_in(above.unwrap_or(Path::new(".")))?;
-        for (file, text) in self.files(mission) {
+        for (file, text) in self.files(mission, schema) {
             std::fs::write(whole.path().join(file), text)?;
         }
         std::fs::rename(whole.path(), directory)?;
@@ -88,12 +91,13 @@ impl Template {
     }
 }
 
-/// A manifest with another name of the mission.
+/// A manifest with another name of the mission, and with the line that editors find its schema by.
 fn named(manifest: &str, mission: &str) -> String {
     let name = toml::Value::String(mission.to_owned());
     let line = |line: &str| match line.strip_prefix("name = ") {
         Some(_) => format!("name = {name}\n"),
         None => format!("{line}\n"),
     };
-    manifest.lines().map(line).collect()
+    let schema = format!("#:schema ./{SCHEMA}\n");
+    std::iter::once(schema).chain(manifest.lines().map(line)).collect()
 }

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use encodings::{Improvement, Limits, Plan, Point, optimize_concurrent};
-use metaplan::mission::{Mission, Planning as _};
+use metaplan::mission::{Mission, Planning as _, Reading, lean};
 use num_rational::BigRational;
 use pddl::ast::Problem;
 
@@ -50,7 +50,12 @@ pub(super) fn solve(
             let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
             Failure { exit, messages }
         })?;
-    let solution = optimize_concurrent(&task, limits, report);
+    let mut solution = optimize_concurrent(&task, limits, report);
+    if let Some(plan) = solution.plan.take() {
+        let mut problem = problem.clone();
+        problem.metric = objectives.metrics.first().cloned().or(problem.metric);
+        solution.plan = Some(lean(mission, &problem, plan, &Reading::concurrent(separation)));
+    }
     let values = solution.plan.iter().map(|plan| plan.cost.clone());
     Ok(Point { values: values.filter(|_| !objectives.metrics.is_empty()).collect(), solution })
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use metaplan::answers::InitAnswer;
 use metaplan::message::Message;
+use metaplan::schemas::schema;
 use metaplan::templates::{MANIFEST, Template};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
@@ -51,8 +52,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = format!("`{shown}` does not name a new directory; give a name, such as `my-robot`");
         return Err(Failure::usage(Message::error("M107", text)));
     };
-    template.write(directory, name).map_err(|error| refused(directory, &shown, error.kind()))?;
-    let files: Vec<&str> = template.files(name).into_iter().map(|(file, _)| file).collect();
+    let schema = output::pretty(&schema("manifest"));
+    template.write(directory, name, &schema).map_err(|error| refused(directory, &shown, error.kind()))?;
+    let files: Vec<&str> = template.files(name, &schema).into_iter().map(|(file, _)| file).collect();
     if common.format == Format::Json {
         output::json_answer(&InitAnswer::new(&shown, template.name(), files));
     } else {

@@ -12,6 +12,7 @@ mod configure;
 mod confirm;
 mod convert;
 mod drawn;
+mod examples;
 mod explain;
 mod export;
 mod import;
@@ -59,38 +60,53 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Subcommands {
     /// A new directory with a mission that plans at once, to start from.
+    #[command(after_long_help = examples::INIT)]
     Init(init::Arguments),
     /// A jointly optimal task plan and configuration.
+    #[command(after_long_help = examples::PLAN)]
     Plan(plan::Arguments),
     /// All errors and warnings of a mission: knowledge base, rules, PDDL and manifest; without planning.
+    #[command(after_long_help = examples::LINT)]
     Lint(lint::Arguments),
     /// What follows from knowledge bases and rules: assertions, availability, objectives in error.
+    #[command(after_long_help = examples::REASON)]
     Reason(reason::Arguments),
     /// A knowledge base with its imports as one document in another syntax.
+    #[command(after_long_help = examples::CONVERT)]
     Convert(convert::Arguments),
     /// Model checking of a PRISM-language model: a value with bounds, and its policy.
     Check(check::Arguments),
     /// Metaplan and probabilistic model checking side by side, on one co-adaptation mission.
+    #[command(after_long_help = examples::COMPARE)]
     Compare(compare::Arguments),
     /// A design for every function in need, as MROS chooses it, without a task plan.
+    #[command(after_long_help = examples::CONFIGURE)]
     Configure(configure::Arguments),
     /// A mission from the files of another tool.
     Import(import::Arguments),
     /// Why a design is available or not, why it is chosen or not, what would change the answer; or what a code means.
+    #[command(after_long_help = examples::EXPLAIN)]
     Explain(explain::Arguments),
     /// A mission for other planners, with what the knowledge base has contributed.
+    #[command(after_long_help = examples::EXPORT)]
     Export(export::Arguments),
     /// An answer as a page to look at: plan, numbers, map, search, designs with reasons; before and after.
+    #[command(after_long_help = examples::REPORT)]
     Report(report::Arguments),
     /// The adaptation loop: events in, adaptations out, one JSON object a line.
+    #[command(after_long_help = examples::RUN)]
     Run(run::Arguments),
     /// What is in the journal of a loop, and whether it can be used; nothing is changed.
+    #[command(after_long_help = examples::JOURNAL)]
     Journal(journal::Arguments),
     /// The loop against a simulated robot, beside other ways of control.
+    #[command(after_long_help = examples::SIMULATE)]
     Simulate(simulate::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
+    #[command(after_long_help = examples::VALIDATE)]
     Validate(validate::Arguments),
     /// Checks a certificate without trusting the planner.
+    #[command(after_long_help = examples::VERIFY)]
     Verify(verify::Arguments),
     /// The JSON Schema of a format, or of manifests: for editors and for programs.
     Schema(schema::Arguments),

@@ -50,7 +50,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mission = arguments.situation.mission(mission)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
-    let plan = read_plan(&source(plan)?)?;
+    let plan = read_plan(&source(plan)?, &mission)?;
     let options = Options { concurrent: arguments.concurrent, tolerance: arguments.tolerance.clone() };
     let verdict = validate(mission.domain(), &problem, &plan, &options);
     match common.format {
@@ -60,15 +60,16 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(if verdict.valid { Exit::Done } else { Exit::Invalid })
 }
 
-fn read_plan(source: &Source) -> Result<PlanText, Failure> {
+fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Failure> {
     if source.text().trim_start().starts_with('{') {
-        return json_plan(source);
+        return json_plan(source, mission);
     }
     PlanText::parse(source).map_err(|diagnostics| Message::from_pddl(&diagnostics, &[source]).into())
 }
 
-/// The steps of a `metaplan-plan/1` document.
-fn json_plan(source: &Source) -> Result<PlanText, Failure> {
+/// The steps of a `metaplan-plan/1` document. Where the knowledge base has given an action of a plain domain its designs, they stand in the
+/// configuration only.
+fn json_plan(source: &Source, mission: &Mission) -> Result<PlanText, Failure> {
     let bad = |place, text: &str| {
         Message::at("M111", source.name(), place, text.to_owned()).with_source(source.text())
     };
@@ -81,10 +82,14 @@ fn json_plan(source: &Source) -> Result<PlanText, Failure> {
         let name = |value: &Value| value.as_str().map(Name::new);
         let arguments =
             step["arguments"].as_array().map(|all| all.iter().map(name).collect::<Option<Vec<_>>>());
-        let (Some(action), Some(Some(arguments))) = (name(&step["action"]), arguments) else {
+        let (Some(action), Some(Some(mut arguments))) = (name(&step["action"]), arguments) else {
             let text = format!("step {} has no `action` with `arguments`", index + 1);
             return Err(bad(None, &text).into());
         };
+        if mission.written_arguments(action.as_str()) == Some(arguments.len()) {
+            let configuration = step["configuration"].as_object();
+            arguments.extend(configuration.into_iter().flat_map(|all| all.values()).filter_map(name));
+        }
         let (start, duration) = (decimal(&step["start"]), decimal(&step["duration"]));
         plan.steps.push(PlanStep { action, arguments, start, duration, line: 0 });
     }

@@ -25,6 +25,12 @@ impl Reading {
     pub fn concurrent(separation: &BigRational) -> Self {
         Self { options: Options { concurrent: true, tolerance: separation.clone() }, timed: true }
     }
+
+    /// What the validator says a plan with this reading comes to, by the problem's metric; none of an invalid plan.
+    pub(super) fn value(&self, mission: &Mission, problem: &Problem, plan: &Plan) -> Option<BigRational> {
+        let verdict = verdict_of(mission, problem, plan, self);
+        measure(problem, &verdict, plan.steps.len(), self.timed).filter(|_| verdict.valid)
+    }
 }
 
 /// What the independent validator says of a plan.

@@ -5,6 +5,7 @@
 mod blocking;
 mod btcpp;
 mod confirm;
+mod lean;
 mod planning;
 mod plansys2;
 mod sections;
@@ -15,6 +16,7 @@ pub use ::mission::{Bindings, CoAdaptation, Mission, Names};
 pub use blocking::{Blocking, blocking};
 pub use btcpp::btcpp_text;
 pub use confirm::{Reading, confirm};
+pub use lean::lean;
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
 pub use plansys2::{PlanLine, decimal, instant, plan_lines, popf_text, spaced};

@@ -133,6 +133,19 @@ pub fn copy_of_mission(name: &str) -> tempfile::TempDir {
     directory
 }
 
+/// Copies the files of a folder, and of those below it.
+pub fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("a folder");
+    for entry in std::fs::read_dir(from).expect("a folder").map(|entry| entry.expect("an entry")) {
+        let (from, to) = (entry.path(), to.join(entry.file_name()));
+        if from.is_dir() {
+            copy_folder(&from, &to);
+        } else {
+            std::fs::copy(from, to).expect("a copy");
+        }
+    }
+}
+
 /// Replaces a text that must be there in a file.
 pub fn edit(directory: &Path, file: &str, old: &str, new: &str) {
     let path = directory.join(file);

@@ -16,6 +16,9 @@ fn check(template: &str, cost: &str, scenarios: &[(&str, &str)]) {
     let mut situations = vec![(vec![], cost)];
     situations.extend(scenarios.iter().map(|(name, cost)| (vec!["--scenario", name], *cost)));
     let text = std::fs::read_to_string(here.join(manifest)).expect("a manifest");
+    assert!(text.starts_with("#:schema ./mission.schema.json\n"), "{text}");
+    let schema = std::fs::read_to_string(here.join("my-robot/mission.schema.json")).expect("a schema");
+    assert_eq!(schema, metaplan_in(here, &["schema", "manifest"], "").stdout);
     let plannable = text.matches("\n[scenarios.").count() - text.matches(".simulation]").count() * 2;
     assert_eq!(scenarios.len(), plannable, "every scenario that is planned is listed");
     for (situation, cost) in situations {

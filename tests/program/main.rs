@@ -13,6 +13,7 @@ mod configure;
 mod doubts;
 mod explain;
 mod export;
+mod help;
 mod init;
 mod journal;
 mod limits;

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::common::{Outcome, metaplan_in};
+use crate::common::{Outcome, metaplan, metaplan_in, root};
 
 const DOMAIN: &str = "(define (domain survey)
   (:requirements :typing :fluents :durative-actions)
@@ -78,4 +78,19 @@ fn messages_have_their_place_and_say_what_would_be_right() {
         assert!(message[field].is_string(), "{field}: {message}");
     }
     assert!(message["help"].as_str().is_some_and(|help| help.contains("`at`")), "{message}");
+}
+
+/// What `plan` writes is a plan, in each format, of plain domains and of explicit ones.
+#[test]
+fn what_is_planned_is_valid_in_each_format() {
+    for mission in ["ugv", "ugv_plain", "uuv", "uuv_plain"] {
+        let file = format!("missions/{mission}.toml");
+        let cost = metaplan(&["plan", &file, "--format", "json"]).json()["cost"].to_string();
+        for format in ["ipc", "json"] {
+            let plan = metaplan(&["plan", &file, "--plan-format", format]).stdout;
+            let outcome = metaplan_in(&root(), &["validate", &file, "-"], &plan);
+            assert_eq!(outcome.status, 0, "{mission}, {format}: {outcome:?}\n{plan}");
+            assert!(outcome.stdout.starts_with(&format!("valid, metric {cost},")), "{mission}: {outcome:?}");
+        }
+    }
 }

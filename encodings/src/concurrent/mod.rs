@@ -258,12 +258,10 @@ fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
         steps.push(((time, *id), Step::new(&concurrent.task, operator, &[], (start, duration, cost))));
     }
     steps.sort_by_key(|(place, _)| *place);
-    let mut current = Vec::new();
-    for (_, step) in &mut steps {
-        step.note_reconfigured(&mut current);
-    }
     let steps = steps.into_iter().map(|(_, step)| step).collect();
     let objective = &concurrent.task.objective;
     let rest = Exact::scaled(&if objective.maximize { -rest } else { rest }, objective.scale);
-    Plan { steps, cost: concurrent.measure.metric(sequence.value.0).plus(&rest) }
+    let mut plan = Plan { steps, cost: concurrent.measure.metric(sequence.value.0).plus(&rest) };
+    plan.note_reconfigured();
+    plan
 }

@@ -101,7 +101,6 @@ pub struct Plan {
 pub(crate) fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> Plan {
     let (task, plan) = (context.task, earliest(context, plan));
     let mut steps = Vec::new();
-    let mut current: Vec<(String, String)> = Vec::new();
     let steps_of = plan.steps.iter().map(|step| (step.operator, &step.choice[..]));
     let (measured, rest) = measured(task, steps_of);
     let actions = plan.steps.iter().zip(measured);
@@ -115,11 +114,11 @@ pub(crate) fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N
         let duration = operator.duration.at(&step.choice, &sizes).to_rational();
         let cost = operator.cost.at(&step.choice, &sizes).to_rational() + measured;
         let cost = task.objective.signed(&cost);
-        let mut step = Step::new(task, operator, &step.choice, (start, duration, cost));
-        step.note_reconfigured(&mut current);
-        steps.push(step);
+        steps.push(Step::new(task, operator, &step.choice, (start, duration, cost)));
     }
-    Plan { steps, cost: metric(task, &(plan.cost.to_rational() + rest)) }
+    let mut plan = Plan { steps, cost: metric(task, &(plan.cost.to_rational() + rest)) };
+    plan.note_reconfigured();
+    plan
 }
 
 /// What the fluents that are only measured come to in a state, in the unit of costs.
@@ -158,6 +157,15 @@ impl Plan {
         let ends = self.steps.iter().map(|step| step.start.0.clone() + &step.duration.0);
         Exact(ends.max().unwrap_or_default())
     }
+
+    /// Says of each step anew which functions have another design than in the last step with them.
+    pub fn note_reconfigured(&mut self) {
+        let mut current = Vec::new();
+        for step in &mut self.steps {
+            step.reconfigured.clear();
+            step.note_reconfigured(&mut current);
+        }
+    }
 }
 
 impl Step {
@@ -180,7 +188,7 @@ impl Step {
     }
 
     /// Notes the functions whose design is not the one in `current`, which has the last design of each; and updates it.
-    pub(crate) fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
+    fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
         for (function, design) in &self.configuration {
             match current.iter_mut().find(|(known, _)| known == function) {
                 Some((_, known)) if known == design => {}

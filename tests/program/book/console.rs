@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use snapbox::{Assert, IntoData as _};
 use tempfile::TempDir;
 
-use crate::common::{root, verifier};
+use crate::common::{copy_folder, root, verifier};
 
 /// What a session finds in its directory, which is not the project's, so that commands may write.
 pub const FILES: [&str; 7] = [
@@ -43,7 +43,7 @@ impl Session {
     pub fn new() -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         for folder in FILES {
-            super::copy(&root().join(folder), &directory.path().join(folder));
+            copy_folder(&root().join(folder), &directory.path().join(folder));
         }
         let programs = verifier().parent().expect("a folder").display().to_string();
         let path = format!("{programs}:{}", std::env::var("PATH").unwrap_or_default());

@@ -19,7 +19,7 @@ mod generated;
 mod help;
 mod page;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::common::root;
 use console::Session;
@@ -138,17 +138,4 @@ fn every_block_is_of_a_kind_that_is_checked() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-/// Copies a folder of texts.
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).expect("a folder");
-    for entry in std::fs::read_dir(from).expect("a folder").map(|entry| entry.expect("an entry")) {
-        let (from, to) = (entry.path(), to.join(entry.file_name()));
-        if from.is_dir() {
-            copy(&from, &to);
-        } else {
-            std::fs::copy(from, to).expect("a copy");
-        }
-    }
 }
