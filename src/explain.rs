@@ -5,6 +5,7 @@
 //! it?" is answered by trying the values at which a requirement begins or ceases to hold, and, for values of the problem such as
 //! a battery, by bisection between a value with the same plan and one with another.
 
+use crate::message::Errors;
 use std::collections::BTreeSet;
 
 use encodings::{Config, Limits, Status, optimize};
@@ -87,7 +88,7 @@ pub enum Target {
 ///
 /// # Errors
 /// The mission cannot be planned for.
-pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Vec<Message>> {
+pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
     solve(mission, limits, &|_, available| available)
 }
 
@@ -96,11 +97,11 @@ fn solve(
     mission: &Mission,
     limits: &Limits,
     allowed: &dyn Fn(&str, bool) -> bool,
-) -> Result<BestPlan, Vec<Message>> {
+) -> Result<BestPlan, Errors> {
     let (mut problem, _) = mission.filled()?;
     let domain = mission.allow(&mut problem, allowed);
     let task = ground_with(mission, &domain, &problem, &[], limits)?;
-    let config = Config { limits: limits.clone(), ..Config::default() };
+    let config = Config::default().with_limits(limits.clone());
     let solution = optimize(&task, &config, &mut |_| {});
     let proved = matches!(solution.status, Status::Optimal | Status::Unsolvable);
     let steps = solution.plan.iter().flat_map(|plan| &plan.steps);
@@ -112,7 +113,7 @@ fn solve(
 ///
 /// # Errors
 /// There is no such design, or the mission cannot be planned for.
-pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignExplanation, Vec<Message>> {
+pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignExplanation, Errors> {
     let designs =
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
     let named = || designs.iter().find(|design| design.individual.name == name);
@@ -125,7 +126,7 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
         let known: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
         let meant = crate::message::did_you_mean(name, known.iter().map(|own| &**own));
         let text = format!("there is no design `{name}`; there are: {}{meant}", known.join(", "));
-        return Err(vec![Message::error("M112", text)]);
+        return Err(vec![Message::error("M112", text)].into());
     };
     let name = found.individual.name.as_str();
     let rivals: BTreeSet<&str> = designs
@@ -155,7 +156,7 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 ///
 /// # Errors
 /// The mission cannot be planned for.
-pub fn smallest_changes(mission: &Mission, limits: &Limits) -> Result<Vec<Change>, Vec<Message>> {
+pub fn smallest_changes(mission: &Mission, limits: &Limits) -> Result<Vec<Change>, Errors> {
     let base = best(mission, limits)?;
     let mut changes = Vec::new();
     for (attribute, from) in measured(mission) {
@@ -243,9 +244,9 @@ fn with_value(
     name: &str,
     value: &BigRational,
     limits: &Limits,
-) -> Result<BestPlan, Vec<Message>> {
+) -> Result<BestPlan, Errors> {
     let mut other = mission.clone();
-    other.set(name, &number::decimal(value)).map_err(|message| vec![message])?;
+    other.set(name, &number::decimal(value))?;
     best(&other, limits)
 }
 
@@ -257,7 +258,7 @@ fn bisect(
     upwards: bool,
     base: &BestPlan,
     limits: &Limits,
-) -> Result<Option<Change>, Vec<Message>> {
+) -> Result<Option<Change>, Errors> {
     let zero = BigRational::default();
     if *from <= zero {
         return Ok(None);
@@ -295,7 +296,7 @@ fn availability_changes(
     mission: &Mission,
     design: &FunctionDesign,
     limits: &Limits,
-) -> Result<Vec<Change>, Vec<Message>> {
+) -> Result<Vec<Change>, Errors> {
     let Some(knowledge) = mission.knowledge() else { return Ok(Vec::new()) };
     let mut changes = Vec::new();
     for component in knowledge.view().components() {
@@ -310,7 +311,7 @@ fn availability_changes(
         let status = if failed { Component::Recovered } else { Component::Failed };
         let Individual { iri, name } = component.individual;
         if let Some(knowledge) = other.knowledge_mut() {
-            knowledge.report(&iri, status).map_err(|message| vec![message])?;
+            knowledge.report(&iri, status)?;
         }
         let to = if failed { Target::Recovered } else { Target::Failed };
         changes.push(Change { name, from: None, to, then: best(&other, limits)? });

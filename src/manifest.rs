@@ -1,5 +1,6 @@
 //! A manifest's text to data, read once. Which sections there are, and what stands in them, is known to whoever asks.
 
+use crate::message::Errors;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -24,10 +25,10 @@ pub struct ManifestPath {
 ///
 /// # Errors
 /// The file cannot be read, is no manifest, or has other sections or keys: all that is wrong with them.
-pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Vec<Message>> {
-    let source = source(file).map_err(|message| vec![message])?;
+pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
+    let source = source(file)?;
     let (name, text) = (source.name().to_owned(), source.text());
-    file::expect(Kind::Manifest, &name, text).map_err(|message| vec![message])?;
+    file::expect(Kind::Manifest, &name, text)?;
     let sections = toml::from_str(text).map_err(|error| mistakes::<S>(text, error, &name))?;
     Ok((
         sections,
@@ -54,7 +55,7 @@ impl ManifestPath {
     }
 
     /// Messages about the manifest with the lines that they are about.
-    pub fn quote(&self, messages: Vec<Message>) -> Vec<Message> {
+    pub fn quote(&self, messages: impl IntoIterator<Item = Message>) -> Vec<Message> {
         let is_own = |message: &Message| message.file.as_ref() == Some(&self.file);
         let quoted =
             |message: Message| if is_own(&message) { message.with_source(&self.text) } else { message };

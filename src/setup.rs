@@ -2,6 +2,7 @@
 //!
 //! Each room defines its own section. Here they stand side by side, so that a key that none of them has is refused.
 
+use crate::message::Errors;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -61,7 +62,7 @@ impl Setup {
     ///
     /// # Errors
     /// All that is wrong with the manifest and with the files that it names.
-    pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
+    pub fn read(manifest: &Path) -> Result<Self, Errors> {
         let (sections, origin): (Sections, ManifestPath) = manifest::read(manifest)?;
         let (settings, bindings) =
             (sections.adaptation.settings(&origin), sections.bindings.bindings(&origin));
@@ -95,7 +96,7 @@ impl Setup {
     ///
     /// # Errors
     /// The file of positions cannot be read, or what is wrong with it.
-    pub fn positions(&self) -> Result<Positions, Vec<Message>> {
+    pub fn positions(&self) -> Result<Positions, Errors> {
         self.report.positions(&self.origin)
     }
 

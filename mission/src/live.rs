@@ -1,5 +1,6 @@
 //! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
 
+use crate::message::Errors;
 use std::borrow::Cow;
 
 use num_rational::BigRational;
@@ -150,12 +151,12 @@ impl Mission {
     ///
     /// # Errors
     /// All that is wrong with it.
-    pub fn goal(&self, text: &str) -> Result<Condition, Vec<Message>> {
+    pub fn goal(&self, text: &str) -> Result<Condition, Errors> {
         let text = format!("(define (problem goal) (:domain {}) (:goal {text}))", self.domain.name.name);
         let source = Source::new("goal", text);
         let (tree, diagnostics) = pddl::parse_problem_of(&self.domain, &source);
         let errors = Message::from_pddl(&diagnostics, &[&source]);
-        let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else { return Err(errors) };
+        let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else { return Err(errors.into()) };
         let mut problem = self.problem.clone();
         problem.goal = tree.goal;
         self.fill(&mut problem);
@@ -163,7 +164,7 @@ impl Mission {
         let wrong = found.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
         // Only the goal has places in this text; all else was checked before.
         let wrong: Vec<_> = wrong.filter(|diagnostic| diagnostic.file == "goal").collect();
-        if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source])) }
+        if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source]).into()) }
     }
 
     /// The functions of the knowledge base that have designs, in alphabetical order.

@@ -4,6 +4,7 @@
     reason = "what is wrong with the command line is said before there is a node"
 )]
 
+use metaplan::message::Errors;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -76,14 +77,13 @@ fn main() -> ExitCode {
     }
 }
 
-fn start() -> Result<(), Vec<Message>> {
+fn start() -> Result<(), Errors> {
     let (words, ros) = RosArguments::split(std::env::args())?;
     let arguments = Arguments::parse_from(words);
-    let (network, warnings) =
-        Network::from_environment(|name| std::env::var(name).ok()).map_err(|message| vec![message])?;
+    let (network, warnings) = Network::from_environment(|name| std::env::var(name).ok())?;
     let opening =
         Opening { name: arguments.role.node().to_owned(), arguments: ros, network, rmw: arguments.rmw };
-    let node = Node::open(opening).map_err(|message| vec![message])?;
+    let node = Node::open(opening)?;
     for warning in warnings {
         node.log(Severity::Warn, warning.text().trim_end());
     }

@@ -11,6 +11,7 @@ mod keeping;
 mod memory;
 mod network;
 
+use metaplan::message::Errors;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -44,7 +45,7 @@ pub struct Options {
 ///
 /// # Errors
 /// The mission or its settings are wrong, or a topic or service cannot be made.
-pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let one = |message: Message| vec![message];
     let Setup { mission, .. } = Setup::read(&options.mission)?;
     let settings = Settings::read(options.settings.as_deref(), &options.mission).map_err(one)?;

@@ -7,6 +7,7 @@
 //!
 //! [1] Gupta, Mumick, Subrahmanian, "Maintaining views incrementally", SIGMOD 1993.
 
+use crate::error::Errors;
 use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
@@ -38,7 +39,7 @@ impl Engine {
         symbols: Symbols,
         program: Program,
         facts: impl IntoIterator<Item = Fact>,
-    ) -> Result<Self, Vec<Error>> {
+    ) -> Result<Self, Errors> {
         Self::with_limits(symbols, program, facts, Limits::default())
     }
 
@@ -51,10 +52,10 @@ impl Engine {
         program: Program,
         facts: impl IntoIterator<Item = Fact>,
         limits: Limits,
-    ) -> Result<Self, Vec<Error>> {
+    ) -> Result<Self, Errors> {
         let facts: Vec<Fact> = facts.into_iter().collect();
         if let Some(error) = facts.iter().find_map(|fact| check_fact(fact, &symbols).err()) {
-            return Err(vec![error]);
+            return Err(vec![error].into());
         }
         let mut symbols = symbols;
         let same = program.equality.then(|| symbols.name(SAME_AS));
@@ -68,7 +69,7 @@ impl Engine {
     }
 
     /// Derives everything from stated facts, in an engine that holds nothing.
-    fn build(&mut self, facts: Vec<Fact>) -> Result<(), Vec<Error>> {
+    fn build(&mut self, facts: Vec<Fact>) -> Result<(), Errors> {
         let mut evaluated = Arc::clone(&self.program);
         if self.equality.is_some() {
             self.begin(facts);
@@ -82,8 +83,8 @@ impl Engine {
         let network = compile(&evaluated, Arc::make_mut(&mut self.symbols), &mut self.store)?;
         self.records = Records::new(&network);
         self.network = Arc::new(network);
-        Maintenance::new(self).derive_all().map_err(|error| vec![error])?;
-        self.settle().map_err(|error| vec![error])
+        Maintenance::new(self).derive_all()?;
+        self.settle().map_err(Errors::from)
     }
 
     /// Changes which facts are stated and returns the net change of all facts that hold, stated or derived, sorted.

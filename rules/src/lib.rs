@@ -3,6 +3,7 @@
 
 mod aggregate;
 mod apply;
+mod builder;
 mod builtin;
 mod codes;
 mod cost;
@@ -35,11 +36,12 @@ mod symbol;
 mod vocabulary;
 mod why_not;
 
+pub use builder::EngineBuilder;
 pub use builtin::{BuiltIn, CustomBuiltIn, Definition, SWRLB};
 pub use codes::CODES;
 pub use derivation::{Aggregated, Cause, Derivation, DerivationStep, Reason, Violation};
 pub use engine::{Delta, Engine};
-pub use error::Error;
+pub use error::{Error, Errors};
 pub use fact::{Arguments, Fact};
 pub use limits::{DEFAULT_STEP_BUDGET, Interrupt, Limits};
 pub use literal::{Decimal, Duration, Literal, Moment, MomentKind, is_subsumed};

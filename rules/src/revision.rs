@@ -5,6 +5,7 @@
 //! everything that holds. Only where the strata of the rules that stay fall apart, or under equality, is everything derived
 //! anew.
 
+use crate::error::Errors;
 use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
@@ -24,7 +25,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
-    pub fn set_program(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
+    pub fn set_program(&mut self, program: Program) -> Result<Delta, Errors> {
         if self.equality.is_some() || program.equality {
             return self.rebuild(program);
         }
@@ -36,7 +37,7 @@ impl Engine {
         self.revise(revision).map_err(|error| {
             (self.network, self.program) = old;
             self.restore(&Delta::default());
-            vec![error]
+            error.into()
         })
     }
 
@@ -44,7 +45,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
-    pub fn add_rules(&mut self, rules: impl IntoIterator<Item = Rule>) -> Result<Delta, Vec<Error>> {
+    pub fn add_rules(&mut self, rules: impl IntoIterator<Item = Rule>) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.extend(rules);
         self.set_program(program)
@@ -54,7 +55,7 @@ impl Engine {
     ///
     /// # Errors
     /// R301 where what remains does not follow within the step budget; the engine is then as it was before.
-    pub fn remove_rule(&mut self, identity: &RuleIdentity) -> Result<Delta, Vec<Error>> {
+    pub fn remove_rule(&mut self, identity: &RuleIdentity) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.retain(|rule| rule.identity != *identity);
         let change = self.set_program(program)?;
@@ -67,7 +68,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
-    pub fn set_enabled(&mut self, identity: &RuleIdentity, enabled: bool) -> Result<Delta, Vec<Error>> {
+    pub fn set_enabled(&mut self, identity: &RuleIdentity, enabled: bool) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         let is_meant = |rule: &mut Rule| rule.identity == *identity;
         let mut disabled = self.disabled.clone();
@@ -125,7 +126,7 @@ impl Engine {
         Ok(change)
     }
 
-    fn rebuild(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
+    fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
         let stated = self.stated();
         let mut engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
         engine.disabled.clone_from(&self.disabled);
@@ -137,6 +138,6 @@ impl Engine {
 }
 
 /// Rules that were compiled before give at most the error that they no longer fit together.
-fn first(errors: Vec<Error>) -> Error {
+fn first(errors: Errors) -> Error {
     errors.into_iter().next().unwrap_or(Error::UnknownSymbol { index: 0 })
 }

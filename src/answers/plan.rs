@@ -3,14 +3,14 @@
 use std::time::Duration;
 
 use encodings::{
-    Alternatives, Exact, Front, Moment, Part, Plan, Point, Proof, Solution, Statistics, Status, Step,
+    Alternatives, Exact, Front, Moment, Part, Plan, Point, Proof, Solution, Statistics, Step,
     Unbounded,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::mission::{Blocking, times};
+use crate::mission::Blocking;
 use crate::number::exact_to_json;
 
 /// A plan with its proof and its figures.
@@ -162,7 +162,7 @@ impl PlanAnswer {
         Self {
             format: "metaplan-plan/1",
             mission: mission.to_owned(),
-            status: word(solution.status),
+            status: solution.status.as_str(),
             cost: solution.plan.as_ref().map(|plan| exact_to_json(&plan.cost)),
             lower_bound: solution.lower_bound.as_ref().map(exact_to_json),
             horizon: solution.horizon,
@@ -223,7 +223,7 @@ impl ParetoAnswer {
         Self {
             format: "metaplan-pareto/1",
             mission: mission.to_owned(),
-            status: word(front.status),
+            status: front.status.as_str(),
             objectives: objectives.to_vec(),
             points: solved.map(point).collect(),
         }
@@ -256,17 +256,6 @@ impl MomentPart {
     }
 }
 
-/// The status in a word.
-fn word(status: Status) -> &'static str {
-    match status {
-        Status::Optimal => "optimal",
-        Status::Feasible => "feasible",
-        Status::Unsolvable => "unsolvable",
-        Status::UnsolvableWithinHorizon => "unsolvable_within_horizon",
-        Status::Unknown => "unknown",
-    }
-}
-
 fn steps(plan: &Plan) -> Vec<StepPart> {
     plan.steps.iter().map(StepPart::of).collect()
 }
@@ -274,7 +263,7 @@ fn steps(plan: &Plan) -> Vec<StepPart> {
 impl StepPart {
     fn of(step: &Step) -> Self {
         let configuration = step.configuration.iter();
-        let (start, duration) = times(step);
+        let (start, duration) = step.times();
         Self {
             action: step.action.clone(),
             arguments: step.arguments.clone(),

@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 
 use clap::{Args, ColorChoice, ValueEnum};
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use probabilistic::{Diagnostic, Error};
 
 /// Exit statuses; `docs/reference/statuses.md` lists them.
@@ -24,24 +24,30 @@ pub(super) enum Exit {
 /// Why a command has no answer.
 pub(super) struct Failure {
     pub(super) exit: Exit,
-    pub(super) messages: Vec<Message>,
+    pub(super) messages: Errors,
 }
 
 impl Failure {
     pub(super) fn usage(message: Message) -> Self {
-        Self { exit: Exit::Usage, messages: vec![message] }
+        Self { exit: Exit::Usage, messages: message.into() }
+    }
+}
+
+impl From<Errors> for Failure {
+    fn from(messages: Errors) -> Self {
+        Self { exit: Exit::BadInput, messages }
     }
 }
 
 impl From<Vec<Message>> for Failure {
     fn from(messages: Vec<Message>) -> Self {
-        Self { exit: Exit::BadInput, messages }
+        Errors::from(messages).into()
     }
 }
 
 impl From<Message> for Failure {
     fn from(message: Message) -> Self {
-        vec![message].into()
+        Errors::from(message).into()
     }
 }
 
@@ -96,7 +102,7 @@ pub(super) fn process_failure(error: Error, model: (&str, &str), property: &str)
         Error::Constant(text) => Failure::usage(Message::error("Q504", text)),
         Error::StateLimit { .. } | Error::Interrupted { .. } => Failure {
             exit: Exit::NothingFound,
-            messages: vec![Message::at("Q505", model.0, None, error.to_string())],
+            messages: vec![Message::at("Q505", model.0, None, error.to_string())].into(),
         },
         other => Message::at("Q506", model.0, None, other.to_string()).into(),
     }

@@ -20,5 +20,5 @@ pub(super) fn confirm(
 /// A fault of ours.
 pub(super) fn fault(reason: &str) -> Failure {
     let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
-    Failure { exit: Exit::Fault, messages: vec![Message::error("M170", text)] }
+    Failure { exit: Exit::Fault, messages: vec![Message::error("M170", text)].into() }
 }

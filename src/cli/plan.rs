@@ -10,9 +10,7 @@ use encodings::{
 use metaplan::answers::{PlanAnswer, Preparation};
 use metaplan::certificate::{self, Ground};
 use metaplan::message::Message;
-use metaplan::mission::{
-    Blocking, Mission, Planning as _, Reading, blocking, blocking_text, btcpp_text, spaced, verdict,
-};
+use metaplan::mission::{Blocking, Mission, Planning as _, Reading, blocking, btcpp_text, spaced};
 use metaplan::report::{Positions, Seen, front_sheet};
 use metaplan::visible::visible;
 use pddl::ast::Problem;
@@ -159,11 +157,14 @@ impl From<Encoding> for Semantics {
 
 /// What the user asks of the optimizer.
 fn configuration(arguments: &Arguments, limits: Limits) -> Config {
-    let backend = arguments.solver.clone();
-    let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
-    let strategy = arguments.strategy.into();
-    let (engine, confirm) = (arguments.engine.into(), arguments.confirm);
-    Config { horizon, engine, confirm, semantics, strategy, backend, limits, ..Config::default() }
+    Config::default()
+        .with_horizon(arguments.horizon)
+        .with_engine(arguments.engine.into())
+        .with_confirmation(arguments.confirm)
+        .with_semantics(arguments.encoding.map(Semantics::from))
+        .with_strategy(arguments.strategy.into())
+        .with_backend(arguments.solver.clone())
+        .with_limits(limits)
 }
 
 impl Arguments {
@@ -320,11 +321,11 @@ fn finish(
     match (show(&point, beside, mission, objectives, preparation, (arguments, common)), &arguments.output) {
         (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
-            output::note(&verdict(&point.solution));
+            output::note(&format!("{}\n", point.solution.verdict()));
         }
         (Some(text), None) => output::answer(&(drawn + &text)),
         // There is nothing to write, and readers of plans would stumble over anything else.
-        (None, _) => output::note(&verdict(&point.solution)),
+        (None, _) => output::note(&format!("{}\n", point.solution.verdict())),
     }
     Ok(exit(status))
 }
@@ -359,7 +360,7 @@ fn show(
         (None, _) => {
             let plan = answer_text(name, solution, common.verbose, preparation);
             let others = beside.others.as_ref().map(|others| alternatives::text(others, solution));
-            let blocking = beside.blocking.as_ref().map(blocking_text);
+            let blocking = beside.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
             let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
             let makespan = concurrent::makespan_text(overlaps);
             Some(plan + &objectives.values_text(point) + &makespan + &others.or(blocking).unwrap_or_default())

@@ -31,7 +31,8 @@ pub(super) fn answer_text(
         }
         text += ": ";
     }
-    text += &verdict(solution);
+    text += &solution.verdict();
+    text.push('\n');
     if verbose {
         text += &statistics_text(solution, preparation);
     }

@@ -1,6 +1,7 @@
 //! `metaplan plan` where numbers are too large for the integers of formulas: by search alone, in exact rationals.
 
 use encodings::{Config, ExactTask, Point, optimize_exact};
+use metaplan::message::Errors;
 use metaplan::message::Message;
 use metaplan::mission::{Mission, Planning as _, Reading};
 use pddl::ast::Problem;
@@ -22,8 +23,8 @@ pub(super) fn solve(
     problem: &Problem,
     objectives: &Objectives,
     config: &Config,
-    refused: Vec<Message>,
-) -> Result<(ExactTask, Point, Reading), Vec<Message>> {
+    refused: Errors,
+) -> Result<(ExactTask, Point, Reading), Errors> {
     if objectives.metrics.len() > 1 {
         return Err(refused);
     }

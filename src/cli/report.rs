@@ -83,7 +83,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         .certificate
         .as_deref()
         .map(|directory| checked(&verify(directory, Some(&setup.mission), &|| limits.reached())));
-    let (status, said) = (answer.solution.status, verdict(&answer.solution));
+    let (status, said) = (answer.solution.status, answer.solution.verdict());
     let report = page(arguments, &setup, before, answer, checked);
     if let Some(directory) = &arguments.svg {
         write_pictures(directory, &report.pictures())?;
@@ -131,7 +131,7 @@ impl Answer {
         limits: &Limits,
     ) -> Result<Self, Failure> {
         let (problem, _) = mission.filled()?;
-        let config = Config { limits: limits.clone(), ..Config::default() };
+        let config = Config::default().with_limits(limits.clone());
         let objectives = Objectives::read(mission, &problem, &[], None)?;
         let failed = |messages| {
             let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };

@@ -1,5 +1,6 @@
 //! Where what the loop hears and answers goes: its answers to standard output, and both to a recording and to a page, if there are.
 
+use metaplan::message::Errors;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -46,7 +47,7 @@ enum Recorded {
 
 impl Outlets {
     /// Who draws the plans of a mission, if anybody can look at them.
-    pub(super) fn painter(&self, setup: &Setup) -> Result<Option<Painter>, Vec<Message>> {
+    pub(super) fn painter(&self, setup: &Setup) -> Result<Option<Painter>, Errors> {
         let positions = self.serve.as_ref().map(|_| setup.positions()).transpose()?;
         Ok(positions.map(|positions| Painter::new(&setup.mission, positions)))
     }

@@ -195,7 +195,7 @@ pub(super) fn knowledge(
     let mut wrong: Vec<Message> =
         fail.iter().filter_map(|component| knowledge.fail(component).err()).collect();
     wrong.extend(set.iter().filter_map(|(attribute, value)| knowledge.measure(attribute, value).err()));
-    if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong }) }
+    if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong.into() }) }
 }
 
 /// Nothing is planned on knowledge that contradicts itself.

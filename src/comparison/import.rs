@@ -3,6 +3,7 @@
 //! The map's licence does not let it be passed on, so users bring their own copy. What the file does not say (the
 //! robot's configurations, their power, which corridors are dark) comes from options and from the table below.
 
+use crate::message::Errors;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
@@ -198,7 +199,7 @@ fn rounded(value: f64, digits: usize) -> f64 {
 ///
 /// # Errors
 /// The file is no such map, or has no such places.
-pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Vec<Message>> {
+pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Errors> {
     let map = Map::read(file, text)?;
     let known = map.places();
     let asked =
@@ -220,7 +221,7 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
         problems.push(Message::error("M124", text));
     }
     if !problems.is_empty() {
-        return Err(problems);
+        return Err(problems.into());
     }
     Ok(Files {
         manifest: manifest(&options.name),

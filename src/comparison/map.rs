@@ -3,6 +3,7 @@
 //! A place has `node-id`, `connected-to` and `coords`; in maps of 2017, for Rainbow's first robots, `coord`. Those have no
 //! measurements, and rectangles that the robot should not enter (`unsafe-rects`), which no corridor needs.
 
+use crate::message::Errors;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Deserializer, de};
@@ -86,7 +87,7 @@ impl<'t> Map<'t> {
     ///
     /// # Errors
     /// It is no JSON of that form, or places are there twice, or lead where there is no place.
-    pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Vec<Message>> {
+    pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Errors> {
         let map: Self = serde_json::from_str(text).map_err(|error| {
             let older = if error.to_string().contains("missing field `coords`") {
                 " (or `coord`, in maps of 2017)"
@@ -102,7 +103,7 @@ impl<'t> Map<'t> {
             ]
         })?;
         let problems = map.problems(file, text);
-        if problems.is_empty() { Ok(map) } else { Err(problems) }
+        if problems.is_empty() { Ok(map) } else { Err(problems.into()) }
     }
 
     /// The names of all places.

@@ -1,5 +1,6 @@
 //! A knowledge base with objectives, and the designs that serve them.
 
+use crate::message::Errors;
 use std::collections::BTreeSet;
 
 use encodings::Limits;
@@ -49,7 +50,7 @@ impl Configurator {
     ///
     /// # Errors
     /// All attribute types and components of the wishes that are not in the knowledge base.
-    pub fn new(mut knowledge: Knowledge, wishes: Wishes) -> Result<Self, Vec<Message>> {
+    pub fn new(mut knowledge: Knowledge, wishes: Wishes) -> Result<Self, Errors> {
         knowledge.limit(STEPS);
         let view = knowledge.view();
         let attributes: Vec<String> = view.attribute_types().into_iter().map(|kind| kind.name).collect();
@@ -68,7 +69,11 @@ impl Configurator {
         }
         wishes.budgets.iter().for_each(|(name, _)| check("quality attribute type", name, &attributes));
         wishes.exclusive.iter().for_each(|name| check("component", name, &components));
-        if wrong.is_empty() { Ok(Self { knowledge, wishes, pending: BTreeSet::new() }) } else { Err(wrong) }
+        if wrong.is_empty() {
+            Ok(Self { knowledge, wishes, pending: BTreeSet::new() })
+        } else {
+            Err(wrong.into())
+        }
     }
 
     /// What is known.

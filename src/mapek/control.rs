@@ -1,5 +1,6 @@
 //! The loop itself: an observation goes through the stations, one after the other, and answers come out.
 
+use crate::message::Errors;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -46,13 +47,13 @@ impl Loop {
     /// # Errors
     /// The mission cannot be planned for: what the knowledge base contributes does not fit the domain, or the knowledge
     /// contradicts itself.
-    pub fn new(mission: Mission, settings: Settings) -> Result<Self, Vec<Message>> {
+    pub fn new(mission: Mission, settings: Settings) -> Result<Self, Errors> {
         mission.filled()?;
         let contradictions = mission.knowledge().map(Knowledge::contradictions).unwrap_or_default();
         if let Some(first) = contradictions.first() {
             let text =
                 format!("the knowledge is inconsistent: {}: {}", first.violated, first.facts.join(", "));
-            return Err(vec![Message::error("M110", text)]);
+            return Err(vec![Message::error("M110", text)].into());
         }
         let monitor = Monitor::new(&mission);
         let digest = digest(&mission, &settings);

@@ -1,5 +1,6 @@
 //! What a manifest says of a mission: its sections `knowledge`, `planning`, `bindings` and `scenarios`.
 
+use crate::message::Errors;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -78,7 +79,7 @@ impl BindingsSection {
     ///
     /// # Errors
     /// All queries that are malformed.
-    pub fn bindings(&self, origin: &ManifestPath) -> Result<Bindings, Vec<Message>> {
+    pub fn bindings(&self, origin: &ManifestPath) -> Result<Bindings, Errors> {
         let mut names = Names::default();
         for (individual, object) in &self.names {
             let place = (origin.file().to_owned(), Some(origin.place(individual.span().start)));
@@ -92,7 +93,7 @@ impl BindingsSection {
         let symbols = self.symbols.iter().map(|(symbol, query)| (symbol.clone(), query.get_ref().clone()));
         match Bindings::with(&symbols.collect()) {
             Ok(bindings) if wrong.is_empty() => Ok(bindings.naming(names)),
-            _ => Err(wrong),
+            _ => Err(wrong.into()),
         }
     }
 }

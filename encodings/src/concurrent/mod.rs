@@ -29,6 +29,7 @@ mod timer;
 mod turns;
 mod unit;
 
+use crate::error::Errors;
 use std::time::Instant;
 
 use num_rational::BigRational;
@@ -63,10 +64,10 @@ pub fn ground_concurrent(
     problem: &Problem,
     config: &GroundConfig,
     separation: &BigRational,
-) -> Result<Concurrent, Vec<Error>> {
+) -> Result<Concurrent, Errors> {
     let overflow = || vec![Error::overflow("the separation")];
     if !separation.is_positive() {
-        return Err(overflow());
+        return Err(overflow().into());
     }
     let separation = Rational::from_big(separation.clone());
     if let Some(place) = first_constraint(domain, problem) {
@@ -74,7 +75,8 @@ pub fn ground_concurrent(
             construct: "a preference, or a constraint on trajectories, where actions overlap".into(),
             instead: "plan without `--concurrent`: states are in one order only where actions are".into(),
             place,
-        }]);
+        }]
+        .into());
     }
     let lifted = || normalize(domain, problem, &config.objectives);
     match ground_normal(domain, lifted()?, config, &separation) {
@@ -93,7 +95,7 @@ fn ground_normal(
     mut lifted: Lifted,
     config: &GroundConfig,
     separation: &Rational,
-) -> Result<Concurrent, Vec<Error>> {
+) -> Result<Concurrent, Errors> {
     let place = Place { file: File::Problem, span: Span::default() };
     let number = |number| Expression::Number(Rational::from_integer(number));
     let (weight, metric) = match lifted.metrics.first() {

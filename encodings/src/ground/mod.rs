@@ -31,6 +31,7 @@ pub(crate) mod vocabulary;
 
 use crate::compile::compile;
 use crate::error::Error;
+use crate::error::Errors;
 use crate::lifted::Lifted;
 use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::limits::Limits;
@@ -48,7 +49,7 @@ use vocabulary::world::World;
 ///
 /// # Errors
 /// Every construct that the planner does not handle, with its place.
-pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Vec<Error>> {
+pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Errors> {
     let measures_ends = config.objectives.len() <= 1;
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
 }
@@ -59,7 +60,7 @@ pub(crate) fn ground_for<N: TaskNumber>(
     problem: &Problem,
     config: &Config,
     generality: &Generality,
-) -> Result<Task<N>, Vec<Error>> {
+) -> Result<Task<N>, Errors> {
     let plain = compile(domain, problem, &config.objectives)?;
     let lifted = || normalize(&plain.domain, &plain.problem, &plain.objectives);
     let found = ground_normal(lifted()?, config, generality);
@@ -78,7 +79,7 @@ fn ground_normal<N: TaskNumber>(
     mut lifted: Lifted,
     config: &Config,
     generality: &Generality,
-) -> Result<Task<N>, Vec<Error>> {
+) -> Result<Task<N>, Errors> {
     zero::split(&mut lifted)?;
     events::begin(&mut lifted);
     let designs: Vec<_> =
@@ -102,17 +103,16 @@ pub(crate) fn ground_lifted<N: TaskNumber>(
     slots: &[Vec<SlotParameter>],
     generality: &Generality,
     limits: &Limits,
-) -> Result<(Task<N>, Reached), Vec<Error>> {
-    let reached = reach::reach(lifted, slots, limits).map_err(|error| vec![error])?;
+) -> Result<(Task<N>, Reached), Errors> {
+    let reached = reach::reach(lifted, slots, limits)?;
     let world = World::new(lifted, &reached, limits);
     let mut ground = instantiate::instantiate(world, designs, slots)?;
-    derived::simplify(&mut ground).map_err(|interrupted| vec![interrupted.into()])?;
+    derived::simplify(&mut ground)?;
     metric::attach_costs(&mut ground, generality)?;
     if limits.reached() {
-        return Err(vec![Error::Interrupted]);
+        return Err(vec![Error::Interrupted].into());
     }
-    let unreachable =
-        prune::prune(&mut ground, generality).map_err(|interrupted| vec![interrupted.into()])?;
-    let task = finish::finish(ground, unreachable, generality).map_err(|error| vec![error])?;
+    let unreachable = prune::prune(&mut ground, generality)?;
+    let task = finish::finish(ground, unreachable, generality)?;
     Ok((task, reached))
 }

@@ -4,6 +4,7 @@
 //! an interval without a point in it (`validate`, clauses 1 and 4 of the definition). So such a schema becomes a second one for
 //! duration 0; the first keeps the durations above 0.
 
+use crate::error::Errors;
 use num_traits::Zero;
 use rustc_hash::FxHashMap;
 
@@ -18,7 +19,7 @@ type Range = Option<(Rational, Rational)>;
 ///
 /// # Errors
 /// A duration that is chosen as short as it may be, and may be 0 or less: what holds with 0 does not tell what holds with a little more.
-pub(crate) fn split(lifted: &mut Lifted) -> Result<(), Vec<Error>> {
+pub(crate) fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {
         let range = ranges.entry(*function).or_insert_with(|| (value.clone(), value.clone()));
@@ -60,7 +61,7 @@ pub(crate) fn split(lifted: &mut Lifted) -> Result<(), Vec<Error>> {
         }
     }
     lifted.schemas.extend(instants);
-    if errors.is_empty() { Ok(()) } else { Err(errors) }
+    if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
 /// The schema with duration 0.

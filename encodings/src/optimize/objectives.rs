@@ -19,6 +19,7 @@ use crate::task::{NumericEffect, Operator, Task};
 
 /// A point of the Pareto front, or what is known in place of one.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Point {
     /// The plan; its cost is that of the first objective.
     pub solution: Solution,
@@ -28,6 +29,7 @@ pub struct Point {
 
 /// The Pareto front of two objectives.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Front {
     /// Best by the first objective to best by the second.
     pub points: Vec<Point>,

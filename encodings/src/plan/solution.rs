@@ -4,9 +4,11 @@ use std::time::Duration;
 
 use crate::plan::ground::GroundPlan;
 use crate::plan::names::{Exact, Plan};
+use crate::words::words;
 
 /// How good the answer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Status {
     /// No plan of any length has a better metric: proved.
     Optimal,
@@ -20,8 +22,18 @@ pub enum Status {
     Unknown,
 }
 
+words! {
+    Status, "status":
+    Optimal = "optimal",
+    Feasible = "feasible",
+    Unsolvable = "unsolvable",
+    UnsolvableWithinHorizon = "unsolvable_within_horizon",
+    Unknown = "unknown",
+}
+
 /// Why the status is what it is.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Proof {
     /// The formula for cheaper plans is unsatisfiable up to the step bound, and no longer plan is cheaper.
     Sat {
@@ -38,6 +50,7 @@ pub enum Proof {
 
 /// A better plan was found, or a better lower bound.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Improvement {
     /// The metric of the best plan so far.
     pub cost: Exact,
@@ -58,6 +71,7 @@ impl Improvement {
 
 /// A metric that has no best value, or none that is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Unbounded {
     /// An action that improves the metric can be repeated for ever in a state that the plan passes.
     Proved,
@@ -67,6 +81,7 @@ pub enum Unbounded {
 
 /// A part of the planner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Part {
     /// A\* with lower bounds.
     Search,
@@ -76,8 +91,11 @@ pub enum Part {
     Sat,
 }
 
+words! { Part, "part of the planner": Search = "search", Satisficing = "satisficing", Sat = "sat" }
+
 /// What was known at some time of a run.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Moment {
     /// Since the optimizer has begun.
     pub time: Duration,
@@ -89,6 +107,7 @@ pub struct Moment {
 
 /// Figures of a run.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Statistics {
     /// Operators of the ground task.
     pub operators: usize,
@@ -128,8 +147,9 @@ pub struct Statistics {
     pub solve: Duration,
 }
 
-/// The answer.
+/// The answer. Shown by `Display` it is its verdict, and the plan if there is one.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Solution {
     /// How good the plan is.
     pub status: Status,

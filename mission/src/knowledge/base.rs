@@ -1,5 +1,6 @@
 //! A knowledge base at run time: OWL documents and rule files in an engine, kept in step with the robot.
 
+use crate::message::Errors;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -62,7 +63,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// All that is wrong with them.
-    pub fn read(sources: &Sources) -> Result<Self, Vec<Message>> {
+    pub fn read(sources: &Sources) -> Result<Self, Errors> {
         Self::read_as(sources, Equality::Owl)
     }
 
@@ -70,7 +71,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// All that is wrong with the sources.
-    pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+    pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Errors> {
         Self::of_stated(sources, Stated::read(sources, equality)?)
     }
 
@@ -79,11 +80,11 @@ impl Knowledge {
     ///
     /// # Errors
     /// All that is wrong with the sources.
-    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Vec<Message>> {
+    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
         Self::of_stated(sources, Stated::read_for(sources, domain)?)
     }
 
-    fn of_stated(sources: &Sources, stated: Stated) -> Result<Self, Vec<Message>> {
+    fn of_stated(sources: &Sources, stated: Stated) -> Result<Self, Errors> {
         let Stated { symbols, program, facts, ontology, rule_count, mut warnings, terms } = stated;
         let engine = Engine::with_limits(symbols, program, facts, sources.limits.clone())
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
@@ -107,7 +108,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// The facts refer to other symbols.
-    pub fn closed(symbols: Symbols, facts: Vec<Fact>, equality: bool) -> Result<Self, Vec<Message>> {
+    pub fn closed(symbols: Symbols, facts: Vec<Fact>, equality: bool) -> Result<Self, Errors> {
         let program = Program { rules: Vec::new(), equality };
         let engine = Engine::new(symbols, program, facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
@@ -408,7 +409,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// All that is wrong with the document.
-    pub fn assertions(&mut self, file: &Path) -> Result<Vec<Fact>, Vec<Message>> {
+    pub fn assertions(&mut self, file: &Path) -> Result<Vec<Fact>, Errors> {
         let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
         let ontology = ontology::read_files(&[file], &options)
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;

@@ -1,5 +1,6 @@
 //! What a knowledge base is read from: documents and rule files.
 
+use crate::message::Errors;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -52,7 +53,7 @@ impl Stated {
     ///
     /// # Errors
     /// All that is wrong with them.
-    pub fn read(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+    pub fn read(sources: &Sources, equality: Equality) -> Result<Self, Errors> {
         Self::read_with(sources, |_| (equality, None))
     }
 
@@ -60,7 +61,7 @@ impl Stated {
     ///
     /// # Errors
     /// As [`Stated::read`].
-    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Vec<Message>> {
+    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
         Self::read_with(sources, |ontology| match planta::wanted(ontology, domain) {
             Some(terms) => (Equality::UniqueNames, Some(Arc::new(terms))),
             None => (Equality::Owl, None),
@@ -70,7 +71,7 @@ impl Stated {
     fn read_with(
         sources: &Sources,
         meaning: impl FnOnce(&Ontology) -> (Equality, Option<Arc<Terms>>),
-    ) -> Result<Self, Vec<Message>> {
+    ) -> Result<Self, Errors> {
         let read = ontology::read_files(&sources.documents, &sources.options);
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
@@ -81,11 +82,11 @@ impl Stated {
         }
         let ontology = match read {
             Ok(ontology) if errors.is_empty() => ontology,
-            Ok(_) => return Err(errors),
+            Ok(_) => return Err(errors.into()),
             Err(more) => {
                 let more = more.iter().map(Message::from_ontology).collect();
                 errors.extend(quoted(discreet(more)));
-                return Err(errors);
+                return Err(errors.into());
             }
         };
         let rule_count = ontology.rules.len() + own.len();
@@ -123,7 +124,7 @@ pub fn rule_text(file: &str) -> Result<String, Message> {
 }
 
 /// The rules of all files. What one file asks for, another may conclude.
-fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Vec<Message>> {
+fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Errors> {
     let (mut texts, mut errors) = (Vec::new(), Vec::new());
     for file in files {
         match rule_text(file) {
@@ -134,7 +135,7 @@ fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>
     let texts: Vec<(&str, &str)> = texts.iter().map(|(file, text)| (file.as_str(), text.as_str())).collect();
     match rules::parse_rules_together(&texts, symbols, &Prefixes::default(), &Syntax::default()) {
         Ok(program) if errors.is_empty() => Ok(program.rules),
-        Ok(_) => Err(errors),
+        Ok(_) => Err(errors.into()),
         Err(more) => {
             let quoted = |error: &rules::Error| {
                 let message = Message::from_rules(error);

@@ -1,5 +1,6 @@
 //! `[bindings.names]` against a knowledge base and a problem: which individual is called what, and what is wrong with the entries.
 
+use crate::message::Errors;
 use std::collections::{BTreeMap, BTreeSet};
 
 use ontology::tomasys::{CalledNames, Individual};
@@ -26,7 +27,7 @@ pub(crate) fn resolve(
     problem: &Problem,
     knowledge: &Knowledge,
     bindings: &Bindings,
-) -> Result<Resolved, Vec<Message>> {
+) -> Result<Resolved, Errors> {
     let entries = bindings.names().entries();
     if entries.is_empty() {
         return Ok(Resolved::default());
@@ -59,7 +60,7 @@ pub(crate) fn resolve(
     if errors.is_empty() {
         Ok((called.into_iter().map(|(iri, (name, _))| (iri.to_owned(), name)).collect(), warnings))
     } else {
-        Err(errors)
+        Err(errors.into())
     }
 }
 

@@ -11,6 +11,7 @@
 mod spoken;
 mod walk;
 
+use crate::message::Errors;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -71,7 +72,7 @@ impl CoAdaptation {
         problem: &Problem,
         view: &View<'_>,
         bindings: &Bindings,
-    ) -> Result<Option<Self>, Vec<Message>> {
+    ) -> Result<Option<Self>, Errors> {
         if domain.types.iter().any(|declared| bindings.is_design(&declared.identifier.name)) {
             return Ok(None);
         }
@@ -99,7 +100,7 @@ impl CoAdaptation {
         let (chosen, changed) = attributes(domain, problem, view, &designs, bindings);
         let adaptation = Self { actions, chosen, changed };
         let errors = adaptation.errors(domain);
-        if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors) }
+        if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors.into()) }
     }
 
     fn errors(&self, domain: &Domain) -> Vec<Message> {

@@ -1,5 +1,6 @@
 //! The bytes of files and of standard input.
 
+use crate::error::Errors;
 use std::io::Read;
 use std::path::Path;
 
@@ -23,10 +24,10 @@ pub(super) fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
 }
 
 /// The bytes of standard input.
-pub(super) fn standard_input() -> Result<Vec<u8>, Vec<Error>> {
+pub(super) fn standard_input() -> Result<Vec<u8>, Errors> {
     let mut text = Vec::new();
     match std::io::stdin().read_to_end(&mut text) {
         Ok(_) => Ok(text),
-        Err(error) => Err(vec![Error::Unreadable { file: "-".into(), reason: error.to_string() }]),
+        Err(error) => Err(vec![Error::Unreadable { file: "-".into(), reason: error.to_string() }].into()),
     }
 }

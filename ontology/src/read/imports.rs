@@ -13,6 +13,7 @@
 //! 6. among the documents already read, by file name;
 //! 7. among the knowledge bases that this crate embeds ([`crate::kb`]), by IRI or by where they have been published.
 
+use crate::error::Errors;
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -60,7 +61,7 @@ struct Candidate {
 
 impl Resolver {
     /// Reads the catalogs named in `options`.
-    pub(crate) fn new(options: &ReadOptions) -> Result<Self, Vec<Error>> {
+    pub(crate) fn new(options: &ReadOptions) -> Result<Self, Errors> {
         let (mut catalogs, mut errors) = (Vec::new(), Vec::new());
         for file in &options.catalogs {
             match horned_catalog::Catalog::from_path(file) {
@@ -69,7 +70,7 @@ impl Resolver {
             }
         }
         if !errors.is_empty() {
-            return Err(errors);
+            return Err(errors.into());
         }
         Ok(Self { catalogs, below: OnceCell::new(), directories: options.directories.clone() })
     }

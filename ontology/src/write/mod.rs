@@ -6,6 +6,7 @@
 
 mod functional;
 
+use crate::error::Errors;
 use std::path::Path;
 
 use oxrdf::{NamedNode, Triple};
@@ -39,7 +40,7 @@ pub fn convert_files<P: AsRef<Path>>(
     files: &[P],
     options: &ReadOptions,
     syntax: OutputSyntax,
-) -> Result<(String, Vec<Warning>), Vec<Error>> {
+) -> Result<(String, Vec<Warning>), Errors> {
     let format = match syntax {
         OutputSyntax::RdfXml => RdfFormat::RdfXml,
         OutputSyntax::Turtle => RdfFormat::Turtle,
@@ -62,7 +63,7 @@ pub fn convert_files<P: AsRef<Path>>(
     }
     serialize(format, &triples)
         .map(|text| (text, warnings))
-        .map_err(|reason| vec![Error::Unwritable { syntax: format.name(), reason }])
+        .map_err(|reason| Error::Unwritable { syntax: format.name(), reason }.into())
 }
 
 /// Writes an N-Triples document (of this crate's making) as Turtle with the prefixes of the vocabularies in it.

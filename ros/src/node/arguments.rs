@@ -4,6 +4,7 @@
 //! `-r node:from:=to`, `-r __node:=name`, `-r __ns:=/namespace`, `-p name:=value` (the value is YAML), `--params-file FILE`,
 //! `--log-level LEVEL`, each as often as wanted; `--` ends the group.
 
+use metaplan::message::Errors;
 use std::path::{Path, PathBuf};
 
 use metaplan::message::Message;
@@ -42,7 +43,7 @@ impl RosArguments {
     ///
     /// # Errors
     /// All that is wrong with the latter, and with the files that it names.
-    pub fn split(words: impl IntoIterator<Item = String>) -> Result<(Vec<String>, Self), Vec<Message>> {
+    pub fn split(words: impl IntoIterator<Item = String>) -> Result<(Vec<String>, Self), Errors> {
         let (mut own, mut ros) = (Vec::new(), Vec::new());
         let mut is_ros = false;
         for word in words {
@@ -64,11 +65,11 @@ impl RosArguments {
         if messages.is_empty() { Ok((own, arguments)) } else { Err(messages) }
     }
 
-    fn take(&mut self, word: &str, words: &mut impl Iterator<Item = String>) -> Result<(), Vec<Message>> {
+    fn take(&mut self, word: &str, words: &mut impl Iterator<Item = String>) -> Result<(), Errors> {
         let mut next = || words.next().ok_or_else(|| vec![wrong(format!("`{word}` wants a value"))]);
         match word {
-            "-r" | "--remap" => self.rules.push(rule(&next()?).map_err(|message| vec![message])?),
-            "-p" | "--param" => self.parameters.push(parameter(&next()?).map_err(|message| vec![message])?),
+            "-r" | "--remap" => self.rules.push(rule(&next()?)?),
+            "-p" | "--param" => self.parameters.push(parameter(&next()?)?),
             "--params-file" => self.parameters.extend(parameters_file(&PathBuf::from(next()?))?),
             "--log-level" => self.log_level = Some(next()?.to_lowercase()),
             // What these set has no counterpart here: the enclave of security, files of log4 libraries, where logs go.
@@ -148,7 +149,7 @@ fn parameter(text: &str) -> Result<Assigned, Message> {
 }
 
 /// A file of parameters: names or patterns of nodes, and below `ros__parameters` their parameters.
-fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Vec<Message>> {
+fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Errors> {
     let file = path.display().to_string();
     let fault = |text: String| vec![Message::at("N102", &file, None, text)];
     let text =

@@ -9,6 +9,7 @@ mod offer;
 mod settings;
 mod topic;
 
+use metaplan::message::Errors;
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
@@ -37,7 +38,7 @@ pub fn performers(
     node: &Arc<Node>,
     actions: &BTreeMap<String, By>,
     poses: &Poses,
-) -> Result<BTreeMap<String, Box<dyn Perform>>, Vec<Message>> {
+) -> Result<BTreeMap<String, Box<dyn Perform>>, Errors> {
     let (mut performers, mut errors) = (BTreeMap::new(), Vec::new());
     let hub = OnceLock::new();
     for (action, by) in actions {

@@ -1,5 +1,6 @@
 //! A mission whose knowledge base joins in, as `/diagnostics` have it.
 
+use metaplan::message::Errors;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -23,8 +24,8 @@ impl Joint {
     ///
     /// # Errors
     /// The topic cannot be made.
-    pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Vec<Message>> {
-        let diagnosed = Diagnosed::hear(node, || {}).map_err(|message| vec![message])?;
+    pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Errors> {
+        let diagnosed = Diagnosed::hear(node, || {})?;
         Ok(Arc::new(Self { mission: Mutex::new(mission), diagnosed }))
     }
 

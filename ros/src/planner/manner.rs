@@ -1,5 +1,6 @@
 //! How plans are made, as the node's parameters say.
 
+use metaplan::message::Errors;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -60,7 +61,7 @@ impl Chosen {
     ///
     /// # Errors
     /// The command line gives a value of another type.
-    pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Vec<Message>> {
+    pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Errors> {
         let manner =
             Manner { metric: None, time_limit: Duration::ZERO, overlap: None, alternatives: ALTERNATIVES };
         let chosen = Arc::new(Self { manner: Mutex::new(manner) });

@@ -1,6 +1,7 @@
 //! What is found, told to people and programs: in the log, and as JSON on the topic `~/plan`, with the designs for which PlanSys2's plans
 //! have no place.
 
+use metaplan::message::Errors;
 use std::sync::Arc;
 
 use metaplan::message::Message;
@@ -21,8 +22,8 @@ impl Told {
     ///
     /// # Errors
     /// It cannot be made.
-    pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Vec<Message>> {
-        let plans = node.publisher("~/plan", latched(1)).map_err(|message| vec![message])?;
+    pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Errors> {
+        let plans = node.publisher("~/plan", latched(1))?;
         Ok(Self { node: Arc::clone(node), plans })
     }
 

@@ -1,5 +1,6 @@
 //! The reasoner on the network: the action that it serves, the diagnostics that it hears, and the services that it calls.
 
+use metaplan::message::Errors;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -63,7 +64,7 @@ impl Network {
         node: &Arc<Node>,
         keeping: Keeping,
         memory: Option<MemoryFile>,
-    ) -> Result<Self, Vec<Message>> {
+    ) -> Result<Self, Errors> {
         let one = |message: Message| vec![message];
         let period = node.declare_seconds(
             "reasoning_period",

@@ -1,5 +1,6 @@
 //! Tokens to rules, by recursive descent; after an error it goes on with the next rule, so that all are reported.
 
+use crate::error::Errors;
 use std::sync::Arc;
 
 use super::foreign::{ForeignAtom, unknown};
@@ -34,7 +35,7 @@ pub fn parse_rules(
     source: &str,
     symbols: &mut Symbols,
     prefixes: &Prefixes,
-) -> Result<Program, Vec<Error>> {
+) -> Result<Program, Errors> {
     parse_rules_as(text, source, symbols, prefixes, &Syntax::default())
 }
 
@@ -48,7 +49,7 @@ pub fn parse_rules_as(
     symbols: &mut Symbols,
     prefixes: &Prefixes,
     syntax: &Syntax,
-) -> Result<Program, Vec<Error>> {
+) -> Result<Program, Errors> {
     parse(text, source, symbols, prefixes, syntax).map(|(program, _)| program)
 }
 
@@ -63,7 +64,7 @@ pub fn parse_rules_together(
     symbols: &mut Symbols,
     prefixes: &Prefixes,
     syntax: &Syntax,
-) -> Result<Program, Vec<Error>> {
+) -> Result<Program, Errors> {
     let (mut program, mut foreign, mut errors) = (Program::default(), Vec::new(), Vec::new());
     for (source, text) in texts {
         match parse(text, source, symbols, prefixes, syntax) {
@@ -77,7 +78,7 @@ pub fn parse_rules_together(
     if errors.is_empty() {
         errors = unknown(foreign, &program, symbols);
     }
-    if errors.is_empty() { Ok(program) } else { Err(errors) }
+    if errors.is_empty() { Ok(program) } else { Err(errors.into()) }
 }
 
 fn parse(
@@ -86,14 +87,14 @@ fn parse(
     symbols: &mut Symbols,
     prefixes: &Prefixes,
     syntax: &Syntax,
-) -> Result<(Program, Vec<ForeignAtom>), Vec<Error>> {
+) -> Result<(Program, Vec<ForeignAtom>), Errors> {
     let (tokens, faults) = tokens(text);
     let errors = faults.into_iter().map(|fault| fault_at(source, fault)).collect();
     let source: Arc<str> = source.into();
     let (variables, foreign, prefixes) = (Vec::new(), Vec::new(), prefixes.clone());
     let mut parser = Parser { tokens, at: 0, source, symbols, prefixes, syntax, variables, foreign, errors };
     let program = parser.program();
-    if parser.errors.is_empty() { Ok((program, parser.foreign)) } else { Err(parser.errors) }
+    if parser.errors.is_empty() { Ok((program, parser.foreign)) } else { Err(parser.errors.into()) }
 }
 
 fn fault_at(source: &str, fault: Fault) -> Error {
